@@ -93,11 +93,9 @@ class Model:
 
     @property
     def hinges(self) -> Floats:
-        """`Material.hinges`, without EI/GJ where zones stay: steps look for no stiffness that is under way there."""
+        """`Material.hinges`, without pieces where zones stay: steps look for no stiffness that is under way there."""
         found = self.cable.hinges
-        if self.layout is None:
-            found[2] = 0.0
-        return found
+        return found if self.layout is not None else np.vstack([found[:2], np.zeros((1, 3))])
 
     @property
     def nodes(self) -> Floats:

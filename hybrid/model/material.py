@@ -52,7 +52,6 @@ STIFFENER_CELLS = 20
 LOCKED = 100.0  # bending stiffness of a restrictor that is locked, over that of the cable
 # Of its height, from which on the added mass of a body without mass counts in full.
 LEAST_DRAUGHT = 0.05
-SAME_RATIO = 1e-9  # part by which the EI/GJ of sections may differ and be one number
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
 OF_SECTIONS = ("mass", "ck", "rotary", "polar")  # per length, whatever else a scene asks for
 POINT = tuple(name for name in OF_POINTS if name not in ("point_lift", "footing"))
@@ -146,29 +145,29 @@ class Material:
         """What the line has by which kinks of joints count as bends (kernels.watch.soft_rods); "": nothing."""
         if any(self.bends or ()):
             return "tables of moment"
-        if any(self.layers):
+        if self.layered:
             return "layers that slip"
         if self.kappa.any():
             return "intrinsic curvature"
-        ratio = self.B[:, :2] / np.maximum(self.B[:, 2:], np.finfo(float).tiny)
-        same = self.B.all() and np.ptp(ratio) <= SAME_RATIO * ratio.max()
-        return "" if same else "sections, or a bend stiffener, that differ in bending over torsional stiffness"
+        return "" if self.B.all() else "sections without bending or torsional stiffness"
 
     @property
     def hinges(self) -> Floats:
-        """(3, 2) of each end where the curvature of a rod fades to nothing: EI, N m2, and how far from the end on, m.
+        """(2 + K, 3) of each end where the curvature of a rod fades to nothing: EI, N m2, and how far from the end, m.
 
         EI 0 where an end bends the line, and where a catenary cannot know what a rod would do: bent without stress, or
-        differently in two directions.  Behind them EI/GJ of all sections; 0 where `kinks_count`.
+        differently in two directions.  Behind them of each stretch of one stiffness EI, where it ends, m, and GJ; zeros
+        where `kinks_count`.
         """
-        found, EI = np.zeros((3, 2)), self.mean_bending
-        if not self.kinks_count:
-            found[2, 0] = (self.B[:, :2] / self.B[:, 2:]).mean()
+        last = np.append(np.diff(self.B, axis=0).any(axis=1), True) if not self.kinks_count else np.zeros(0, bool)
+        found, EI = np.zeros((2 + max(int(last.sum()), 1), 3)), self.mean_bending
+        if last.size:
+            found[2:] = np.column_stack([self.mean_initial_bending, self.bounds[1:], self.B[:, 2]])[last]
         for k, (hinged, order) in enumerate(zip(self.hinged, (1, -1), strict=True)):
             if hinged and not self.kappa[-k, :2].any() and self.B[-k, 0] == self.B[-k, 1]:
                 same = np.flatnonzero(EI[::order] != EI[-k])
                 lengths = np.diff(self.bounds)[::order]
-                found[k] = EI[-k], lengths[: same[0] if same.size else lengths.size].sum()
+                found[k, :2] = EI[-k], lengths[: same[0] if same.size else lengths.size].sum()
         return found
 
     @property

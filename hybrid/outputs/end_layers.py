@@ -48,7 +48,7 @@ def end_layers(view: Observation) -> list[EndLayer]:
     ends &= catenary & (spans[:, 1] - spans[:, 0] > 1)  # a catenary of one cell knows no curvature
     return [
         _layer(view, *_way_in(spans, catenary, int(first), way), way, EI, reach)
-        for mine, way, (EI, reach) in zip(ends, (1, -1), view.grid.hinges[:2].tolist(), strict=True)
+        for mine, way, (EI, reach) in zip(ends, (1, -1), view.grid.hinges[:2, :2].tolist(), strict=True)
         if EI > 0.0
         for first in np.flatnonzero(mine)
     ]

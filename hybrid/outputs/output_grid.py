@@ -18,7 +18,7 @@ from hybrid.kernels.algebra.sparse_rows import add_rows, cubic_rows, linear_rows
 from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Zone
 
-NO_HINGES: Floats = np.zeros((3, 2))
+NO_HINGES: Floats = np.zeros((3, 3))
 
 
 class Rows(NamedTuple):
@@ -98,7 +98,7 @@ class Grid:
         """loads: arc lengths, m, that cut the line, as of `stretches`; changes: those of them where one section ends
 
         and the next begins; after: a point on a cut shows the side after it; kept: those of loads where no force acts;
-        hinges: (3, 2) as of `Material`.
+        hinges: (2 + K, 3) as of `Material`.
         """
         nodes_s = np.require(nodes_s, float, ("C", "W"))  # so that kernels have one signature
         self.loads, self.changes, self.after, self.hinges = tuple(loads), tuple(changes), after, hinges

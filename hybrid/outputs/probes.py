@@ -228,7 +228,7 @@ class Observer:
         section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
         gauges: places (x, y), m, where the elevation of the sea is recorded.
         payout: whether the line is paid out; quantities: what the scene asks for beside the usual;
-        obstacles: their names; hinges: (3, 2) as of `Material`; edges: whether what cells miss beside edges of
+        obstacles: their names; hinges: (2 + K, 3) as of `Material`; edges: whether what cells miss beside edges of
         contact is written (outputs.edge_errors).
         """
         self._finest = finest

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.watch.soft_rods import LINE, SLACK, WHOLE
+from hybrid.kernels.watch.soft_rods import EI, END, GJ, LINE, SLACK, WHOLE
 from hybrid.outputs.vectors import cross, directions_of
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def restored(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.b
     stretches; rods: (n,) which of them are rods.
     """
     found = list[Restored]()
-    if view.grid.hinges[LINE, 0] <= 0.0 or not rods.any():
+    if view.grid.hinges[LINE, EI] <= 0.0 or not rods.any():
         return found
     first = np.flatnonzero(rods & ~np.append(False, rods[:-1] & (spans[:-1, 1] == spans[1:, 0])))
     for k in first.tolist():
@@ -61,30 +61,21 @@ def restored(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.b
 
 def parts_of_stiffness(view: Observation, nodes: Integers, cells: Integers) -> Floats:
     """(m, nb) of the elements at nodes (m,), each beside one of the cells (m,); 1 where nothing lacks or is known."""
-    if view.grid.hinges[LINE, 0] <= 0.0:
+    pieces = view.grid.hinges[LINE:]
+    if pieces[0, EI] <= 0.0:
         return np.ones((len(nodes), view.columns))
-    EI, hn = _EI_by_torsion(view, nodes, cells), view.of_line("hn", nodes)
-    give = np.divide(hn, EI, out=np.zeros_like(EI), where=EI > 0.0)
-    swivels = np.flatnonzero((view.line.element[nodes] != 0) & (view.stiffness(nodes)[:, 2] == 0.0).any(axis=1))
-    for k in swivels.tolist():  # by the elements beside them
-        node, cell = int(nodes[k]), int(cells[k])
-        inner, inside = 2 * cell + 1 - node, node not in view.end_nodes
-        beside = [(node - 1, node - 1), (node + 1, node)] if inside else [(inner, cell)] * 2
-        found = [_EI_by_torsion(view, np.array([j]), np.array([c]))[0] for j, c in beside]
-        found = [np.where(x > 0.0, x, y) for x, y in zip(found, found[::-1], strict=True)]
-        lengths = [view.cell_lengths[c] if inside else hn[k] for _, c in beside]
-        for x, length in zip(found, lengths, strict=True):
-            give[k] += np.divide(0.5 * length, x, out=np.zeros_like(x), where=x > 0.0)
-    part = view.stiffness(nodes)[:, 0] * give
+    ends, bends, twists = np.isin(nodes, view.end_nodes), np.zeros((1, 1)), np.zeros((1, 1))
+    for beside in (np.where(ends, cells, nodes - 1), np.where(ends, cells, nodes)):
+        middle = 0.5 * (view.of_line("s", beside) + view.of_line("s", beside + 1))
+        of = pieces[np.searchsorted(pieces[:-1, END], middle, side="right")]
+        half = 0.5 * view.cell_lengths[beside] * np.where(ends, 0.5, 1.0)[:, None]
+        bends, twists = bends + half / of[..., EI], twists + half / of[..., GJ]  # by a moment, rad per N m
+        if ends.any():  # an angular spring at a clamp does not twist
+            bends = np.where(ends[:, None], view.of_line("hn", nodes) / of[..., EI], bends)
+    kb = view.stiffness(nodes)
+    twists = np.where(kb[:, 2] > 0.0, twists * kb[:, 2], 1.0)  # of no swivel: all of its torsion is there, whatever
+    part = np.array(np.broadcast_to(kb[:, 0] * bends / twists, (len(nodes), view.columns)))  # lengths are under way
     return np.where((part > 0.0) & (part < WHOLE), part, 1.0)
-
-
-def _EI_by_torsion(view: Observation, nodes: Integers, cells: Integers) -> Floats:
-    """(m, nb) N m2 of elements, by the torsion of which all is there; 0 where there is none, as at swivels."""
-    ends = np.isin(nodes, view.end_nodes)[:, None]  # an angular spring at a clamp does not twist
-    length = np.where(ends, 0.5 * view.cell_lengths[cells], view.of_line("hn", nodes))
-    EI = view.grid.hinges[LINE, 0] * view.stiffness(nodes)[:, 2] * length
-    return np.array(np.broadcast_to(EI, (len(nodes), view.columns)))
 
 
 def _stiffness(view: Observation, nodes: Integers, part: Floats) -> Floats:
@@ -96,14 +87,14 @@ def _stiffness(view: Observation, nodes: Integers, part: Floats) -> Floats:
     return np.asarray(K)
 
 
-def _of_sides(view: Observation, spans: Integers, EI: Floats) -> Floats:
+def _of_sides(view: Observation, spans: Integers, whole: Floats) -> Floats:
     """Factors (rows, nb) of the curvature of a rod's stretches: where sections meet, the moment is one."""
     (a, _, start), (_, b, _) = spans[0], spans[-1]
-    found = np.ones((spans[-1, 2] + b - spans[-1, 0] + 1 - start, EI.shape[1]))
+    found = np.ones((spans[-1, 2] + b - spans[-1, 0] + 1 - start, whole.shape[1]))
     for first, last, row in (spans - [0, 0, start]).tolist():
         for node, inner, at in ((first, first + 1, row), (last, last - 1, row + last - first)):
             if node in view.changes and view.line.element[node] and view.line.element[inner]:
-                found[at] = EI[node - a] / EI[inner - a]
+                found[at] = whole[node - a] / whole[inner - a]
     return found
 
 

@@ -285,7 +285,7 @@ def of_equilibrium(
     ends, sea = model.ends.at(np.inf), model.sea.at(np.inf)
     stepper = Stepper(line, model.length, model.tension_scale)
     run.books.loaded[:] = model.loaded_ends
-    run.books.hinges[:] = model.hinges
+    run.books = run.books._replace(hinges=model.hinges)
     run.attach(
         line, sea, ends, model.ends.moves(), stepper.work, stepper.limits, found.state, np.full(model.cells, np.inf),
         np.zeros(0, int), marks_of(scene, model),

@@ -177,13 +177,12 @@ class LineResult:
         right[marked] = nodes + np.arange(marked.size)
         books, base = blank_books(line.h.size), self.model.always.astype(np.int64)
         books.loaded[:] = self.model.loaded_ends
-        books.hinges[:] = self.model.hinges
         books.clock[[LEAST_PEAK, RELEASE_START, RELEASE_END]] = np.inf
         books.counts[STIFF], books.counts[VARIES] = self.model.inextensible, self.model.layout is not None
         books.clock[RHO] = self.scene.time.rho_inf if self.scene.time is not None else 0.0
         return books._replace(
             strains=np.zeros((nodes, STRAINS)), marks=marks, right=right, start=begin.copy(), base=base,
-            placed=begin[base], borne=1.0 + borne_strain(self.model),
+            hinges=self.model.hinges, placed=begin[base], borne=1.0 + borne_strain(self.model),
             extremes=no_extremes(nodes + marked.size),
             touch=self._blank_touch(),
         )  # fmt: skip

@@ -136,7 +136,7 @@ class Transient:
         self._leaves = self._returns = False  # whether it leaves its plane, or is back in it, after this step
         self._rescues = 0, 0  # the step before, and repetitions with more rod since
         self.run.books.loaded[:] = model.loaded_ends
-        self.run.books.hinges[:] = model.hinges
+        self.run.books = self.run.books._replace(hinges=model.hinges)
         self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
         self.run.count[b.STIFF] = model.inextensible
         if not self._begins_at_once:

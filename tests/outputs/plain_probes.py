@@ -229,7 +229,7 @@ class Plain:
         for k in range(1, len(self.grid.parts)):  # what a joint takes of a rod's curvature is put back
             if self.grid.parts[k - 1].kind != self.grid.parts[k].kind:
                 self._put_back(out, k)
-        for k, (EI, reach) in enumerate(self.grid.hinges[:2]):  # what a pin takes of a catenary's is taken away
+        for k, (EI, reach) in enumerate(self.grid.hinges[:2, :2]):  # what a pin takes of a catenary's is taken away
             if EI > 0.0 and self.grid.parts[-k].kind == "catenary":
                 self._take_away(out, k, EI, reach)
         return out

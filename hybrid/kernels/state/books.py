@@ -144,8 +144,8 @@ class Books(NamedTuple):
     velocity: Floats  # (2, 3) m/s, of held ends now
     imposed: Floats  # (2, 2, 21) now and before the last step, of each end: position, frame, spin, force, moment
     loaded: NDArray[np.int8]  # (2,) 1 where there is a body at the end
-    # (3, 2) of ends where the curvature of a rod fades to nothing: EI, N m2 (0: it does not), how far, m; then EI/GJ of
-    # all of the line (0: it is not one number)
+    # (2 + K, 3) of ends where the curvature of a rod fades to nothing: EI, N m2 (0: it does not), how far, m; then of
+    # pieces of the line EI, N m2, where they end, m, and GJ, N m2 (zeros: not known)
     hinges: Floats
     base: NDArray[np.int64]  # nodes whose displacement is watched
     placed: Floats  # (base.size, 3) m, where they were at the start
@@ -215,7 +215,7 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
     z, nodes = np.zeros, cells + 1
     return Books(
         clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
-        report=z((3, REPORT_SIZE)), tension=z((2, cells)), twist=z((2, 2)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), hinges=z((3, 2)), base=z(0, np.int64), placed=z((0, 3)),
+        report=z((3, REPORT_SIZE)), tension=z((2, cells)), twist=z((2, 2)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), hinges=z((3, 3)), base=z(0, np.int64), placed=z((0, 3)),
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
         samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, STRAINS)), start=z((nodes, 3)), marks=z(nodes, np.int8),
         right=np.arange(nodes),

@@ -48,7 +48,7 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import FORCE_A
-from hybrid.kernels.watch.soft_rods import BENT, LINE, bend_direction, of_chords, part_of_stiffness, restore_stiffness
+from hybrid.kernels.watch.soft_rods import BENT, bend_direction, of_chords, part_of_stiffness, restore_stiffness
 
 SAME_PLACE = 1e-9  # part of a length
 
@@ -351,7 +351,7 @@ def at_rod_end(line, ends, state, books, i, side, passed):
         elif has_bend_law(line, j):
             curvature += curvature_under(line, j, -side, moment)
         elif stiffness > 0.0:
-            curvature += moment / (stiffness / part_of_stiffness(line, j, books.hinges[LINE, 0]))
+            curvature += moment / (stiffness / part_of_stiffness(line, j, books.hinges))
     return curvature, moment, torque
 
 
@@ -391,9 +391,9 @@ def beside_seam(line, books, i, j):
         return curvature_under(line, i, j - i, books.strains[i, 1])
     own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
     stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
-    x, bent, ratio = books.strains[i, 0], abs(books.strains[i, BENT]), books.hinges[LINE, 0]
+    x, bent, pieces = books.strains[i, 0], abs(books.strains[i, BENT]), books.hinges
     if bent != x:  # of a rod with all of its stiffness
-        parts = part_of_stiffness(line, j, ratio) / part_of_stiffness(line, i, ratio) if line.element[j] else 1.0
+        parts = part_of_stiffness(line, j, pieces) / part_of_stiffness(line, i, pieces) if line.element[j] else 1.0
         x = bent * (own / stiffness * parts if line.element[j] and stiffness > 0.0 else 1.0)
     elif line.element[j] and own > 0.0 and stiffness > 0.0:
         x = max(0.0, x + books.strains[i, 1] * (1.0 / stiffness - 1.0 / own))

@@ -33,7 +33,8 @@ from hybrid.kernels.machine.compile import inner, kernel
 # Columns of books.strains: curvature of elements, that of results; c and d of above.
 RAW, BENT, C, D = 0, 3, 4, 5
 WHOLE = 1.0 - 1e-9  # p from which on a rod has all of its stiffness
-LINE = 2  # row of books.hinges with EI/GJ
+LINE = 2  # first row of books.hinges of pieces of the line
+EI, END, GJ = range(3)  # columns of these
 SLACK = 2.5e-5  # least h T/K, for lines with hardly any tension: M fades within some 200 cells
 
 
@@ -75,38 +76,43 @@ def bend_at(line, ends, state, books, i):
 
 
 @inner
-def EI_by_torsion(line, i, ratio):
-    """EI, N m2, of the element at node i, by its torsion; 0 where there is none, as at swivels.  ratio: EI/GJ."""
-    n = line.h.shape[0]
-    if i < 0 or i > n or not line.element[i]:
-        return 0.0
-    length = line.hn[i] if 0 < i < n else 0.5 * line.h[min(i, n - 1)]  # an angular spring at a clamp does not twist
-    return ratio * line.kb[i, 2] * length
+def piece_at(pieces, s):
+    """Row of `pieces`, books.hinges, of the piece that lies at s (m)."""
+    low, high = LINE, pieces.shape[0] - 1
+    while low < high:
+        middle = (low + high) // 2
+        if s < pieces[middle, END]:
+            high = middle
+        else:
+            low = middle + 1
+    return low
 
 
 @inner
-def part_of_stiffness(line, i, ratio):
-    """p of the element at node i, 1 where it has all of its stiffness or ratio, EI/GJ, is not known (0)."""
-    if not line.element[i] or ratio <= 0.0:
+def part_of_stiffness(line, i, pieces):
+    """p of the element at node i, 1 where it has all of its stiffness or that is not known; pieces: books.hinges."""
+    if not line.element[i] or pieces[LINE, EI] <= 0.0:
         return 1.0
-    EI, n = EI_by_torsion(line, i, ratio), line.h.shape[0]
-    give = line.hn[i] / EI if EI > 0.0 else 0.0
-    if EI == 0.0:  # of a swivel by the elements beside it
-        before, after = EI_by_torsion(line, i - 1, ratio), EI_by_torsion(line, i + 1, ratio)
-        before, after = max(before, after if before == 0.0 else 0.0), max(after, before if after == 0.0 else 0.0)
-        if before > 0.0:
-            inside = 0 < i < n
-            give = 0.5 * (line.h[i - 1] if inside else line.hn[i]) / before
-            give += 0.5 * (line.h[i] if inside else line.hn[i]) / after
-    part = line.kb[i, 0] * give
+    a, b, s = max(i - 1, 0), min(i, line.h.shape[0] - 1), line.s
+    j = piece_at(pieces, 0.5 * (s[a] + s[a + 1]))
+    half = 0.5 * line.h[a]
+    bends, twists = half / pieces[j, EI], half / pieces[j, GJ]  # by a moment, rad per N m
+    if a != b:
+        k, half = piece_at(pieces, 0.5 * (s[b] + s[b + 1])), 0.5 * line.h[b]
+        bends, twists = bends + half / pieces[k, EI], twists + half / pieces[k, GJ]
+    else:  # an angular spring at a clamp does not twist
+        bends = line.hn[i] / pieces[j, EI]
+    if line.kb[i, 2] > 0.0:  # of no swivel: all of its torsion is there, whatever lengths are under way
+        bends /= twists * line.kb[i, 2]
+    part = line.kb[i, 0] * bends
     return part if 0.0 < part < WHOLE else 1.0
 
 
 @inner
-def all_stiffness(line, i, ratio, way):
+def all_stiffness(line, i, pieces, way):
     """K of node i; at a joint of the rod on its side `way` (-1, 1)."""
     j = i if line.element[i] else i + way
-    return line.kb[j, 0] / part_of_stiffness(line, j, ratio) * (line.hn[j] / line.hn[i])
+    return line.kb[j, 0] / part_of_stiffness(line, j, pieces) * (line.hn[j] / line.hn[i])
 
 
 @inner
@@ -118,12 +124,12 @@ def goes_on_outside(line, marks, i):
 @inner
 def balance(line, ends, state, books, i, a, b):
     """Diagonal and right side of the balance of node i of the rod from node a to b, if a is not an end that turns."""
-    n, h, ratio, inside = line.h.shape[0], line.h, books.hinges[LINE, 0], a < i < b
+    n, h, pieces, inside = line.h.shape[0], line.h, books.hinges, a < i < b
     way = 1 if i == a else -1
-    K, rod = all_stiffness(line, i, ratio, way), min(max(i, a), b - 1)
+    K, rod = all_stiffness(line, i, pieces, way), min(max(i, a), b - 1)
     T = 0.5 * (state.T[i - 1] + state.T[i]) if inside else state.T[rod]
     T = max(T, SLACK * K / h[rod])
-    lack = 1.0 - part_of_stiffness(line, i, ratio) if line.element[i] else 1.0
+    lack = 1.0 - part_of_stiffness(line, i, pieces) if line.element[i] else 1.0
     rhs = scale(T * lack * line.hn[i], bend_at(line, ends, state, books, i))
     diagonal = T / K + (1.0 / h[i - 1] if i > a else 0.0) + (1.0 / h[i] if i < b else 0.0)
     outer = i - way
@@ -151,7 +157,7 @@ def restore_rod(line, ends, state, books, a, b):
 
     on the side of the catenary it is the same.
     """
-    bent, ratio, h, n = books.strains, books.hinges[LINE, 0], line.h, line.h.shape[0]
+    bent, pieces, h, n = books.strains, books.hinges, line.h, line.h.shape[0]
     for i in range(a, b + 1):
         if turns_freely(line, i):
             for k in range(4):
@@ -170,8 +176,8 @@ def restore_rod(line, ends, state, books, a, b):
         M = add(get_solved(bent, i), scale(bent[i, C], M))
         bend, part = bend_at(line, ends, state, books, i), 0.0
         if line.element[i]:
-            part = part_of_stiffness(line, i, ratio)
-        K = all_stiffness(line, i, ratio, 1 if i == a else -1)
+            part = part_of_stiffness(line, i, pieces)
+        K = all_stiffness(line, i, pieces, 1 if i == a else -1)
         whole = add(scale(part, bend), scale(1.0 / (K * line.hn[i]), M))
         bent[i, BENT] = math.copysign(math.sqrt(dot(whole, whole)), dot(whole, bend))
         if not line.element[i] and 0 < i < n:
@@ -180,15 +186,15 @@ def restore_rod(line, ends, state, books, a, b):
 
 @kernel
 def restore_stiffness(line, ends, state, books):
-    """`restore_rod` of all rods with an element that has not all of its stiffness, if EI/GJ is known."""
-    n, ratio, a = line.h.shape[0], books.hinges[LINE, 0], 0
-    while ratio > 0.0 and a < n:
+    """`restore_rod` of all rods with an element that has not all of its stiffness, if that is known."""
+    n, pieces, a = line.h.shape[0], books.hinges, 0
+    while pieces[LINE, EI] > 0.0 and a < n:
         if not line.spin[a]:
             a += 1
             continue
         b, soft = a + 1, False
         while b < n and line.spin[b]:
-            soft |= line.kb[b, 2] > 0.0 and part_of_stiffness(line, b, ratio) < WHOLE
+            soft |= line.kb[b, 2] > 0.0 and part_of_stiffness(line, b, pieces) < WHOLE
             b += 1
         if soft:
             restore_rod(line, ends, state, books, a, b)
