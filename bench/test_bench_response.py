@@ -9,8 +9,8 @@ largest of them; curvature where it is resolved (`LineResponse.resolved`, and `h
 the largest of that line.  Behind +- is the standard error of that mean.  CPU time; of responses the median of three.
 
 What was run, on a busy machine: ten hours of the first ten scenes, three of "tensioned riser, current", two of
-"bridle", "sunken body", "lazy wave" and both "sagging", one of "spar"; not "tensioned riser, 5 m", "S tether" and "lazy
-wave, rods".  Beyond 3 % where valid: the ropes of the sunken body (3.6 %, near resonance: what is left out of the drag
+"bridle", "sunken body", "lazy wave" and both "sagging", one of "spar", "S tether" and "lazy wave, rods"; not "tensioned
+riser, 5 m".  Beyond 3 % where valid: the ropes of the sunken body (3.6 %, near resonance: what is left out of the drag
 of members is not counted) and one place of a bridle's curvature (3.9 +-0.6 %).  The chain on a vessel was (4.0 %),
 since when lines whose ends move may leave out less.
 """
