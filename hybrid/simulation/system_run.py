@@ -30,7 +30,7 @@ from hybrid.scene.plane import OUT
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
 from hybrid.simulation.body_overlap import note_overlaps
-from hybrid.simulation.collapse import COLLAPSE, CONTACT, GIVE_UP, collapse_text
+from hybrid.simulation.collapse import COLLAPSE, EACH_OTHER, GIVE_UP, ITSELF, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import energy_gains_text
 from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
@@ -786,14 +786,17 @@ class SystemRun:
         detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
         if dt == 0.0:
             detail = "no accelerations are consistent with the shape and the loads"
-        if self._in_contact:
-            detail += CONTACT
+        detail += self._in_contact
         return LineFailed(taken.line, taken.outcome, self.t, self._place(solver, taken), detail)
 
     @property
-    def _in_contact(self) -> bool:
-        """Whether a line touches itself, or another one, now."""
-        return any(x is not None and x.touches for x in (self.shared, *(line.contact for line in self.lines)))
+    def _in_contact(self) -> str:
+        """What touches now, a line itself or another one, for the text of a failure; empty: nothing."""
+        pairs = self.shared.points_between() if self.shared is not None else []
+        if any(a != b for (a, _), (b, _) in pairs):
+            return EACH_OTHER
+        own = (line.contact for line in self.lines)
+        return ITSELF if pairs or any(x is not None and x.touches for x in own) else ""
 
     def _place(self, solver: SystemSolver, taken: SystemTaken) -> float | None:
         """Where (m) a step was worst; None: of no line."""
@@ -808,9 +811,8 @@ class SystemRun:
         number, where = self.loop.last_cut
         line = self.lines[max(number, 0)]
         s = float(line.model.line.s[min(max(where, 0), line.model.line.s.size - 1)]) if number >= 0 else 0.0
-        touches = self._in_contact
         cuts, tiny = {cause: int(count[k]) for cause, k in CUTS.items()}, int(count[b.TINY_STEPS])
-        text = collapse_text(tiny, self.last_step, float(clock[b.LONGEST]), cuts, s, touches)
+        text = collapse_text(tiny, self.last_step, float(clock[b.LONGEST]), cuts, s, self._in_contact)
         if tiny == MANY:
             line.events.event(self.t, s, s, COLLAPSE, text, value=self.last_step)
         if self.target is None and tiny >= GIVE_UP:
