@@ -221,8 +221,8 @@ class System(Table):
     lines: dict[Name, JoinedLine] = Field(min_length=1, description="lines by name, each between two points")
     contact: LinesContact | None = Field(
         default=None,
-        description="which lines touch each other, with what friction; absent: in runs with a step and without accuracy "
-        "all that have diameters, from where they come near each other",
+        description="which lines touch each other, with what friction; absent: in runs with a step and without "
+        "accuracy all that have diameters, from where they come near each other",
     )
     obstacles: Obstacles = Field(
         default={},

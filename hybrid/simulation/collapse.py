@@ -18,14 +18,14 @@ CAUSES = {
     NEWTON: ("Newton's method, which does not converge", "more cells where the cable bends, or damping"),
     ERROR: ("the error that a step makes", "a larger accuracy or time.tolerance, or damping of what is fast there"),
 }
-ITSELF = "; the line touches itself there, and contact: {self: false} leaves that out"
-EACH_OTHER = "; lines touch each other there, and contact: {between: []} leaves that out"
+TOUCHES_ITSELF = "; the line touches itself there, and contact: {self: false} leaves that out"
+TOUCH_EACH_OTHER = "; lines touch each other there, and contact: {between: []} leaves that out"
 
 
 def collapse_text(steps: int, dt: float, longest: float, cuts: Mapping[str, int], s: float, contact: str) -> str:
     """Text of the event of so many steps in a row, the last of dt (s), the longest of the run before.
 
-    cuts: tries that were given up, by cause; s: m, where the last was; contact: what touches now, ITSELF or EACH_OTHER;
+    cuts: tries that were given up, by cause; s: m, where the last was; contact: what touches now, TOUCHES_ITSELF or TOUCH_EACH_OTHER;
     empty: nothing.
     """
     text = (

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, TOLD
 from hybrid.kernels.state import books as b
 from hybrid.kernels.step.accept import MANY
-from hybrid.simulation.collapse import COLLAPSE, ERROR, GAIN, GIVE_UP, ITSELF, NEWTON, TURN, collapse_text
+from hybrid.simulation.collapse import COLLAPSE, ERROR, GAIN, GIVE_UP, NEWTON, TOUCHES_ITSELF, TURN, collapse_text
 from hybrid.simulation.contact_start import comes_near
 from hybrid.simulation.events import energy_gains_text, slack_steps_text, steps_cut_text
 from hybrid.simulation.run_sample import NOT_ESTIMATED
@@ -105,7 +105,7 @@ def note_collapse(moving: Transient) -> bool:
     steps, dt, node = int(count[b.TINY_STEPS]), float(clock[b.LAST_DT]), int(count[b.CUT_AT])
     s = float(moving.model.line.s[min(max(node, 0), moving.model.line.s.size - 1)])
     cuts = {cause: int(count[k]) for cause, k in CUTS.items()}
-    contact = ITSELF if moving.run.contact is not None and moving.run.contact.touches else ""
+    contact = TOUCHES_ITSELF if moving.run.contact is not None and moving.run.contact.touches else ""
     text = collapse_text(steps, dt, float(clock[b.LONGEST]), cuts, s, contact)
     if steps == MANY:
         moving.events.event(moving.t, s, s, COLLAPSE, text, value=dt)

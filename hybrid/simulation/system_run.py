@@ -30,7 +30,7 @@ from hybrid.scene.plane import OUT
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
 from hybrid.simulation.body_overlap import note_overlaps
-from hybrid.simulation.collapse import COLLAPSE, EACH_OTHER, GIVE_UP, ITSELF, collapse_text
+from hybrid.simulation.collapse import COLLAPSE, GIVE_UP, TOUCH_EACH_OTHER, TOUCHES_ITSELF, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import energy_gains_text
 from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
@@ -794,9 +794,9 @@ class SystemRun:
         """What touches now, a line itself or another one, for the text of a failure; empty: nothing."""
         pairs = self.shared.points_between() if self.shared is not None else []
         if any(a != b for (a, _), (b, _) in pairs):
-            return EACH_OTHER
+            return TOUCH_EACH_OTHER
         own = (line.contact for line in self.lines)
-        return ITSELF if pairs or any(x is not None and x.touches for x in own) else ""
+        return TOUCHES_ITSELF if pairs or any(x is not None and x.touches for x in own) else ""
 
     def _place(self, solver: SystemSolver, taken: SystemTaken) -> float | None:
         """Where (m) a step was worst; None: of no line."""
