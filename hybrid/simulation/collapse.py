@@ -25,8 +25,8 @@ TOUCH_EACH_OTHER = "; lines touch each other there, and contact: {between: []} l
 def collapse_text(steps: int, dt: float, longest: float, cuts: Mapping[str, int], s: float, contact: str) -> str:
     """Text of the event of so many steps in a row, the last of dt (s), the longest of the run before.
 
-    cuts: tries that were given up, by cause; s: m, where the last was; contact: what touches now, TOUCHES_ITSELF or TOUCH_EACH_OTHER;
-    empty: nothing.
+    cuts: tries that were given up, by cause; s: m, where the last was; contact: what touches now, TOUCHES_ITSELF or
+    TOUCH_EACH_OTHER; empty: nothing.
     """
     text = (
         f"the last {steps} steps were shorter than {TINY:g} of the longest, {longest:.3g} s; the last took {dt:.3g} s"
