@@ -82,11 +82,13 @@ class LoadedMembers:
 
     def drag_blocks(self, which: np.ndarray, start: bool) -> Floats:
         """Linear drag (n, 3, 3) N s/m of every piece, as of hybrid.linear.loaded_line."""
-        motion = np.einsum("nij,fj->fni", self.T, self.q[which] * (0.0 if start else 1.0))
-        u = math.sqrt(len(self.omegas) / which.size) * (
-            self.water[which] + 1j * self.omegas[which, None, None] * motion
-        )
+        u = math.sqrt(len(self.omegas) / which.size) * self.relative(which, start)
         return of_cylinders(self.d, self.axes, (self.cn, self.ct), self.current, u, self.phases)
+
+    def relative(self, which: np.ndarray, start: bool = False) -> Floats:
+        """Velocity (F, n, 3) m/s of the water relative to the pieces, by the motion found last; start: none."""
+        motion = np.einsum("nij,fj->fni", self.T, self.q[which] * (0.0 if start else 1.0))
+        return np.asarray(self.water[which] + 1j * self.omegas[which, None, None] * motion)
 
     def damping(self) -> Floats:
         """(6, 6) N s/m, .. of the drag as it is, against velocities of the body."""

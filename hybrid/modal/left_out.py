@@ -1,8 +1,8 @@
-"""What a linear response leaves out of a line that swings: the rest of quadratic drag, and the stretch by swinging.
+"""What a linear response leaves out: the rest of quadratic drag of lines and members, and the stretch by swinging.
 
 Both are taken from the linear motion, at times of a stretch of sea, as loads that the linear network then answers:
 
-    on half cells   f(U + u) - mean - B u,        of cells   a length of -|de|^2/2l across,
+    on half cells and pieces of members   f(U + u) - mean - B u,        of cells   a length of -|de|^2/2l across,
 
 with B the linear drag of a velocity u relative to the water.  To the first order it is what quadratic drag and large
 turns change, harmonics and all; what they change in turn is left out.  docs/theory.md, 21.
@@ -11,7 +11,7 @@ turns change, harmonics and all; what they change in turn is left out.  docs/the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 from typing import Any
@@ -24,12 +24,16 @@ from hybrid.kernels.state.state import Floats
 from hybrid.linear.drag import shape_of_drag
 from hybrid.linear.excitation import current_at
 from hybrid.linear.loaded_line import LoadedLine
+from hybrid.linear.loaded_members import LoadedMembers
 from hybrid.linear.matrices import LinearNetwork
 from hybrid.linear.response_results import LineResponse
 
 # Parts of times (of fewer, what is found scatters with the phases by more than a quarter), times of each, how many to
 # the shortest period that counts, by a part of the power; loads beyond the last of their power are left out.
 PARTS, TIMES, TO_A_PERIOD, POWER = 4, 256, 8.2, 0.01
+# Times of each part where bodies have members, whose drag alone may damp them: parts must outlast many such decays,
+# else their windows spread what drag leaves out over more frequencies than the resonance answers to.
+WITH_MEMBERS = 1024
 # Multiplications from which a product of matrices is shared among threads, whose waiting takes more processor time than
 # products of this size.
 SHARED = 2**18
@@ -37,18 +41,25 @@ SHARED = 2**18
 Answer = Callable[[float, Any], Any]
 
 
-def left_out(network: LinearNetwork, lines: Sequence[LoadedLine], answer: Answer) -> list[LineResponse]:
+def left_out(
+    network: LinearNetwork, lines: Sequence[LoadedLine], members: Mapping[int, LoadedMembers], answer: Answer
+) -> list[LineResponse]:
     """The response of each line, whose motion is known at all frequencies, with parts by which this changes standard
 
-    deviations of tension (N,) and curvature (N+1,), and with the shape of the law of curvature.
+    deviations of tension (N,) and curvature (N+1,), and with the shape of the law of curvature.  members: of bodies, by
+    their numbers.
     """
-    omegas, step = lines[0].omegas, _step(lines)
-    t = step * np.arange(PARTS * TIMES)
+    omegas, step = lines[0].omegas, _step([*lines, *members.values()])
+    times = WITH_MEMBERS if members else TIMES
+    t = step * np.arange(PARTS * times)
     turned = np.hstack([np.cos(np.outer(t, omegas)), np.sin(np.outer(t, omegas))])  # (M, 2F)
-    window = np.hanning(TIMES + 1)[:-1]  # so that no end of a part excites what hardly anything damps
+    window = np.hanning(times + 1)[:-1]  # so that no end of a part excites what hardly anything damps
     loads = network.place.T @ np.concatenate([_loads(x, turned) for x in lines])  # (q, M)
-    there = np.fft.rfft(loads.reshape(network.size, PARTS, TIMES) * window, axis=2) / TIMES
-    nu = 2.0 * np.pi * np.fft.rfftfreq(TIMES, step)
+    for b, each in members.items():
+        first = network.size + 6 * (b - network.bodies)
+        loads[first : first + 6] += _loads_of_members(each, turned)
+    there = np.fft.rfft(loads.reshape(network.size, PARTS, times) * window, axis=2) / times
+    nu = 2.0 * np.pi * np.fft.rfftfreq(times, step)
     power = np.cumsum((np.abs(there[:, :, 1:]) ** 2).sum(axis=(0, 1)))
     last = 2 + int(np.searchsorted(power, (1.0 - POWER) * power[-1])) if power[-1] > 0.0 else 1
     numbers = np.arange(1, min(last, nu.size))
@@ -60,11 +71,11 @@ def left_out(network: LinearNetwork, lines: Sequence[LoadedLine], answer: Answer
     return [_changes(x, whole[a:b], part) for x, (a, b) in zip(lines, pairwise(network.at), strict=True)]
 
 
-def _step(lines: Sequence[LoadedLine]) -> float:
+def _step(loaded: Sequence[LoadedLine | LoadedMembers]) -> float:
     """s, between times that show the loads."""
-    omegas = lines[0].omegas
+    omegas = loaded[0].omegas
     every = np.arange(omegas.size)
-    power = sum((np.abs(x.relative(every)) ** 2).sum(axis=(1, 2)) for x in lines)
+    power = sum((np.abs(x.relative(every)) ** 2).sum(axis=(1, 2)) for x in loaded)
     part = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
     shortest = omegas[min(int(np.searchsorted(part, 1.0 - POWER)), omegas.size - 1)]
     return float(2.0 * np.pi / shortest / TO_A_PERIOD)
@@ -87,14 +98,9 @@ def _loads(x: LoadedLine, turned: Floats) -> Floats:
     n, count = x.line.s.size, len(turned)
     u = _at_times(turned, x.relative(np.arange(x.omegas.size)))  # (N+1, 3, M)
     used = np.flatnonzero((x.cn > 0.0) | (x.ct > 0.0))
-    d = x.d[used][:, :, None]
-    speed = u[x.node[used]] + x.current[used][:, :, None]
-    along = (speed * d).sum(axis=1)[:, None]
-    speed -= d * along
-    speed *= x.cn[used][:, None, None] * np.sqrt((speed**2).sum(axis=1))[:, None]
-    speed += d * (x.ct[used][:, None, None] * np.abs(along) * along)
+    drag = _of_cylinders(x.d[used], (x.cn[used], x.ct[used]), u[x.node[used]] + x.current[used][:, :, None])
     gathered = sparse.csr_array((np.ones(used.size), (x.node[used], np.arange(used.size))), shape=(n, used.size))
-    force = (gathered @ speed.reshape(used.size, 3 * count)).reshape(n, 3, count)
+    force = (gathered @ drag.reshape(used.size, 3 * count)).reshape(n, 3, count)
     at = np.flatnonzero(x.point_drag)
     speed = u[at] + current_at(x.line, x.sea, x.linear.r[at])[:, :, None]
     force[at] += x.point_drag[at][:, None, None] * np.sqrt((speed**2).sum(axis=1))[:, None] * speed
@@ -107,6 +113,27 @@ def _loads(x: LoadedLine, turned: Floats) -> Floats:
     out[1:, 0] = -square / (2.0 * l)[:, None]
     out -= out.mean(axis=2)[:, :, None]
     return np.asarray(out.reshape(n * SIZE, count))
+
+
+def _loads_of_members(x: LoadedMembers, turned: Floats) -> Floats:
+    """(6, M) N, N m on the body: what is left out of the drag of its members at each time, less its mean."""
+    u = _at_times(turned, x.relative(np.arange(x.omegas.size)))  # (n, 3, M)
+    rest = _of_cylinders(x.d, (x.cn, x.ct), u + x.current[:, :, None]) - x.blocks @ u
+    out = np.einsum("nia,nim->am", x.T, rest)
+    return np.asarray(out - out.mean(axis=1)[:, None])
+
+
+def _of_cylinders(d: Floats, drag: tuple[Floats, Floats], speed: Floats) -> Floats:
+    """Quadratic drag (H, 3, M) N of cylinders along d (H, 3) in water at a speed (H, 3, M) m/s, which it overwrites.
+
+    drag: across and along, (H,) N s^2/m^2.
+    """
+    d = d[:, :, None]
+    along = (speed * d).sum(axis=1)[:, None]
+    speed -= d * along
+    speed *= drag[0][:, None, None] * np.sqrt((speed**2).sum(axis=1))[:, None]
+    speed += d * (drag[1][:, None, None] * np.abs(along) * along)
+    return speed
 
 
 def _changes(x: LoadedLine, whole: Any, part: float) -> LineResponse:

@@ -99,6 +99,8 @@ class _Linear:
                 self.members[b] = LoadedMembers(rest.bodies[b], members, state, omegas)
                 stiffness[b] = stiffness_by_water(rest.solver, rest.states, b, members)
         self.damping, self.by_water = damping, self._of_bodies(stiffness)
+        for x in self.lines:
+            x.by_members = bool(self.members) and max(x.x.joints) >= 0
         self.loaded: list[LoadedLine | LoadedMembers] = [*self.lines, *self.members.values()]
         self.solver: ComplexSolver | None = None
         self.vectors = np.zeros((len(omegas), self.network.size), complex)
@@ -161,7 +163,7 @@ class _Linear:
 
     def results(self) -> dict[str, LineResponse]:
         """Of each line, by its name."""
-        found = left_out(self.network, self.lines, self.answer)
+        found = left_out(self.network, self.lines, self.members, self.answer)
         return {x.name: each for x, each in zip(self.lines, found, strict=True)}
 
     def points(self) -> dict[str, Floats]:

@@ -17,7 +17,7 @@ from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.laws.soil import DEPTH, PRESSES, STEEP, SUCTION
 from hybrid.kernels.state.forces import OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.state import Floats
-from hybrid.linear.loaded_line import LoadedLine
+from hybrid.linear.loaded_line import STRAIGHT, LoadedLine
 from hybrid.linear.memory import pulls
 from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse
 
@@ -34,11 +34,16 @@ NEAR = 1e-7
 MOST_ADDED, SHAPE = ADDED | {"curvature": 0.1}, 0.1
 # That of tension of a line whose ends move, where 1.2 of it comes true: 3 % (bench/test_bench_response.py).
 OF_MOVED = 0.025
+# That where members of bodies move it, of which up to twice as much comes true near a resonance that their drag alone
+# damps: 3 % (test_resonance_of_members of bench/test_bench_response.py).
+OF_MEMBERS = 0.015
+# Part of a line on which curvature has to be known at least.
+FEW_PLACES = 0.05
 
 
 def doubts_of(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """Each place where the motion of a line is not small, in words."""
-    for doubt in (_slack, _swing, _kinks, _layers, _soil, _touchdown, _on_obstacles, _left_out, _shape):
+    for doubt in (_slack, _swing, _kinks, _layers, _soil, _touchdown, _on_obstacles, _left_out, _shape, _hardly_known):
         yield from doubt(x, found)
 
 
@@ -192,10 +197,13 @@ def _left_out(x: LoadedLine, found: LineResponse) -> Iterator[str]:
         added = np.where(deviation >= OF_LARGEST * deviation.max(), part, 0.0)
         k = int(added.argmax())
         moved = x.shifts.any() or x.turns.any() or max(x.x.joints) >= 0
-        if added[k] > (OF_MOVED if moved and name == "tension" else MOST_ADDED[name]):
+        of_moved = OF_MEMBERS if x.by_members else OF_MOVED
+        if added[k] > (of_moved if moved and name == "tension" else MOST_ADDED[name]):
+            what, remedy = ", that of members too,", "; near a resonance it is more: run it in time"
             yield (
-                f"{name} at s = {places[k]:.4g} m: the rest of quadratic drag and the stretch by swinging would add "
-                f"up to {100.0 * part[k]:.2g} % to its standard deviation of {deviation[k]:.3g} {unit}"
+                f"{name} at s = {places[k]:.4g} m: the rest of quadratic drag{what if x.by_members else ''} and the "
+                f"stretch by swinging would add up to {100.0 * part[k]:.2g} % to its standard deviation of "
+                f"{deviation[k]:.3g} {unit}{remedy if x.by_members else ''}"
             )
 
 
@@ -208,4 +216,16 @@ def _shape(x: LoadedLine, found: LineResponse) -> Iterator[str]:
         yield (
             f"curvature at s = {found.s[k]:.4g} m, of {found.mean_curvature[k]:.3g} 1/m in the mean, turns over: that "
             f"drag is not normal changes its standard deviation of {deviation[k]:.3g} 1/m by {100.0 * change[k]:.2g} %"
+        )
+
+
+def _hardly_known(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """Whether curvature is known hardly anywhere, or not where it varies most."""
+    deviation, known = found.deviation("curvature"), found.resolved("curvature")
+    k = int(deviation.argmax())
+    if deviation[k] > STRAIGHT and not (known[k] and known.mean() >= FEW_PLACES):
+        yield (
+            f"curvature at s = {found.s[k]:.4g} m, where it varies most, is {'' if known[k] else 'not '}known; along "
+            f"{100.0 * (1.0 - known.mean()):.3g} % of the line it is not, as it varies by less than a fifth of that or "
+            f"more than {100.0 * ADDED['curvature']:.2g} % of it are left out"
         )

@@ -146,3 +146,58 @@ def test_drag_of_a_single_harmonic():
     line = of_few(np.array([[0.3]]), np.array([[[0.5 + 0j]]]), one)[0, 0, 0]
     speed = 0.3 + 0.5 * np.cos(angle)
     assert line == pytest.approx(2.0 * (np.abs(speed) * speed * np.cos(angle)).mean() / 0.5, rel=1e-4)
+
+
+def test_what_is_left_out_of_the_drag_of_members():
+    """A member that stiff lines hold in waves of one harmonic: all they feel is c |u| u of it, as of a line.
+
+    The whole load has sqrt(3/8) c U^2, its linear part 8/(3 pi sqrt 2) c U^2 (tests/modal/test_left_out.py).
+    """
+    member = {"start": [0, 0, -1], "end": [0, 0, 1], "diameter": 0.05, "drag": 200.0, "pieces": 2}
+    waves = {"kind": "regular", "height": 1.0, "period": 8.0, "ramp": 10.0}
+    made = scene({"surface": 0.0, "waves": waves}, body(members=[member], inertia=[900.0] * 3))
+    for line in made["lines"].values():
+        line["sections"] = [{"length": 99.8, "mass": 0.01, "diameter": 0.003, "axial_stiffness": 1e8}]
+    part = math.sqrt(3.0 / 8.0) / (8.0 / (3.0 * math.pi) / math.sqrt(2.0)) - 1.0
+    for line in hybrid.response(made).lines.values():
+        assert line.left_out["tension"] == pytest.approx(part, rel=0.02)
+
+
+def sunken(height, damping):
+    """A buoyant body 20 m down on three taut ropes that surges with a period of 9.9 s, in a sea with a peak at 10 s."""
+    ways = {"east": (1.0, 0.0), "north": (-0.5, 0.866), "south": (-0.5, -0.866)}
+    points = {x: {"position": [60.0 * a, 60.0 * b, -90]} for x, (a, b) in ways.items()}
+    points |= {f"at_{x}": {"body": "buoy", "place": [2 * a, 2 * b, -1]} for x, (a, b) in ways.items()}
+    buoy = {
+        "mass": 1.2e4, "volume": 24.0, "inertia": [3e4, 3e4, 3e4], "centre_of_buoyancy": [0, 0, 0.6],
+        "initial_guess": [0, 0, -20], "damping": np.diag([damping] * 3 + [1e4] * 3).tolist(),
+        "members": [{"start": [0, 0, -1.5], "end": [0, 0, 1.5], "diameter": 3.0, "drag": 1.6, "added_mass": 1.0}],
+    }  # fmt: skip
+    rope = {"length": 89.5, "mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "added_mass": {"normal": 1.0}}
+    waves = {"kind": "pierson_moskowitz", "significant_height": height, "peak_period": 10.0, "depth": 100.0}
+    return {
+        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": waves | {"ramp": 10.0}}},
+        "points": points, "bodies": {"buoy": buoy},
+        "lines": {x: {"start": x, "end": f"at_{x}", "sections": [rope], "mesh": {"cells": 8}} for x in ways},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("height", "damping", "least", "most"), [(1.5, 0.0, 0.03, 0.08), (0.1, 3000.0, -0.01, 0.01)])
+def test_tension_near_a_resonance_that_drag_alone_damps(height, damping, least, most):
+    """Too small by more than 3 %, which is told; and right where what damps it is linear, of which nothing is told.
+
+    By the same waves at the same times, so that it is no matter of chance.
+    """
+    tables = sunken(height, damping)
+    found = hybrid.response(tables)
+    time = {"time": {"duration": 1800.0, "step": 0.1}, "output": {"every": 0.5, "points": 17}}
+    with hybrid.run(tables | time) as run:
+        late = run.t > 100.0
+        for name, line in found.lines.items():
+            there = run.lines[name].tension[late][:, 8].std()
+            amplitudes = 0.5 * (line.tension[:, 3] + line.tension[:, 4])
+            here = (np.exp(-2j * np.pi * np.outer(run.t[late], line.f)) @ amplitudes).real.std()
+            assert least < there / here - 1.0 < most
+    notes = [x for x in found.notes if "tension at s" in x]
+    assert found.valid_for("tension") == (not notes) == (most < 0.03)
+    assert all("of quadratic drag, that of members too," in x and "run it in time" in x for x in notes)
