@@ -28,6 +28,8 @@ YEAR = 365.25 * 86400.0
 # m: plate thickness to which S-N curves refer.
 REFERENCE_THICKNESS = 0.025
 LARGEST_SLOPE = 20.0
+# Part by which zero crossings over peaks fall short of 1, below which Dirlik's parts are round-off.
+NARROW = 1e-6
 
 
 class Curve(NamedTuple):
@@ -163,16 +165,13 @@ def stress_of(tension: ArrayLike, bending: ArrayLike, area: float, outer_diamete
 
 
 def narrow_band_damage(spectrum: Spectrum, curve: Curve, duration: float) -> Floats:
-    """Damage (...) in `duration` (s) of a Gaussian process whose ranges are Rayleigh-distributed; one slope."""
+    """Damage (...) in `duration` (s) of a Gaussian process whose ranges are Rayleigh-distributed."""
     m0, m2 = spectrum.moment(0), spectrum.moment(2)
-    rate = np.sqrt(m2 / m0)
-    return np.asarray(
-        rate * duration * 10.0**-curve.log_a * (2.0 * np.sqrt(2.0 * m0)) ** curve.m * math.gamma(1.0 + 0.5 * curve.m)
-    )
+    return np.asarray(np.sqrt(m2 / m0) * duration * _mean_damage(curve, np.sqrt(8.0 * m0), 2))
 
 
 def dirlik_damage(spectrum: Spectrum, curve: Curve, duration: float) -> Floats:
-    """Damage (...) in `duration` (s) of a Gaussian process by Dirlik's law of rainflow ranges; one slope."""
+    """Damage (...) in `duration` (s) of a Gaussian process by Dirlik's law of rainflow ranges."""
     m0, m1, m2, m4 = (spectrum.moment(n) for n in (0, 1, 2, 4))
     peaks, regular = np.sqrt(m4 / m2), m2 / np.sqrt(m0 * m4)
     centre = m1 / m0 * np.sqrt(m2 / m4)
@@ -180,7 +179,22 @@ def dirlik_damage(spectrum: Spectrum, curve: Curve, duration: float) -> Floats:
     r = (regular - centre - d1**2) / (1.0 - regular - d1 + d1**2)
     d2 = (1.0 - regular - d1 + d1**2) / (1.0 - r)
     d3 = 1.0 - d1 - d2
-    q = 1.25 * (regular - d3 - d2 * r) / d1
-    k = curve.m
-    mean = d1 * q**k * math.gamma(1.0 + k) + 2.0 ** (0.5 * k) * math.gamma(1.0 + 0.5 * k) * (d2 * np.abs(r) ** k + d3)
-    return np.asarray(peaks * duration * 10.0**-curve.log_a * (2.0 * np.sqrt(m0)) ** k * mean)
+    q = np.maximum(1.25 * (regular - d3 - d2 * r) / d1, 0.0)
+    mean = d1 * _mean_damage(curve, 2.0 * np.sqrt(m0) * q, 1)
+    mean += d2 * _mean_damage(curve, np.sqrt(8.0 * m0) * np.abs(r), 2) + d3 * _mean_damage(curve, np.sqrt(8.0 * m0), 2)
+    narrow = regular > 1.0 - NARROW
+    return np.asarray(np.where(narrow, narrow_band_damage(spectrum, curve, duration), peaks * duration * mean))
+
+
+def _mean_damage(curve: Curve, size: Floats, shape: int) -> Floats:
+    """Damage (...) of a mean cycle, whose range over a size (...) exceeds y with the probability exp(-y^shape)."""
+    k = curve.m / shape
+    first = 10.0**-curve.log_a * size**curve.m * math.gamma(1.0 + k)
+    if not math.isfinite(curve.knee):
+        return first
+    from scipy.special import gammainc, gammaincc
+
+    k2 = curve.m2 / shape
+    at = ((10.0**curve.log_a / curve.knee) ** (1.0 / curve.m) / size) ** shape
+    second = 10.0**-curve.log_a2 * size**curve.m2 * math.gamma(1.0 + k2)
+    return np.asarray(first * gammaincc(1.0 + k, at) + second * gammainc(1.0 + k2, at))

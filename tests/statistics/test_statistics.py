@@ -269,6 +269,27 @@ def test_damage_of_a_gaussian_process() -> None:
     assert counted < fatigue.narrow_band_damage(exact, curve, HOUR) < 1.4 * counted
 
 
+@pytest.mark.parametrize("stress", [8.0, 30.0, 120.0])
+def test_damage_of_a_gaussian_process_over_two_slopes(stress: float) -> None:
+    """Most of it on the second slope, on both, on the first, as of cycles that are counted.
+
+    Of ranges of Rayleigh's law it is the integral of each cycle's damage.
+    """
+    curve = fatigue.curves()["D air"]
+    f = np.linspace(0.0, 0.6, 60001)
+    exact = spectrum.Spectrum(f, stress**2 * density(f), f[1])
+    counted = np.mean([fatigue.damage(stress * record(HOUR, 50 + k)[1], curve) for k in range(12)])
+    assert fatigue.dirlik_damage(exact, curve, HOUR) == pytest.approx(counted, rel=0.07)
+    z, dz = np.linspace(1e-4, 12.0, 400_001, retstep=True)
+    ranges, m0 = 2.0 * np.sqrt(exact.moment(0)) * z, exact.moment(0)
+    mean = float((z * np.exp(-0.5 * z**2) / curve.cycles(ranges)).sum() * dz)
+    rate = HOUR * np.sqrt(exact.moment(2) / m0)
+    assert fatigue.narrow_band_damage(exact, curve, HOUR) == pytest.approx(rate * mean, rel=1e-4)
+    one = spectrum.Spectrum(np.array([0.1, 0.2]), np.array([stress**2, 0.0]), 0.1)  # all power at one frequency
+    with np.errstate(divide="ignore", invalid="ignore"):
+        assert fatigue.dirlik_damage(one, curve, HOUR) == fatigue.narrow_band_damage(one, curve, HOUR) > 0.0
+
+
 def test_life_over_a_scatter_diagram() -> None:
     """Half the time a damage of 1e-6 an hour, a third 3e-6, the rest none."""
     years = fatigue.life_in_years([1e-6, 3e-6], [0.5, 1.0 / 3.0], HOUR)
