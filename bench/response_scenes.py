@@ -158,6 +158,16 @@ def sunken(waves: Scene) -> Scene:
     }  # fmt: skip
 
 
+def buoyed(waves: Scene) -> Scene:
+    """The three ropes at a free point, as heavy, buoyant and slow as that body."""
+    buoy = {"mass": 1.2e4, "volume": 24.0, "drag_area": 5.8, "added_mass": 2.17e4, "initial_guess": [0, 0, -20]}
+    points: Scene = {x: {"position": [60.0 * a, 60.0 * b, -90]} for x, (a, b) in PLACES.items()}
+    lines = {
+        x: {"start": x, "end": "buoy", "sections": [ROPE | {"length": 91.5}], "mesh": {"cells": 20}} for x in PLACES
+    }
+    return {"environment": water(waves), "points": points | {"buoy": buoy}, "lines": lines}
+
+
 # By name, what makes the tables of a scene in a folder for its files.
 SCENES: dict[str, Callable[[Path], Scene]] = {
     "taut leg": lambda _: taut({}),

@@ -56,7 +56,7 @@ class LoadedLine:
         self.q = np.zeros((len(omegas), count, SIZE), complex)
         self.omegas, self.phases = omegas, phases_of(omegas) if omegas.size else None
         self.blocks = np.zeros((count, 3, 3))
-        self.by_members = False  # whether drag of members of bodies moves it
+        self.by_drag = False  # whether free points or bodies move it that have drag of their own
 
     def drag_blocks(self, which: np.ndarray, start: bool) -> Floats:
         """Linear drag (N+1, 3, 3) N s/m of every node, by the motion found last at some frequencies, which stand for

@@ -31,9 +31,9 @@ from hybrid.linear.response_results import LineResponse
 # Parts of times (of fewer, what is found scatters with the phases by more than a quarter), times of each, how many to
 # the shortest period that counts, by a part of the power; loads beyond the last of their power are left out.
 PARTS, TIMES, TO_A_PERIOD, POWER = 4, 256, 8.2, 0.01
-# Times of each part where bodies have members, whose drag alone may damp them: parts must outlast many such decays,
-# else their windows spread what drag leaves out over more frequencies than the resonance answers to.
-WITH_MEMBERS = 1024
+# Times of each part where free points or bodies have drag, which alone may damp them: parts must outlast many such
+# decays, else their windows spread what drag leaves out over more frequencies than the resonance answers to.
+RESONANT = 1024
 # Multiplications from which a product of matrices is shared among threads, whose waiting takes more processor time than
 # products of this size.
 SHARED = 2**18
@@ -50,7 +50,7 @@ def left_out(
     their numbers.
     """
     omegas, step = lines[0].omegas, _step([*lines, *members.values()])
-    times = WITH_MEMBERS if members else TIMES
+    times = RESONANT if any(x.by_drag for x in lines) else TIMES
     t = step * np.arange(PARTS * times)
     turned = np.hstack([np.cos(np.outer(t, omegas)), np.sin(np.outer(t, omegas))])  # (M, 2F)
     window = np.hanning(times + 1)[:-1]  # so that no end of a part excites what hardly anything damps

@@ -99,8 +99,11 @@ class _Linear:
                 self.members[b] = LoadedMembers(rest.bodies[b], members, state, omegas)
                 stiffness[b] = stiffness_by_water(rest.solver, rest.states, b, members)
         self.damping, self.by_water = damping, self._of_bodies(stiffness)
+        dragged = bool(self.members) or any(
+            x.x.joints[k] >= 0 and x.point_drag[-k] > 0.0 for x in self.lines for k in (0, 1)
+        )
         for x in self.lines:
-            x.by_members = bool(self.members) and max(x.x.joints) >= 0
+            x.by_drag = dragged and max(x.x.joints) >= 0
         self.loaded: list[LoadedLine | LoadedMembers] = [*self.lines, *self.members.values()]
         self.solver: ComplexSolver | None = None
         self.vectors = np.zeros((len(omegas), self.network.size), complex)
