@@ -168,6 +168,12 @@ def buoyed(waves: Scene) -> Scene:
     return {"environment": water(waves), "points": points | {"buoy": buoy}, "lines": lines}
 
 
+def floated(waves: Scene) -> Scene:
+    """Two of these ropes as one, with a float at its middle."""
+    held = {"kind": "float", "at": 91.5, "buoyancy": 1.2e5, "mass": 1.2e4, "drag_area": 5.8, "added_mass": 2.17e4}
+    return line(183.0, [-60, 0, -90], [60, 0, -90], waves | {"direction": 0.0}, section=ROPE, items=[held], cells=40)
+
+
 # By name, what makes the tables of a scene in a folder for its files.
 SCENES: dict[str, Callable[[Path], Scene]] = {
     "taut leg": lambda _: taut({}),

@@ -23,7 +23,7 @@ import time as clock
 
 import numpy as np
 import pytest
-from response_scenes import SCENES, buoyed, sunken
+from response_scenes import SCENES, buoyed, floated, sunken
 
 import hybrid
 from hybrid.modal.validity import OF_DRAGGED
@@ -116,20 +116,21 @@ def test_against_hours(name, tmp_path):
         print(f"  {note}")
 
 
-@pytest.mark.parametrize("made", [sunken, buoyed])
+@pytest.mark.parametrize("made", [sunken, buoyed, floated])
 @pytest.mark.parametrize("height", [0.1, 0.4, 1.5])
 def test_resonance(made, height):
-    """Tension of ropes at a body and at a point by the same waves at the same times, and what is said to be left out."""
+    """Tension of ropes at a body, a point and a float by the same waves at the same times, and what is said to be left out."""
     sea, off, left = {"kind": "pierson_moskowitz", "significant_height": height, "peak_period": 10.0}, [], []
     for seed in SEEDS:
         tables = seeded(made(sea), seed)
         found = hybrid.response(tables)
-        with hybrid.run(tables | {"output": {"every": 0.25, "points": 21}}) as result:
+        with hybrid.run(tables | {"output": {"every": 0.25, "points": 41 if made is floated else 21}}) as result:
             late = result.times > LATE
             for name, line in found.lines.items():
                 amplitudes = 0.5 * (line.tension[:, 9] + line.tension[:, 10])
                 here = (np.exp(-2j * np.pi * np.outer(result.times[late], line.f)) @ amplitudes).real.std()
-                off.append(float(np.asarray(result.lines[name].tension)[late][:, 10].std() / here - 1.0))
+                of = result if len(found.lines) == 1 else result.lines[name]
+                off.append(float(np.asarray(of.tension)[late][:, 10].std() / here - 1.0))
                 left.append(float(line.left_out["tension"].max()))
     off, left = np.reshape(off, (len(SEEDS), -1)).mean(axis=1), np.reshape(left, (len(SEEDS), -1)).mean(axis=1)
     print(f"\n{made.__name__}, {height:g} m: tension {100.0 * off.mean():.2f} % more in time, of the hours "

@@ -56,7 +56,10 @@ class LoadedLine:
         self.q = np.zeros((len(omegas), count, SIZE), complex)
         self.omegas, self.phases = omegas, phases_of(omegas) if omegas.size else None
         self.blocks = np.zeros((count, 3, 3))
-        self.by_drag = False  # whether free points or bodies move it that have drag of their own
+        # whether free points or bodies move it that have drag of their own, or what it carries and is heavier than it
+        carried = np.nan_to_num(self.line.point_mass) + np.nan_to_num(self.line.point_added)
+        own = float((self.line.mass - np.nan_to_num(self.line.point_mass)).sum())
+        self.by_drag = bool((carried > own)[self.point_drag > 0.0].any())
 
     def drag_blocks(self, which: np.ndarray, start: bool) -> Floats:
         """Linear drag (N+1, 3, 3) N s/m of every node, by the motion found last at some frequencies, which stand for

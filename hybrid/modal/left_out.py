@@ -31,8 +31,8 @@ from hybrid.linear.response_results import LineResponse
 # Parts of times (of fewer, what is found scatters with the phases by more than a quarter), times of each, how many to
 # the shortest period that counts, by a part of the power; loads beyond the last of their power are left out.
 PARTS, TIMES, TO_A_PERIOD, POWER = 4, 256, 8.2, 0.01
-# Times of each part where free points or bodies have drag, which alone may damp them: parts must outlast many such
-# decays, else their windows spread what drag leaves out over more frequencies than the resonance answers to.
+# Times of each part where free points, bodies or heavy floats have drag, which alone may damp them: parts must outlast
+# many such decays, else their windows spread what drag leaves out over more frequencies than the resonance answers to.
 RESONANT = 1024
 # Multiplications from which a product of matrices is shared among threads, whose waiting takes more processor time than
 # products of this size.

@@ -103,7 +103,7 @@ class _Linear:
             x.x.joints[k] >= 0 and x.point_drag[-k] > 0.0 for x in self.lines for k in (0, 1)
         )
         for x in self.lines:
-            x.by_drag = dragged and max(x.x.joints) >= 0
+            x.by_drag |= dragged and max(x.x.joints) >= 0
         self.loaded: list[LoadedLine | LoadedMembers] = [*self.lines, *self.members.values()]
         self.solver: ComplexSolver | None = None
         self.vectors = np.zeros((len(omegas), self.network.size), complex)

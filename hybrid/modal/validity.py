@@ -34,9 +34,9 @@ NEAR = 1e-7
 MOST_ADDED, SHAPE = ADDED | {"curvature": 0.1}, 0.1
 # That of tension of a line whose ends move, where 1.2 of it comes true: 3 % (bench/test_bench_response.py).
 OF_MOVED = 0.025
-# That where free points or bodies with drag move it, of which up to twice as much comes true near a resonance that only
-# this damps: 3 % (test_resonance of bench/test_bench_response.py).
-OF_DRAGGED = 0.015
+# That where free points, bodies or heavy floats with drag move it, of which up to three times as much comes true near a
+# resonance that only this damps: 3 % (test_resonance of bench/test_bench_response.py).
+OF_DRAGGED = 0.01
 # Part of a line on which curvature has to be known at least.
 FEW_PLACES = 0.05
 
@@ -198,8 +198,8 @@ def _left_out(x: LoadedLine, found: LineResponse) -> Iterator[str]:
         k = int(added.argmax())
         moved = x.shifts.any() or x.turns.any() or max(x.x.joints) >= 0
         of_moved = OF_DRAGGED if x.by_drag else OF_MOVED
-        if added[k] > (of_moved if moved and name == "tension" else MOST_ADDED[name]):
-            what, remedy = ", of points and bodies too,", "; near a resonance it is more: run it in time"
+        if added[k] > (of_moved if (moved or x.by_drag) and name == "tension" else MOST_ADDED[name]):
+            what, remedy = ", of points, floats and bodies too,", "; near a resonance it is more: run it in time"
             yield (
                 f"{name} at s = {places[k]:.4g} m: the rest of quadratic drag{what if x.by_drag else ''} and the "
                 f"stretch by swinging would add up to {100.0 * part[k]:.2g} % to its standard deviation of "

@@ -218,4 +218,24 @@ def test_tension_near_a_resonance_that_drag_alone_damps(tables, least, most):
             assert least < there / here - 1.0 < most
     notes = [x for x in found.notes if "tension at s" in x]
     assert found.valid_for("tension") == (not notes) == (most < 0.03)
-    assert all("of quadratic drag, of points and bodies too," in x and "run it in time" in x for x in notes)
+    assert all("of quadratic drag, of points, floats and bodies too," in x and "run it in time" in x for x in notes)
+
+
+def test_tension_of_a_line_with_a_heavy_float_near_its_resonance():
+    """As that of ropes at a free point."""
+    rope = {"length": 183.0, "mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "added_mass": {"normal": 1.0}}
+    held = {"kind": "float", "at": 91.5, "buoyancy": 1.2e5, "mass": 1.2e4, "drag_area": 5.8, "added_mass": 2.17e4}
+    sea = sunken(0.4, 0.0)["environment"]
+    places = {"start": [-60, 0, -90], "end": [60, 0, -90]}
+    tables = {
+        "environment": sea, "cable": {"sections": [rope], "attachments": [held]}, "model": "catenary",
+        "ends": {k: {"kind": "pinned", "position": x} for k, x in places.items()},
+        "initial": "equilibrium", "mesh": {"cells": 16},
+    }  # fmt: skip
+    found = hybrid.response(tables)
+    line, time = found.lines["cable"], {"duration": 1800.0, "step": 0.1}
+    with hybrid.run(tables | {"time": time, "output": {"every": 0.5, "points": 17}}) as run:
+        late = run.times > 100.0
+        here = (np.exp(-2j * np.pi * np.outer(run.times[late], line.f)) @ line.tension[:, 3:5].mean(axis=1)).real.std()
+        assert 0.03 < run.tension[late][:, 4].std() / here - 1.0 < 0.08
+    assert not found.valid_for("tension")
