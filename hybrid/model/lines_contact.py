@@ -101,7 +101,9 @@ def that_may_meet(system: System, scenes: Mapping[str, Scene]) -> tuple[int, ...
 
 def passing_each_other(system: System) -> System:
     """The same, of which no line touches another one unless the scene asks for it."""
-    return system if system.contact is not None else system.model_copy(update={"contact": LinesContact(between=())})
+    if system.contact is not None or len(system.lines) == 1:
+        return system
+    return system.model_copy(update={"contact": LinesContact(between=())})
 
 
 def _may_meet(scene: Scene) -> bool:

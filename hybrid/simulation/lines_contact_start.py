@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun
 
 Pair = tuple[int, int]
+BEGINS = "contact begins"
 
 
 def lines_near(run: SystemRun) -> list[Pair]:
@@ -45,7 +46,7 @@ def lines_near(run: SystemRun) -> list[Pair]:
             f"contact between them is computed from here on; {COST.split(';')[0]}; contact: {{between: []}} switches "
             "it off"
         )
-        run.recorder.event(run.t, 0.0, 0.0, "contact begins", text)
+        run.recorder.event(run.t, 0.0, 0.0, BEGINS, text)
     return begun
 
 
