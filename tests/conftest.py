@@ -47,6 +47,9 @@ ROWS = pytest.StashKey[list[Row]]()
 MISSED = pytest.StashKey[set[str]]()
 Report = Callable[[str, str, str, str], None]
 
+# What pyproject.toml leaves out everywhere.
+USUAL = "not slow and not bench"
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--write-validation", action="store_true", help="write the figures to docs/evidence/validation.md")
@@ -54,7 +57,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    """The whole suite is run without tests of a second or more; where files or marks are named they are run."""
     config.stash[ROWS], config.stash[MISSED] = [], set()
+    if config.args_source is pytest.Config.ArgsSource.TESTPATHS and config.option.markexpr == USUAL:
+        config.option.markexpr = f"{USUAL} and not long"  # which worker processes are told
 
 
 @pytest.fixture

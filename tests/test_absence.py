@@ -166,6 +166,7 @@ def test_only_what_is_asked_for_has_a_bit_and_numbers(asked: hybrid.Scene, bits:
         assert (np.isfinite(value) if bits & bit else np.isnan(value)).all(), name
 
 
+@pytest.mark.long
 @each_scene
 def test_the_contents_say_what_the_line_does(asked: hybrid.Scene, bits: int) -> None:
     plan = hybrid.plan(asked)

@@ -107,6 +107,7 @@ def test_ci_reads_its_commands_from_the_readme() -> None:
     assert "pip install" not in script
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_scenes_on_pages_load(page: Path) -> None:
     for text in blocks(page, "yaml"):

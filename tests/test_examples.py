@@ -220,6 +220,7 @@ PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[float, float]], flo
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SEA)
 def test_the_plan_of_an_example_is_what_it_was(name: str) -> None:
     """A change here is a change of criteria, of plans or of the mesh: see whether it is meant.
@@ -391,6 +392,7 @@ def test_slack_cable_lies_in_a_bight_that_friction_holds() -> None:
     assert x.max() > 16 and x[-1] == pytest.approx(8) and y[-1] == pytest.approx(10)
 
 
+@pytest.mark.long
 def test_buoy_follows_an_irregular_sea() -> None:
     """The sea of this seed, at this place and for 180 s only; over 1000 s 4 std is 1.94 m, the header says.
 
@@ -415,6 +417,7 @@ def event_times(result: hybrid.Result, kind: str) -> list[float]:
     return [event.t for event in result.events if event.kind == kind]
 
 
+@pytest.mark.long
 def test_the_twisted_rod_goes_from_a_helix_to_a_loop_to_intertwining() -> None:
     """The sequence of Goyal, Perkins and Lee: by writhe, crossings and contact, with all turns kept."""
     result = ran("plectoneme")
@@ -435,6 +438,7 @@ def test_the_twisted_rod_goes_from_a_helix_to_a_loop_to_intertwining() -> None:
     assert not event_times(result, "unstable")
 
 
+@pytest.mark.long
 def test_the_twisted_tether_throws_a_loop_that_pops_out_too_tight() -> None:
     result = ran("twisted_tether")
     writhe, tension = result["turns/writhe"], result.reaction_end[:, 0]
@@ -449,6 +453,7 @@ def test_the_twisted_tether_throws_a_loop_that_pops_out_too_tight() -> None:
     assert np.abs(writhe[-1]) < 1e-3
 
 
+@pytest.mark.long
 def test_the_laid_cable_throws_a_loop_at_its_touchdown() -> None:
     result = ran("laying_loop")
     np.testing.assert_allclose(result["turns/link"][result.times > 20.1], 14.0, atol=2e-3)  # as above
@@ -463,6 +468,7 @@ def test_the_laid_cable_throws_a_loop_at_its_touchdown() -> None:
     assert event.value == pytest.approx(0.137, rel=0.1)
 
 
+@pytest.mark.long
 def test_python_example_prints_what_it_promises(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Distances of the reference solutions (validation): hybrid 5.36 cm, its joint at 0.2 ... 1.7 m as listed."""
     script = runpy.run_path(str(EXAMPLES / "08_python_api.py"))
@@ -478,6 +484,7 @@ def test_python_example_prints_what_it_promises(tmp_path: Path, capsys: pytest.C
     assert (tmp_path / "picture.png").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_armoured_cable_has_the_torque_of_its_mean_tension() -> None:
     result = ran("armoured_cable")
     w = 9.81 * (2.0 - 1025.0 * 0.25 * math.pi * 0.025**2)

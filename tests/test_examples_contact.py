@@ -44,6 +44,7 @@ def writhe(x: Floats) -> float:
     return total
 
 
+@pytest.mark.long
 def test_a_rope_slips_over_a_sheave_as_the_capstan_equation_says() -> None:
     result = ran("rope_over_sheave")
     late = (result.times > 0.7) & (result.times < 1.5)
@@ -57,6 +58,7 @@ def test_a_rope_slips_over_a_sheave_as_the_capstan_equation_says() -> None:
     assert np.abs(held.position[late, -1, 2] - held.position[late, -1, 2].mean()).max() < 0.02
 
 
+@pytest.mark.long
 def test_a_rope_is_drawn_over_a_fairlead_of_triangles() -> None:
     result = ran("rope_over_fairlead")
     late = int(np.argmin(np.abs(result.times - 1.5)))
@@ -69,6 +71,7 @@ def test_a_rope_is_drawn_over_a_fairlead_of_triangles() -> None:
     assert len(result["obstacles/fairlead/triangles"]) == 432
 
 
+@pytest.mark.long
 def test_tethers_wind_up_without_passing_through_each_other_and_come_apart() -> None:
     result = ran("tethers_tangle")
     assert [e.kind for e in result.events].count("lines touch") == 1
@@ -81,6 +84,7 @@ def test_tethers_wind_up_without_passing_through_each_other_and_come_apart() -> 
     assert distances[-1] > 2.0 * 0.03
 
 
+@pytest.mark.long
 def test_an_umbilical_clashes_with_a_mooring_line() -> None:
     result = ran("umbilical_clash")
     kinds = [e.kind for e in result.events]
@@ -88,6 +92,7 @@ def test_an_umbilical_clashes_with_a_mooring_line() -> None:
     assert result["gap"].min() < 0.05 and result["gap"].max() > 1.0
 
 
+@pytest.mark.long
 def test_a_cable_comes_down_on_a_pipeline_and_lies_there() -> None:
     result = ran("cable_over_pipeline")
     x = result.position

@@ -71,6 +71,7 @@ def prove(proofs: list[str], package: Path, folder: Path, **more: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_what_needs_no_change_holds_as_it_is(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     prove(blocks("python")[:UNCHANGED], ROOT, tmp_path)

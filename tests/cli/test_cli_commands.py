@@ -159,6 +159,7 @@ def test_the_lowest_point_of_a_flat_line_is_not_chosen_by_round_off() -> None:
     assert lowest_node(s, r) == 7
 
 
+@pytest.mark.long
 def test_plot_takes_its_format_from_the_name(call: Call) -> None:
     call("run", "wire.yaml")
     said = call("plot", "wire.h5")
@@ -190,6 +191,7 @@ def test_plan_of_lines_has_their_forces_their_time_and_no_text_that_is_cut(call:
     assert re.fullmatch(r"10 s in 100 steps of 0.1 s; about [\d.]+ m?s of CPU for all runs", rows["time"]), rows["time"]
 
 
+@pytest.mark.long
 def test_plan_of_lines_says_what_touches_what(call: Call) -> None:
     Path("bridle.yaml").write_text(BRIDLE)
     apart = " ".join(call("plan", "bridle.yaml", "--set", "contact={between: []}").out.split())
@@ -234,6 +236,7 @@ def test_plan_says_what_is_on_and_computes_nothing(call: Call) -> None:
     assert {"what", "on", "why", "event", "s"} == set(plan["contents"][0])
 
 
+@pytest.mark.long
 def test_plan_of_a_line_with_20_000_attachments(call: Call) -> None:
     """Seconds; it did not end within 40 s when each asked for all the others."""
     clumps = "".join(f"    - {{kind: clump, at: {i * 1e-4:.4f}, mass: 0.001}}\n" for i in range(1, 20_000))

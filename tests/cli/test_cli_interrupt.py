@@ -73,6 +73,7 @@ def test_an_interrupted_run_leaves_a_whole_file(number: signal.Signals) -> None:
     assert err == f"interrupted; long.h5 is complete up to t = {last['t']:.6g} s; `hybrid resume long.h5` goes on\n"
 
 
+@pytest.mark.long
 def test_a_reader_who_goes_away_ends_the_run() -> None:
     process = start()
     assert process.stdout is not None and process.stderr is not None
@@ -83,6 +84,7 @@ def test_a_reader_who_goes_away_ends_the_run() -> None:
     assert err == f"interrupted; long.h5 is complete up to t = {check_file():.6g} s; `hybrid resume long.h5` goes on\n"
 
 
+@pytest.mark.long
 def test_the_live_line_on_a_terminal_and_ctrl_c() -> None:
     here, there = pty.openpty()
     environment = os.environ | {"TERM": "xterm", "COLUMNS": "80", "LINES": "24"}

@@ -49,6 +49,7 @@ def test_what_needs_no_numbers_imports_no_numbers(arguments: list[str]) -> None:
     assert out and not modules & HEAVY
 
 
+@pytest.mark.long
 def test_plan_draws_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("hanging.yaml").write_text(json.dumps(HANGING))  # JSON is YAML
@@ -78,6 +79,7 @@ def test_what_is_compiled_is_called_without_numba(
     assert command == "run" or not any(x.partition(".")[0] == "rich" for x in modules), "a long run shows a line"
 
 
+@pytest.mark.long
 def test_a_picture_of_a_command_is_that_of_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A command imports matplotlib without the help of its classes; its modules are those that drawing needs."""
     monkeypatch.chdir(tmp_path)
@@ -121,6 +123,7 @@ def test_python_runs_the_package_as_the_command(
     assert not left.value.code and capsys.readouterr().out.startswith(f"hybrid {hybrid.__version__}\n")
 
 
+@pytest.mark.long
 def test_version_and_help() -> None:
     named, code = call("--version")[0].splitlines()
     assert named == f"hybrid {hybrid.__version__}" and code.startswith(

@@ -119,6 +119,7 @@ def test_what_cannot_be_written_is_refused(call: Call, arguments: tuple[str, ...
         assert len(result.times) == 6
 
 
+@pytest.mark.long
 def test_a_file_of_others_is_replaced_only_with_overwrite(call: Call) -> None:
     for command, name in (("plot", "run.png"), ("report", "run.html")):
         Path(name).write_bytes(b"a holiday")

@@ -58,6 +58,7 @@ def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     return run
 
 
+@pytest.mark.long
 def test_trade_writes_into_the_current_folder_and_says_what_to_take(call: Call) -> None:
     Path("there").mkdir()
     Path("sag.yaml").rename("there/sag.yaml")
@@ -74,6 +75,7 @@ def test_trade_writes_into_the_current_folder_and_says_what_to_take(call: Call) 
     assert call("trade", "there/sag.yaml", *SHORT, "--quiet")[1:] == ("", ""), "its runs are kept"
 
 
+@pytest.mark.long
 def test_json_has_a_line_for_every_row(call: Call) -> None:
     said = call("trade", "sag.yaml", *SHORT, "-o", "out", "--for", "10%", "--json")
     assert said.code == 0, said.err
@@ -136,6 +138,7 @@ def test_a_reference_that_fails_is_exit_2(call: Call, monkeypatch: pytest.Monkey
     assert said.code == 2 and "the reference run, rod 3%, failed" in " ".join(said.err.split())
 
 
+@pytest.mark.long
 def test_ctrl_c_leaves_what_is_done_and_the_same_command_goes_on(call: Call) -> None:
     Path("long.yaml").write_text(SAG.replace("duration: 1.0", "duration: 200.0"))  # runs of about half a second
     arguments = ["trade", "long.yaml", *SHORT, "--json"]

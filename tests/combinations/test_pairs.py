@@ -55,6 +55,7 @@ def turned(tables: Tables) -> Tables:
     return exchanged(seen_by(turned_and_mirrored(), tables))
 
 
+@pytest.mark.long
 def test_every_pair_is_read_or_refused_by_the_table() -> None:
     """Also turned, mirrored and with its ends exchanged: refused so where it is as it stands, and only there."""
     read = 0
@@ -137,6 +138,7 @@ def differences(names: Iterable[tuple[str, ...]]) -> list[str]:
     return [x for each in names for said in (turned, as_system) if (x := differ(each, said))]
 
 
+@pytest.mark.long
 def test_a_feature_computed_otherwise_is_the_same() -> None:
     assert not differences((name,) for name in FEATURES)
 

@@ -195,6 +195,7 @@ def test_base_cells_to_a_layer_of_cells_that_follow_show_the_bend_at_both_clamps
         assert np.abs(found / true - 1.0).max() < bound
 
 
+@pytest.mark.long
 def test_cells_to_a_layer_of_several_lines_are_where_the_pre_run_of_one_puts_them() -> None:
     """Also of a line that doubles its length, of which the pre-run has places on the reel."""
     paid = {END: BASE["ends"]["end"] | {"motion": None, "payout": {"rate": 6.0, "ramp": 0.5}}}
@@ -415,6 +416,7 @@ def slope_on_the_pipe(line: hybrid.Result) -> float:
     return float(np.mean(found))
 
 
+@pytest.mark.long
 def test_friction_that_has_settled_on_a_pipe_is_that_of_the_capstan() -> None:
     """T = T_top e^(mu phi) on both sides of the top, which stays where it lay; without it T is even; of several, too.
 

@@ -26,6 +26,7 @@ def test_it_is_found_by_its_entry_point() -> None:
     assert found.load() is HybridSolver
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "bounds"),
     [
@@ -47,6 +48,7 @@ def test_a_rope_holds_below_its_overhang_and_slides_beyond_it() -> None:
     assert solved("capstan", overhang=1.1).metrics["slide"] > 0.02
 
 
+@pytest.mark.long
 def test_directors_stay_across_the_chords_and_follow_the_twist() -> None:
     trajectory = solved("crossing").trajectory
     assert trajectory is not None

@@ -152,6 +152,7 @@ def test_what_runs_off_to_nothing_is_no_optimum(low):
     assert "no optimum" in note and not found.settled
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("key", "bounds", "minimise", "side"),
     [
@@ -423,6 +424,7 @@ def _sagging(turn, several):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_turned_in_plan_and_written_as_a_system_it_is_the_same():
     one, other = _sagging(0.0, False), _sagging(0.7, True)
     assert any(x.active for x in one.kept)

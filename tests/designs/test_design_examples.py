@@ -35,6 +35,7 @@ def test_pretension_of_three_lines_takes_six_equilibria() -> None:
     assert abs(found.kept[0].finer - 60e3) < 0.001 * 60e3  # on twice the cells, with other numbers than these
 
 
+@pytest.mark.long
 def test_the_lazy_wave_is_held_by_as_many_limits_as_there_are_unknowns() -> None:
     found = designed("lazy_wave")
     assert found.equilibria <= 60 and found.minimised == pytest.approx(2.394, rel=2e-3)
@@ -63,6 +64,7 @@ def test_a_sagging_umbilical_shows_the_ratio_of_stiffness_and_mass() -> None:
     assert found.numbers["stiffness"] / found.numbers["mass"] == pytest.approx(10.0, abs=0.045)  # three deviations
 
 
+@pytest.mark.long
 def test_a_towing_record_shows_stiffness_and_drag() -> None:
     """The record was made with 6 N m2 and 1.3, and noise of 2 % of the largest force and change of angle."""
     found = designed("towing")

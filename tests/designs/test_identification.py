@@ -162,6 +162,7 @@ def towed(tmp_path, noise):
     )
 
 
+@pytest.mark.long
 def test_stiffness_and_drag_from_a_history(tmp_path):
     """Without noise both come back; deviations are those of differences of runs by hand, J^T J over deviations."""
     found = towed(tmp_path, np.zeros((40, 2)))
@@ -193,6 +194,7 @@ def test_a_row_without_a_time_is_of_the_equilibrium(tmp_path):
     assert found.numbers == pytest.approx({"EI": 6.0}, rel=1e-5) and found.runs == 0 and not found.histories
 
 
+@pytest.mark.long
 def test_noise_that_goes_on_from_reading_to_reading_is_said(tmp_path):
     """Of x_i = 0.8 x_(i-1) + e; noise of readings by themselves is not said to be so."""
     white = np.random.default_rng(3).standard_normal((40, 2))

@@ -55,6 +55,7 @@ OPEN = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("more", OPEN, ids=["tolerance", "accuracy", "and cells", "cells"])
 @pytest.mark.parametrize("several", [False, True])
 def test_the_same_in_steps_and_cells_that_a_run_has_chosen(more, several):
@@ -126,6 +127,7 @@ def test_a_study_of_the_step(found):
         np.testing.assert_allclose(ours.derivatives[i], theirs, rtol=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["catenary", "rod", {"kind": "adaptive", "hold_time": 0.5}])
 @pytest.mark.parametrize("mesh", [{"cells": 40}, None])
 def test_a_replay_is_the_run_and_its_derivatives_those_of_short_steps(model, mesh):

@@ -121,6 +121,7 @@ def test_an_optimum_is_that_of_the_design():
     assert problem.get_val("top").item() == pytest.approx(1962.0, rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_design_states_its_own_problem():
     """Buoyancy of a lazy wave in three cases: bounds, limits and what is minimised are those of its file, with bounds
 

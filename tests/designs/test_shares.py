@@ -82,6 +82,7 @@ def test_a_product(chain: Path, result: str):
     assert [x.variable for x in found.rows] == ["L", "m"]  # the largest first
 
 
+@pytest.mark.long
 def test_where_a_line_does_not_hold_nothing_is_claimed(tmp_path: Path):
     """Tension of a line 1 to 10 m longer than its span goes with the root of that: by the mean it is another."""
     vary = {"L": {"key": LENGTH, "low": 100.3, "high": 110.0}, "m": {"key": MASS, "low": 4.9, "high": 5.1}}
@@ -98,6 +99,7 @@ def test_where_a_line_does_not_hold_nothing_is_claimed(tmp_path: Path):
     assert slopes == pytest.approx({"L": exact[LENGTH], "m": exact[MASS]}, rel=1e-9)
 
 
+@pytest.mark.long
 def test_variables_that_go_together_are_no_shares(tmp_path: Path):
     values = {
         "m": {"key": MASS, "values": [4.9, 4.95, 5.0, 5.05, 5.1, 5.2]},
@@ -109,6 +111,7 @@ def test_variables_that_go_together_are_no_shares(tmp_path: Path):
     assert np.isnan([x.share for x in found.rows]).all()
 
 
+@pytest.mark.long
 def test_a_motion(tmp_path: Path):
     """Of runs: derivatives are those of `sensitivity` at the mean, and the line through it explains the cases."""
     vary = {
@@ -131,6 +134,7 @@ def test_a_motion(tmp_path: Path):
         assert slopes[x.by] == pytest.approx(x.derivative, rel=1e-7)
 
 
+@pytest.mark.long
 def test_several_keys_of_one_variable_and_one_that_stays(tmp_path: Path):
     """Two halves of the chain that get heavier together; the end is varied by one value alone."""
     two = CHAIN.replace(
@@ -145,6 +149,7 @@ def test_several_keys_of_one_variable_and_one_that_stays(tmp_path: Path):
     assert row.derivative == pytest.approx(G * 40, rel=1e-6) and row.share == 1.0 and found.r2 == pytest.approx(1.0)
 
 
+@pytest.mark.long
 def test_what_has_no_derivative_is_refused(tmp_path: Path):
     vary = {
         "kind": {"key": "model", "values": ["catenary", "catenary", "adaptive"]},
@@ -161,6 +166,7 @@ def test_what_has_no_derivative_is_refused(tmp_path: Path):
         hybrid.shares(study, "two")
 
 
+@pytest.mark.long
 def test_what_is_kept_otherwise_is_refused(tmp_path: Path):
     collect = {
         "pull": {"quantity": "end_force_end", "take": ["deviation", "median"]},
@@ -176,6 +182,7 @@ def test_what_is_kept_otherwise_is_refused(tmp_path: Path):
         hybrid.shares(study, "late")
 
 
+@pytest.mark.long
 def test_the_command_and_the_report(chain: Path, capsys: pytest.CaptureFixture[str]):
     def said(*words: str) -> str:
         with pytest.raises(SystemExit) as left:

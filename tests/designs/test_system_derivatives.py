@@ -35,6 +35,7 @@ def moored(top, hose=False):
     return {"environment": SEA, "points": points, "lines": lines}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("hose", "keys"),
     [
@@ -90,6 +91,7 @@ def test_a_system_of_one_line_is_the_cable():
         assert y.derivative == pytest.approx(x.derivative, rel=1e-6), (x.of, x.by)
 
 
+@pytest.mark.long
 def test_pretension_of_a_mooring():
     """One number for each line; anchors that are not alike get other lengths; few equilibria."""
     tables = moored(HELD)
@@ -114,6 +116,7 @@ def test_what_is_refused():
             hybrid.sensitivity(plain, ["east/tension@end"], [key])
 
 
+@pytest.mark.long
 def test_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mooring.yaml").write_text(yaml.safe_dump(moored(HELD)))

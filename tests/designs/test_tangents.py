@@ -77,11 +77,13 @@ def twisted() -> dict[str, Any]:
 KEYS = [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.gravity", "ends.end.motion.heave.amplitude"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["catenary", "rod"])
 def test_a_touchdown_that_moves(model: str) -> None:
     agree(on_the_bed(model), OF, KEYS)
 
 
+@pytest.mark.long
 def test_zones_that_stay() -> None:
     zones = {"kind": "zones", "zones": [{"catenary": 150.0, "cells": 25}, {"rod": 100.0, "cells": 20}]}
     agree(on_the_bed() | {"model": zones, "mesh": None}, OF, KEYS)
@@ -95,12 +97,14 @@ def test_a_phase_that_is_nothing() -> None:
     assert size_of(scene, key, 0.0) == pytest.approx(180.0 / np.pi)
 
 
+@pytest.mark.long
 def test_waves_and_a_current_across() -> None:
     agree(
         in_water(on_the_bed("rod")), OF, [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.fluid.waves.height"]
     )
 
 
+@pytest.mark.long
 def test_a_hose_that_is_twisted_and_damped() -> None:
     """Between outputs, too, which are not at the ends of steps."""
     of = ["std position.z@5", "last position.y@7", "last torque@6", "max curvature@6", "last tension@6"]

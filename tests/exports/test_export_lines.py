@@ -68,6 +68,7 @@ def test_every_dimension_of_a_file_leads_to_its_scale(folder: Path, file: str) -
                     assert dim[0].is_scale and len(dim[0]) == data.shape[k]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
 @pytest.mark.parametrize("file", ["run.h5", "resumed.h5", "static.h5"])
 def test_a_file_opens_in_xarray(folder: Path, file: str, engine: Any) -> None:
@@ -114,6 +115,7 @@ def test_points_and_bodies_are_exported_under_their_names(folder: Path, capsys: 
     assert exported(capsys, folder, "e.csv", "--names", "events")[1] == {"e.csv", "e.west.csv", "e.east.csv"}
 
 
+@pytest.mark.long
 def test_netcdf_holds_everything(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")
     assert exported(capsys, folder, "all.nc")[:2] == (0, {"all.nc", "all.west.nc", "all.east.nc"})

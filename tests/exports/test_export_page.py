@@ -15,6 +15,7 @@ ROOT = Path(hybrid.__file__).parents[1]
 PAGE = ROOT / "docs" / "export.md"
 
 
+@pytest.mark.long
 def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     for package in ("xarray", "h5netcdf", "netCDF4", "pandas", "vtk", "rainflow"):
         pytest.importorskip(package, reason="the extra `dev` is not installed")

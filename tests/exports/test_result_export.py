@@ -564,6 +564,7 @@ def test_places_where_nothing_can_be_written(result: Result, tmp_path: Path) -> 
             export(result, f"/proc/run{SUFFIXES[kind]}", format=kind)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes there")
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_full_disk_leaves_what_was_there(tmp_path: Path, kind: str) -> None:

@@ -6,6 +6,7 @@ import pytest
 from every import CASES, parameters
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", parameters(CASES))
 def test_extremes(case, assert_honest):
     assert_honest(case)

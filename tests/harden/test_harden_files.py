@@ -112,6 +112,7 @@ def _told(what: str, numbers: range, count: Counter[str]) -> None:
     print(f"\n{len(numbers)} variants of {what}: {said}")
 
 
+@pytest.mark.long
 def test_spoilt_files(good: Path) -> None:
     count, bad = opened(good, range(10_000, 10_100), 25)
     _told("a complete result", range(100), count)
@@ -130,6 +131,7 @@ def test_three_thousand_spoilt_files(good: Path) -> None:
     assert sum(n for kind, n in count.items() if kind.startswith("crashed")) <= 60
 
 
+@pytest.mark.long
 def test_spoilt_files_of_a_run_that_was_killed(tmp_path: Path) -> None:
     """They have no sums, so other numbers are told and not promised; but they do not keep a reader waiting.
 

@@ -87,6 +87,7 @@ def test_a_million_steps_take_no_more_memory_than_a_hundred_thousand(tmp_path: P
     _stays(1_000_000, tmp_path / "long.h5", 8.0)
 
 
+@pytest.mark.long
 def test_events_that_repeat_are_counted_and_not_all_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What was left out is said, in the file and in the number of changes of zones at the end of a run."""
     everything = hybrid.run(_scene(8000), tmp_path / "all.h5", criterion=comes_and_goes)

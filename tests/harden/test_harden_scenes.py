@@ -103,6 +103,7 @@ def _none_is_bad(seeds: range) -> None:
     assert ended["ran"] and ended["refused"], "the harms do not reach the reader, or nothing comes through"
 
 
+@pytest.mark.long
 def test_the_scenes_are_whole_before_they_are_harmed(warm: None) -> None:
     """What is harmed is accepted, written and read back the same."""
     for k, (name, data) in enumerate(all_scenes().items()):
@@ -114,6 +115,7 @@ def test_the_scenes_are_whole_before_they_are_harmed(warm: None) -> None:
             assert command("plan", "whole.yaml").code == 0, name
 
 
+@pytest.mark.long
 def test_harmed_scenes(warm: None) -> None:
     _none_is_bad(range(10_000, 10_040))
 

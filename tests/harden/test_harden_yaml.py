@@ -151,6 +151,7 @@ def _fuzz(seeds: range) -> None:
     assert codes[0] and codes[1] and set(codes) == {0, 1}
 
 
+@pytest.mark.long
 def test_spoilt_texts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     _fuzz(range(90_000, 90_150))
@@ -174,6 +175,7 @@ time: {duration: 0.4, step: 0.05}
 ROWS = "t,x,y,z\n" + "".join(f"{0.05 * k:.2f},{10 - 0.01 * (0.05 * k) ** 3:.9f},0,0\n" for k in range(20))
 
 
+@pytest.mark.long
 def test_motion_files_that_are_spoilt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("moved.csv").write_text(ROWS)

@@ -223,6 +223,7 @@ def imports_or_refuses(text: str, folder: Path) -> ImportedDeck | SceneError:
         return error
 
 
+@pytest.mark.long
 @settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(mutated())
 def test_a_mutated_deck_is_imported_or_refused_with_its_line(tmp_path: Path, text: str) -> None:

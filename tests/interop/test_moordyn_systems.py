@@ -256,6 +256,7 @@ def test_angles_of_a_deck_are_rotations_of_a_scene_and_back(angles: tuple[float,
         assert _rotated(angles_of(rotation_of(angles)), v) == pytest.approx(_rotated(angles, v))
 
 
+@pytest.mark.long
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(mutated([RISER, RISER.replace("3 Body1 0 0 0 0", "3 Body1 1 0 0.5 0"), text_of("rods_and_bodies")]))
 def test_a_mutated_deck_is_one_scene_or_refused_with_its_line(tmp_path: Path, text: str) -> None:

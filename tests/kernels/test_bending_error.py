@@ -82,6 +82,7 @@ def rate_rows(line, sea, ends, st, q):
     return (J @ np.column_stack([np.zeros(N + 1), q]).ravel()).reshape(N + 1, 5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bits", WITHOUT_OBSTACLES)
 @pytest.mark.parametrize("seed", range(3))
 def test_history_of_a_catenary_is_the_matrix_own(bits, seed):
@@ -155,6 +156,7 @@ def chain(cells, angle=0.1, EI=2.0, T=50.0, tangent=(0, 0), turn=None):
     return s, dM[:, 1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cells", [10, 50, 200, 800])
 def test_moment_at_a_kink_at_any_length_of_cells(cells):
     """EI alpha / (2 lambda) of the boundary layers on both sides, of cells of lambda/16 to 5 lambda; beside it exp(-s)."""
@@ -215,6 +217,7 @@ def distances(low: hybrid.Scene, high: hybrid.Scene) -> tuple[np.ndarray, np.nda
     return true, a["errors/model/position"].max(axis=1)
 
 
+@pytest.mark.long
 def test_estimate_is_the_distance_to_the_rod():
     """In proportion to EI; of curvature, whose layers at the pins results have, little is left, and no less is said."""
     found = []
@@ -236,6 +239,7 @@ def test_estimate_is_the_distance_to_the_rod():
     assert 1.8 < found[1] / found[0] < 2.1
 
 
+@pytest.mark.long
 def test_pull_of_the_ends_is_estimated():
     """The force that holds an end, as its magnitude; within a tenth in the median (0.99 when written)."""
     a, b = hybrid.run(span(4.0, "catenary")), hybrid.run(span(4.0, "rod"))

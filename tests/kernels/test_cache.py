@@ -92,6 +92,7 @@ def edit(folder: Path, file: str, old: str, new: str) -> None:
     path.write_text(text.replace(old, new))
 
 
+@pytest.mark.long
 def test_a_copy_elsewhere_compiles_nothing_and_an_edit_in_another_file_anew(
     copy: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -163,6 +164,7 @@ def test_the_first_scene_from_a_wheel_compiles_nothing(tmp_path: Path) -> None:
             assert shipped.position.tobytes() == result.position.tobytes()
 
 
+@pytest.mark.long
 def test_an_edit_of_any_file_with_a_kernel_means_another_folder(copy: Path) -> None:
     """Scenes load what lies in the folder of their hash: an edit of a file that it does not know would go unnoticed."""
     package = copy / "hybrid"
@@ -179,12 +181,14 @@ def test_an_edit_of_any_file_with_a_kernel_means_another_folder(copy: Path) -> N
         file.write_text(text)
 
 
+@pytest.mark.long
 def test_a_second_process_compiles_nothing_for_its_scene() -> None:
     command = [sys.executable, "-c", SCENE]
     misses = [subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2)]
     assert misses[1] == "0\n"
 
 
+@pytest.mark.long
 def test_own_numba_functions_keep_their_own_cache(tmp_path: Path) -> None:
     """The user's setting of numba's cache folder is the same before and after, and honoured."""
     (tmp_path / "mine.py").write_text("import numba\n@numba.njit(cache=True)\ndef twice(x):\n    return 2.0 * x\n")

@@ -107,6 +107,7 @@ DAMAGES: dict[str, Callable[[bytes, Path], bytes]] = {
 }
 
 
+@pytest.mark.long
 def test_damaged_and_poisoned_files_run_nothing_and_are_made_again(home: Path) -> None:
     assert compiled() == 1 and compiled() == 0
     file = only_file(home)

@@ -107,6 +107,7 @@ def check(ends: EndConditions, around: Surroundings, times=TIMES) -> None:
         np.testing.assert_allclose(velocity, ends.velocity, rtol=0, atol=ROUND_OFF * size, err_msg=f"velocity at {t}")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", KINDS)
 def test_compiled_is_python(first: str) -> None:
     around = waters()
@@ -129,6 +130,7 @@ def test_ends_on_a_body_that_moves_compiled_are_python(tmp_path: Path, name: str
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("begin", [0.0, -5.0])
 @pytest.mark.parametrize(("shift", "turn"), [(True, True), (True, False), (False, True)])
 def test_files_compiled_are_python(tmp_path: Path, shift: bool, turn: bool, begin: float) -> None:
@@ -203,6 +205,7 @@ def way(ends: EndConditions, a: float, b: float) -> float:
     return float((np.append(weights, 1.0) @ speeds).max() * (b - a) / 6000.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["harmonics", "lists", "no ramp", "everything", "file", "blended file"])
 def test_turn_is_an_upper_bound_within_a_factor(tmp_path: Path, name: str) -> None:
     """No less than the integral of the angular speed (its error: 1e-5); axes that add up, and a ramp that counts with

@@ -33,6 +33,7 @@ def boxes(tmp_path_factory: Any) -> Around:
     )
 
 
+@pytest.mark.long
 def test_a_box_of_triangles_is_a_box(boxes: Around) -> None:
     """d, n and K within and without, to round-off."""
     for x in places(600):

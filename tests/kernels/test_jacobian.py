@@ -165,6 +165,7 @@ def by_differences(line, sea, ends, st):
     return numeric
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, BITS)))
 def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
     line, sea, ends, st = random_case(3, ZONES[zones], bits)

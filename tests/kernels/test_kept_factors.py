@@ -27,6 +27,7 @@ def exchanged(order, a, b):
     return exchange(order, a, b)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("exactly", [True, False])
 @pytest.mark.parametrize("first", [0, 3, N])
 @pytest.mark.parametrize("name", ZONES)

@@ -200,6 +200,7 @@ def dense(rows):
     return J[:, 6 : 6 + 3 * N + 3], b
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, WITHOUT_OBSTACLES)))
 def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
     line, sea, ends, st = flat_case(3, ZONES[zones], bits)
@@ -229,6 +230,7 @@ def test_a_singular_block_is_named():
     assert in_plane(line, sea, ends, st, np.zeros_like(st.r))[1] is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("zones", ZONES)
 @pytest.mark.parametrize("seed", range(4))
 def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):

@@ -56,6 +56,7 @@ def test_a_rotation_is_the_exponential_of_its_vector() -> None:
         assert np.abs(out.reshape(3, 3) - expm(K)).max() < 1e-14
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(3))
 def test_the_change_of_the_forces_of_a_body_against_differences(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -184,6 +184,7 @@ def test_regular_wave_kinematics(depth, z):
         assert np.abs(got - exact).max() <= ROUND_OFF * max(size, 1.0) * 10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("depth", [math.inf, 60.0, 4.0])
 @pytest.mark.parametrize("stretched", [1.0, 0.0])
 def test_slopes_of_waves(depth, stretched):

@@ -86,6 +86,7 @@ def shifts(tangle: Rubbing, size: float, seed: int = 5) -> np.ndarray:
     return x
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("uneven", [False, True], ids=["even", "uneven"])
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("size", [1e-7, 0.3], ids=["sticks", "slides"])
@@ -120,6 +121,7 @@ def test_it_is_coulomb_at_most_along_the_way(name: str) -> None:
     assert np.abs(across).max() < 1e-13 * size.max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("uneven", [False, True], ids=["even", "uneven"])
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("size", [1e-7, 0.01, 0.3], ids=["sticks", "slides", "slides far"])

@@ -119,6 +119,7 @@ SHAPES = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SHAPES)
 def test_force_and_stiffness_are_derivatives_of_the_energy(name: str) -> None:
     tangle, random = Tangle(SHAPES[name]), np.random.default_rng(1)

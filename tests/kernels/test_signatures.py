@@ -76,6 +76,7 @@ def too_many(found: dict[str, list[str]]) -> dict[str, list[str]]:
     return {name: x for name, x in found.items() if len(x) > 1 and len(x) > kinds(name)}
 
 
+@pytest.mark.long
 def test_kernels_have_one_signature() -> None:
     found = signatures()
     used = [name for name, all_of_it in found.items() if all_of_it]

@@ -106,6 +106,7 @@ def test_slopes_are_those_of_the_branches(soil: np.ndarray) -> None:
     assert worst < 1e-6
 
 
+@pytest.mark.long
 def test_no_history_exceeds_first_penetration_or_suction_and_none_gives_energy() -> None:
     """Of random ways: between -f Pu and first penetration; every closed way takes work up."""
     rng = np.random.default_rng(5)

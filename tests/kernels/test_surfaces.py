@@ -66,6 +66,7 @@ def places(count: int) -> np.ndarray:
     return np.random.default_rng(7).uniform(-1.2, 1.2, (count, 3))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OBSTACLES)
 def test_kernels_and_scene_have_the_same_distances(name: str, sea: Around) -> None:
     """The scene has closed forms of its own."""

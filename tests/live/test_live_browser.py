@@ -71,6 +71,7 @@ def scene(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.long
 def test_a_scene_is_seen_changed_run_played_and_saved(browser: Any, scene: Path) -> None:
     with served(scene) as (address, _):
         visit = Visit(browser, address)
@@ -165,6 +166,7 @@ def test_a_new_scene_by_five_questions_and_its_completion(
         visit.context.close()
 
 
+@pytest.mark.long
 def test_two_browsers_and_a_lost_connection_lose_nothing(browser: Any, scene: Path) -> None:
     with served(scene) as (address, session):
         one, two = Visit(browser, address), Visit(browser, address)

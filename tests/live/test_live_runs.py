@@ -18,6 +18,7 @@ from hybrid.live.playback import Playback
 from hybrid.live.runs import Run
 
 
+@pytest.mark.long
 def test_a_run_is_followed_stopped_and_played(tmp_path: Path) -> None:
     scene, result = tmp_path / "scene.yaml", tmp_path / "scene.h5"
     scene.write_text(
@@ -61,6 +62,7 @@ def test_a_run_is_followed_stopped_and_played(tmp_path: Path) -> None:
     assert sorted(x.name for x in tmp_path.iterdir()) == ["scene.h5", "scene.yaml"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("delay", [0.0, 0.05, 0.3, 0.8])
 def test_a_run_is_stopped_while_it_starts(tmp_path: Path, delay: float) -> None:
     """Also by what a background shell starts, whose SIGINT is ignored: before the process is made, while it imports."""
@@ -108,6 +110,7 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
     assert broken.read()[1] and "run.h5" in broken.problem and not broken.frames
 
 
+@pytest.mark.long
 def test_a_scene_whose_name_begins_with_a_hyphen_is_no_option(tmp_path: Path) -> None:
     scene = tmp_path / "-rf.yaml"
     scene.write_text(SCENE.replace("duration: 4.0", "duration: 0.1"))

@@ -153,6 +153,7 @@ def test_a_browser_that_comes_before_the_server_runs_waits() -> None:
         assert early.getpeername() == at.getsockname()
 
 
+@pytest.mark.long
 def test_messages_that_are_too_large_end_the_connection_and_nothing_else(
     viewed: tuple[str, Session, Path], page: Page
 ) -> None:

@@ -111,6 +111,7 @@ def test_the_size_of_a_vector_with_the_law_of_drag() -> None:
     assert shape(1.6, 0.4, 0.05, 0.0) < -0.05 < 0.0 < shape(2.4, 0.4, 0.02, 3.2)
 
 
+@pytest.mark.long
 def test_a_string_whose_bend_turns_over_in_waves_as_in_an_hour() -> None:
     """A taut leg near the surface: its curvature is drag over tension, not normal, and 1.6 standard deviations from 0.
 
@@ -139,6 +140,7 @@ def test_a_string_whose_bend_turns_over_in_waves_as_in_an_hour() -> None:
     assert (here / (1.0 + np.asarray(line.shape)[nodes]))[1] > 1.06 * there[1]
 
 
+@pytest.mark.long
 def test_fast_bends_across_hide_nothing_of_a_quiet_bend() -> None:
     """A hung line in short waves, deep down: across its bend it moves by waves, in it mostly by what drag leaves out.
 

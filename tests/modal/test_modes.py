@@ -59,6 +59,7 @@ def omega(found):
     return np.array([2.0 * np.pi / x.period for x in found.modes])
 
 
+@pytest.mark.long
 def test_string_is_that_of_lumped_masses():
     """2/h sqrt(T/m) sin(n pi/2N), of which half waves lie in either direction; h and m are of the unstretched line."""
     cells = 40
@@ -86,6 +87,7 @@ def beam(cells, end):
     return scene(section, end(0, 0, 0), end(100.01, 0, 0), "rod", cells)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", CLOSED)
 def test_closed_forms_with_order_two(name):
     make, meshes, exact = CLOSED[name]

@@ -57,6 +57,7 @@ def moved(tables: dict[str, Any], amplitude: float, places: list[float], last: i
     return response, parts
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", [LAYERS, {S + "stiffness_per_tension": 0.3}], ids=["slip", "by tension"])
 def test_a_slow_small_motion_of_layers_is_that_in_time(law):
     """Where layers have slipped, and where a stiffness hangs on tension: without that it is off by a quarter."""
@@ -95,6 +96,7 @@ def test_a_pipe_that_heaves_in_soil_has_the_stiffness_of_unloading():
     assert heave.period == pytest.approx(2.0 * math.pi / math.sqrt(K * most / (D * 40.0)), rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_slow_small_motion_of_a_line_in_soil_is_that_in_time_and_a_large_one_is_told():
     """Once it has sunk as far as the motion lets it: in the seventh period tension is off by 1.1 % as yet."""
     pipe = {

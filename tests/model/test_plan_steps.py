@@ -52,6 +52,7 @@ def test_a_pre_run_that_is_cut_leaves_a_plan(monkeypatch: pytest.MonkeyPatch) ->
     assert plan.measured and plan.steps > 0 and plan.seconds > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("settled", [0, 1000])
 def test_a_few_first_steps_do(settled: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of the shortest budget foretell the steps of a line that is paid out, and no later ones are shorter."""

@@ -105,6 +105,7 @@ def shift_at(shift: Shift | None, i: int) -> Shift | None:
     return shift and shift._replace(**{x: getattr(shift, x)[..., i] for x in OF_OUTPUTS})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     values_of, checked = Observer.values_of, set()

@@ -57,6 +57,7 @@ def slack(
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LINES)
 def test_a_joint_that_moves_on_leaves_no_bend_behind(name: str) -> None:
     """The smallest bend radius of zones that move is that of rods: half and a third of it, before."""
@@ -71,6 +72,7 @@ def test_a_joint_that_moves_on_leaves_no_bend_behind(name: str) -> None:
     assert (largest > 0.9 * of_rods)[counts].all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["60 m, level", "several EI/GJ"])
 def test_while_line_is_paid_out_as_well(name: str) -> None:
     scenes = [slack(**LINES[name], model=x) for x in (MOVES, {"kind": "rod"})]
@@ -82,6 +84,7 @@ def test_while_line_is_paid_out_as_well(name: str) -> None:
     assert smallest == pytest.approx(true, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["60 m, in space", "two sections, clamped", "several EI/GJ", "stiffener"])
 def test_steps_and_outputs_have_the_same(name: str) -> None:
     """Where every step has an output and every node a point, extremes are those of the outputs."""
@@ -112,6 +115,7 @@ def stepped(scene: dict[str, Any], again: bool) -> hybrid.Result:
         return sim.result()
 
 
+@pytest.mark.long
 def test_stepped_from_outside_and_as_a_system_it_is_the_same() -> None:
     """Steps that are taken back leave every bit; times of steps differ by a bit or two from those of a run."""
     scene = slack(**LINES["60 m, level"], model=MOVES)

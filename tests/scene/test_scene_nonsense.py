@@ -282,6 +282,7 @@ def test_nonsense_for_a_value_in_a_file(name: str) -> None:
             assert all(c.expected and c.value == nonsense for c in here), (path, nonsense)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "nonsense", ["nonsense", float("nan"), -math.inf, True, None, [], {}, 10**400, b"", object], ids=repr
 )
@@ -435,6 +436,7 @@ def test_the_texts_of_this_file_have_every_key() -> None:
     assert known - written == elsewhere  # where these are tested
 
 
+@pytest.mark.long
 def test_an_unknown_key_in_every_table() -> None:
     for name, path in [*TABLES, *((n, ()) for n in TEXTS)]:
         data = _load(name)
@@ -456,6 +458,7 @@ SNIPPETS = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 @settings(derandomize=True, max_examples=200, deadline=None)
 @given(data=st.data())
 def test_mutations_raise_nothing_but_scene_errors(data: st.DataObject) -> None:

@@ -67,6 +67,7 @@ def test_round_trip(text: str) -> None:
     assert validate_scene(scene.model_dump()) == scene
 
 
+@pytest.mark.long
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(
     title=st.text().map(lambda text: "".join(c for c in text if c.isprintable()).strip()),

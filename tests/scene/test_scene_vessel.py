@@ -89,6 +89,7 @@ def test_arms_and_headings(tmp_path: Path) -> None:
     np.testing.assert_allclose(tangent - [0, 0, 1], small, rtol=0, atol=2.0 * (pitch**2 + roll**2))
 
 
+@pytest.mark.long
 def test_the_spectrum_of_the_fairlead_is_that_of_the_waves_times_the_square_of_the_response(tmp_path: Path) -> None:
     """An hour of a JONSWAP sea against the elevation of that hour: 2 % in a band at the peak, heights within 1 %."""
 

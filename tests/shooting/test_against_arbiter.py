@@ -76,6 +76,7 @@ def joints(zones):
     return [round(10 * x) for x in bounds]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("zones", ZONES)
 def test_motion(zones):
     """From equilibrium, with a start that heaves: mesh and step halved together."""

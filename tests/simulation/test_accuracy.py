@@ -406,6 +406,7 @@ def test_what_does_not_converge_is_written_and_printed_as_not_known(capsys, monk
     assert "not known" not in rows["largest tension"] + rows["position"] + rows["end force"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("settings", [["model=rod"], []])
 def test_errors_do_not_depend_on_the_blocks_they_are_computed_in(settings, tmp_path, monkeypatch):
     """Of a result in a file, which is read block by block, and of one in memory; the order is a sum over blocks."""
@@ -496,6 +497,7 @@ def pull(result):
     return np.linalg.norm(result.reaction_end, axis=1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("percent", [10, 3, 1, 0.3])
 @pytest.mark.parametrize("model", ["rod", {"kind": "adaptive", "always_move": True}], ids=["rod", "zones that move"])
 def test_what_is_asked_is_met_and_the_figure_is_true(truth, model, percent):
@@ -564,6 +566,7 @@ def test_what_is_missed_is_named_with_what_is_met():
     assert judge(RequestedAccuracy(0.02, None, None), errors, run).reached == ""
 
 
+@pytest.mark.long
 def test_a_figure_beside_a_run_with_fixed_steps(truth):
     """Without accuracy, output.errors asks for the figure alone; the run is the same as without."""
     settings = {"time": {"duration": 6.0, "step": 0.02}, "mesh": {"cells": 40}}
@@ -583,6 +586,7 @@ def test_a_figure_that_cannot_be_had_is_said():
     assert "no error figure" in kinds and "errors" not in result
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("exact", [False, True])
 def test_steps_land_on_ramps_and_where_asked_on_outputs(exact):
     result = hybrid.run(swinging(accuracy="3%", output={"every": 0.37, "points": 5, "exact": exact}))
@@ -605,6 +609,7 @@ def test_statics(percent):
         assert 0.7 <= said / error <= 3.0
 
 
+@pytest.mark.long
 def test_the_model_error_is_that_of_a_coarser_run():
     """A catenary in motion: what leaving bending out does is estimated, and is most of its error."""
     result = hybrid.run(swinging(model="catenary", accuracy="1%"))
@@ -635,6 +640,7 @@ def test_steps_see_what_a_motion_file_does(tmp_path):
     assert first_resolution(slow).step == pytest.approx(2.0 / 12)  # a twelfth of the period of the heave
 
 
+@pytest.mark.long
 def test_a_finer_run_is_no_other_result(tmp_path):
     """Several result runs go into one file, which need not be overwritten, and leave nothing beside it."""
     target = tmp_path / "run.h5"
@@ -683,6 +689,7 @@ def test_a_reader_does_not_lose_the_figure(tmp_path):
     readers[0].close()
 
 
+@pytest.mark.long
 def test_what_steps_damp_out_is_said():
     """A stiff rod let go swings as a pendulum; its bending vibrations are far below what a step may be wrong by."""
     data = {
@@ -823,6 +830,7 @@ def test_what_a_model_error_is_bounded_by_is_kept_in_proportion(own):
     assert largest["position"].max() == pytest.approx(0.1) and largest["end_force_end"].max() == pytest.approx(0.7)
 
 
+@pytest.mark.long
 def test_a_pull_that_outputs_do_not_show_is_said():
     """A pendulum's pull swings between outputs that come once a period: the curve through them is a straight line."""
     rare = hybrid.run(swinging(accuracy="1%", output={"every": 0.6, "points": 5}, time={"duration": 6.0}))

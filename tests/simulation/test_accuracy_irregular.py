@@ -336,6 +336,7 @@ SEA = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 def test_an_irregular_sea(tmp_path):
     """The file has both figures; the closing lines say which were asked; `instant` asks for the other."""
     result = hybrid.run(SEA, tmp_path / "sea.h5")

@@ -183,6 +183,7 @@ def test_a_rope_that_is_cut_is_the_same_rope(section: dict[str, Any]) -> None:
     assert np.ptp(top) > 0.1 * top.max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("system", [False, True], ids=["one", "several"])
 def test_a_rope_goes_on_bit_for_bit(tmp_path: Path, system: bool) -> None:
     rope = SOFT | {"dynamic_stiffness": {"constant": 8e5, "per_tension": 15, "relaxation_time": 5}}

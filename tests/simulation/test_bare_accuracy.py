@@ -186,6 +186,7 @@ def test_plan_says_in_metres_what_is_asked() -> None:
     assert "2 to 10 % of min_bend_radius, as its verdict needs" in lines
 
 
+@pytest.mark.long
 def test_a_limit_that_is_nearly_reached_is_settled_at_a_loose_accuracy() -> None:
     """The line bends to 33.75 m: at 1 m of position that was known to 10 %, whatever the limit.
 

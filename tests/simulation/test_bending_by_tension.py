@@ -61,6 +61,7 @@ def test_the_clamp_of_a_taut_line(dimension: int) -> None:
     assert of_clamp(BEGIN) > 1.5 * of_clamp(BEGIN, 0.0)
 
 
+@pytest.mark.long
 def test_a_pull_that_falls_leads_to_the_rest_under_it_and_its_energy_is_booked() -> None:
     """The end of the motion is the equilibrium; what no work accounts for falls with the step."""
     rest = hybrid.static(taut(80, END))

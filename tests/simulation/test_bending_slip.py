@@ -61,6 +61,7 @@ def masing(kappa: Floats, table: list[list[float]]) -> Floats:
     return out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize(
     ("section", "table", "most"),

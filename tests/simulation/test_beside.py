@@ -30,6 +30,7 @@ def scene(*settings: str) -> hybrid.Scene:
     return hybrid.load_scene(TOUCHDOWN, ["output.errors=true", "time.duration=10", *settings])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("settings", [["model=catenary"], ["model=rod", "accuracy=2%"], []])
 def test_any_number_of_threads_gives_the_same_bits(
     settings: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -79,6 +80,7 @@ def ended(before: set[threading.Thread]) -> bool:
     return set(threading.enumerate()) <= before
 
 
+@pytest.mark.long
 def test_an_interrupt_ends_all_threads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
     monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)

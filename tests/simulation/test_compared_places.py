@@ -82,6 +82,7 @@ def test_where_bends_are_judged_it_is_everywhere(
     assert (Case(hybrid.validate_scene(scene), None).places.size == 0) == everywhere
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [ESTIMATION, REFINEMENT])
 @pytest.mark.usefixtures("rough")
 def test_it_is_resumed_at_the_same_places(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,6 +94,7 @@ def test_it_is_resumed_at_the_same_places(name: str, tmp_path: Path, monkeypatch
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("rough")
 def test_a_result_of_before_goes_on_at_all_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its checkpoint has errors at all of them."""

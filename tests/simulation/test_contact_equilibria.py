@@ -99,6 +99,7 @@ def test_stretches_that_stay_catenary_touch() -> None:
     assert result.zones[0][0].s_b >= 1.5 and 0.94 < apart(result) < 1.05
 
 
+@pytest.mark.long
 def test_a_loop_in_zones_that_move_is_rod() -> None:
     """A torque that throws a loop asks for rods from end to end."""
     result = hybrid.static(hybrid.validate_scene(twisted("adaptive")))
@@ -107,6 +108,7 @@ def test_a_loop_in_zones_that_move_is_rod() -> None:
     assert result["envelope/self_contact_max"].max() >= result["self_contact"].max() > 0.0  # limits count at all nodes
 
 
+@pytest.mark.long
 def test_a_catenary_that_a_loop_presses_is_refused() -> None:
     """Between catenaries at both clamps the loop pushes; they cannot carry that, and the message says where."""
     with pytest.raises(hybrid.ComputationError, match=r"compression; a catenary cannot carry it \(s = "):
@@ -142,6 +144,7 @@ def knotted(**more: Any) -> dict[str, Any]:
     } | more  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_knot_that_is_given_is_a_knot_at_rest() -> None:
     """Without contact the line is a catenary, which it reaches by passing through itself: a writhe of 0 for -3."""
     scene = knotted()

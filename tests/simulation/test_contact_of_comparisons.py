@@ -52,6 +52,7 @@ def test_they_do_from_the_start_where_contact_is_asked(touched: list[bool]) -> N
     assert touched == [True] * 3
 
 
+@pytest.mark.long
 def test_a_tether_far_from_itself_does_not_stall() -> None:
     """Two parts 12 m apart, 367 diameters, on chords longer than their bend, began contact in the coarsest run."""
     result = hybrid.run(hybrid.load_scene(DEFECTS / "long_s_tether.yaml", ["time.duration=60"]))

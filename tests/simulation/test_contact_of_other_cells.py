@@ -57,6 +57,7 @@ def travels(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
     return found
 
 
+@pytest.mark.long
 def test_it_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, travels: list[tuple[int, int]]) -> None:
     """Energy and force of contact do not fall to nothing where cells change, and friction keeps its travels."""
     stopping, scene = Stopping(monkeypatch), rubbing()

@@ -54,6 +54,7 @@ def test_the_mirror_image(rod: hybrid.Result) -> None:
     np.testing.assert_allclose(mirror["energy/self_contact"], rod["energy/self_contact"], atol=1e-3 * most)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("more", [{"model": "adaptive"}, {"winch": WINCH, "side": "start"}], ids=["zones", "winch"])
 def test_it_resumes_to_the_last_bit(tmp_path: Path, rod: hybrid.Result, more: dict[str, Any]) -> None:
     """Stopped while strands touch; zones that move touch as rods do."""

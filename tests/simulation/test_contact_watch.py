@@ -112,6 +112,7 @@ def departures(result: Any) -> list[Any]:
     return [e for e in result.events if e.kind == "line leaves the sheave"]
 
 
+@pytest.mark.long
 def test_a_line_leaves_a_sheave_and_comes_back() -> None:
     result = hybrid.run(over_a_sheave())
     place = result["obstacles/wheel/position"]

@@ -85,6 +85,7 @@ def test_it_does_not_depend_on_outputs() -> None:
 ADAPTIVE = ("model={kind: adaptive, tolerance: 1.0e-4}", "mesh={cells: 20}", "output={every: 0.5}", "time.duration=8")
 
 
+@pytest.mark.long
 def test_zones_that_change_leave_it_on_the_finest_mesh_and_above_all_outputs() -> None:
     result = hybrid.run(scene(*ADAPTIVE, "output={every: 0.02, exact: true}"))
     assert len({tuple(zones) for zones in result.zones}) > 1

@@ -161,6 +161,7 @@ def test_the_force_at_a_held_end_of_a_line_let_go_is_of_order_one():
     assert force[0] <= 0.03 * force.max() or "accuracy missed" in {event.kind for event in result.events}
 
 
+@pytest.mark.long
 def test_zones_that_change_are_those_of_the_result():
     """Zones come and go with the tension; in a coarser run they did so at other times: 0.44 for the force at the start.
 

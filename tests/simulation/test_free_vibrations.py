@@ -155,6 +155,7 @@ def test_long_runs_are_looked_at_in_parts(monkeypatch):
     assert some == pytest.approx(whole[np.searchsorted(t, times)], rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_vibration_that_all_runs_have_lost_is_said():
     """Asked for 2 % of the moment it was 8 % off and said 1.6 %."""
     result = hybrid.run(cantilever(accuracy={"bending_moment": "2%"}))

@@ -39,6 +39,7 @@ SCENES = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("end", ["start", "end"])
 @pytest.mark.parametrize("name", list(SCENES))
 def test_it_is_what_differences_of_the_step_give(name: str, end: str) -> None:

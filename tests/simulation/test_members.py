@@ -39,6 +39,7 @@ def scene(fluid: dict[str, Any], given: dict[str, Any], **more: Any) -> dict[str
     } | more  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_current_pushes_with_the_drag_of_the_members() -> None:
     """1/2 rho D Cd L U^2 across, pi D Cd_t along, in equilibrium with the lines."""
     members = [{"start": [0, -2, 0], "end": [0, 2, 0], "diameter": 0.5, "drag": 0.9},

@@ -115,6 +115,7 @@ def test_a_criterion_asks_for_zones_that_move():
     assert kind_of(result) == "adaptive"
 
 
+@pytest.mark.long
 def test_the_choice_survives_a_stop(tmp_path: Path, monkeypatch):
     scene = hybrid.validate_scene(TAUT | {"time": {"duration": 4.0}})
     stopping = Stopping(monkeypatch)
@@ -194,6 +195,7 @@ def test_curvature_that_is_asked_rules_catenaries_out_beforehand() -> None:
     assert kind_of(result) == "rod" and "catenary is no choice: they lack" in why and "asked along the line" in why
 
 
+@pytest.mark.long
 def test_zones_begin_with_rods_where_a_pre_run_shows_that_they_will_be_needed() -> None:
     """Over all the way of the edge: the curvature was off by 18 % of its largest where they came after it."""
     asked = [

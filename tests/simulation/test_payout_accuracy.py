@@ -181,6 +181,7 @@ def test_errors_of_neglected_bending_are_followed_while_line_comes() -> None:
         assert 0.7 < ratio < 3.0, name
 
 
+@pytest.mark.long
 def test_an_accuracy_is_asked_and_met() -> None:
     """Without steps and cells it is 1 %, as of any line; the true error is below what is asked."""
     scene = {k: x for k, x in sagging("catenary", 2e6).items() if k != "mesh"} | {"time": {"duration": 20.0}}

@@ -115,6 +115,7 @@ def test_the_mirror_image_pays_out_the_same() -> None:
     assert np.abs(other["moment"][:, ::-1] - one["moment"]).max() < 1e-6 * np.abs(one["moment"]).max()
 
 
+@pytest.mark.long
 def test_resumed_bit_for_bit(tmp_path: Path) -> None:
     scene = bent()
     scene["ends"]["end"]["payout"]["longest"] = 120.0

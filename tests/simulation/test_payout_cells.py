@@ -125,6 +125,7 @@ def test_a_winch_at_the_start_is_the_mirror_image(rate: float) -> None:
             np.testing.assert_allclose(y[::-1][: x.size // 2], x[: x.size // 2], rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(  # every two of stiffness, direction and clamp meet
     ("EI", "rate", "most", "clamp"),
     [(2e4, 0.8, 6e-4, False), (500.0, 0.8, 6e-4, True), (500.0, -0.8, 6e-4, False), (2e4, -0.8, 1e-3, True)],
@@ -157,6 +158,7 @@ def test_a_winch_that_holds_a_tension() -> None:
     assert np.abs(lengths[0] - lengths[1]).max() < 0.02
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rate", "clamp"), [(0.8, True), (-0.8, False)])
 def test_resumed_to_the_last_bit(tmp_path: Path, rate: float, clamp: bool) -> None:
     """Stopped while cells have just been handed over by the winch, or are merged on their way to it."""

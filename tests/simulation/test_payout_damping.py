@@ -111,6 +111,7 @@ def test_halving_the_step_gives_second_order() -> None:
     assert 3.0 < off[0] / off[1] < 5.5
 
 
+@pytest.mark.long
 def test_the_mirror_image_does_the_same_and_it_is_resumed_bit_for_bit(tmp_path: Path) -> None:
     """The same with the winch at the start; and what is resumed is what was run, to the last bit."""
     scene = damped(rod(0.8))

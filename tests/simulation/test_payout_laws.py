@@ -56,6 +56,7 @@ def creeping(step: float = 0.05) -> dict[str, Any]:
 SCENES = {"creep": creeping, "torque": twisting, "polyester": polyester, "vortices": shedding}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 def test_resumed_bit_for_bit(tmp_path: Path, name: str) -> None:
     scene = SCENES[name](0.05)
@@ -227,6 +228,7 @@ def released(step: float = 0.05) -> dict[str, Any]:
     return scene
 
 
+@pytest.mark.long
 def test_a_release_is_resumed_bit_for_bit_and_balanced(tmp_path: Path) -> None:
     scene = released()
     scene["ends"]["end"]["payout"]["longest"] = 110.0

@@ -22,6 +22,7 @@ def in_water(scene: dict[str, Any]) -> dict[str, Any]:
     return scene | {"environment": scene.get("environment", {}) | {"fluid": fluid}}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rate", [1.0, -1.0])
 def test_a_weight_at_the_end_shows_at_the_winch(tmp_path: Path, rate: float) -> None:
     """Vertical line: the pull is w L less its inertia, and what pulls at its end, to round-off after the change."""
@@ -48,6 +49,7 @@ LINES: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LINES)
 def test_loads_that_stay_change_nothing(tmp_path: Path, name: str) -> None:
     """The same current again: accelerations are found anew, and the line goes on as it would have.
@@ -70,6 +72,7 @@ def test_loads_that_stay_change_nothing(tmp_path: Path, name: str) -> None:
     assert np.abs(again[f"reaction_{winch}"] - whole[f"reaction_{winch}"]).max() < 5e-3 * pull
 
 
+@pytest.mark.long
 def test_a_changed_run_is_resumed_bit_for_bit(tmp_path: Path) -> None:
     scene = in_water(sagging("rod", 2e6, 2e4))
     scene["ends"]["end"]["payout"]["longest"] = 110.0

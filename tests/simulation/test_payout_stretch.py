@@ -65,6 +65,7 @@ def test_the_mirror_image_pays_out_the_same() -> None:
     assert np.abs(one["reaction_end"] - other["reaction_start"]).max() < 1e-7 * np.abs(one["reaction_end"]).max()
 
 
+@pytest.mark.long
 def test_resumed_bit_for_bit(tmp_path: Path) -> None:
     scene = paid(ROPE, model="rod", EI=2e4, step=0.1)
     scene = clamped(scene)

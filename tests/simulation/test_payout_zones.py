@@ -71,6 +71,7 @@ def test_zones_that_move_in_a_current_across_are_those_of_the_turned_scene() -> 
     assert np.abs(found.position[-1, :, 1]).max() > 0.1
 
 
+@pytest.mark.long
 def test_resumed_to_the_last_bit(tmp_path: Path) -> None:
     whole = hybrid.run(touching())
     hybrid.run(touching(time={"duration": 5.0, "step": 0.05}), output=tmp_path / "part.h5")

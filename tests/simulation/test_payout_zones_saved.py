@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 
 import hybrid
 
@@ -39,5 +40,6 @@ def driven(again: int) -> hybrid.Result:
         return sim.result()
 
 
+@pytest.mark.long
 def test_rods_at_a_winch_are_those_of_the_last_node_after_a_step_is_taken_back() -> None:
     assert np.array_equal(driven(-1).tension, driven(22).tension)

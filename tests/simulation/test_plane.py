@@ -48,6 +48,7 @@ def entry(asked: hybrid.Scene) -> Any:
     return next(x for x in hybrid.plan(asked).contents if x.what == WHAT)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FLAT)
 def test_the_gallery_in_its_plane_and_in_space(name: str) -> None:
     """The same motion, the same zones, nothing across the plane, and no event of it in the first 300 steps."""
@@ -62,6 +63,7 @@ def test_the_gallery_in_its_plane_and_in_space(name: str) -> None:
         assert n is not None and np.abs(flat.velocity @ n[2]).max() == 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name, model", [("touchdown", "catenary"), ("irregular_sea", None), ("rov_tether", None)])
 def test_the_model_error_in_its_plane_and_in_space(name: str, model: str | None) -> None:
     """What leaving bending out does, followed with the factors of either march; 1e-9 in tensions makes 1e-7 in forces."""

@@ -36,6 +36,7 @@ def storm(duration: float) -> hybrid.Scene:
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_line_that_has_buckled_comes_back_to_its_plane(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the plane its forces are those in space, and what was left across it leads to the same next buckle."""
     flat = hybrid.run(storm(333.0))

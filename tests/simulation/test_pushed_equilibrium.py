@@ -28,6 +28,7 @@ def test_the_side_that_nothing_chooses(load: float, cells: int, falls: bool) -> 
     assert all("initial.points" in text for text in said)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "cells", "orcaflex"), [("lazy_s", 200, 59640.7), ("lazy_wave", 400, 24172.9)])
 def test_a_line_is_pushed_off_each_unstable_equilibrium_that_is_met(name: str, cells: int, orcaflex: float) -> None:
     """0.6.0 refused both, unless the scene said `guess: arc` or `guess: span`."""

@@ -124,6 +124,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", CASES)
 def test_a_stopped_run_goes_on_bit_for_bit(name: str, tmp_path: Path, monkeypatch) -> None:
     """Stopped before, near and after the release."""
@@ -186,6 +187,7 @@ def test_what_cannot_be_is_refused(name: str) -> None:
 ZONES = {"kind": "zones", "zones": [{"rod": 2.0, "cells": 6}, {"catenary": 6.0, "cells": 12}, {"rod": 2.0, "cells": 6}]}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["zones", "adaptive"])
 def test_a_twisted_catenary_is_let_go_with_its_twist(model: str, tmp_path: Path) -> None:
     """Its torque is gone, its energy in the event, and it moves as a system of one line whose end breaks off."""

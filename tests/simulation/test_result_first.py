@@ -101,6 +101,7 @@ def stopped_in(name: str, scene: dict[str, Any], path: Path) -> None:
         hybrid.run(scene, path, progress=stop)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scene", [asked(), two_lines()], ids=["one", "several"])
 @pytest.mark.usefixtures("rough")
 def test_stopped_after_the_result(scene: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,6 +148,7 @@ def test_whoever_looks_at_it_is_told(
     assert f"{ERRORS}; `hybrid resume {tmp_path / 'run.h5'}` makes up for it" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_stopped_in_the_errors_of_fixed_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Stopping(monkeypatch)
     monkeypatch.setattr(system_run, "LOOK", 1)
@@ -164,6 +166,7 @@ def test_stopped_before_the_result_nothing_is_there(tmp_path: Path, monkeypatch:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_stopped_in_the_result_what_there_is_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -191,6 +194,7 @@ def test_stopped_in_the_result_what_there_is_goes_on(
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("rough")
 @pytest.mark.parametrize("module", [passes, system_accuracy])
 def test_errors_are_written_before_a_long_finer_run(
@@ -271,6 +275,7 @@ def test_a_stop_is_heard_while_the_equilibrium_is_searched(
     assert not reached and not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("rough")
 @pytest.mark.parametrize("kept", [True, False])
 def test_of_results_that_follow_each_other_the_last_is_written(
@@ -304,6 +309,7 @@ def _noting(written: list[str], place: Any) -> Any:
     return noting
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("rough")
 def test_a_finer_result_is_no_file_before_it_is_complete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first one grows, for those who read it; before, the finer one did too, and was copied to add its errors."""

@@ -56,6 +56,7 @@ def test_a_stopped_run_goes_on_bit_for_bit(name, tmp_path, monkeypatch):
     assert {x.suffix for x in tmp_path.iterdir()} == {".h5"}, "something is left behind"
 
 
+@pytest.mark.long
 def test_steps_failed_and_taken_back_go_on_as_well(tmp_path, monkeypatch):
     """What a controller and a manager remember of steps that failed is in the checkpoint."""
     scene = hybrid.load_scene(EXAMPLES / "06_whip.yaml", ["time={duration: 0.3, tolerance: 1.0e-7}", "accuracy=null"])
@@ -67,12 +68,14 @@ def test_steps_failed_and_taken_back_go_on_as_well(tmp_path, monkeypatch):
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
+@pytest.mark.long
 def test_there_are_several_results_in_one_of_the_cases():
     file, settings = CASES["accuracy by a second result"]
     with hybrid.run(hybrid.load_scene(EXAMPLES / f"{file}.yaml", settings)) as result:
         assert result.attributes["effort_runs"] > 4
 
 
+@pytest.mark.long
 def test_what_the_user_asks_of_zones_is_given_again(tmp_path, monkeypatch):
     scene = hybrid.load_scene(EXAMPLES / "s_tether.yaml", ["time.duration=4"])
 
@@ -91,6 +94,7 @@ def test_what_the_user_asks_of_zones_is_given_again(tmp_path, monkeypatch):
         hybrid.resume(tmp_path / "run.h5")
 
 
+@pytest.mark.long
 def test_events_that_are_too_many_are_counted_on(tmp_path, monkeypatch):
     """Of those that are not written the file says how many there were, also where the run was stopped in between."""
     monkeypatch.setattr(record, "MOST_OF_A_KIND", 2)
@@ -102,6 +106,7 @@ def test_events_that_are_too_many_are_counted_on(tmp_path, monkeypatch):
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
+@pytest.mark.long
 def test_into_another_file(tmp_path, monkeypatch):
     scene = hybrid.load_scene(EXAMPLES / "02_suspension.yaml", ["time.duration=2"])
     stopping = Stopping(monkeypatch)

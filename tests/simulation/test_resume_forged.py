@@ -48,11 +48,13 @@ def good(tmp_path: Path) -> Path:
     return tmp_path / "good.h5"
 
 
+@pytest.mark.long
 def test_a_checkpoint_in_another_container_is_refused(good: Path) -> None:
     """Other types and shapes, lengths that nothing holds, links, other files, bombs; see CONTAINERS in forge.py."""
     assert forgeries(good, 0, len(CONTAINERS)) == {"refused": len(CONTAINERS)}
 
 
+@pytest.mark.long
 def test_a_checkpoint_of_other_content_is_refused_or_resumed(good: Path) -> None:
     """Types, shapes, sizes, numbers that are not finite, missing and surplus names, versions, bits: 60 drawn."""
     count = forgeries(good, 1000, 1060)

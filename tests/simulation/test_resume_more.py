@@ -63,6 +63,7 @@ def test_beyond_its_end_it_is_the_longer_run(tmp_path, whole):
     assert differences(tmp_path / "longer.h5", tmp_path / "at_once.h5") == []
 
 
+@pytest.mark.long
 def test_beyond_the_end_of_an_accuracy_the_whole_is_judged(tmp_path):
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["accuracy=3%", "time={duration: 5}"])
     hybrid.run(scene, tmp_path / "run.h5").close()
@@ -74,6 +75,7 @@ def test_beyond_the_end_of_an_accuracy_the_whole_is_judged(tmp_path):
         assert checkpoint.BEFORE not in file
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("errors", [False, True])
 def test_a_result_keeps_its_output_points(errors, tmp_path, monkeypatch):
     """Results of 0.6 have no output point at a change of section, and one value there; so have their errors."""
@@ -109,6 +111,7 @@ def test_a_load_that_ends_is_a_load_that_is_changed(tmp_path):
         assert np.ptp(one.position[:, -1, 0]) > 0.03, "nothing moves"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["slack_on_seabed", "touchdown", "laying"])
 def test_changes_are_made_at_their_time_however_often_it_is_stopped(name, tmp_path, monkeypatch):
     """A current from 3 s on: computed anew, from a checkpoint at 3 s, and stopped on the way; one motion."""
@@ -197,6 +200,7 @@ def test_a_file_without_checkpoints_is_refused(tmp_path):
         hybrid.resume(tmp_path / "text.h5")
 
 
+@pytest.mark.long
 def test_a_checkpoint_that_was_cut_off_leaves_the_one_before(tmp_path, monkeypatch):
     hybrid.run(swinging(), tmp_path / "whole.h5").close()
     path = stopped(tmp_path / "run.h5", monkeypatch)
@@ -240,6 +244,7 @@ def test_an_end_that_moves_otherwise_is_noticed(tmp_path, monkeypatch):
         hybrid.resume(path)
 
 
+@pytest.mark.long
 def test_two_processes_on_one_file(tmp_path, monkeypatch):
     from hybrid.cli.commands import main
 
@@ -267,6 +272,7 @@ def test_two_processes_on_one_file(tmp_path, monkeypatch):
     assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", [0.5, 0.7, 0.95])
 def test_a_full_disk_loses_nothing(part, tmp_path):
     """As full as a limit of the file's size makes it, in a process of its own; then it goes on, bit for bit."""
@@ -314,6 +320,7 @@ def test_a_folder_that_is_read_only(tmp_path, monkeypatch):
 # ---- the command -----------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_the_command_goes_on_and_says_so(tmp_path, monkeypatch, capsys):
     from hybrid.cli.commands import main
 
@@ -345,6 +352,7 @@ def test_a_file_of_a_newer_format_is_refused(whole):
 # ---- what an adversary found -----------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "more", [{"until": 8.0}, {"settings": ["environment.fluid.current=[0.4, 0, 0]"], "start": 4.5}]
 )
@@ -373,6 +381,7 @@ def test_a_change_that_is_stopped_has_the_errors_of_the_change(more, tmp_path, m
         assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
+@pytest.mark.long
 def test_a_run_that_is_stopped_while_its_model_error_is_followed_again(tmp_path, monkeypatch):
     """After the result, where no accuracy is asked for: the result stands, and goes on to its error figure."""
     monkeypatch.setattr(Estimate, "lacks_model_errors", lambda self: True)
@@ -386,6 +395,7 @@ def test_a_run_that_is_stopped_while_its_model_error_is_followed_again(tmp_path,
     assert differences(tmp_path / "whole.h5", path) == []
 
 
+@pytest.mark.long
 def test_a_finer_result_of_another_scene_is_not_taken(tmp_path):
     """What a killed run has left beside its file is of that run."""
     file, settings = "touchdown.yaml", ["accuracy=0.3%", "time={duration: 5}"]
@@ -429,6 +439,7 @@ def test_an_end_before_a_change_is_refused(tmp_path, monkeypatch, whole):
         hybrid.resume(whole, until=2.5)
 
 
+@pytest.mark.long
 def test_a_checkpoint_of_odd_things_is_refused_in_words(tmp_path, monkeypatch):
     """Its digest is right, and what it says is not."""
     path = stopped(tmp_path / "run.h5", monkeypatch)
@@ -452,6 +463,7 @@ def test_a_checkpoint_of_odd_things_is_refused_in_words(tmp_path, monkeypatch):
             hybrid.resume(path)
 
 
+@pytest.mark.long
 def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["accuracy=0.3%", "time={duration: 5}"])
@@ -486,6 +498,7 @@ def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeyp
     assert kept[0] == kept[1]
 
 
+@pytest.mark.long
 def test_zones_that_are_fixed_stay_so(tmp_path, monkeypatch):
     """A run whose rods may not go, and which says so in its checkpoint alone: the same bits, and none goes."""
     text = hybrid.load_scene(EXAMPLES / "touchdown.yaml").model_dump(exclude_none=True)

@@ -93,6 +93,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return make
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "harm"), [("model left open", None), *(("rods", harm) for harm in (None, Path.unlink, spoil, shorten))]
 )
@@ -118,6 +119,7 @@ def test_a_stopped_run_goes_on_bit_for_bit(
     assert {x.name for x in tmp_path.iterdir()} == {"whole.h5", "run.h5"}
 
 
+@pytest.mark.long
 def test_the_file_of_the_result_does_not_hold_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     interrupted(scene(*CASES["rods"]), tmp_path / "run.h5", Stopping(monkeypatch))
     beside = sum(x.stat().st_size for x in rows(tmp_path))
@@ -127,6 +129,7 @@ def test_the_file_of_the_result_does_not_hold_them(tmp_path: Path, monkeypatch: 
     assert len(kept) == 3 and all(x["rows"] and not x["values"] for x in kept)
 
 
+@pytest.mark.long
 def test_into_another_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those beside the source are used, and stay there: it can be resumed again."""
     interrupted(scene(*CASES["rods"]), tmp_path / "run.h5", Stopping(monkeypatch))
@@ -148,6 +151,7 @@ def test_nothing_is_left_where_there_is_no_result(tmp_path: Path, monkeypatch: p
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_killed_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """kill -9 in a finer result: the files beside the first are found by another process."""
     Stopping(monkeypatch)

@@ -40,6 +40,7 @@ def swinging(model: str, step: float, every: float, **output: Any) -> hybrid.Sce
     )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["rod", "catenary"])
 def test_an_output_within_a_step_is_of_second_order(model: str) -> None:
     """Outputs that fall anywhere in steps, against the same times as ends of steps 8 to 32 times as short."""
@@ -85,6 +86,7 @@ def asks_at_once(look: hybrid.NodeState) -> np.ndarray:
     return np.where((look.t > 1.0) & (np.abs(look.s - 200.0) < 10.0), 10.0, 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["touchdown", "s_tether", "repeated"])
 def test_outputs_wait_for_nothing_that_changes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Zones that move: the same bits with outputs that wait in batches, and with a buffer of one."""
@@ -102,6 +104,7 @@ def test_outputs_wait_for_nothing_that_changes(name: str, monkeypatch: pytest.Mo
             assert np.array_equal(batches[field], one_by_one[field], equal_nan=True), field
 
 
+@pytest.mark.long
 def test_no_outputs_wait_for_the_search_for_garbage() -> None:
     """Batches, checkpoints and results go when they are done with: in a reference cycle they would fill the memory."""
     scene = swinging("rod", 0.02, 0.05)
@@ -120,6 +123,7 @@ def test_no_outputs_wait_for_the_search_for_garbage() -> None:
     assert not found
 
 
+@pytest.mark.long
 def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of a batch have each their own ratios: the same bits as one output at a time."""
     settings = ["time.duration=30", "output.criteria=true"]

@@ -63,6 +63,7 @@ def energy(run: Transient) -> float:
     return float(parts.sum()) + (float(contact.contact.numbers[ENERGY]) if contact else 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("steps", [1.0, 10.0], ids=["pass-through step", "ten times that"])
 def test_a_throw(seed: int, steps: float) -> None:
@@ -129,6 +130,7 @@ def test_steps_of_a_line_that_has_not_come_near_itself_are_not_judged_by_contact
         assert "steps cut" not in {event.kind for event in result.events}
 
 
+@pytest.mark.long
 def test_steps_that_would_create_energy_are_repeated() -> None:
     """A throw of the bench that stopped at 2.3 times its energy: steps of 5 ms, in which a strand could pass 9 diameters."""
     random = np.random.default_rng(901)
@@ -204,6 +206,7 @@ def looped(**more: Any) -> dict[str, Any]:
     } | more  # fmt: skip
 
 
+@pytest.mark.long
 def test_strands_of_a_loop_stay_a_diameter_apart() -> None:
     free = hybrid.run(hybrid.validate_scene(looped(contact={"self": False})))
     assert "line meets itself" in {event.kind for event in free.events}
@@ -227,6 +230,7 @@ def test_strands_of_a_loop_stay_a_diameter_apart() -> None:
     assert result["work/scheme"].max() < 1e-3 * put_in
 
 
+@pytest.mark.long
 def test_what_is_at_rest_does_not_depend_on_the_speed_of_the_collision() -> None:
     """The law that a collision has made stiff fades."""
     found = []
@@ -245,6 +249,7 @@ def test_what_is_at_rest_does_not_depend_on_the_speed_of_the_collision() -> None
     assert apart == pytest.approx(distance, rel=2e-3)
 
 
+@pytest.mark.long
 def test_friction_holds_a_loop_and_its_work_is_booked() -> None:
     smooth = hybrid.run(hybrid.validate_scene(looped()))
     rough = hybrid.run(hybrid.validate_scene(looped(contact={"self": True, "friction": 0.3})))
@@ -258,6 +263,7 @@ def test_friction_holds_a_loop_and_its_work_is_booked() -> None:
     assert rough["work/scheme"].max() < 1e-3 * put_in
 
 
+@pytest.mark.long
 def test_it_resumes_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = hybrid.validate_scene(looped(contact={"self": True, "friction": 0.2}))
     stopping = Stopping(monkeypatch)
@@ -304,6 +310,7 @@ def test_catenaries_that_come_near_themselves_become_rods() -> None:
     assert np.linalg.norm(result["position"] - rods["position"], axis=2).max() < 1e-3 * 8.0
 
 
+@pytest.mark.long
 def test_it_resumes_bit_for_bit_with_zones_that_move(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """On 160 cells: with 100, rods everywhere and zones alike let go of each other before it is stopped at 5 s."""
     scene, stopping = hybrid.validate_scene(closing("adaptive", mesh={"cells": 160})), Stopping(monkeypatch)
@@ -316,6 +323,7 @@ def test_it_resumes_bit_for_bit_with_zones_that_move(tmp_path: Path, monkeypatch
 LEGS = {"zones": [{"catenary": 3.0}, {"rod": 2.0}, {"catenary": 3.0}]}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("asked", [True, None])
 def test_fixed_zones_touch_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: bool | None) -> None:
     """The legs of a U, catenaries whose bend between them is rod; against rods, and resumed."""
@@ -358,6 +366,7 @@ def test_an_equilibrium_in_contact(resting: tuple[dict[str, Any], hybrid.Result]
     assert float(result.message.split("residual force ")[1].split()[0]) < 1e-6  # N, of a tension of 10
 
 
+@pytest.mark.long
 def test_a_run_stays_where_it_touches_itself_at_rest(resting: tuple[dict[str, Any], hybrid.Result]) -> None:
     tables, static = resting
     result = hybrid.run(hybrid.validate_scene(tables))

@@ -54,6 +54,7 @@ def test_a_run_that_stops_by_its_energy_says_so() -> None:
     assert "try:      ends.end: the velocities given miss" in str(caught.value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("again", [False, True])
 def test_points_of_several_lines(again: bool) -> None:
     """Left out as for ends; again: every step is taken back once, which leaves the same bits and one event."""

@@ -342,6 +342,7 @@ def test_an_accuracy_is_not_missed_by_round_off_of_a_tension_that_is_nothing():
     assert {x.verdict for x in result.verdicts().accuracy} == {"met"}
 
 
+@pytest.mark.long
 def test_remedies_of_a_slack_catenary_lead_to_a_result():
     """A chain that is 10 m too long for the bed: what the message asks for computes, without a note of a bend too sharp."""
     held = {"start": pinned(0, 0, 0), "end": pinned(100, 0, 0)}

@@ -70,6 +70,7 @@ def pressed(bed: dict[str, Any], over: float, step: float, motion: dict[str, Any
 HEAVE = [{"amplitude": 0.06, "period": 8.0, "phase": -90.0}, {"amplitude": 0.004, "period": 1.7}]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_penetration_suction_and_repenetration_follow_the_backbone(dimension: int) -> None:
     """In, up through suction until it breaks away, in again, with small loops on the way; energy per cycle."""
@@ -110,6 +111,7 @@ def test_a_rest_in_soil_bears_its_weight_at_the_depth_of_first_penetration() -> 
     np.testing.assert_allclose(same.contact, found.contact, rtol=1e-5, atol=1e-2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_friction_breaks_out_and_falls_to_what_is_left(dimension: int) -> None:
     """A line that is drawn along a bed: mu N (r + (1 - r) exp(-w/l)), w the way behind the elastic travel."""
@@ -138,6 +140,7 @@ def test_friction_breaks_out_and_falls_to_what_is_left(dimension: int) -> None:
     assert drawn[k] == pytest.approx(mu * total, rel=3e-2) and way[k] == pytest.approx(travel, rel=0.3)
 
 
+@pytest.mark.long
 def test_soil_beside_a_line_resists_and_breaks_out() -> None:
     """A rod that is pressed in and then moved to the side: friction on its force, and API's clay on its depth."""
     travel, over, left = 0.004, 0.05, 0.4
@@ -164,6 +167,7 @@ def test_soil_beside_a_line_resists_and_breaks_out() -> None:
     np.testing.assert_allclose(force[late], -np.array(expected)[late], atol=1e-2 * scale)
 
 
+@pytest.mark.long
 def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     friction = {"axial": 0.4, "lateral": 0.5, "residual": [0.2, 0.3], "breakout": 0.05}
     bed = {"soil": SOIL, "friction": friction}
@@ -174,6 +178,7 @@ def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     assert differences(tmp_path / "whole.h5", tmp_path / "part.h5") == []
 
 
+@pytest.mark.long
 def test_a_line_of_several_is_the_same_in_soil() -> None:
     alone = pressed({"soil": SOIL}, 6.0, 0.02, {"heave": HEAVE}, dimension=3)
     points = {name: {k: x for k, x in end.items() if k != "kind"} for name, end in alone["ends"].items()}

@@ -59,6 +59,7 @@ def test_zones_that_move_feel_the_soil_that_rods_feel(dimension: int) -> None:
     assert lost[1] == pytest.approx(lost[0], rel=0.05)
 
 
+@pytest.mark.long
 def test_zones_that_move_go_on_bit_for_bit(tmp_path: Path) -> None:
     tables = laid(ADAPTIVE)
     hybrid.run(tables, tmp_path / "whole.h5")
@@ -114,6 +115,7 @@ def test_what_lies_still_remembers_the_same_while_line_is_paid_out(side: str) ->
     assert there[0].min() > 500.0 and np.abs(there - there[0]).max() < 1e-3 * there[0].max()
 
 
+@pytest.mark.long
 def test_a_winch_over_soil_goes_on_bit_for_bit(tmp_path: Path) -> None:
     tables = reeled(80, 0.02)
     hybrid.run(tables, tmp_path / "whole.h5")

@@ -52,6 +52,7 @@ def test_stepped_from_outside_it_is_the_run(model: str) -> None:
     assert len(result["steps/t"]) == len(run["steps/t"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["rod", "{kind: adaptive, tolerance: 2.0e-5}"])
 def test_what_is_taken_back_leaves_nothing(model: str) -> None:
     """Every fifth step is taken thrice, with the end elsewhere at first: bit for bit the run without that."""
@@ -169,6 +170,7 @@ def test_python_and_kernels_move_an_end_alike() -> None:
     assert np.abs(rotation_vector(rotation(turn)) - turn).max() < 1e-12
 
 
+@pytest.mark.long
 def test_a_body_and_a_cable_keep_their_energy() -> None:
     """The example: what the body loses the cable gains, to 0.1 %, and to a quarter of that with half the step."""
     main = runpy.run_path(str(EXAMPLES / "09_coupled_body.py"))["main"]
@@ -179,6 +181,7 @@ def test_a_body_and_a_cable_keep_their_energy() -> None:
     assert left[0] < 1e-3 and 3.0 < left[0] / left[1] < 5.0
 
 
+@pytest.mark.long
 def test_a_controller_brings_a_vehicle_to_its_depth() -> None:
     """The example, to 100 m: it stays above its target, and at its depth in the mean."""
     across, depth_error = runpy.run_path(str(EXAMPLES / "11_rov_controller.py"))["main"](depth=100.0)

@@ -38,6 +38,7 @@ def place(t: float) -> np.ndarray:
     return np.array([0.6 * np.sin(np.pi * x) - 0.4 * max(t - 3.0, 0.0), 0.0, FAR[2] + 3.5 * x])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("begin", [cable, system])
 def test_it_touches_itself_and_goes_back_before_that(begin: Any) -> None:
     """What is taken back takes its contact along: the same state, bit for bit, at the same time again."""

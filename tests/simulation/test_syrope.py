@@ -189,6 +189,7 @@ def test_a_rope_that_is_cut_is_the_same_rope() -> None:
     assert np.abs(top - cut).max() < 1e-6 * np.abs(top).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("system", [False, True], ids=["one", "several"])
 def test_a_rope_goes_on_bit_for_bit(tmp_path: Path, system: bool) -> None:
     scene = two_lines(True) if system else swing("exponential", 0.01)

@@ -159,6 +159,7 @@ def test_errors_of_leaving_bending_out_against_fine_rods(bends: dict[str, Any], 
             assert figure / size < 3.0 or quantity == "curvature", (name, quantity, figure, size)
 
 
+@pytest.mark.long
 def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = bridle(accuracy=None, time={"duration": 0.5, "step": 0.05})
     scene["lines"]["tow"] |= {"model": "catenary", "accuracy": "2%"}
@@ -186,6 +187,7 @@ def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> 
     assert {"no error figure"} <= {e.kind for e in found.events}
 
 
+@pytest.mark.long
 def test_an_accuracy_too_high_is_missed_and_says_so() -> None:
     scene = bridle(accuracy={"position": "0.0001 mm"}, time={"duration": 1.0, "step": 0.1})
     found = hybrid.run(scene)
@@ -194,6 +196,7 @@ def test_an_accuracy_too_high_is_missed_and_says_so() -> None:
     assert any(text.startswith("line west: position") and "time.step" in text for text in texts)
 
 
+@pytest.mark.long
 def test_an_equilibrium_has_an_accuracy_too() -> None:
     scene = bridle(accuracy={"tension": "0.02%"})
     del scene["time"]
@@ -205,6 +208,7 @@ def test_an_equilibrium_has_an_accuracy_too() -> None:
         )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["no better", "failed"])
 def test_a_finer_run_that_is_no_better_is_not_kept(how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The lines are one result: that before the finer one stays, in its file, with errors that know of the finer one."""

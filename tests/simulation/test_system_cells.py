@@ -53,6 +53,7 @@ def test_a_system_of_one_line_has_the_cells_of_the_cable() -> None:
     assert np.isclose(rope["work/zones"][-1], cable["work/zones"][-1], rtol=1e-6)
 
 
+@pytest.mark.long
 def test_a_line_that_touches_itself_has_the_cells_of_the_cable() -> None:
     """With friction, whose grips find their places on the cells that come: more are asked for as the legs touch."""
     one, several = alone(), touching_themselves(0.0)
@@ -69,6 +70,7 @@ def test_a_line_that_touches_itself_has_the_cells_of_the_cable() -> None:
         assert np.abs(line[name] - cable[name]).max() <= 1e-5 * np.abs(cable[name]).max() > 0.0, name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rate", [0.8, -0.8])
 def test_a_line_that_is_paid_out_has_the_cells_of_the_cable(rate: float) -> None:
     scene = pinned(rate, dimension=3)
@@ -93,6 +95,7 @@ def test_against_rods(three: hybrid.Result) -> None:
         assert np.abs(line.tension - fine.tension).max() < 0.01 * fine.tension.max(), name
 
 
+@pytest.mark.long
 def test_a_stopped_run_goes_on_bit_for_bit(
     three: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -106,6 +109,7 @@ def test_a_stopped_run_goes_on_bit_for_bit(
     assert three.file is not None and differences(three.file, path) == []
 
 
+@pytest.mark.long
 def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
     """Bit for bit, also where each is computed twice across changes of cells."""
     times = 0.02 * np.arange(5, 100, 5)
@@ -117,6 +121,7 @@ def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
     assert max(len({*cells(line)}) for line in result.lines.values()) > 1
 
 
+@pytest.mark.long
 def test_lines_that_touch_with_friction() -> None:
     """Cells become short where ropes cross as they come down onto each other; these rub and roll as fine rods do."""
     fine, follow = lowered(), lowered()
@@ -163,6 +168,7 @@ def on_a_body(held: str, model: Tables | None = None, count: int = 0) -> Tables:
     }  # fmt: skip
 
 
+@pytest.mark.long
 def test_with_an_accuracy_the_error_that_is_said_holds() -> None:
     scene = mooring(accuracy={"position": "5 cm", "tension": "2%"}, time={"duration": 2.0})
     for line in scene["lines"].values():

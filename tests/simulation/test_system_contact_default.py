@@ -59,6 +59,7 @@ def test_nothing_is_computed_before_a_line_is_near_itself(monkeypatch: pytest.Mo
     assert 0.5 * touched < since < touched
 
 
+@pytest.mark.long
 def test_it_resumes_bit_for_bit_before_contact_begins_and_in_it(whole: Path, tmp_path: Path) -> None:
     scene = system(contact=RUNS_ON)
     with hybrid.open(whole) as result:
@@ -70,6 +71,7 @@ def test_it_resumes_bit_for_bit_before_contact_begins_and_in_it(whole: Path, tmp
     assert [x for x in differences(whole, tmp_path / "part.h5") if "scene" not in x and "checkpoint" not in x] == []
 
 
+@pytest.mark.long
 def test_what_is_taken_back_takes_its_contact_with_it() -> None:
     """From before contact begins into it, back, and there again: bit for bit."""
     times = np.arange(1, 18) * 0.1
@@ -86,6 +88,7 @@ def test_what_is_taken_back_takes_its_contact_with_it() -> None:
     assert np.array_equal(*found)
 
 
+@pytest.mark.long
 def test_a_file_of_before_goes_on_as_it_began(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = system(contact={}) | {"time": TIME | {"duration": 0.2}}
     with monkeypatch.context() as before:

@@ -66,6 +66,7 @@ def stays(scene: dict[str, Any], static: hybrid.Result, name: str) -> None:
     assert run["energy/self_contact"] == pytest.approx(energy, rel=1e-5)
 
 
+@pytest.mark.long
 def test_lines_rest_as_the_cable_does() -> None:
     """Each with its zones, contact and forces; the other beside it changes nothing."""
     alone, scene = hybrid.static(hybrid.validate_scene(cable())), beside_each_other(0.0, 3.0)
@@ -84,6 +85,7 @@ def test_lines_rest_as_the_cable_does() -> None:
     stays(scene, system, "line 1")
 
 
+@pytest.mark.long
 def test_a_line_that_a_body_presses_against_itself() -> None:
     scene = at_a_body()
     result = hybrid.static(scene)
@@ -97,6 +99,7 @@ def test_a_line_that_a_body_presses_against_itself() -> None:
     stays(scene, result, "hose")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("y", [-0.005, -0.02])
 def test_the_stiffness_of_a_body_in_contact(y: float) -> None:
     """That of the forces on the body held on both sides, with the contact of the node at its fairlead; yaw is free."""
@@ -110,6 +113,7 @@ def test_the_stiffness_of_a_body_in_contact(y: float) -> None:
             assert found == pytest.approx((there[0] - there[1]) / 4e-5, rel=3e-3, abs=1e-4 * np.abs(found).max())
 
 
+@pytest.mark.long
 def test_without_a_seabed_no_friction_settles() -> None:
     """What settles is friction on the bed: a line that has none rests where it rests without."""
     scene = beside_each_other(0.0)

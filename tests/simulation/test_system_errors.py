@@ -68,6 +68,7 @@ def test_coarser_cells_keep_what_is_fixed() -> None:
     assert len(other.lines["west"].mesh.nodes) == 11
 
 
+@pytest.mark.long
 def test_a_longer_run_has_figures_of_all_of_it(result: hybrid.Result, tmp_path: Path) -> None:
     assert result.file is not None
     more = hybrid.resume(result.file, tmp_path / "more.h5", until=12.0)

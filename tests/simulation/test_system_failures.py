@@ -170,6 +170,7 @@ def test_a_mooring_of_a_body_breaks() -> None:
         assert [x.t for x in result.events if x.kind == "end released"] == [0.5, 0.8]
 
 
+@pytest.mark.long
 def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped before the break, between two breaks and after both."""
     monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
@@ -190,6 +191,7 @@ def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch: pytest.M
     assert differences(whole, path) == []
 
 
+@pytest.mark.long
 def test_a_line_breaks_after_the_end_of_a_run_that_is_continued(tmp_path: Path) -> None:
     """Lines and points that break at times behind the end of a run, which goes on as the longer run, bit for bit."""
     short, whole = tmp_path / "short.h5", tmp_path / "whole.h5"

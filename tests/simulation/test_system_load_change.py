@@ -27,6 +27,7 @@ def adrift() -> dict[str, Any]:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["rod", "adaptive"])
 def test_a_load_that_ends_is_a_load_that_is_changed(model: str, tmp_path: Path) -> None:
     """A force on a float until 1 s, and the same force taken off by resuming at 1 s: one motion."""
@@ -72,6 +73,7 @@ def test_a_force_on_a_body_that_has_ended_stays_ended(start: float, tmp_path: Pa
 SCENES = {"spar": spar, "clamped": clamped, "adrift": adrift}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 def test_changes_are_made_at_their_time_however_often_it_is_stopped(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -121,6 +123,7 @@ def test_a_line_of_several_changes_as_a_cable_does(tmp_path: Path) -> None:
     assert np.abs(found[0][-1, -1] - found[0][0, -1]).max() > 0.01
 
 
+@pytest.mark.long
 def test_errors_are_of_the_motion_with_its_changes(tmp_path: Path) -> None:
     scene = tables_with(
         mooring(), {"time.duration": 1.0, "output": {"every": 0.25, "errors": True}, "lines.hose.model": "catenary"}

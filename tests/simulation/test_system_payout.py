@@ -209,6 +209,7 @@ def test_turned_it_is_the_same() -> None:
         assert np.abs(other.lines[name]["reaction_end"] - one.lines[name]["reaction_end"] @ M.T).max() < 1e-5 * size
 
 
+@pytest.mark.long
 def test_resumed_bit_for_bit(tmp_path: Path) -> None:
     whole, scene = raised()
     hybrid.run(scene | {"time": {"duration": 3.0, "step": 0.02}}, output=tmp_path / "part.h5")

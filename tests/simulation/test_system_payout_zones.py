@@ -72,6 +72,7 @@ def test_beside_a_buoy_they_move_as_rods() -> None:
         assert np.abs(pulls[0] - pulls[1]).max() < 0.02 * pulls[1].mean()
 
 
+@pytest.mark.long
 def test_resumed_to_the_last_bit(tmp_path: Path) -> None:
     scene = to_a_buoy(-0.8)
     whole = hybrid.run(scene)
@@ -96,6 +97,7 @@ def test_a_step_is_taken_back() -> None:
     assert np.array_equal(*places)
 
 
+@pytest.mark.long
 def test_loads_that_change_on_the_way(tmp_path: Path) -> None:
     """Another current from the middle on, as with rods."""
     pulls = []

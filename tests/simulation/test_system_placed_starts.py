@@ -64,6 +64,7 @@ def test_an_inextensible_rope_let_go_level_falls_and_swings_as_one_cable() -> No
     assert np.abs(lines.lines["one"].position - cable.position).max() < 1e-9 * LENGTH
 
 
+@pytest.mark.long
 def test_a_run_from_such_a_start_goes_on_bit_for_bit_and_steps_from_outside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -115,6 +115,7 @@ def stopping(monkeypatch: pytest.MonkeyPatch) -> Stopping:
     return Stopping(monkeypatch)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 def test_a_stopped_run_goes_on_bit_for_bit(name: str, tmp_path: Path, stopping: Stopping) -> None:
     scene, whole, path = SCENES[name], tmp_path / "whole.h5", tmp_path / "run.h5"
@@ -150,6 +151,7 @@ def test_rotations_go_on_beyond_half_a_turn(tmp_path: Path) -> None:
     assert yaw.min() < 165.0 and yaw.max() > 195.0 and np.abs(np.diff(yaw)).max() < 10.0
 
 
+@pytest.mark.long
 def test_a_run_goes_on_beyond_its_end_as_if_it_had_been_that_long(tmp_path: Path) -> None:
     every = {"output": {"every": 0.2}}
     hybrid.run(mooring(**every), tmp_path / "long.h5").close()
@@ -168,6 +170,7 @@ def test_a_run_goes_on_beyond_its_end_as_if_it_had_been_that_long(tmp_path: Path
         assert [tuple(e) for e in long.events] == [tuple(e) for e in more.events]
 
 
+@pytest.mark.long
 def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every line has an output as soon as the points have it; extremes are those up to now."""
     monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 0)  # the file is written whenever the run looks

@@ -109,6 +109,7 @@ def test_outputs_and_buffers_do_not_shape_the_motion(monkeypatch: pytest.MonkeyP
             assert np.array_equal(mine[name][::4], x), name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("automatic", [False, True])
 def test_a_run_that_stops_between_outputs_goes_on_bit_for_bit(
     automatic: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

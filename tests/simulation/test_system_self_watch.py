@@ -62,6 +62,7 @@ def test_a_line_that_meets_itself_says_so(file: Path) -> None:
         assert least == pytest.approx(float(alone["self_distance/clearance"]), abs=1e-4) and least < 0.0
 
 
+@pytest.mark.long
 def test_a_run_that_goes_on_knows_of_it(file: Path, tmp_path: Path) -> None:
     """The least clearance, and that it has been told, are in the checkpoint."""
     with hybrid.open(file) as whole:

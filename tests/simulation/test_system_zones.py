@@ -111,6 +111,7 @@ def of_fibres(**more: Any) -> tuple[hybrid.Result, dict[str, Any]]:
     return hybrid.run(one), several
 
 
+@pytest.mark.long
 def test_fibre_ropes_keep_their_mean_tensions_when_zones_change(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -234,6 +235,7 @@ def stepped_again(scene: dict[str, Any], times: np.ndarray) -> hybrid.Result:
         return simulation.result()
 
 
+@pytest.mark.long
 def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
     """Bit for bit, also where each is computed twice, and several again, across changes of zones."""
     result = stepped_again(mooring(), 0.02 * np.arange(5, 130, 5))  # to the bit the ends of its steps
@@ -299,6 +301,7 @@ def test_a_criterion_sees_the_line_that_it_is_asked_for() -> None:
         hybrid.run(short, criterion=lambda look: look.s)
 
 
+@pytest.mark.long
 def test_a_resumed_run_asks_the_same_criterion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is the run that was not stopped, bit for bit; without the criterion it is refused."""
     _, system = slackening(duration=0.6)

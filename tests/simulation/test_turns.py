@@ -148,6 +148,7 @@ def wound(folder: Path, turns: float, over: float, until: float) -> dict:
     return {"motion": {"file": str(folder / "turns.csv")}}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("every", "step"), [(25.0, 25.0), (25.0, 5.0), (1.0, 1.0), (25.0, None), (1.0, None)])
 def test_turns_beyond_outputs(tmp_path, every, step):
     """27 turns in 1000 s: 1.3385 N m, however long steps and outputs are; only steps that are cut are an event."""

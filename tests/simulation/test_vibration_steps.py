@@ -126,6 +126,7 @@ def test_drag_that_sets_it_off_again_in_every_period_keeps_steps_short():
     assert dt.max() <= 1.001 * PERIOD / 48.0
 
 
+@pytest.mark.long
 def test_a_stopped_run_goes_on_bit_for_bit(tmp_path, monkeypatch):
     scene, stopping = sag(duration=6.0, accuracy="10%", ramp=0.5), Stopping(monkeypatch)
     hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()

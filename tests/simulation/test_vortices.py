@@ -77,6 +77,7 @@ def by_equations(U: float) -> tuple[float, float]:
     return amplitude(found.y[1]), frequency(found.t, found.y[1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("U", [0.45, 0.65])
 def test_a_cylinder_on_springs_moves_as_its_equations_say(U: float) -> None:
     """In 50 steps a period; within the range of frequencies it locks in to."""
@@ -91,6 +92,7 @@ def test_a_cylinder_on_springs_moves_as_its_equations_say(U: float) -> None:
         assert (size, f) == pytest.approx((0.89135, 1.11867), rel=2e-2)
 
 
+@pytest.mark.long
 def test_lock_in_has_a_range() -> None:
     """Beside the natural frequency, 1.12 Hz in water, the cylinder moves by most of a diameter; far from it hardly."""
     sizes = []
@@ -131,6 +133,7 @@ def stepped_current(**vortices: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("vortices", "beam_f", "beam_size"),
     [({}, 1.63, 0.85), ({"lift": 0.7, "center": 0.18, "low": 0.1, "high": 0.26}, 1.67, 0.52)],
@@ -170,6 +173,7 @@ def catenary(model: Any = "rod", duration: float = 60.0, **more: Any) -> dict[st
     } | more  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_catenary_riser_shakes_as_in_moordyn() -> None:
     """MoorDyn 2.7.2: 1.0497 Hz and 0.326 diameters at 0.66 of the length (its target 1.04 Hz), 20 to 60 s."""
     found = hybrid.run(catenary())
@@ -182,6 +186,7 @@ def test_a_catenary_riser_shakes_as_in_moordyn() -> None:
     assert np.ptp(drag) > 0.0 and lost < 0.05 * np.ptp(potential) + 0.2 * found["energy/kinetic"].max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["adaptive", {"kind": "adaptive", "curvature_error": 0.05}], ids=["zones", "cells"])
 def test_phases_go_along_where_zones_move(model: Any) -> None:
     """The amplitude of a riser whose cells and kinds change is that of rods everywhere."""
@@ -198,6 +203,7 @@ def test_phases_go_along_where_zones_move(model: Any) -> None:
     assert sizes[1] == pytest.approx(sizes[0], rel=0.2)
 
 
+@pytest.mark.long
 def test_a_shaking_riser_goes_on_bit_for_bit_and_turned(tmp_path: Path) -> None:
     scene, long, short = catenary(duration=8.0), tmp_path / "long.h5", tmp_path / "short.h5"
     one = hybrid.run(scene, long)

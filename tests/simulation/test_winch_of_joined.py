@@ -122,6 +122,7 @@ def test_energy_is_balanced_to_second_order() -> None:
     assert left[0] > 3.0 * left[1]
 
 
+@pytest.mark.long
 def test_resumed_bit_for_bit(tmp_path: Path) -> None:
     scene = lowered(model="adaptive")
     whole = hybrid.run(scene, output=tmp_path / "whole.h5").lines["one"]
@@ -144,6 +145,7 @@ def over_a_sheave(inertia: float) -> Tables:
     return tables
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("inertia", [0.01, 0.1])
 def test_a_winch_lets_a_rope_run_over_a_sheave(inertia: float) -> None:
     """(m L + J/rho^2 + I) L'' = F - T(t) by another integrator; winch and sheave stand beside each other in Newton's method."""
@@ -163,6 +165,7 @@ def test_a_winch_lets_a_rope_run_over_a_sheave(inertia: float) -> None:
     assert np.abs(line["payout/length"][late] - exact[0]).max() < 5e-3 * (exact[0, -1] - begin[0])
 
 
+@pytest.mark.long
 def test_stepped_from_outside_bit_for_bit() -> None:
     """Every other step is taken twice, elsewhere at first."""
     scene = lowered() | {"time": {"duration": 3.0, "step": STEP}}
@@ -230,6 +233,7 @@ def held_by_friction(found: hybrid.Result) -> tuple[float, float]:
     return float(np.log(T[0] / T[1]) / angle), float(angle)
 
 
+@pytest.mark.long
 def test_a_rope_that_another_line_holds_by_friction() -> None:
     """Without friction the load feels the winch; with it less, and what slides takes energy.
 
@@ -262,6 +266,7 @@ def zones_that_touch(diameter: float) -> Tables:
     return scene
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("diameter", [0.1, 0.11])
 def test_friction_acts_where_surfaces_of_zones_that_move_touch(diameter: float) -> None:
     """e^(mu theta R/(R + r)) of a bar of R and a rope of r: R + r = 6 cm from axis to axis in both."""

@@ -112,6 +112,7 @@ def leaves_range(depths: Depths, parts: int = 7) -> float:
     return most
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("x", "row"),
     [

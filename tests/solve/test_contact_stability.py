@@ -74,6 +74,7 @@ def test_the_stiffness_of_contact_is_the_derivative_of_its_forces() -> None:
     np.testing.assert_allclose((forces[1] - forces[0]) / (2.0 * small), change, atol=1e-6 * np.abs(change).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("joined", [False, True], ids=["one line", "two that meet at a point"])
 def test_a_line_on_top_of_another_one_falls_off(joined: bool) -> None:
     """Its scene lies in a plane, in which it balances; that would not stay, and the rest found does."""
@@ -107,6 +108,7 @@ def test_what_rests_between_sample_points_alone_is_said_to(drop: float, slides: 
     assert all("it would slide but for" in x for x in told)
 
 
+@pytest.mark.long
 def test_a_slack_chain_over_a_taut_rope_is_refused_because_it_is_slack() -> None:
     """Its legs snap from fold to fold in steps of microseconds, so that the motion does not come to rest."""
     chain = {"length": 2.0, "mass": 0.3, "diameter": D, "axial_stiffness": 1e5, "bending_stiffness": 0}

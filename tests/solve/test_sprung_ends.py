@@ -50,6 +50,7 @@ def as_a_system(start: dict[str, Any], end: dict[str, Any]) -> dict[str, Any]:
     return COMMON | {"points": points, "lines": {"line": line}}
 
 
+@pytest.mark.long
 def test_a_cable_on_springs_is_the_line_on_springs_of_several() -> None:
     """Places, moments and curvature, at rest and in motion; the springs turn, and are not those of a rigid clamp."""
     scene = one(START, END)

@@ -82,6 +82,7 @@ def variant(seed):
     return hybrid.validate_scene(data | {"model": kind, "initial": "equilibrium", "mesh": {"cells": 100}})
 
 
+@pytest.mark.long
 def test_random_variants_converge_or_are_refused_with_a_true_reason():
     """Out of balance: below 1e-6 of the largest tension, a thousand times what Newton's tolerance leaves."""
     hybrid.static(variant(SEEDS[0]))  # compile

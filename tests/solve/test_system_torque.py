@@ -171,6 +171,7 @@ C = 5e-3
 RODS = {"model": "rod", "mesh": {"cells": CELLS}}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "model"), [
     ("whole, the other way", ""), ("zones on both sides of a point", ""),
     ("whole, the other way", "rod"), ("zones on both sides of a point", "rod"), ("that both run to", "rod"),

@@ -68,6 +68,7 @@ def errors(model, rho, pattern, carried, reference):
     return np.array(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rho", [0.5, 0.8])
 @pytest.mark.parametrize("model", ["rod", "catenary"])
 def test_tension_is_clean_when_steps_change(model, rho):

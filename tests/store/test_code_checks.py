@@ -127,6 +127,7 @@ def test_every_output_has_what_codes_let_it_use(moved):
             assert name in result.label("code_used")["description"]
 
 
+@pytest.mark.long
 def test_codes_are_shown(moved, tmp_path):
     """In `hybrid stats`, in the report with pictures along s and over time, and kept by a study."""
     out = CliRunner().invoke(app, ["stats", str(moved)])

@@ -150,6 +150,7 @@ def of_study(result: Result) -> dict[str, str]:
     return found
 
 
+@pytest.mark.long
 def test_thirty_results_say_the_same_everywhere(
     results: dict[tuple[str, str], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -68,6 +68,7 @@ def test_the_cheapest_that_meets_a_level_is_named() -> None:
     assert "failed: no moment" in table.markdown()
 
 
+@pytest.mark.long
 def test_levels_are_computed_once_and_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[str] = []
     real = runs.run

@@ -205,6 +205,7 @@ def test_every_case_is_the_run_of_its_scene(folder: Path, found: object) -> None
         assert ds["steps"].values[case] == len(result["steps/t"])
 
 
+@pytest.mark.long
 def test_other_workers_and_batches_give_the_same(folder: Path, found: object, tmp_path: Path) -> None:
     alone = hybrid.study(folder / "heave.yaml", tmp_path / "alone.zarr", workers=1, batch=9)
     for name in alone.data_vars:
@@ -397,6 +398,7 @@ def test_the_command_says_ranges_and_reasons(
         assert np.array_equal(kept["force_max"].values, found["force_max"].values, equal_nan=True)
 
 
+@pytest.mark.long
 def test_a_script_needs_no_guard(folder: Path, tmp_path: Path) -> None:
     """Workers do not import the script that calls: it may call at its top level."""
     script = tmp_path / "script.py"

@@ -26,6 +26,7 @@ def test_there_is_no_other_example() -> None:
     assert studies == set(CASES)
 
 
+@pytest.mark.long
 def test_life_over_a_scatter_diagram(tmp_path: Path) -> None:
     """Damage of each sea state at every place, times its part of the time, is the rate of the life."""
     study = read_study(STUDIES / "touchdown_fatigue.yaml")

@@ -259,6 +259,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     yield made
 
 
+@pytest.mark.long
 def test_a_ladder_is_computed_once_and_kept(tmp_path: Path, counted: list[str]) -> None:
     first = hybrid.trade(scene(), tmp_path, **LADDER)
     assert counted[:2] == ["rod 1%", "rod 3%"], "the reference comes first, then what shows how converged it is"
@@ -293,6 +294,7 @@ def ladder(tmp_path_factory: pytest.TempPathFactory) -> tuple[TradeTable, Path]:
     return hybrid.trade(scene(), folder, **LADDER, command="hybrid trade sag.yaml"), folder
 
 
+@pytest.mark.long
 def test_table_page_and_picture(ladder: tuple[TradeTable, Path]) -> None:
     found, folder = ladder
     rows = list(csv.DictReader(io.StringIO((folder / "trade.csv").read_text())))
@@ -393,6 +395,7 @@ def test_a_signal_where_python_drops_exceptions_is_not_lost(
     assert "(5 runs are missing)" in (tmp_path / "trade.md").read_text()
 
 
+@pytest.mark.long
 def test_a_half_written_run_is_made_again(ladder: tuple[TradeTable, Path], tmp_path: Path, counted: list[str]) -> None:
     shutil.copytree(ladder[1], tmp_path, dirs_exist_ok=True)
     for file in (tmp_path / "runs").glob("*.json"):

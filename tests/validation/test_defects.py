@@ -163,6 +163,7 @@ def test_the_error_that_is_said_is_that_to_a_finer_rod(seed: int) -> None:
     assert 0.7 < of_error(zones, ran(name, "model=rod", "accuracy=0.1%")) < 3.0
 
 
+@pytest.mark.long
 def test_the_error_of_a_motion_that_comes_to_rest() -> None:
     """Against a finer run: right at the last output, where 0.5.0 said a twelfth of it, and at most of the others."""
     finer = ("mesh={cells: 400}", "time.step=0.005", "accuracy=null")

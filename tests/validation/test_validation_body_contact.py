@@ -94,6 +94,7 @@ def _rows(tables: Tables) -> Any:
     return build_system(system).models[0].sea.values.obstacles
 
 
+@pytest.mark.long
 def test_stiffness_of_a_ball_on_two_lines_is_that_of_equilibria_under_forces() -> None:
     """Across the lines and upwards; about its middle nothing holds it."""
     found = hybrid.stiffness(on_two_lines(), "body:ball")
@@ -123,6 +124,7 @@ def tied_down(knot: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Tables:
     return tables
 
 
+@pytest.mark.long
 def test_stiffness_and_offsets_of_points_beside_a_body_that_lines_touch() -> None:
     """The ball gives way with its lines: of a free point by forces on it, of one that is held by shifts."""
     found, force = hybrid.stiffness(tied_down(), "point:knot").matrix, np.array([0.03, 0.01, 0.05])
@@ -133,6 +135,7 @@ def test_stiffness_and_offsets_of_points_beside_a_body_that_lines_touch() -> Non
     np.testing.assert_allclose((shifted[0] - shifted[1]) / 2e-4, held[:, 0], rtol=5e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("heading", [0.0, 90.0])
 @pytest.mark.parametrize("tables", [on_two_lines(), tied_down()], ids=["alone", "tied"])
 def test_a_body_that_is_held_bears_what_lines_that_touch_it_do(tables: Tables, heading: float) -> None:
@@ -234,6 +237,7 @@ def test_where_the_origin_of_a_body_is_changes_nothing(fallen: Any) -> None:
         np.testing.assert_allclose(a["obstacles/ball/moment"], b["obstacles/ball/moment"], atol=0.02 * most)
 
 
+@pytest.mark.long
 def test_a_run_that_goes_on_has_the_same_bits(tmp_path: Path, fallen: Any) -> None:
     hybrid.run(pushed() | {"time": {"duration": 0.25, "step": 0.005}}, tmp_path / "a.h5")
     result = hybrid.resume(tmp_path / "a.h5", until=0.5)
@@ -281,6 +285,7 @@ def test_a_very_heavy_body_is_an_obstacle(kind: str) -> None:
         np.testing.assert_allclose(a.tension, b.tension, rtol=1e-6, atol=left)
 
 
+@pytest.mark.long
 def test_a_box_that_falls_on_lines(tmp_path: Path) -> None:
     """Work of lines on it and of it on them, the scene turned, and a run that goes on, as of a ball."""
     box = {"kind": "box", "size": [0.9, 1.3, 0.8], "rounding": 0.15, "rotation": [10, 20, 5], "friction": 0.4}
@@ -494,6 +499,7 @@ def test_a_shape_has_the_name_of_no_obstacle() -> None:
         hybrid.static(tables)
 
 
+@pytest.mark.long
 def test_bodies_that_are_in_each_other_or_in_what_is_around_are_told(tmp_path: Path) -> None:
     def body(x: float, z: float, shape: dict[str, Any]) -> dict[str, Any]:
         return {"initial_guess": [x, 5.0, z], "mass": 2, "inertia": [0.1] * 3, "shape": shape}

@@ -83,6 +83,7 @@ def test_a_turned_scene_moves_the_same(fallen: Any) -> None:
         np.testing.assert_allclose(result.lines[side].position, x.position @ turn.T, atol=1e-7)
 
 
+@pytest.mark.long
 def test_a_run_that_goes_on_has_the_same_bits(tmp_path: Path, fallen: Any) -> None:
     hybrid.run(crossed() | {"time": {"duration": 0.25, "step": 0.005}}, tmp_path / "a.h5")
     result = hybrid.resume(tmp_path / "a.h5", until=0.3)
@@ -180,6 +181,7 @@ def cradle() -> Tables:
     return tables | {"contact": {}}
 
 
+@pytest.mark.long
 def test_a_ball_rests_on_lines_that_lie_on_others() -> None:
     """From the scene alone; all pins together bear what weighs, and an obstacle there holds the lines the same."""
     tables = cradle()
@@ -209,6 +211,7 @@ def build_of(tables: Tables) -> Any:
 # --- free flight ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_a_line_thrown_at_another_and_a_ball_keeps_momentum(friction: float) -> None:
     """The upper line meets the lower, which meets the ball; momentum and angular momentum to 1e-6 of what they are."""

@@ -49,6 +49,7 @@ def pulled() -> hybrid.Result:
     return hybrid.static(clasp())
 
 
+@pytest.mark.long
 def test_bights_press_on_each_other_by_the_pull_of_both_arms(pulled: hybrid.Result) -> None:
     """What their ends bear, and twice the tension but for what the arms lean: 2 T cos(lean)."""
     upper, lower = pulled.lines["upper"], pulled.lines["lower"]

@@ -108,6 +108,7 @@ def test_a_floor_that_moves_bears_what_its_force_is() -> None:
 # --- lines ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_crossing_ropes_press_by_the_force_of_the_reference() -> None:
     """In N, whatever the cells are: what the one rope does to the other is what their pins lack."""
     for cells in (60, 100):

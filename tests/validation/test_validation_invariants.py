@@ -11,6 +11,7 @@ from problems import build, motion, order, shaken_line, solid_angle, turned_by, 
 import hybrid
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("damping", [0.0, 0.01], ids=["undamped", "damped strain"])
 @pytest.mark.parametrize("kind", ["catenary", "rod", "hybrid"])
 def test_length_and_frames_over_many_steps(kind, damping, report):

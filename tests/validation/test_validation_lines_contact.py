@@ -129,6 +129,7 @@ def test_what_lines_do_to_each_other_is_booked(moved: Any) -> None:
     assert max(np.abs(x["work/scheme"]).max() for x in (upper, lower)) < 2e-3 * put_in
 
 
+@pytest.mark.long
 def test_it_resumes_bit_for_bit(moved: Any, tmp_path: Path) -> None:
     hybrid.run(lowered(0.8), tmp_path / "half.h5")
     more = hybrid.resume(tmp_path / "half.h5", until=1.6)
@@ -164,6 +165,7 @@ def test_it_stays_where_it_rests_on_another() -> None:
 # --- fibres under tension ---------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_crossing_fibres_push_each_other_by_their_tension() -> None:
     """F = (d - e) T/(l - lam tanh(l/lam)), lam^2 = EI/T, with d the distance in contact; here e = 0 and 2 l the span."""
     half, width, pull, stiff = 1.0, 0.01, 100.0, 1.0
@@ -201,6 +203,7 @@ def thrown(friction: float, speed: float, steps: float, duration: float, seed: i
     return throw([a, b], [va, vb], steps * D / speed, duration * D / speed, friction, kind=kind)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.0, 0.6])
 def test_momentum_and_angular_momentum_are_kept(friction: float) -> None:
     """In steps that resolve the collision, as of a line that touches itself."""
@@ -212,6 +215,7 @@ def test_momentum_and_angular_momentum_are_kept(friction: float) -> None:
     assert found.least > 0.9 * D
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["rod", "catenary"])
 @pytest.mark.parametrize("steps", [1.0, 10.0], ids=["pass-through step", "ten times that"])
 def test_no_step_carries_a_line_through_another(steps: float, kind: str) -> None:
@@ -274,6 +278,7 @@ def without_contact(**more: Any) -> Tables:
     return lowered(0.8) | {"contact": {"between": []}} | more
 
 
+@pytest.mark.long
 def test_lines_without_contact_do_not_pass_through_each_other_in_silence(moved: Any, tmp_path: Path) -> None:
     """One event, when and where contact would have begun; a run that goes on says it no second time."""
     hybrid.run(without_contact(), tmp_path / "half.h5")
@@ -362,6 +367,7 @@ def test_lines_that_stay_apart_or_have_contact_are_not_said_to_pass(moved: Any) 
         assert PASSAGE not in {e.kind for e in events}
 
 
+@pytest.mark.long
 def test_the_distance_of_lines_is_that_of_their_cells() -> None:
     """Against all pairs of cells, of random polygons at rest."""
     random = np.random.default_rng(5)
@@ -455,6 +461,7 @@ def clash(speed: float) -> Tables:
     }  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_current_does_not_drive_a_line_through_another_one() -> None:
     """It lies against the chain, on the side on which it hangs in still water; without contact it is beyond it."""
     free, held, weak = (

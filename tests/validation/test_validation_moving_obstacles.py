@@ -203,6 +203,7 @@ def test_a_bearing_holds_a_sheave_back() -> None:
     assert speeds(result)[-1] == pytest.approx(4.0 * CENTRELINE**2, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_run_over_a_sheave_goes_on_and_is_taken_back_bit_for_bit(rolled: Any, tmp_path: Any) -> None:
     half = weights(0.1)
     half["time"] = half["time"] | {"duration": 0.6}

@@ -109,6 +109,7 @@ def test_zones_that_move_have_the_answer_of_rods(laid: Any, folder: Path) -> Non
     assert np.linalg.norm(np.array(zones.position) - np.array(laid.position), axis=2).max() < 0.012
 
 
+@pytest.mark.long
 def test_no_step_carries_a_line_through(folder: Path) -> None:
     """At 20 m/s in steps of 0.02 s, 0.4 m: through a beam of 0.2 m in one step."""
     file = text_stl(folder / "bar.stl", box((0.2, 2.0, 0.2)))

@@ -112,6 +112,7 @@ def _several(tables: Tables) -> Tables:
     return found
 
 
+@pytest.mark.long
 def test_what_is_asked_is_met_on_a_beam() -> None:
     tables = DRAGGED | {"obstacles": {"beam": BEAM | {"rounding": 1.0}}}
     duration = tables["time"]["duration"]

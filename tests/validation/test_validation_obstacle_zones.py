@@ -25,6 +25,7 @@ def apart(a: Any, b: Any) -> float:
     return float(np.linalg.norm(np.array(a.position) - np.array(b.position), axis=2).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tables", [HEAVE, DRAGGED], ids=["heave", "dragged"])
 def test_a_line_is_rod_where_it_touches_and_moves_as_one_that_is_rod_everywhere(tables: Tables) -> None:
     """Catenaries everywhere are off by 3 cm; zones by less than their tolerance, which is 12 mm."""

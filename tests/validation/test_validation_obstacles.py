@@ -134,6 +134,7 @@ def test_a_rotated_scene_has_a_rotated_result(laid: Any) -> None:
     np.testing.assert_allclose(other.tension, laid.tension, atol=1e-7 * laid.tension.max())
 
 
+@pytest.mark.long
 def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(laid: Any, tmp_path: Any) -> None:
     half = over_pipe()
     half["time"] = {"duration": 1.0, "step": 0.02}

@@ -58,6 +58,7 @@ def heaved() -> Any:
     return hybrid.run(HEAVE | FINE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tables", [HEAVE, DRAGGED, MOVES], ids=["heave", "dragged", "pipe moves"])
 def test_figures_are_those_of_a_fine_run_and_steps_meet_what_is_asked(tables: Tables, heaved: Any) -> None:
     """Contact opens and closes, and friction holds and slides: none of three figures is below the truth."""
@@ -84,6 +85,7 @@ def as_system(tables: Tables) -> Tables:
     return own | {"points": points, "lines": {"one": line}}
 
 
+@pytest.mark.long
 def test_figures_of_given_cells_and_steps(heaved: Any) -> None:
     """Both-sided, of tension too, whose slope jumps where friction begins: of order 1.  Of a system of one line as well."""
     given = HEAVE | {
@@ -96,6 +98,7 @@ def test_figures_of_given_cells_and_steps(heaved: Any) -> None:
     assert system.errors["total/tension"].max() == pytest.approx(alone.errors["total/tension"].max(), rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["catenary", "rod"])
 @pytest.mark.parametrize("cells", [16, 25, 100, 400])
 def test_a_rope_lies_over_the_pipe_on_any_cells(model: str, cells: int) -> None:

@@ -99,6 +99,7 @@ def test_what_a_paid_rope_does_to_another_is_booked(whole: hybrid.Result) -> Non
     np.testing.assert_allclose(upper["energy/self_contact"], lower["energy/self_contact"], atol=1e-12)
 
 
+@pytest.mark.long
 def test_a_stopped_run_goes_on_bit_for_bit(
     whole: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -132,6 +133,7 @@ def test_first_in_the_scene_or_last_it_is_the_same(whole: hybrid.Result) -> None
 # --- bodies ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_ball_goes_down_on_lines_that_are_let_out() -> None:
     """It swings about where it rests on longer lines."""
     paid, like = on_two_lines(), on_two_lines()

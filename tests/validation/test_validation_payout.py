@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import hybrid
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
+@pytest.mark.long
 def test_laid_at_the_speed_of_the_ship_a_cable_is_a_straight_line() -> None:
     """w cos a = 1/2 rho Cd d V^2 sin^2 a (Zajac 1957): the angle to 1e-3, the pull steady within 0.1 %.
 
@@ -62,6 +64,7 @@ def test_laid_at_the_speed_of_the_ship_a_cable_is_a_straight_line() -> None:
     assert abs((pull[-1] - moves) / np.linalg.norm(towed["reaction_end"][-1]) - 1.0) < 5e-3
 
 
+@pytest.mark.long
 def test_a_vehicle_goes_down_on_a_tether_that_is_paid_out() -> None:
     """What the head of the example says."""
     result = hybrid.run(EXAMPLES / "rov_descent.yaml")

@@ -161,6 +161,7 @@ def test_a_free_sheave_has_the_energy_that_the_line_has_given(rolled: Any) -> No
     assert 1e-6 < kick(result, pull(result)) < 4e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rate", [0.1, -0.05])
 def test_slow_payout_over_a_free_sheave_is_the_equilibrium_of_that_length_without_friction(rate: float) -> None:
     """At rest both legs pull alike, as on a smooth pipe."""
@@ -242,6 +243,7 @@ def test_a_winch_at_the_start_is_the_mirror_image(chute: Any) -> None:
         assert np.abs(two[other] - one[name]).max() < 1e-6 * np.abs(one["work/end"]).max(), name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("several", [False, True])
 def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(chute: Any, tmp_path: Path, several: bool) -> None:
     scene, one, _ = chute
@@ -256,6 +258,7 @@ def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(chute: Any, tmp_path: Path,
         assert np.array_equal(one[name], two[name]), name
 
 
+@pytest.mark.long
 def test_steps_are_taken_back_bit_for_bit(chute: Any) -> None:
     """From outside, every step of the first second twice: nodes enter in some of them."""
     scene, one, _ = chute

@@ -183,6 +183,7 @@ def slow(length: float, model: str, rate: float = 0.0) -> dict[str, Any]:
     return scene | {"time": {"duration": 9.0, "step": 0.02}}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("model", "rate"), [("rod", 0.1), ("catenary", 0.1), ("rod", -0.05)])
 def test_slow_payout_over_a_pipe_is_the_equilibrium_of_that_length(model: str, rate: float) -> None:
     result = hybrid.run(slow(12.0, model, rate))

@@ -473,6 +473,7 @@ def test_touchdown_in_motion(name, report):
     assert abs(error["static"]) <= mean
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("amplitude", [0.25, 2.0])
 def test_touchdown_converges(amplitude, report):
     """Top tension against 800 cells, and against dt = 1/80 s, root mean square over its standard deviation, from 16 s on.

@@ -96,6 +96,7 @@ def test_a_very_heavy_sheave_is_a_drum_that_stands() -> None:
     assert light.steps.iterations.sum() < 1.05 * still.steps.iterations.sum()  # derivatives are as exact
 
 
+@pytest.mark.long
 def test_it_goes_on_and_is_taken_back_bit_for_bit(pulled: Any, tmp_path: Path) -> None:
     half = crossed_legs(0.02, held=False)
     half["time"]["duration"] = 0.4
@@ -168,6 +169,7 @@ def test_two_ropes_turn_one_sheave_by_what_both_are_pulled(rolled: Any) -> None:
     np.testing.assert_array_equal(left, right)
 
 
+@pytest.mark.long
 def test_ropes_that_lie_against_each_other_turn_it_the_same(rolled: Any) -> None:
     """Side by side on the sheave, within the reach of their contact."""
     beside = hybrid.run(two_ropes(0.99 * STRAND, contact={"friction": 0.2}))
@@ -175,6 +177,7 @@ def test_ropes_that_lie_against_each_other_turn_it_the_same(rolled: Any) -> None
     np.testing.assert_allclose(accelerations(beside), accelerations(rolled), rtol=2e-3)
 
 
+@pytest.mark.long
 def test_ropes_over_a_sheave_go_on_bit_for_bit(rolled: Any, tmp_path: Path) -> None:
     hybrid.run(two_ropes() | {"time": {"duration": 0.8, "step": 0.002}}, tmp_path / "half.h5")
     whole = hybrid.resume(tmp_path / "half.h5", until=0.9)
@@ -186,6 +189,7 @@ def test_ropes_over_a_sheave_go_on_bit_for_bit(rolled: Any, tmp_path: Path) -> N
 # --- free flight ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.1, 0.5])
 def test_lines_thrown_at_two_sheaves_and_each_other_keep_angular_momentum(friction: float) -> None:
     """About the axis, which both sheaves have in common: what the lines lose the sheaves have, to 1e-6."""

@@ -49,6 +49,7 @@ def test_greenhill_is_the_published_root():
         assert greenhill_clamped(load) == pytest.approx(published, abs=0.5e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("torsional_stiffness", [1.0, 100.0], ids=["GJ = EI", "GJ = 100 EI"])
 def test_torsional_buckling(torsional_stiffness, report):
     found = np.array([critical_torque(100.0, n, torsional_stiffness) for n in (50, 100)])
@@ -95,6 +96,7 @@ def critical_turn(cells: int) -> float:
     return float(brentq(softest_but_rolling, 0.9, 1.05, xtol=1e-7))
 
 
+@pytest.mark.long
 def test_twisted_ring(report):
     error = np.array([critical_turn(n) for n in (20, 40, 80)]) - 1
     p = order(error)

@@ -98,6 +98,7 @@ def test_a_rope_that_comes_down_is_rod_before_it_touches_and_moves_as_rods_do() 
     assert np.abs(force - like_force)[late].max() < 0.03 * np.abs(like_force[late]).max()
 
 
+@pytest.mark.long
 def test_rods_that_come_and_go_roll_with_their_inertia() -> None:
     """Of lines that nothing holds about their axis: without it ropes that rub were 0.10 m off, and a third of the work."""
     rods = hybrid.run(lowered())

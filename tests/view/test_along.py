@@ -87,6 +87,7 @@ def test_histories_at_a_jump_are_two(swing: hybrid.Result) -> None:
     assert len(lines(panels.history(swing, "position", [CLUMP], component=0))) == 1
 
 
+@pytest.mark.long
 def test_pages_and_films_of_jumps_are_made(swing: hybrid.Result, tmp_path: Path) -> None:
     assert hybrid.report(swing, tmp_path / "swing.html").stat().st_size > 1e5
     hybrid.plot(swing, path=tmp_path / "swing.png")

@@ -42,6 +42,7 @@ def test_a_narrow_page_for_telephones(tmp_path: Path) -> None:
     assert size == (396, 412) and np.abs(second - first).max() > 100
 
 
+@pytest.mark.long
 def test_an_mp4_plays_everywhere(tmp_path: Path) -> None:
     program = film.ffmpeg()
     if program is None:
@@ -53,6 +54,7 @@ def test_an_mp4_plays_everywhere(tmp_path: Path) -> None:
     assert counted and counted[-1] == made.frames
 
 
+@pytest.mark.long
 def test_the_number_of_frames_is_bounded_and_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(film._FRAMES, ".gif", 24)
     made = film.animate(reported(outputs=151, points=21), tmp_path / "run.gif")

@@ -61,6 +61,7 @@ def test_pictures_have_the_shapes(found):
     assert any(x["ticks"] for x in drawn)
 
 
+@pytest.mark.long
 def test_a_page_of_their_own_and_in_the_report(found, tmp_path):
     scene, modes = found
     page = tmp_path / "modes.html"

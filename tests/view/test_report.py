@@ -71,6 +71,7 @@ CASES: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_every_kind_of_result_has_a_report(case: str) -> None:
     result = reported(**CASES[case])
@@ -108,6 +109,7 @@ def test_what_is_drawn_is_what_is_in_the_file() -> None:
     assert array(page, high["y"]) == pytest.approx(result.tension.max(axis=0) / 1e3, rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_long_run_is_thinned_and_says_so_but_its_extremes_are_exact() -> None:
     short, long = reported(), reported(outputs=1501, points=301)
     assert "To keep this file small" not in html(short)

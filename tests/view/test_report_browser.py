@@ -76,6 +76,7 @@ def visit(browser: Any, page_file: Path) -> Iterator[Visit]:
     assert [url.split(":")[0] for url in opened.asked if not url.startswith(("data:", "blob:"))] == ["file"]
 
 
+@pytest.mark.long
 def test_it_opens_complete_and_without_complaint(visit: Visit) -> None:
     for plot in visit.page.query_selector_all(".plot[data-figure]"):
         visit.shown(f"#{plot.get_attribute('id')}")
@@ -92,6 +93,7 @@ def test_its_pictures_are_not_blank(visit: Visit) -> None:
         assert visit.pixels("#cable-plot" if name == "cable" else f"#plot-{name}").std() > 5.0, name
 
 
+@pytest.mark.long
 def test_the_slider_moves_the_cable_and_the_cursors(visit: Visit) -> None:
     first = visit.cable()
     visit.shown("#plot-end-forces")
@@ -107,6 +109,7 @@ def test_the_slider_moves_the_cable_and_the_cursors(visit: Visit) -> None:
     assert visit.page.evaluate(now) == pytest.approx(21.0, rel=1e-5)
 
 
+@pytest.mark.long
 def test_play_moves_time_and_stops_again(visit: Visit) -> None:
     visit.page.select_option("#pace", "1")
     visit.page.click("#play")
@@ -221,6 +224,7 @@ def test_other_results_open_without_complaint(browser: Any, tmp_path: Path, aske
     opened.context.close()
 
 
+@pytest.mark.long
 def test_the_cable_is_drawn_when_it_is_looked_at_as_it_is_then(browser: Any, page_file: Path) -> None:
     """Until then its still drawing is there; time that went on before is that of the drawing."""
     opened = Visit(browser, page_file, cable=False, viewport={"width": 1280, "height": 500})
@@ -238,6 +242,7 @@ def test_the_cable_is_drawn_when_it_is_looked_at_as_it_is_then(browser: Any, pag
     opened.context.close()
 
 
+@pytest.mark.long
 def test_stills_stand_until_plotly_draws(browser: Any, page_file: Path) -> None:
     """plotly starts with the first picture that is looked at; its graph has the limits of the still drawing."""
     opened = Visit(browser, page_file, cable=False, viewport={"width": 1280, "height": 400})
@@ -255,6 +260,7 @@ def test_stills_stand_until_plotly_draws(browser: Any, page_file: Path) -> None:
     opened.context.close()
 
 
+@pytest.mark.long
 def test_without_javascript_every_picture_is_there(browser: Any, page_file: Path) -> None:
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
@@ -278,6 +284,7 @@ def test_without_webgl_the_cable_is_shown_still(browser: Any, page_file: Path) -
     context.close()
 
 
+@pytest.mark.long
 def test_paper_has_every_picture(browser: Any, page_file: Path) -> None:
     """Printed from a dark screen before anything was scrolled to: A4, light, every still drawing, folds open."""
     pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
@@ -313,6 +320,7 @@ def test_paper_has_every_picture(browser: Any, page_file: Path) -> None:
     opened.context.close()
 
 
+@pytest.mark.long
 def test_a_dark_screen_gets_a_dark_page_and_the_other_way_round(browser: Any, page_file: Path) -> None:
     opened = Visit(browser, page_file, color_scheme="dark")
     assert opened.pixels("#plot-end-forces").mean() < 80.0 and opened.pixels("#cable-plot").mean() < 80.0
@@ -323,6 +331,7 @@ def test_a_dark_screen_gets_a_dark_page_and_the_other_way_round(browser: Any, pa
     opened.context.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_nothing_serious_for_screen_readers_and_keyboards(browser: Any, page_file: Path, scheme: str) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")

@@ -244,6 +244,7 @@ def test_the_area_that_was_swept_is_shaded() -> None:
     assert np.ptp(tips[:, 0]) == pytest.approx(2 * 100.0 * np.sin(0.5), rel=0.02)
 
 
+@pytest.mark.long
 def test_the_table_of_pages_tells_what_room_they_leave(monkeypatch: pytest.MonkeyPatch) -> None:
     bowed = CASES["bowed"][0]
     for name, position, bed in (
@@ -553,6 +554,7 @@ CASES: dict[str, tuple[Callable[[np.ndarray, float], Sequence[Any]], list[tuple[
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_the_plane_suits_the_shape(case: str) -> None:
     position, labels, title = CASES[case]
@@ -637,6 +639,7 @@ def test_nonsense_is_refused(tmp_path: Path) -> None:
         draw_panel(panels.history(result, "tenson", [0.0]), ax)
 
 
+@pytest.mark.long
 def test_no_pyplot_and_no_matplotlib_before_something_is_drawn() -> None:
     code = (
         "import sys, hybrid.view.plots as p, hybrid.view.report; assert 'matplotlib' not in sys.modules; sys.path.insert(0, sys.argv[1]);"

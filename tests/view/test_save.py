@@ -32,6 +32,7 @@ WRITERS: list[tuple[Write, str]] = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("write", "name"), WRITERS, ids=[name for _, name in WRITERS])
 def test_a_file_of_ours_is_replaced_and_another_is_not(write: Write, name: str, tmp_path: Path) -> None:
     result, file = reported(outputs=3), tmp_path / name
@@ -74,6 +75,7 @@ def test_a_name_that_cannot_be_written_is_refused(write: Write, name: str, words
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("write", "name"), WRITERS, ids=[name for _, name in WRITERS])
 def test_a_full_disk_leaves_the_old_file_and_nothing_else(
     write: Write, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -47,6 +47,7 @@ def cells(visit: Any, column: int) -> list[str]:
     )
 
 
+@pytest.mark.long
 def test_a_page_of_2000_cases(browser: Any, page: Path) -> None:  # noqa: F811
     visit = Visit(browser, page)
     assert visit.complaints == [] and {url.split(":")[0] for url in visit.asked} <= {"file", "data", "blob"}
@@ -74,6 +75,7 @@ def test_a_page_of_2000_cases(browser: Any, page: Path) -> None:  # noqa: F811
     visit.context.close()
 
 
+@pytest.mark.long
 def test_a_phone_needs_no_scrolling_aside(browser: Any, page: Path) -> None:  # noqa: F811
     visit = Visit(browser, page, viewport={"width": 390, "height": 800})
     assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390

@@ -235,6 +235,7 @@ def test_the_stress_of_pipes_is_judged(tmp_path: Path, capsys: pytest.CaptureFix
     assert "<td>max_stress</td><td>broken</td>" in text and "1 of 1 broken" in text
 
 
+@pytest.mark.long
 def test_a_film_moves_all_lines(result: hybrid.Result, tmp_path: Path) -> None:
     film = animate(result, tmp_path / "spar.gif")
     with Image.open(film.path) as image:
@@ -251,6 +252,7 @@ def test_what_is_of_one_line_says_so(result: hybrid.Result) -> None:
         hybrid.plot(result, history=[1.0])
 
 
+@pytest.mark.long
 def test_commands_take_all_lines_or_one(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     call = CliRunner()
