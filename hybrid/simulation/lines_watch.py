@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.contact.self_contact_law import OUTER
 from hybrid.kernels.junctions.lines_distance import (
     AT,
     HAVE_MET,
@@ -40,6 +41,22 @@ def watched_pairs(system: System, model: SystemModel) -> list[tuple[int, int]]:
     return [(a, b) for a, b in combinations(thick, 2) if touching is None or b not in touching.partners(a)]
 
 
+def _joined_by_place(system: System, width: float) -> NDArray[np.int64]:
+    """As joined_ends_of, but what is held or moved is one thing only where it is one place at first.
+
+    width: m, the largest diameter.
+    """
+    joined = joined_ends_of(system)
+    held = np.argwhere(joined == 0)
+    lines = list(system.lines.values())
+    at = np.array([system.first_place((lines[k].start, lines[k].end)[end]) for k, end in held]).reshape(-1, 3)
+    first = 1 + int(joined.max(initial=0))
+    for row, place in zip(held, at, strict=True):  # the number of the first that is there
+        beside = np.linalg.norm(at - place, axis=1) <= OUTER * width
+        joined[tuple(row)] = first + int(beside.argmax())
+    return joined
+
+
 class LinesWatch:
     """What looks after every step whether two of such lines have met, or are near."""
 
@@ -54,9 +71,10 @@ class LinesWatch:
         self._room = np.zeros((len(self._pairs), ROOM))
         width = [diameters(x) for x in model.models]
         begins = np.concatenate([[0], np.cumsum([x.size for x in width])[:-1]]).astype(np.int64)
+        widest = max((float(x.max()) for x in width), default=0.0)
         self._bound = {
-            "joined": joined_ends_of(system), "begins": begins, "width": np.concatenate(width), "clock": clock,
-            "pairs": self._pairs, "room": self._room, "moved": np.zeros((len(width), MOVED)),
+            "joined": _joined_by_place(system, widest), "begins": begins, "width": np.concatenate(width),
+            "clock": clock, "pairs": self._pairs, "room": self._room, "moved": np.zeros((len(width), MOVED)),
         }  # fmt: skip
         self._jobs = Table(blank_lines_job), Table(blank_lines_job)
 
