@@ -56,6 +56,15 @@ def test_contact_begins_where_lines_come_near_and_is_that_which_is_asked_for(beg
     assert same(begun, hybrid.run(unasked(contact={}))) < 1e-9
 
 
+def test_taut_catenaries_touch_as_if_asked() -> None:
+    tables = unasked()
+    for line in tables["lines"].values():
+        line |= {"model": "catenary", "sections": [ROPE | {"length": 0.805}]}
+    found = hybrid.run(tables)
+    assert BEGINS in kinds(found) and PASSAGE not in kinds(found)
+    assert same(found, hybrid.run(tables | {"contact": {}})) < 1e-9
+
+
 @pytest.mark.parametrize("until", [0.2, 0.5])
 def test_a_run_goes_on_to_the_bit_from_before_and_after_contact_began(begun: Any, until: float, tmp_path: Path) -> None:
     hybrid.run(unasked(until), tmp_path / "half.h5")
