@@ -57,7 +57,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """The whole suite is run without tests of a second or more; where files or marks are named they are run."""
+    """The whole suite is run without tests of about a second or more; where files or marks are named they are run."""
     config.stash[ROWS], config.stash[MISSED] = [], set()
     if config.args_source is pytest.Config.ArgsSource.TESTPATHS and config.option.markexpr == USUAL:
         config.option.markexpr = f"{USUAL} and not long"  # which worker processes are told

@@ -66,6 +66,7 @@ def test_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyte
     assert (clone / "02_suspension.h5").is_file() and (clone / "02_suspension.png").is_file()
 
 
+@pytest.mark.long
 def test_readme_says_what_the_first_command_says(
     clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -84,6 +85,7 @@ def test_readme_says_what_the_first_command_says(
             assert line.split() in [x.split() for x in out.out.splitlines()]
 
 
+@pytest.mark.long
 def test_readme_python_runs(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(clone)
     (block,) = blocks(README, "python")

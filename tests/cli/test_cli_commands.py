@@ -168,6 +168,7 @@ def test_plot_takes_its_format_from_the_name(call: Call) -> None:
     assert said.code == 0 and Path("wire.svg").read_text().startswith("<?xml")
 
 
+@pytest.mark.long
 def test_plot_zones_has_a_file_of_its_own(call: Call) -> None:
     call("run", "wire.yaml")
     said = call("plot", "wire.h5", "--zones")

@@ -60,6 +60,7 @@ def check_file() -> float:
         return float(result.times[-1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_a_whole_file(number: signal.Signals) -> None:
     process = start()

@@ -60,6 +60,7 @@ def test_plan_draws_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypatch
     assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.accuracy.api"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["run", "static", "plan"])
 def test_what_is_compiled_is_called_without_numba(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

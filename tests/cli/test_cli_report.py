@@ -135,6 +135,7 @@ def test_a_picture_that_may_not_be_written_stops_a_run_before_it_begins(call: Ca
     assert code == 1 and "scene.png exists and was not made by hybrid" in err and not Path("scene.h5").exists()
 
 
+@pytest.mark.long
 def test_a_film_is_an_mp4_where_that_can_be_written_else_a_gif(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as bare:
         bare.setattr(animate, "ffmpeg", lambda: None)

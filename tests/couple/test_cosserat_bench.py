@@ -42,6 +42,7 @@ def test_errors_against_its_references(name: str, bounds: dict[str, float]) -> N
         assert abs((result.metrics | result.observations)[key]) <= bound, key
 
 
+@pytest.mark.long
 def test_a_rope_holds_below_its_overhang_and_slides_beyond_it() -> None:
     """Friction sticks: it does not creep; and it gives way where the capstan equation with weight says so."""
     assert solved("capstan", overhang=0.95).metrics["slide"] < 1e-3

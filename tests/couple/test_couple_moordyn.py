@@ -107,6 +107,7 @@ def test_forces_of_a_motion_are_those_of_the_scene_that_has_it(tmp_path: Path) -
     assert np.ptp(pull[:, 0]) > 0.05 * np.abs(pull[:, 0]).max()
 
 
+@pytest.mark.long
 def test_a_coupled_body_is_its_points(tmp_path: Path) -> None:
     body, points = started(on_a_body(tmp_path / "body.txt")), started()
     assert moordyn.NCoupledDOF(body) == 6

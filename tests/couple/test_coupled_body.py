@@ -65,6 +65,7 @@ def couple(step: float, duration: float, agreed: bool, newton: bool = False) -> 
     return Coupled(np.array(heights[every - 1 :: every]), (body + work) / energy, tries * step / duration)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("agreed", "order"), [(True, 2.0), (False, 1.0)])
 def test_steps_that_are_repeated_are_of_order_two_and_staggered_ones_of_order_one(agreed: bool, order: float) -> None:
     coarse, middle, fine = (couple(step, 6.0, agreed).height for step in (0.05, 0.025, 0.0125))

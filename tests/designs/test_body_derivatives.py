@@ -138,6 +138,7 @@ SCENES = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", SCENES)
 def test_differences_of_equilibria(what):
     """Bodies shift and turn with what holds them."""

@@ -217,6 +217,7 @@ def test_what_is_refused():
             hybrid.sensitivity(tables, [of], [by])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cells", [{}, {"curvature_error": 0.02}])
 def test_zones_that_move_stay_where_they_were_found(cells):
     """Of a line that bends at its clamp: differences of equilibria whose zones are the same, and near those of rods."""

@@ -107,6 +107,7 @@ def test_an_extreme_changes_evenly_as_it_goes_from_one_output_to_the_next(side):
     assert np.abs(np.diff(values)).max() < 3e-4 and values == pytest.approx(np.ones(2001), abs=0.05)
 
 
+@pytest.mark.long
 def test_one_unknown_at_its_bound_and_one_at_the_limit_of_the_higher_sea():
     """As heavy as can be where only m L + M counts for the pull: by hand M is least, and m is what the limit leaves."""
     found = hybrid.design(

@@ -64,6 +64,7 @@ def errors_of(problem: om.Problem, **how: object) -> dict[tuple[str, str], float
     }
 
 
+@pytest.mark.long
 def test_partials_are_those_of_differences():
     component = hybrid.openmdao_component(
         ROD,
@@ -152,6 +153,7 @@ def test_a_target_is_an_equality():
     assert problem.get_val("length").item() == pytest.approx(3000.0 / 5.0 / 9.81, rel=1e-6)
 
 
+@pytest.mark.long
 def test_several_lines():
     design = EXAMPLES / "designs" / "pretension.yaml"
     problem = problem_of(hybrid.openmdao_component(design))

@@ -155,6 +155,7 @@ def test_loads_that_change_are_noticed() -> None:
     assert "loads change" in in_motion(scene, ["last tension@start"], [f"{SECTION}.mass"]).ways[0]
 
 
+@pytest.mark.long
 def test_numbers_that_are_not_followed_are_differenced_beside_those_that_are() -> None:
     """A place that turns the plane of the line; in the order asked for."""
     tables = on_the_bed()

@@ -231,6 +231,7 @@ def test_csv_of_places_components_and_tables_opens_in_pandas(result: Result, tmp
     assert events["events/text"].tolist() == [event.text for event in result.events], "commas and quotes are kept"
 
 
+@pytest.mark.long
 def test_csv_knows_no_locale(result: Result, tmp_path: Path) -> None:
     before = locale.setlocale(locale.LC_ALL)
     try:
@@ -534,6 +535,7 @@ def test_nonsense_is_refused_and_nothing_is_left(
     assert folder_of(tmp_path) == before
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", FORMATS)
 def test_only_older_exports_are_replaced(result: Result, tmp_path: Path, kind: str) -> None:
     file = export(result, format=kind).files[0]
@@ -615,6 +617,7 @@ def test_a_result_without_outputs_and_a_closed_one(tmp_path: Path) -> None:
     assert folder_of(tmp_path) == {"run.h5"}
 
 
+@pytest.mark.long
 def test_a_killed_run_is_exported_as_far_as_it_came(tmp_path: Path) -> None:
     """xarray cannot open such a file, which has no end; `hybrid` can."""
     xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")

@@ -80,6 +80,7 @@ def test_a_torque_passes_through_zones_that_move():
     np.testing.assert_allclose(found["torque"][-1], np.radians(90.0) / 10.0, rtol=1e-9)  # GJ 1 N m2, 10 m
 
 
+@pytest.mark.long
 def test_steps_in_which_an_end_rolls_too_far_are_cut():
     """Fifty turns in eighty steps passed as a few: beyond half a turn a step the way cannot be known."""
     turned = clamped(X, X, motion={"roll": {"amplitude": 18_000, "period": 4}, "ramp": 1})

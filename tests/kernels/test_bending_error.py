@@ -258,6 +258,7 @@ def suspension(model: Any) -> hybrid.Scene:
     return hybrid.validate_scene(what)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("joint", [0.2, 0.4, 1.0, 1.5, 1.7])
 def test_joints_in_the_middle_of_a_sag_know_what_they_cost(joint):
     """The suspension, lambda a tenth of its length (shared/validation: 1.9 to 8 cm): 0.95 to 1.15 of the truth."""

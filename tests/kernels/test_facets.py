@@ -57,6 +57,7 @@ def test_diagonals_of_sides_are_flat(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.linalg.eigvalsh(np.reshape(K, (3, 3))), [0, 1 / 0.13, 1 / 0.13], atol=1e-9)
 
 
+@pytest.mark.long
 def test_a_sphere_of_triangles_converges_with_order_two(tmp_path: Path) -> None:
     """Its distance, around it and within, by a quarter with every halving of its edges."""
     x, errors = places(400), []

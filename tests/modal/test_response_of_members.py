@@ -109,6 +109,7 @@ BUOY = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 def test_how_much_of_the_members_waves_may_wet():
     """A buoy of 6 m draft in waves of 1 and 2 m, which reach a quarter and half of it: told where it matters."""
     for height, most, told in ((1.0, 0.04, False), (2.0, 0.15, True)):

@@ -19,6 +19,7 @@ def scene(accuracy: str, *settings: str) -> hybrid.Scene:
     )
 
 
+@pytest.mark.long
 def test_steps_are_about_those_of_the_run() -> None:
     for accuracy in ("3%", "0.3%"):
         run, foretold = hybrid.run(scene(accuracy)), hybrid.plan(scene(accuracy)).steps

@@ -161,6 +161,7 @@ output:
 """
 
 
+@pytest.mark.long
 def test_ranges_of_several_lines(tmp_path: Path) -> None:
     def run(text: str, name: str) -> hybrid.Result:
         system = parse_either(text)[0]

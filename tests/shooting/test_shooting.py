@@ -494,6 +494,7 @@ def swinging_chain(cells: int, steps: int, periods: float = 2.0) -> tuple[Scene,
     return scene(section, pinned(0, 0, 0), free(), "catenary", cells, 9.81, initial=initial, time=time), w
 
 
+@pytest.mark.long
 def test_hanging_chain() -> None:
     """First frequency, half the first zero of J0: second order, 3e-3 with 40 steps a period."""
     errors = []
@@ -680,6 +681,7 @@ def test_energy_ledger() -> None:
     assert misses[1] < 1e-2
 
 
+@pytest.mark.long
 def test_ends_follow_their_motion() -> None:
     """A clamp that heaves and pitches: the end is where it should be, to third order in the step (SETTLE)."""
     from hybrid.scene.motion import EndMotion

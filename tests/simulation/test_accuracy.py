@@ -518,6 +518,7 @@ def test_what_is_asked_is_met_and_the_figure_is_true(truth, model, percent):
         assert 0.5 <= said[1] / force <= 6.0
 
 
+@pytest.mark.long
 def test_positions_are_met_without_much_to_spare():
     """Asked for alone: cells and steps are no finer than it takes by more than a factor of 4.5 of the error."""
     sets = ["accuracy={position: 0.03%}", "time.step=null", "mesh=null", "model=rod", "output.every=1"]

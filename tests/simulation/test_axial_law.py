@@ -197,6 +197,7 @@ def test_a_rope_goes_on_bit_for_bit(tmp_path: Path, system: bool) -> None:
     assert [x for x in differences(long, short) if not x.endswith(same)] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["polyester_on_depths", "table_with_turns"])
 def test_a_rod_that_is_judged_at_rest_may_have_a_law_of_stretch(name: str) -> None:
     """Both rest compressed or twisted at the start, where their stability is judged from the outputs."""
@@ -268,6 +269,7 @@ def test_mean_tensions_go_along_where_zones_move(model: Any) -> None:
     assert np.ptp(first) > 0.5 * first.max() > 0.0
 
 
+@pytest.mark.long
 def test_a_rope_whose_zones_move_goes_on_bit_for_bit(tmp_path: Path) -> None:
     rope = SOFT | {"dynamic_stiffness": {"constant": 6e5, "per_tension": 15, "relaxation_time": 1}}
     scene, long, short = heaved(rope, "adaptive"), tmp_path / "long.h5", tmp_path / "short.h5"

@@ -169,6 +169,7 @@ def swinging(accuracy: str) -> hybrid.Scene:
     })  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("file", [True, False])
 @pytest.mark.parametrize("how", ["no better", "failed"])
 def test_the_file_is_that_of_the_run_before(file, how, tmp_path, monkeypatch) -> None:

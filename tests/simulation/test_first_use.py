@@ -123,6 +123,7 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
     assert not (called & large) - set(known) - stood_for
 
 
+@pytest.mark.long
 def test_an_equilibrium_in_a_plane_asks_for_no_solver_in_space() -> None:
     """Whose compilation takes longest; in a process of its own, where nothing is compiled or loaded yet."""
     code = "import hybrid, json, sys; from hybrid.kernels.run import run; hybrid.static(json.loads(sys.argv[1])); "

@@ -33,6 +33,7 @@ def taut(duration, periods, **more):
     } | more
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("periods", "asked"),
     [(1.3, {"line_tension": "1%"}), (1.3, {"tension": "1%"}), (2.4, {"position": "0.1%"})],

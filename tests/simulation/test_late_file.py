@@ -102,6 +102,7 @@ def test_rows_are_added_to_a_copy_of_one_that_was_written_in_one_go(tmp_path: Pa
     assert [x for x in found if x != "other values: scene" and "message" not in x] == []
 
 
+@pytest.mark.long
 def test_it_is_there_when_the_run_is_stopped_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Stopping(monkeypatch, checkpoints=False)  # a step a call
     hybrid.run(described(True), tmp_path / "whole.h5").close()

@@ -136,6 +136,7 @@ def test_zones_that_move_have_the_mesh_of_rods() -> None:
         assert any(zone.kind == "catenary" for zone in moving.zones[-1])
 
 
+@pytest.mark.long
 def test_layers_of_a_line_of_several_have_the_cells_of_the_cable(tmp_path: Path) -> None:
     """As many to sqrt(EI/T) beside its clamp, by a coarse run of the system; at rest, in motion, resumed to the bit."""
     section = {"length": 100, "mass": 5, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 300,

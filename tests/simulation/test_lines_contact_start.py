@@ -65,6 +65,7 @@ def test_taut_catenaries_touch_as_if_asked() -> None:
     assert same(found, hybrid.run(tables | {"contact": {}})) < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("until", [0.2, 0.5])
 def test_a_run_goes_on_to_the_bit_from_before_and_after_contact_began(begun: Any, until: float, tmp_path: Path) -> None:
     hybrid.run(unasked(until), tmp_path / "half.h5")
@@ -221,6 +222,7 @@ def paid(tables: Tables) -> None:
     tables["lines"]["upper"]["connections"] = {"end": {"kind": "pinned", "payout": {"rate": 0.01, "ramp": 0.2}}}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("change", [moving, following, paid])
 def test_contact_begins_in_lines_whose_cells_come_and_go(change: Callable[[Tables], None], tmp_path: Path) -> None:
     tables = unasked()

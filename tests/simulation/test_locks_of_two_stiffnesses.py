@@ -38,6 +38,7 @@ def apart(one: hybrid.Result, two: hybrid.Result) -> float:
     return float(np.abs(one.position - two.position).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("axis", [0, 1])
 def test_about_an_axis_it_is_the_restrictor_of_that_stiffness(axis: int) -> None:
     """All of the line, so that no element is at its edge: at rest, and swinging."""

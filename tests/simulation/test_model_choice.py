@@ -63,6 +63,7 @@ def test_rods_are_the_same_as_asked_for(tmp_path, free):
     assert found and all("event" in x or "scene" in x for x in found), found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("in_file", [False, True])
 def test_rods_after_catenaries_that_fail(tmp_path, monkeypatch, in_file):
     """A line that is slackened, of which the criteria are not asked: rods, and why."""
@@ -177,6 +178,7 @@ def test_the_plan_says_which_why_and_where_rods_are():
     assert any(float(x) in (0.0, length) for part in places.split(", ") for x in part.split(" to "))
 
 
+@pytest.mark.long
 def test_the_plan_predicts_the_number_of_runs():
     """A pre-run, three to compare with and the result, and three finer ones; what is fixed cannot be made finer."""
     plan = hybrid.plan(TAUT)

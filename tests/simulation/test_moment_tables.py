@@ -204,6 +204,7 @@ def test_energy_is_kept_in_motion(tau: float) -> None:
     assert off[0] < 1e-2 and off[1] < 0.35 * off[0]
 
 
+@pytest.mark.long
 def test_a_swinging_cable_goes_on_bit_for_bit(tmp_path: Path) -> None:
     scene, long, short = swung(8e-3), tmp_path / "long.h5", tmp_path / "short.h5"
     hybrid.run(scene, long)

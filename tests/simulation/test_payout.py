@@ -130,6 +130,7 @@ def pendulum(step: float, duration: float, payout: dict[str, Any]) -> dict[str, 
     }  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_pendulum_of_variable_length() -> None:
     """L th'' + 2 L' th' + g sin th = 0 over ten swings, paid out and taken in: order 2, 1e-3 at 0.02 s."""
     duration = 80.0
@@ -250,6 +251,7 @@ def test_a_cell_that_enters_or_leaves_does_not_kick(
     assert_no_kicks(sagging(model, EA, EI, rate, duration=12.0), 1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("EA", "EI", "cells"), [(2e6, 2e4, 40), (None, 2e4, 40), (None, 500.0, 80)])
 @pytest.mark.parametrize("rate", [0.8, -0.8])
 def test_behind_a_clamp_it_does_not_kick_either(EA: float | None, EI: float, cells: int, rate: float) -> None:
@@ -384,6 +386,7 @@ def test_at_the_start_a_length_is_set_from_python() -> None:
 # --- resume and Python ------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("model", "EA", "EI", "clamp"),
     [("catenary", None, None, False), ("rod", 2e6, 2e4, False), ("rod", None, 2e4, False), ("rod", 2e6, 2e4, True)],
@@ -547,6 +550,7 @@ def test_rates_and_lengths_from_a_file(tmp_path: Path) -> None:
 # --- the plan ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_the_plan_says_how_long_the_line_will_be() -> None:
     def said(payout: dict[str, Any]) -> str:
         scene = hybrid.validate_scene(hanging(payout, 20.0))

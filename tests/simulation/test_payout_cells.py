@@ -48,6 +48,7 @@ def change_cells(run: Transient, random: np.random.Generator, part: float) -> No
     run._switch(run.switching.manager.same_zones(), here)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("side", ["end", "start"])
 def test_a_hanging_line_weighs_what_is_out_while_its_cells_change(sign: float, side: str) -> None:
@@ -188,6 +189,7 @@ def test_the_tension_now_is_that_of_the_result(model: dict[str, Any], tmp_path: 
     np.testing.assert_allclose(found, result["tension"][k], rtol=1e-9)
 
 
+@pytest.mark.long
 def test_a_step_is_taken_back() -> None:
     """`save` and `restore` over cells that change, and nodes that enter."""
     with hybrid.Simulation(pinned(0.8)) as sim:

@@ -85,6 +85,7 @@ def test_energy_is_balanced_to_second_order(rate: float) -> None:
     assert other["work/stiffness_damping"][-1] < -10.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["catenary", "rod", "clamped"])
 def test_a_node_that_enters_does_not_kick(kind: str) -> None:
     """The tension of damping is carried on where the cell that grows is cut: as without damping."""

@@ -89,6 +89,7 @@ def test_the_mirror_image_pays_out_the_same(name: str) -> None:
     assert np.abs(other.position[:, ::-1] - one.position).max() < 1e-7 * 100.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 def test_a_node_that_enters_does_not_kick(name: str) -> None:
     scene = SCENES[name](0.05)
@@ -201,6 +202,7 @@ def test_what_differs_on_the_reel_is_refused() -> None:
 # --- the end at the winch is let go -----------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("clamp", [False, True])
 @pytest.mark.parametrize("rate", [1.0, -0.8])
 def test_what_is_out_falls_as_it_moves(rate: float, clamp: bool) -> None:

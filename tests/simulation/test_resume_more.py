@@ -95,6 +95,7 @@ def test_a_result_keeps_its_output_points(errors, tmp_path, monkeypatch):
         assert now.s.size == 12 and now["right/s"].tolist() == [0.45]
 
 
+@pytest.mark.long
 def test_a_load_that_ends_is_a_load_that_is_changed(tmp_path):
     """A force until 1 s, and the same force taken off by resuming at 1 s: one motion."""
     free = {"kind": "free", "force": {"value": [0.3, 0, 0], "until": 1.0}}
@@ -175,6 +176,7 @@ def test_what_cannot_be_is_refused_and_the_file_stays(more, match, whole):
     assert [x.name for x in whole.parent.iterdir()] == [whole.name]
 
 
+@pytest.mark.long
 def test_another_program_goes_on_and_says_so(tmp_path, monkeypatch, whole):
     """The format of the checkpoint decides, not the program; that bits may differ is an event."""
     path = stopped(tmp_path / "run.h5", monkeypatch)

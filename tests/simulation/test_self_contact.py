@@ -291,6 +291,7 @@ def closing(model: Any, **more: Any) -> dict[str, Any]:
     } | more  # fmt: skip
 
 
+@pytest.mark.long
 def test_catenaries_that_come_near_themselves_become_rods() -> None:
     rods = hybrid.run(hybrid.validate_scene(closing("rod", mesh={"cells": 160})))
     watched = closing("adaptive")

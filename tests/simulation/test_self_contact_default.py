@@ -109,6 +109,7 @@ def test_it_resumes_bit_for_bit_before_contact_begins_and_in_it(
     assert differences(whole, tmp_path / "run.h5") == []
 
 
+@pytest.mark.long
 def test_a_file_of_before_goes_on_as_it_began(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It was written when nothing was computed that was not asked for, and has no fields for it."""
     stopping, scene = Stopping(monkeypatch), led_through(time={"duration": 0.2, "step": 0.02})

@@ -91,6 +91,7 @@ def reeled(cells: int, step: float, **more: Any) -> dict[str, Any]:
     return tables | {"ends": tables["ends"] | {"end": end}}
 
 
+@pytest.mark.long
 def test_line_that_is_taken_in_and_paid_out_comes_to_the_same_soil_on_finer_cells() -> None:
     """What soil takes of a line that leaves it and comes back, and the pull at the winch; nodes leave and enter."""
     coarse, fine = hybrid.run(reeled(80, 0.02)), hybrid.run(reeled(160, 0.01))

@@ -42,6 +42,7 @@ def three(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
     return hybrid.open(path)
 
 
+@pytest.mark.long
 def test_a_system_of_one_line_has_the_cells_of_the_cable() -> None:
     one, several = slackening()
     one["model"] = several["lines"]["rope"]["model"] = FOLLOWS

@@ -38,6 +38,7 @@ def scene(u: float, model: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
+@pytest.mark.long
 def test_the_same_motion_in_every_unit() -> None:
     """Round-off grows to 1e-12 m by the end."""
     first, *others = (hybrid.run(scene(u, "rod"), progress=False) for u in UNITS)

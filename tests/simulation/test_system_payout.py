@@ -114,6 +114,7 @@ def test_what_breaks_off_the_far_end_does_as_an_end_that_is_let_go() -> None:
     assert np.abs(one.position - two.position).max() < 1e-6
 
 
+@pytest.mark.long
 def test_loads_change_as_of_one_cable(tmp_path: Path) -> None:
     """In mid-run, of a line that is longer then than at t = 0."""
     scene, found = cable(EA=2e6), []

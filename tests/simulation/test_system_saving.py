@@ -100,6 +100,7 @@ def test_what_is_taken_back_leaves_nothing(breaks: str, tmp_path: Path) -> None:
     assert_same(result, expected)
 
 
+@pytest.mark.long
 def test_bodies_are_taken_back_too() -> None:
     """A spar between three lines, whose force stops at 0.45 s: advanced, taken back, advanced again."""
     data = spar() | {"time": {"duration": 1.5, "step": 0.1}}
@@ -118,6 +119,7 @@ def test_bodies_are_taken_back_too() -> None:
     assert_same(*results)
 
 
+@pytest.mark.long
 def test_too_much_after_a_save_makes_it_final(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hybrid.simulation.deferred_recorder, "MOST_WAITING", 3)
     with hybrid.SystemSimulation(scene()) as lines:
@@ -177,6 +179,7 @@ OUTCOMES = {"strain": Outcome.OVERSTRETCHED, "slack": Outcome.SLACK}
 FAILING = {"strain": [HOSE | {"max_strain": 0.05}], "slack": [LEG | {"length": 100}]}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hose", FAILING)
 def test_a_failed_step_is_undone_and_a_smaller_one_goes_on(hose: str) -> None:
     """The hose is torn, or pushed together, within two steps; without that, the run afterwards is the same to the bit.

@@ -147,6 +147,7 @@ def in_waves() -> dict[str, Any]:
     return scene | {"time": {"duration": 4.0, "step": 0.1}}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scene, body", [(TOWED, "buoy"), (in_waves(), "spar")])
 def test_bodies_are_moved_and_loaded_in_compiled_steps(
     scene: dict[str, Any], body: str, monkeypatch: pytest.MonkeyPatch

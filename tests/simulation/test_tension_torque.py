@@ -146,6 +146,7 @@ def test_what_it_does_not_go_with(more, words):
         hanging(model, "guided", 500.0, **more)
 
 
+@pytest.mark.long
 def test_cells_that_follow_the_curvature_carry_it():
     """A sagging tether that is moved: torque of 400 rods, on cells that change, and positions as near as without it."""
     clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1], "normal": [0, 1, 0]}

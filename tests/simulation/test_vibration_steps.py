@@ -104,6 +104,7 @@ def test_a_checkpoint_goes_on_and_a_forged_one_does_not():
     assert again.look > clock[b.NOW]
 
 
+@pytest.mark.long
 def test_steps_are_longer_where_it_has_died_out_and_forces_stay_right():
     """Of 40 s with short steps throughout there were 8949 (docs/evidence/accuracy.md); drag stops the vibration in 2 s."""
     result = hybrid.run(sag())

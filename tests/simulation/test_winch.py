@@ -176,6 +176,7 @@ def test_the_end_of_the_reel_stops_the_run() -> None:
     found.value.snapshot.unlink()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["catenary", "rod"])
 def test_resumed_bit_for_bit(tmp_path: Path, model: str) -> None:
     whole = hybrid.run(sagging(model), output=tmp_path / "whole.h5")

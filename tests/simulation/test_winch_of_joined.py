@@ -183,6 +183,7 @@ def test_stepped_from_outside_bit_for_bit() -> None:
         assert np.array_equal(whole[name], stepped[name]), name
 
 
+@pytest.mark.long
 def test_an_accuracy_that_is_asked_holds() -> None:
     """Positions lie within their stated error of those of short fixed steps on twice the cells."""
     fine = lowered() | {"time": {"duration": 4.0, "step": 0.005}}
@@ -281,6 +282,7 @@ def test_friction_acts_where_surfaces_of_zones_that_move_touch(diameter: float) 
     assert abs(work["work/scheme"]) < 5e-4 * work["work/start"] and work["work/friction"] < -2.0
 
 
+@pytest.mark.long
 def test_a_rope_under_friction_with_its_ends_exchanged() -> None:
     one, other = (hybrid.run(pressed(0.3, first)).lines["rope"] for first in (True, False))
     assert np.abs(one["payout/length"] - other["payout/length"]).max() < 1e-6

@@ -78,6 +78,7 @@ def energy_error(result: hybrid.Result) -> float:
     return float(np.abs(left - left[0]).max() / part["energy/kinetic"].max())
 
 
+@pytest.mark.long
 def test_free_decay_in_heave_has_the_period_of_mass_and_stiffness_and_energy_of_order_two() -> None:
     errors, energies = [], []
     for step in (0.08, 0.04):

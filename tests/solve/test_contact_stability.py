@@ -88,6 +88,7 @@ def test_a_line_on_top_of_another_one_falls_off(joined: bool) -> None:
     assert ContactStability(found.solver).holds(found.state)
 
 
+@pytest.mark.long
 def test_one_that_leans_to_a_side_needs_no_push() -> None:
     found, pushed = equilibrium(on_top(aside=0.002)), equilibrium(on_top())
     assert len(found.path) == 1 and PUSHED not in found.path[0]

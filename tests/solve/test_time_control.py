@@ -90,6 +90,7 @@ def test_tension_is_clean_when_steps_change(model, rho):
             assert plain[-1, 1] > 5.0 * found[-1, 1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rho", [0.5, 0.8])
 def test_tension_is_cleaner_where_a_step_is_cut_far(rho):
     """Of first order, as with plain weights, but three times less: a cut by more than two is weighted as one by two."""

@@ -425,6 +425,7 @@ output: {every: 0.5, quantities: {gap: {kind: clearance, line: port, point: [0, 
 """
 
 
+@pytest.mark.long
 def test_several_lines(folder: Path, tmp_path: Path, scheduler: str) -> None:
     """Each case is the run of its scene: of one line, of another whose name is no word, of what stands beside them."""
     (folder / "lines.yaml").write_text(LINES)

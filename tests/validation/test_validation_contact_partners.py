@@ -145,6 +145,7 @@ def test_a_rope_across_two_others_presses_on_each_by_its_own_force() -> None:
     assert "contacts/one/two/force" not in result
 
 
+@pytest.mark.long
 def test_the_largest_force_at_rest_is_that_of_nodes_whatever_the_output_points_are() -> None:
     """On the pair, from which of both lines it is looked at; five output points have the crossing, sixteen do not."""
     largest = []

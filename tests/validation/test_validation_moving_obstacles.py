@@ -178,6 +178,7 @@ def speeds(result: Any) -> Any:
     return -result.velocity[:, -1, 2]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("inertia", [0.01, 0.1])
 def test_two_weights_over_a_free_sheave(inertia: float, rolled: Any) -> None:
     """a = (F2 - F1)/(m + I/rho^2)."""
@@ -361,6 +362,7 @@ def test_a_smooth_obstacle_does_no_work_of_friction() -> None:
     assert -0.1 * done < result["work/scheme"].min() <= result["work/scheme"].max() < 1e-3 * done
 
 
+@pytest.mark.long
 def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(aside: Any, tmp_path: Any) -> None:
     half = pushed()
     half["time"] = {"duration": 0.5, "step": 0.005}

@@ -71,6 +71,7 @@ def test_a_system_of_one_line_is_that_line(aside: Any) -> None:
     np.testing.assert_allclose(rope["work/obstacles"], result["work/obstacles"], atol=1e-4)
 
 
+@pytest.mark.long
 def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(aside: Any, tmp_path: Path) -> None:
     result, kind = aside
     hybrid.run(by(kind, time={"duration": 0.5, "step": 0.005}), tmp_path / "half.h5").close()

@@ -45,6 +45,7 @@ def test_a_line_is_rod_where_it_touches_and_moves_as_one_that_is_rod_everywhere(
     assert apart(system, zones) < 1e-4
 
 
+@pytest.mark.long
 def test_cells_that_follow_the_curvature_show_a_pipe() -> None:
     """The curvature on it and elsewhere to the share that is asked."""
     tables = fixed(DRAGGED, {"kind": "adaptive", "curvature_error": 0.05})

@@ -119,6 +119,7 @@ def test_energy_over_a_pipe_is_booked(laid: Any) -> None:
     assert laid["work/friction"][-1] < 0.0
 
 
+@pytest.mark.long
 def test_a_rotated_scene_has_a_rotated_result(laid: Any) -> None:
     c, s = np.cos(0.7), np.sin(0.7)
     M = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

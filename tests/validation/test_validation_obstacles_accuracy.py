@@ -138,6 +138,7 @@ def test_layers_of_a_line_over_a_pipe() -> None:
     assert found[1] < 0.8 * found[0] < 0.04
 
 
+@pytest.mark.long
 def test_the_equilibrium_of_a_line_over_a_sheave_is_that_over_a_pipe_at_rest() -> None:
     """On cells on which it takes a damped motion to rest, in which the sheave is held."""
     own: Tables = {"at": [4, 0, -1.7], "axis": [0, 1, 0]}

@@ -83,6 +83,7 @@ def test_it_is_the_same_as_a_system_of_one_line() -> None:
     assert line.steps.iterations.sum() == cable.steps.iterations.sum()
 
 
+@pytest.mark.long
 def test_a_very_heavy_sheave_is_a_drum_that_stands() -> None:
     tables = crossed_legs(1e12)
     heavy = ran(tables)

@@ -56,6 +56,7 @@ def limp(system: Tables) -> Tables:
     return tables
 
 
+@pytest.mark.long
 def test_crossing_ropes_at_rest_are_rods_where_they_cross() -> None:
     rods, zones = hybrid.static(limp(crossing(0.1))), hybrid.static(with_zones(limp(crossing(0.1))))
     off, on = force_between(zones, 0)
@@ -185,6 +186,7 @@ def test_as_a_system_of_one_line(heaving: Any) -> None:
     assert apart(system, heaving) < 1e-4
 
 
+@pytest.mark.long
 def test_cells_that_follow_the_curvature_show_a_pipe_that_moves() -> None:
     tables = fixed(MOVES, {"kind": "adaptive", "curvature_error": 0.05})
     del tables["mesh"]

@@ -93,6 +93,7 @@ def test_every_kind_of_result_has_a_report(case: str) -> None:
         array(page, json.loads(ref + "}"))
 
 
+@pytest.mark.long
 def test_what_is_drawn_is_what_is_in_the_file() -> None:
     result = reported()
     page = html(result)
@@ -168,6 +169,7 @@ def test_nothing_is_asked_for_from_outside() -> None:
     assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", shell)
 
 
+@pytest.mark.long
 def test_only_a_report_of_ours_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result, page = reported(outputs=2), tmp_path / "run.html"
     assert hybrid.report(result, page) == page

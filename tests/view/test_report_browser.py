@@ -125,6 +125,7 @@ def test_play_moves_time_and_stops_again(visit: Visit) -> None:
     assert visit.page.evaluate("window.report.frame") == 100, "it ends at the last frame"
 
 
+@pytest.mark.long
 def test_pointing_at_an_event_shows_what_happened(visit: Visit) -> None:
     visit.shown("#plot-zones")
     for name, words in (("split", "bend 1.05 > 1 at s = 49 to 51 m"), ("warning", "a <b>peak</b>")):

@@ -283,6 +283,7 @@ def test_an_equilibrium_is_drawn_as_one_picture_of_all_lines(tmp_path: Path, mon
     assert {x.label for x in drawn["b"].items if isinstance(x, Line)} == set(PLACES)  # bending moments of all lines
 
 
+@pytest.mark.long
 def test_a_stopped_run_is_drawn(tmp_path: Path) -> None:
     """A file with fewer outputs than were asked for, and an equilibrium with one."""
 
