@@ -13,7 +13,7 @@ from hybrid.kernels.state.forces import SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import touching_among
-from hybrid.model.self_reach import COST, contact_bits
+from hybrid.model.self_reach import contact_bits
 from hybrid.scene.schema import Scene
 from hybrid.simulation.lines_contact import pair_text
 from hybrid.simulation.self_watch import diameters
@@ -43,8 +43,8 @@ def lines_near(run: SystemRun) -> list[Pair]:
         one, two = run.model.names[a], run.model.names[b]
         text = (
             f"lines {one} and {two} come near each other, at s = {s:.4g} m of {one} and s = {other:.4g} m of {two}: "
-            f"contact between them is computed from here on; {COST.split(';')[0]}; contact: {{between: []}} switches "
-            "it off"
+            "contact between them is computed from here on, and steps take longer; contact: {between: []} switches it "
+            "off"
         )
         run.recorder.event(run.t, 0.0, 0.0, BEGINS, text)
     return begun

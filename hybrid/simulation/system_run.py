@@ -183,7 +183,7 @@ class SystemRun:
         self.met: set[tuple[int, int]] = set()  # lines that have been said to touch
         self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
         self.passed: set[tuple[int, int]] = set()  # and those that have been said to
-        self.let_pass: set[tuple[int, int]] = set()  # lines that may meet, but of which contact can not begin, or go on
+        self.let_pass: set[tuple[int, int]] = set()  # of lines that may meet, those between which it is not computed
         self.rotations = Rotations(system, self.model)
         self.quantities = SystemQuantities(system, scenes)
         if moves and target is not None:
@@ -786,11 +786,11 @@ class SystemRun:
         detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
         if dt == 0.0:
             detail = "no accelerations are consistent with the shape and the loads"
-        detail += self._in_contact
+        detail += self._touching
         return LineFailed(taken.line, taken.outcome, self.t, self._place(solver, taken), detail)
 
     @property
-    def _in_contact(self) -> str:
+    def _touching(self) -> str:
         """What touches now, a line itself or another one, for the text of a failure; empty: nothing."""
         pairs = self.shared.points_between() if self.shared is not None else []
         if any(a != b for (a, _), (b, _) in pairs):
@@ -812,7 +812,7 @@ class SystemRun:
         line = self.lines[max(number, 0)]
         s = float(line.model.line.s[min(max(where, 0), line.model.line.s.size - 1)]) if number >= 0 else 0.0
         cuts, tiny = {cause: int(count[k]) for cause, k in CUTS.items()}, int(count[b.TINY_STEPS])
-        text = collapse_text(tiny, self.last_step, float(clock[b.LONGEST]), cuts, s, self._in_contact)
+        text = collapse_text(tiny, self.last_step, float(clock[b.LONGEST]), cuts, s, self._touching)
         if tiny == MANY:
             line.events.event(self.t, s, s, COLLAPSE, text, value=self.last_step)
         if self.target is None and tiny >= GIVE_UP:

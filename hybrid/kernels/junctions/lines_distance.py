@@ -210,11 +210,11 @@ def widest_of(job, line, first, last):
 
 
 @inner
-def search(job, row, a, b, asks):
+def search(job, row, a, b, reach):
     """The least clearance of two lines in their last step, m, and at which arc lengths, into a row of room.
 
-    asks: whether what matters is where cells are near: closer than AHEAD more steps like the last one may close; returns
-    whether any are.
+    reach: m, within which cells may be near: closer than AHEAD more steps like the last one may close; -infinity:
+    none are looked for.  Returns whether any are.
     """
     one, two = read(job.tables[a]), read(job.tables[b])
     line, other = one.line, two.line
@@ -224,11 +224,11 @@ def search(job, row, a, b, asks):
         low, high = box_of(one.old.r, one.new.r, first, last)
         widest = widest_of(job, a, first, last)
         for second in range(0, m, BOX):
-            end, ahead = min(second + BOX, m), 0.0
+            end, ahead = min(second + BOX, m), -math.inf  # within which cells of these boxes may be near
             lower, higher = box_of(two.old.r, two.new.r, second, end)
             width = 0.5 * (widest + widest_of(job, b, second, end))
             gap = boxes_apart(low, high, lower, higher) - width
-            if asks and not near and gap < math.inf:
+            if gap < reach and not near:
                 moves = moves_apart(one.old.r, one.new.r, first, last, two.old.r, two.new.r, second, end)
                 ahead = max(AHEAD * moves, LEAST_APART * width)
             if not (gap < best or gap < ahead):
@@ -237,16 +237,17 @@ def search(job, row, a, b, asks):
                 for j in range(second, end):
                     width = 0.5 * (job.width[job.begins[a] + i] + job.width[job.begins[b] + j])
                     apart, x, y = cells_apart(one.old.r, one.new.r, two.old.r, two.new.r, i, j)
-                    if not (apart - width < best or apart - width < ahead):
+                    clear = apart - width
+                    if not (clear < best or (clear < ahead and not near)):
                         continue
                     if are_neighbours(job, a, b, line, other, i, j, JOINT * width):
                         continue
-                    if apart - width < best:
-                        best = apart - width
+                    if clear < best:
+                        best = clear
                         row[AT], row[OTHER] = line.s[i] + x * line.h[i], other.s[j] + y * other.h[j]
-                    if not near and apart - width < ahead:
+                    if clear < ahead and not near:
                         moves = moves_apart(one.old.r, one.new.r, i, i + 1, two.old.r, two.new.r, j, j + 1)
-                        near = apart - width < max(AHEAD * moves, LEAST_APART * width)
+                        near = clear < max(AHEAD * moves, LEAST_APART * width)
     row[APART] = best
     return near
 
@@ -274,7 +275,7 @@ def look_at_pair(job, pair, row):
         square += gone * gone
     if math.sqrt(square) + spread - row[SPREAD] + ahead < row[APART]:
         return
-    near = search(job, row, a, b, pair[ASKS])
+    near = search(job, row, a, b, ahead if pair[ASKS] else -math.inf)
     for j in range(3):
         row[WAY + j] = moved[a, MEAN + j] - moved[b, MEAN + j]
     row[SPREAD] = spread
