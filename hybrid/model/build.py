@@ -211,7 +211,7 @@ def build(
     follows = resolution.follow and followed(scene, zones).on
     plane, flat = in_plane(scene, start, others, ends.values)
     kept: Floats | None = None
-    if plane is not None and scene.obstacles:  # which are computed in space
+    if plane is not None and (scene.obstacles or scene.contact.self):  # which are computed in space
         kept, plane = plane[2], None
     elif plane is not None and scene.dimension == 2:
         line = planar(line, plane)

@@ -272,11 +272,14 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
         why = "rods that come and go have what sections[].rotary_inertia gives; fixed zones and `model: rod` any"
         entries = [replace(x, why=why) if x.what == "rotary inertia" else x for x in entries]
     if scene.ends.turns:
-        loose = next((z for z in zones if z.kind != "rod" and not line.torsion.size), None)
+        free = swivels(scene)
+        loose = next((z for z in zones if z.kind != "rod" and not line.torsion.size and not free), None)
         what, why = f"twist by {scene.ends.turns:g} turns of the ends", "ends.*.turns"
-        if loose is not None:
+        if free:
+            why = f"no effect: the swivel at s = {free[0]:g} m lets it turn back"
+        elif loose is not None:
             why = f"no effect: the catenary zone s = {loose.s_a:g} to {loose.s_b:g} m passes no torque on; a rod does"
-        entries.append(Entry(what, loose is None, why, event="torque neglected" if loose is not None else ""))
+        entries.append(Entry(what, loose is None and not free, why, event="torque neglected" if loose else ""))
     entries += obstacle_entries(scene, obstacle_rows(scene))
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = end.prescribed_motion is not None

@@ -27,11 +27,11 @@ def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: 
     """
     if scene.dimension == 3:
         return None, Entry(WHAT, False, "dimension: 3")
-    if scene.contact.self:
-        return None, Entry(WHAT, False, "contact.self: contact of the line with itself is computed in space")
-    if scene.obstacles and scene.dimension != 2:
-        return None, Entry(WHAT, False, "obstacles: contact with obstacles is computed in space")
     asked = scene.dimension == 2
+    touching = "contact.self" if scene.contact.self else "obstacles" if scene.obstacles else ""
+    if touching and not asked:
+        what = "of the line with itself" if scene.contact.self else "with obstacles"
+        return None, Entry(WHAT, False, f"{touching}: contact {what} is computed in space")
     tolerance = TYPED if asked else EXACT
     found, findings = plane_of(scene.environment, scene.cable, scene.ends, scene.initial, tolerance)
     if findings:
@@ -46,8 +46,8 @@ def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: 
         return None, Entry(WHAT, False, f"the first shape leaves {found.text()}")
     if asked:
         others[:] = [(name, x) for name, x in others if _lies_in(plane, x, ends, tolerance)]
-        if scene.obstacles:
-            why = f"obstacles: contact is computed in space, where nothing may leave {found.text()}"
+        if touching:
+            why = f"{touching}: contact is computed in space, where nothing may leave {found.text()}"
             return plane, Entry(WHAT, False, why)
         return plane, Entry(WHAT, True, f"dimension: 2; {found.text()}")
     why = f"all of the scene lies in {found.text()}; dimension: 3 switches it off"

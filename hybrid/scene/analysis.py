@@ -289,6 +289,14 @@ class AdaptiveModel(Table):
         "this table asks for that too",
     )
 
+    @model_validator(mode="after")
+    def _cells_follow(self) -> AdaptiveModel:
+        if self.rod_cell is not None and self.curvature_error is None:
+            expected = "nothing, because rods and catenaries have the cells of one mesh, which stay"
+            fix = "leave it out and give mesh.cells or mesh.nodes, or write curvature_error for cells that follow"
+            refuse([Finding(("rod_cell",), expected, fix)])
+        return self
+
 
 def usual_model(cable: Any, obstacles: Any = None) -> RodModel | CatenaryModel | AdaptiveModel:
     """The model of a scene that names none: zones that move, if the cable can bend; a rod, if they cannot hold it."""

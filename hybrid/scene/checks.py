@@ -78,6 +78,8 @@ def _fluid_and_diameter(environment: Environment, cable: Cable) -> Iterator[Find
             if environment.fluid is None:
                 fix = f"give environment.fluid, such as `fluid: {{density: 1025}}` (kg/m^3), or leave {key} out"
                 yield Finding((*here, key), f"no {name} without a fluid", fix)
+        if environment.seabed is not None and environment.seabed.soil is not None:
+            reasons.append("soil")
         if reasons and section.diameter is None:
             expected = f"a number > 0, in m, needed for {' and '.join(reasons)}"
             yield Finding((*here, "diameter"), expected, "add `diameter: ...` (m)")

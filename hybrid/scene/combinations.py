@@ -147,16 +147,6 @@ def _stretch_laws(tables: Tables) -> Iterator[Place]:
             yield (*at, *(given or ["tension_strain"])[:1])
 
 
-def _bed(of: Callable[[Any], Any], *key: str) -> Callable[[Tables], Iterator[Place]]:
-    """A key of the seabed, where `of` is true of that."""
-
-    def find(tables: Tables) -> Iterator[Place]:
-        bed = getattr(tables.get("environment"), "seabed", None)
-        return iter([("environment", "seabed", *key)] if bed is not None and of(bed) else [])
-
-    return find
-
-
 def _curls(section: Section) -> bool:
     return section.intrinsic_curvature is not None and any(section.intrinsic_curvature)
 
@@ -306,10 +296,6 @@ def _moving(tables: Tables) -> Iterator[Place]:
     return iter([("model",)] if isinstance(tables.get("model"), AdaptiveModel) else [])
 
 
-def _of_moving(key: str) -> Callable[[Tables], Iterator[Place]]:
-    return lambda tables: ((*at, key) for at in _moving(tables) if getattr(tables["model"], key))
-
-
 def _asks(table: str, key: str, when: Callable[[Any], Any]) -> Callable[[Tables], Iterator[Place]]:
     """A key of a table that is there, when `when` is true of the table."""
     return lambda tables: iter([(table, key)] if tables.get(table) is not None and when(tables[table]) else [])
@@ -317,10 +303,6 @@ def _asks(table: str, key: str, when: Callable[[Any], Any]) -> Callable[[Tables]
 
 def _plane(tables: Tables) -> Iterator[Place]:
     return iter([("dimension",)] if tables.get("dimension") == 2 else [])
-
-
-def _self_contact(tables: Tables) -> Iterator[Place]:
-    return iter([("contact", "self")] if "contact" in tables and tables["contact"].self else [])
 
 
 def _clamped(tables: Tables) -> Iterator[Place]:
@@ -402,11 +384,6 @@ def _used(*uses: Use) -> Callable[[Tables], Iterator[Place]]:
 # --- features -----------------------------------------------------------------------------------
 
 MOVING_ZONES = Feature("zones that move", "model: adaptive", _moving)
-STAYING_CELLS = Feature(
-    "zones that move on cells that stay", "model: adaptive",
-    lambda tables: (at for at in _moving(tables) if not tables["model"].curvature_error),
-)  # fmt: skip
-SHORTEST_CELLS = Feature("shortest cells of rods", "model.rod_cell", _of_moving("rod_cell"))
 TWO_STIFFNESSES = Feature(
     "two bending stiffnesses", "bending_stiffness: [EI_1, EI_2]",
     _in_sections("bending_stiffness", of=lambda x: x.anisotropic),
@@ -423,15 +400,11 @@ SLIP = Feature(
     "stiffnesses, a table of moment beside them",
     "bending_slip, first_loading, stiffness_per_tension, attachments: kind: bend_restrictor, moment_curvature", _slips,
 )  # fmt: skip
-SOIL = Feature("soil that remembers", "seabed.soil", _bed(lambda x: x.soil, "soil"))
-NO_WIDTH = Feature("a section without diameter", "diameter",
-                   _in_sections("diameter", of=lambda x: x.diameter is None))  # fmt: skip
 SPRING_BESIDE_SLIP = Feature("an angular spring at a clamp of such a section", "bend_stiffness", _springs_beside_slip)
 DAMPED_OTHERWISE = Feature(
     "damping proportional to stiffness of laws and tables, with torque of tension, of a line clamped to what turns",
     "damping.stiffness", _damped_otherwise,
 )  # fmt: skip
-SWIVEL = Feature("swivels on the line", "attachments: kind: swivel", _swivels)
 DIRECTED = Feature(
     "sections that have a direction about their axis", "bending_stiffness: [EI_1, EI_2], intrinsic_curvature",
     _either(TWO_STIFFNESSES, CURLED),
@@ -441,7 +414,6 @@ TURNS = Feature("turns at an end", "ends.end.turns", _turns)
 TORSION = Feature("turns at an end, torque of tension", "ends.end.turns, tension_torque",
                   _either(TURNS, TORQUE_OF_TENSION))  # fmt: skip
 PLANE = Feature("a plane", "dimension: 2", _plane)
-SELF_CONTACT = Feature("contact of a line with itself", "contact.self", _self_contact)
 PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
 PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
@@ -491,10 +463,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "zones move (model), and a catenary forgets how far layers have slipped, and what tension adds to stiffness",
         fix="leave it out, or write `model: rod`",
     ),
-    Refusal(
-        NO_WIDTH, SOIL, "physics", "the cable lies in soil with its width ({key})", "a number > 0, in m",
-        "add `diameter: ...` (m)",
-    ),
     Refusal(SLIP, PAYOUT, "not worked out", "layers that slip, and stiffness by tension, do not go with {key}"),
     Refusal(
         SPRING_BESIDE_SLIP, SLIP, "not worked out",
@@ -506,14 +474,6 @@ REFUSALS: tuple[Refusal, ...] = (
         f"leave it out, or {IN_SPACE}",
     ),
     Refusal(
-        PLANE, SELF_CONTACT, "physics", "contact of the cable with itself leads out of a plane", "3 or nothing",
-        "or leave contact.self out",
-    ),
-    Refusal(
-        SWIVEL, TURNS, "physics", "{key} twists the cable, and a swivel lets it turn back", "no swivel",
-        "leave it out, or leave {key} out",
-    ),
-    Refusal(
         SWIVEL_BESIDE, DIRECTED, "not worked out",
         "a section beside it has a bending_stiffness of two numbers or an intrinsic_curvature, and its two sides turn "
         "against each other",
@@ -523,10 +483,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         STRETCH_LAW, TORQUE_OF_TENSION, "not worked out", "tension makes a torque in this line (tension_torque)",
         "axial_stiffness alone", "give axial_stiffness alone",
-    ),
-    Refusal(
-        SHORTEST_CELLS, STAYING_CELLS, "physics", "rods and catenaries have the cells of one mesh, which stay",
-        fix="leave it out and give mesh.cells or mesh.nodes, or write curvature_error for cells that follow",
     ),
     # --- obstacles, and other lines ---
     Refusal(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hybrid.scene.base import Finding
-from hybrid.scene.cable import Contact
+from hybrid.scene.cable import Contact, Environment
 from hybrid.scene.ends import Clamped, Ends, Pinned
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.payout import Payout
@@ -20,15 +20,18 @@ def _winch(ends: Ends) -> tuple[str, Pinned | Clamped, Payout] | None:
     return found
 
 
-def reel_has_diameters(ends: Ends, contact: Contact, obstacles: Obstacles) -> Iterator[Finding]:
-    """Contact of the line with itself, and with obstacles, knows the diameters on the reel."""
+def reel_has_diameters(
+    environment: Environment, ends: Ends, contact: Contact, obstacles: Obstacles
+) -> Iterator[Finding]:
+    """Contact of the line with itself and with obstacles, and soil, know the diameters on the reel."""
     found = _winch(ends)
     if found is None:
         return
     name = found[0]
-    if contact.self or obstacles:
+    soil = environment.seabed is not None and environment.seabed.soil is not None
+    if contact.self or obstacles or soil:
         apart = "which parts of the cable keep apart (contact.self)"
-        how = apart if contact.self else "with which it touches obstacles"
+        how = apart if contact.self else "with which it touches obstacles" if obstacles else "needed for soil"
         for i, section in enumerate(getattr(ends, name).payout.reel or ()):
             if section.diameter is None:
                 expected = f"a number > 0, in m, {how}"

@@ -90,7 +90,7 @@ def count_turns(scene: Scene, model: Model, t: float, state: State, given: tuple
     """
     by_end = given or (scene.ends.start.held_turns, scene.ends.end.held_turns)
     asked, name = by_end[1] - by_end[0], "end" if by_end[1] else "start"
-    if not asked:
+    if not asked or model.cable.swivels.size:  # which lets it turn back
         return
     where, s = f"ends.{name}.turns: {by_end[name == 'end']:g}", model.length if name == "end" else 0.0
     if not model.line.element[1:-1].all():

@@ -119,6 +119,37 @@ def test_a_body_between_lines_turns_in_their_plane() -> None:
     assert all(not x.position[..., 1].any() for x in found.lines.values())
 
 
+def folded(**more: Any) -> Tables:
+    """A loop whose clamped ends come together until its legs, which would cross, press against each other."""
+    section = {
+        "length": 4.0, "mass": 1.5, "diameter": 0.04, "axial_stiffness": 1e5, "bending_stiffness": 1.0,
+        "torsional_stiffness": 1.0, "damping": {"mass": 2.0},
+    }  # fmt: skip
+    ends: Tables = {}
+    for name, side in (("start", -1.0), ("end", 1.0)):
+        motion = {"travel": {"by": [-0.3 * side, 0, 0], "over": 0.8}}
+        ends[name] = {"kind": "clamped", "position": [0.35 * side, 0, 0], "tangent": [0.5, 0, side], "motion": motion}
+    return hung(
+        environment={}, cable={"sections": [section]}, ends=ends, contact={"self": True}, mesh={"cells": 60},
+        time={"duration": 1.5, "step": 0.01}, output=STEPS["output"] | {"points": 61},
+    ) | more  # fmt: skip
+
+
+def test_a_line_that_touches_itself_in_a_plane_stays_in_it() -> None:
+    """It is the motion in space, across which there is nothing; its legs stay a diameter apart, where they lie flat."""
+    found = hybrid.run(folded())
+    assert not found.position[..., 1].any() and any(x.kind == "line touches itself" for x in found.events)
+    space = hybrid.run({key: x for key, x in folded().items() if key != "dimension"})
+    assert np.abs(found.position - space.position).max() == 0.0
+    apart = found.position[-1, ::-1, 0] - found.position[-1, :, 0]
+    legs = slice(1, 12)
+    assert apart[legs].min() == pytest.approx(0.04, rel=0.05)
+    through = hybrid.run(folded(contact={"self": False})).position[-1]
+    assert (through[::-1, 0] - through[:, 0])[legs].min() < 0.03
+    again = hybrid.run(seen_by(np.diag([-1.0, 1.0, 1.0]), folded()))
+    assert np.abs(again.position * [-1.0, 1.0, 1.0] - found.position).max() < 1e-9
+
+
 OUT: list[tuple[Tables, str, float | None]] = [
     (over(axis=[0.4, 1, 0]), "", 0.0),
     (over("sphere", at=[4.0, 0.2, 0.9]), "", None),

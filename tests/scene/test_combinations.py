@@ -53,7 +53,6 @@ ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}
 SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"density": 1025, "current": [0.3, 0, 0]}}
 HIGH_WAVES: dict[str, Any] = {"environment.fluid": {
     "density": 1025, "surface": 5, "waves": {"kind": "stream_function", "height": 1, "period": 5, "ramp": 9}}}  # fmt: skip
-CLAY: dict[str, Any] = {"environment.seabed": {"z": -9, "soil": {"shear_strength": 2000}}}
 RAO = {"rao": str(Path(__file__).parents[1] / "data" / "rao.csv"), "origin": [8, 0, 0], "fairlead": [0, 0, 0]}
 CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
 SHAPED = {
@@ -69,15 +68,11 @@ PAID_LINE = {ONE + "connections.start.payout": {"rate": 0.1, "ramp": 1.0}}
 EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.TWO_STIFFNESSES, c.MOVING_ZONES): (TWO | MOVING, ""),
     (c.SLIP, c.MOVING_ZONES): (SLIPS | MOVING, ""),
-    (c.NO_WIDTH, c.SOIL): (CLAY | {"cable.sections": [{"length": 10, "mass": 2, "bending_stiffness": 10}]}, ""),
     (c.SLIP, c.PAYOUT): (SLIPS | PAID, ""),
     (c.SPRING_BESIDE_SLIP, c.SLIP): (SLIPS | {END + "bend_stiffness": 5}, ""),
     (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
-    (c.PLANE, c.SELF_CONTACT): ({"dimension": 2, "contact": {"self": True}}, ""),
-    (c.SWIVEL, c.TURNS): (SWIVEL | {END + "turns": 2}, ""),
     (c.SWIVEL_BESIDE, c.DIRECTED): (SWIVEL | TWO, ""),
     (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
-    (c.SHORTEST_CELLS, c.STAYING_CELLS): ({"model": {"kind": "adaptive", "rod_cell": 0.1}}, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.GOES_ITS_WAY): (TWO_LINES | {ONE + "initial": {"friction": "settled"}}, ""),
     (c.ABOUT_REST, c.MOVED_BY_LINES): (TWO_LINES, "about rest"),

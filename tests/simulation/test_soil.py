@@ -194,7 +194,7 @@ def test_a_line_of_several_is_the_same_in_soil() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"cable": {"sections": [{"length": 1.0, "mass": 20.0, "bending_stiffness": 1.0}]}}, "with its width"),
+        ({"cable": {"sections": [{"length": 1.0, "mass": 20.0, "bending_stiffness": 1.0}]}}, "needed for soil"),
         ({"environment": {"seabed": {"z": 0, "soil": SOIL, "stiffness": 1e4}}}, "soil says how the bed resists"),
         ({"environment": {"seabed": {"z": 0, "soil": SOIL | {"lateral": {}}}}}, "over which lateral resistance grows"),
         ({"environment": {"seabed": {"z": 0}}}, "in N/m per m"),
