@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from hybrid.designs.line_at_rest import LineAtRest, steps_along
+from hybrid.designs.stretch import anywhere
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
 
@@ -70,10 +71,7 @@ class Gradients:
         """Whether results depend on these unknowns and on no other one."""
         line, others, q = self._line, self._every & ~moved, _each(moved)
         most = np.abs(line.by_state(q) * steps_along(line.state, q)[:, None]).max(axis=0)
-        size = np.ones(SIZE)  # of a movement that stretches and turns all cells alike
-        size[0], size[1:4] = np.abs(line.state.T).max() or 1.0, np.linalg.norm(line.state.e, axis=1).mean()
-        far = np.random.default_rng(1).uniform(0.5, 1.0, (1, *others.shape)) * (size * others)
-        far[:, 1::2] *= -1.0  # else nodes would go along with their neighbours
+        far = anywhere(line.state, SIZE) * others
         change = np.abs(line.by_state(far)[0] * steps_along(line.state, far)[0])
         return bool((change <= OUTSIDE * most).all())
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from hybrid.designs.stretch import Stretch, anywhere, stretch_of
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.march.assembly import JOINED
@@ -21,7 +24,6 @@ from hybrid.linear.matrices import ANCHOR, rotation
 from hybrid.linear.memory import settle_layers
 from hybrid.model.build import Model
 from hybrid.model.output_points import jump_points
-from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.probes import PROBES, Observer
 from hybrid.scene.schema import Scene
 from hybrid.simulation.static_case import StaticCase
@@ -37,6 +39,11 @@ ALONG = 1e-5
 KINK, ROUGH = 0.3, 1e-7
 # Forces that do not act at rest, or depend on the way there; and a plane has block rows of its own.
 LEFT_OUT = PLANAR | WAVES | FRICTION
+# Movements from which on a line without what results do not depend on pays; parts within which its results are these,
+# and change as these do along a movement of all unknowns.
+MANY, ALIKE = 3, (1e-11, 1e-6)
+# Of lines that are looked at together what has to be the same, and what results ask for that may differ.
+SAME, VARIES = ("element", "spin"), ("s", "h", "hn", "k0", "kb", "ck", "mass", "force", "rotary", "polar")
 SAME_PLACE = 1e-9  # part of the length within which a node is at a jump
 TURNED = 1e-9  # N m over N m, torque through catenary zones that is none
 
@@ -128,6 +135,7 @@ class LineAtRest:
         them.  SceneError: the line has no result of that name, or they have no derivative.
         """
         self.model, self.state, self.wanted, self._free = model, state, tuple(wanted), list(free)
+        self._frames = frames
         self.here = Beside(scene, model, self._ends(model, frames), model.sea.at(np.inf))
         self._at = [x.at for x in wanted if x.at is not None]
         self._nodes = any(x.extreme for x in wanted) or not self._at
@@ -224,12 +232,39 @@ class LineAtRest:
                 found.add(int(np.searchsorted(s, min(x.at, s[-1]))))
         return sorted(found)
 
+    @cached_property
+    def _near(self) -> tuple[Stretch, LineAtRest] | None:
+        """The line by the places of results, whose results are these, and change as these do; None: there is none."""
+        stretch = stretch_of(self.model, self.near()) if self._looked_at_with(self.here) == 0 else None
+        if stretch is None:
+            return None
+        model = replace(stretch.model(self.model), sea=self.model.sea.on(stretch.cells.size))
+        near = LineAtRest(self.here.scene, model, stretch.state(self.state), self.wanted, self._free, self._frames)
+        for x, peak in self._peak_of.items():
+            near._peak_of[x] = peak._replace(nodes=np.searchsorted(stretch.nodes, peak.nodes))
+        near._values = near._of_states(near._output(near.here, near.left(near.here)[1]))[0]
+        q = anywhere(self.state, SIZE)
+        steps = steps_along(self.state, q)
+        both = (
+            [near._values, self._values],
+            [x._by_state(y, steps) for x, y in ((near, q[:, stretch.nodes]), (self, q))],
+        )
+        same = all(np.allclose(a, b, rtol=part, atol=0.0) for (a, b), part in zip(both, ALIKE, strict=True))
+        return (stretch, near) if same else None
+
     def by_state(self, q: Floats, turns: Floats | None = None) -> Floats:
         """(P, W) derivatives of results along movements (P, N+1, 5) of the state.
 
         turns: (P, 2, 3) rad, of the frames of ends; None: they stay.
         """
-        steps = steps_along(self.state, q, turns)
+        on = self
+        if len(q) >= MANY and self._near is not None:
+            stretch, on = self._near
+            q = q[:, stretch.nodes]
+        return on._by_state(q, steps_along(on.state, q, turns), turns)
+
+    def _by_state(self, q: Floats, steps: Floats, turns: Floats | None = None) -> Floats:
+        """The same, moved by these parts (P,) of the movements."""
         moved = displaced(self.state, np.repeat(q, 2, axis=0), (steps[:, None] * (1.0, -1.0)).ravel())
         batch = _repeated(self._output(self.here, self._work.report), 2 * len(q))._replace(**cast(Any, moved))
         for end in self._free:
@@ -257,42 +292,69 @@ class LineAtRest:
         lines: with more and with less of each number, in turn, and their reports.
         """
         found = np.tile(self._values, (len(lines), 1))  # of the line here
-        other = [k for k, (x, _) in enumerate(lines) if x is not self.here]
-        observers = {k: self._observer_of(lines[k][0]) for k in other}
-        points = self._observer.s.size
-        together = [k for k in other if self._looked_at_with(lines[k][0]) and observers[k].s.size == points]
-        if together:
-            outputs = [Output(x.model.line, x.model.zones, self._output(x, y)) for x, y in (lines[k] for k in together)]
-            of = [observers[k] for k in together]
-            observer, seen = self._observer.look_on(outputs, [x.grid for x in of])
-            nodes = [lines[k][0].model.line.s for k in together]
-            places = list(zip([x.s for x in of], nodes, strict=True))
-            found[together] = self._results(observer.values_of(seen), places)
-        for k in sorted({*other} - {*together}):
-            observer = observers[k]
-            places = [(observer.s, lines[k][0].model.line.s)]
-            found[k] = self._results(observer.values_of(observer.look(self._output(*lines[k]))), places)
+        groups: dict[int, list[int]] = {0: [], 1: []}  # on the nodes here, and on others that are as many
+        for k, (x, _) in enumerate(lines):
+            if x is self.here:
+                continue
+            if (moved := self._looked_at_with(x)) is not None:
+                groups[moved].append(k)
+                continue
+            observer = self._observed(x)
+            values = observer.values_of(observer.look(self._output(*lines[k])))
+            found[k] = self._results(values, [(observer.s, x.model.line.s)])
+        for moved, each in groups.items():
+            if len(each) < 2 * MANY or self._near is None:
+                found[each] = self._of_lines([lines[k] for k in each], bool(moved)) if each else found[each]
+                continue
+            stretch, near = self._near
+            short = [(x._replace(model=stretch.model(x.model, VARIES)), y) for x, y in (lines[k] for k in each)]
+            found[each] = near._of_lines(short, bool(moved))
         return self._slopes(found[::2], found[1::2], steps)
 
-    def _looked_at_with(self, x: Beside) -> bool:
-        """Whether a line differs from the one here in what may differ among outputs that are looked at together."""
-        line = x.model.line
-        more = (line.law, line.bend_law, line.torsion, line.tension_torque, line.wake_law, line.slip_law)
-        plain = not x.model.attached and x.model.cable.bounds.size == 2  # else what cuts the line moves with its nodes
-        same = x.sea is self.here.sea and (plain or np.array_equal(line.s, self.model.line.s))
-        return same and not any(a.size for a in more) and self._observer.quantities is None
+    def _of_lines(self, lines: Sequence[tuple[Beside, Floats]], moved: bool) -> Floats:
+        """(n, W) of this state on lines, with their reports; moved: whether their nodes are not those here."""
+        batch = _repeated(self._output(self.here, self._work.report), len(lines))
+        for k, (x, report) in enumerate(lines):
+            ends = self._held_ends(x)
+            batch.report[k] = report
+            for name in Ends._fields:
+                getattr(batch, name)[k] = getattr(ends, name)
+        varied = {name: np.stack([getattr(x.model.line, name) for x, _ in lines]) for name in VARIES[not moved :]}
+        batch, observer = batch._replace(h=varied["h"], kb=varied["kb"]), self._observer
+        places = [(observer.s, self.model.line.s)] * len(lines)
+        if moved:
+            points = np.stack([self._points(x.model) for x, _ in lines])
+            observer = observer.on_varied(self.model.line, self.here.sea, self.model.zones, varied["s"], points)
+            places = list(zip(points, varied["s"], strict=True))
+        return self._results(observer.values_of(observer.look(batch, varied)), places)
 
-    def _observer_of(self, x: Beside) -> Observer:
-        """What looks at a line: that of this one where the nodes and all that it looks at are the same."""
-        same = np.array_equal(x.model.line.s, self.model.line.s) and self._looked_at_with(x)
-        return self._observer if same else self._observed(x)
+    def _looked_at_with(self, x: Beside) -> int | None:
+        """Whether a line differs from the one here in what may differ among outputs that are looked at together: 0; 1:
+
+        and in where its nodes are; None: in more.
+        """
+        line, here, model = x.model.line, self.model.line, self.model
+        if x.sea is not self.here.sea or self._observer.quantities is not None:
+            return None
+        more = (line.law, line.bend_law, line.torsion, line.tension_torque, line.wake_law, line.slip_law)
+        same = line.bits == here.bits and all(np.array_equal(getattr(line, y), getattr(here, y)) for y in SAME)
+        # beside ends of catenaries the observer knows how stiff a rod would be
+        same &= bool(here.spin.all()) or np.array_equal(x.model.cable.B, model.cable.B)
+        if any(a.size for a in more) or not same:
+            return None
+        if np.array_equal(line.s, here.s):
+            return 0 if x.model.zones == model.zones else None
+        plain = not x.model.attached and x.model.cable.bounds.size == 2 and len(model.zones) == 1
+        return 1 if plain and self._points(x.model).size == self._observer.s.size else None
+
+    def _points(self, model: Model) -> Floats:
+        """Where results are looked at, m: at nodes where extremes are wanted, and at places."""
+        at = [min(place, model.length) for place in self._at]
+        return np.unique(np.concatenate([model.line.s, at] if self._nodes else [at]))
 
     def _observed(self, x: Beside) -> Observer:
         """What looks at a line, at its nodes where extremes are wanted, and at places."""
-        model = x.model
-        at = [min(place, model.length) for place in self._at]
-        places = np.unique(np.concatenate([model.line.s, at] if self._nodes else [at]))
-        observer = StaticCase(x.scene).observer(model, at=places)
+        observer = StaticCase(x.scene).observer(x.model, at=self._points(x.model))
         for wanted in self.wanted:
             if wanted.name not in observer.names:
                 names = ", ".join(sorted(name for name in observer.names if "/" not in name))
@@ -318,20 +380,23 @@ class LineAtRest:
 
     def _of_states(self, batch: Batch) -> Floats:
         """(n, W) of outputs of the line."""
-        return self._results(
-            self._observer.values_of(self._observer.look(batch)), [(self._observer.s, self.model.line.s)] * batch.t.size
-        )
+        places = [(self._observer.s, self.model.line.s)] * batch.t.size
+        return self._results(self._observer.values_of(self._observer.look(batch)), places)
 
     def _output(self, x: Beside, report: Floats) -> Batch:
-        """This state on a line; an end at a free point counts as held, by it."""
+        """This state on a line."""
+        ends = self._held_ends(x)
+        state = self.state._replace(layers=self.state.layers.copy())
+        settle_layers(x.model.line, ends, state, self._work)
+        return batch_of_one(0.0, ends, state, report, np.zeros(len(POWERS)), x.sea)
+
+    def _held_ends(self, x: Beside) -> Ends:
+        """Ends of a line; one at a free point counts as held, by it."""
         held, position = x.ends.held.copy(), x.ends.position.copy()
         held[self._free] = 1
         for k in self._free:
             position[k] = self.state.r[-k]
-        ends = x.ends._replace(held=held, position=position)
-        state = self.state._replace(layers=self.state.layers.copy())
-        settle_layers(x.model.line, ends, state, self._work)
-        return batch_of_one(0.0, ends, state, report, np.zeros(len(POWERS)), x.sea)
+        return x.ends._replace(held=held, position=position)
 
     def _results(self, values: Mapping[str, Floats], places: Sequence[tuple[Floats, Floats]]) -> Floats:
         """(n, W) of what is wanted, of values of n outputs; places: of each, arc lengths of values and of nodes, m."""

@@ -194,7 +194,7 @@ class Material:
     @property
     def submerged_weight(self) -> Floats:
         """(K,) N/m, downwards, with all of its volume under the surface; in air where there is no fluid."""
-        return np.asarray(self.weight - np.nan_to_num(self.buoy))
+        return np.asarray(self.weight - np.where(np.isnan(self.buoy), 0.0, self.buoy))
 
     def bending_length(self, least: Floats | float) -> Floats:
         """(K,) m, (EI/w)^(1/3): over it a cable without tension bends under its weight; w at least `least` N/m."""
@@ -212,7 +212,7 @@ class Material:
 
     def piece(self, s: Floats) -> np.ndarray:
         """Piece that each of the arc lengths s (m) lies in."""
-        return np.clip(np.searchsorted(self.bounds, s) - 1, 0, self.mass.size - 1)
+        return np.searchsorted(self.bounds[1:-1], s)
 
     def swivel_nodes(self, s: Floats) -> np.ndarray:
         """Of nodes at s (N+1,) m, those of swivels."""

@@ -21,6 +21,7 @@ from hybrid.model.plane import planar
 from hybrid.model.resolution import Resolution
 from hybrid.model.sea import Surroundings, surroundings
 from hybrid.model.sections import stiffeners_of
+from hybrid.scene.ends import Pinned
 from hybrid.scene.schema import Scene
 
 # Part of the length by which nodes may move: further than that, another one has been chosen for a place that needs one.
@@ -41,6 +42,11 @@ def nearby(
     """
     if model.payout is not None or (_turned_by_shape(model) and not clamped):
         return _built(model, scene, resolution)
+    if _moves_ends_alone(of, scene):
+        line, chords = model.line._replace(bits=model.line.bits & ~without), model.start.e[[0, -1]]
+        chords = chords / np.linalg.norm(chords, axis=1)[:, None]
+        first = model.ends.values.frame.reshape(2, 3, 3)[:, :, 0]
+        return replace(model, line=line, ends=end_conditions(scene, (first[0], first[1]), chords, model.sea))
     cable = material(scene)
     placed = _cells(model, cable, of, scene, resolution)
     if placed is None:
@@ -71,6 +77,22 @@ def nearby(
         model, line=line, zones=zones, ends=ends, sea=sea, length=float(line.s[-1]), cable=cable, layout=layout,
         on_base=on_base, attached=tuple(cable.at.tolist()), inextensible=not line.ck.any(),
     )  # fmt: skip
+
+
+def _moves_ends_alone(of: Scene, scene: Scene) -> bool:
+    """Whether ends that are held are elsewhere, and nothing else is another one."""
+    if scene.environment.seabed is not None or scene.obstacles:
+        return False
+    if any(getattr(scene, x) is not getattr(of, x) for x in type(scene).model_fields if x != "ends"):
+        return False
+    for x, y in zip(of.ends.both, scene.ends.both, strict=True):
+        if x is y:
+            continue
+        if not (isinstance(x, Pinned) and isinstance(y, Pinned)):
+            return False
+        if x.model_copy(update={"position": y.position}) != y:
+            return False
+    return True
 
 
 def _held_axes(model: Model, of: Scene, scene: Scene, line: Line, cable: Material) -> Floats:

@@ -325,11 +325,17 @@ class Observer:
         self.grid = Grid(line.s, zones, s, self._cuts, self._changes, kept=self._unloaded, hinges=self._hinges)
         self._after = Grid(line.s, zones, jumps, self._cuts, self._changes, True, self._unloaded, self._hinges)
 
-    def on_varied(self, line: Line, sea: Sea, zones: Sequence[Zone], nodes: Floats) -> Observer:
-        """The same fields of a line whose nodes (nb, N+1) m are elsewhere in every output; zones: of the first."""
+    def on_varied(
+        self, line: Line, sea: Sea, zones: Sequence[Zone], nodes: Floats, points: Floats | None = None
+    ) -> Observer:
+        """The same fields of a line whose nodes (nb, N+1) m are elsewhere in every output; zones: of the first.
+
+        points: (nb, ns) m, output points of each; None: those of this one.
+        """
         other, ends = copy(self), (nodes[:, :1], nodes[:, -1:])
         other.line, other.sea, other.zones = line, sea, tuple(zones)
-        s, jumps = np.clip(self.s, *ends), np.clip(self.jumps, *ends)  # on the reel: the values of the fairlead
+        at = self.s if points is None else points
+        s, jumps = np.clip(at, *ends), np.clip(self.jumps, *ends)  # on the reel: the values of the fairlead
         other.grid = VaryingGrid(nodes, zones, s, self._cuts, self._changes, kept=self._unloaded, hinges=self._hinges)
         other._after = VaryingGrid(nodes, zones, jumps, self._cuts, self._changes, True, self._unloaded, self._hinges)
         return other
@@ -358,16 +364,9 @@ class Observer:
         within = [x.line.s[[0, -1]] for x in outputs]  # beyond, on the reel: the values of the fairlead
         s, jumps = ([np.clip(x, *ends) for ends in within] for x in (self.s, self.jumps))
         of = list(zip(outputs, s, jumps, strict=True))
-        after = self._grids([(x, at) for x, _, at in of], True) if self._right else []
-        return self.look_on(outputs, self._grids([(x, at) for x, at, _ in of], False), after)
-
-    def look_on(
-        self, outputs: Sequence[Output], grids: Sequence[Grid], after: Sequence[Grid] = ()
-    ) -> tuple[Observer, JoinedObservation]:
-        """The same, each on a grid of its own, with as many points; after: those just after points where it jumps."""
-        other, grid = copy(self), JoinedGrid(grids)
-        if after:
-            other._after = JoinedGrid(after)
+        other, grid = copy(self), JoinedGrid(self._grids([(x, at) for x, at, _ in of], False))
+        if self._right:
+            other._after = JoinedGrid(self._grids([(x, at) for x, _, at in of], True))
         other.line, other.zones, other.grid = outputs[0].line, outputs[0].zones, grid
         return other, JoinedObservation(outputs, self.sea, grid)
 

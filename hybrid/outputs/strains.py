@@ -95,9 +95,9 @@ def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
     # an angular spring at a clamp bends, but does not twist
     held = np.flatnonzero(~bare & ~jumps & np.isin(at.node, view.end_nodes))
     if held.size:
-        part = line.hn[at.node[held]] / (0.5 * line.h[at.cell[held]])
-        out[at.row[held], 1] *= part[:, None]
-        for k in held[part > 1.0 / RIGID]:
+        part = view.of_line("hn", at.node[held]) / (0.5 * view.cell_lengths[at.cell[held]])
+        out[at.row[held], 1] *= part
+        for k in held[(part > 1.0 / RIGID).any(axis=1)]:
             out[at.row[k], 0] = _beside_spring(view, int(at.node[k]), int(at.cell[k]))
     if line.tension_twist.size:
         beside = np.where(at.cell == at.node, at.cell + 1, at.cell - 1)
