@@ -99,9 +99,8 @@ def test_a_phase_that_is_nothing() -> None:
 
 @pytest.mark.long
 def test_waves_and_a_current_across() -> None:
-    agree(
-        in_water(on_the_bed("rod")), OF, [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.fluid.waves.height"]
-    )
+    tables = in_water(on_the_bed("rod")) | {"time": {"duration": 4.0, "step": 0.05}}
+    agree(tables, OF, [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.fluid.waves.height"])
 
 
 @pytest.mark.long

@@ -15,9 +15,9 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 # Everything that a state can consist of: fixed zones, adaptive ones, friction, waves, a plane, the model error,
 # joints with moments, steps that follow the error, a climb to an accuracy with several results.
 CASES = {
-    "fixed zones": ("02_suspension", ["time.duration=2"]),
-    "catenary": ("07_forced_taut_cable", ["time.duration=2"]),
-    "rod in a plane": ("06_whip", ["time.duration=0.1"]),
+    "fixed zones": ("02_suspension", ["time.duration=1"]),
+    "catenary": ("07_forced_taut_cable", ["time.duration=1"]),
+    "rod in a plane": ("06_whip", ["time.duration=0.06"]),
     "adaptive in a plane": ("touchdown", ["time.duration=14"]),
     "cells that follow": (
         "touchdown",
@@ -25,7 +25,7 @@ CASES = {
     ),
     "adaptive in space": ("s_tether", ["time.duration=6"]),
     "friction, laid": ("laying", ["time.duration=12"]),
-    "waves": ("irregular_sea", ["time.duration=6"]),
+    "waves": ("irregular_sea", ["time.duration=4"]),
     "two spread seas": (
         "irregular_sea",
         [

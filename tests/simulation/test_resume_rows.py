@@ -70,7 +70,7 @@ def shorten(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-8])
 
 
-ASKED = ["accuracy={tension: 0.3%}", "time={duration: 12}", "mesh=null"]
+ASKED = ["accuracy={tension: 0.3%}", "time={duration: 7}", "mesh=null"]
 CASES = {"rods": [*ASKED, "model=rod"], "model left open": ASKED}
 
 
@@ -120,20 +120,20 @@ def test_a_stopped_run_goes_on_bit_for_bit(
 
 
 @pytest.mark.long
-def test_the_file_of_the_result_does_not_hold_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    interrupted(scene(*CASES["rods"]), tmp_path / "run.h5", Stopping(monkeypatch))
-    beside = sum(x.stat().st_size for x in rows(tmp_path))
-    assert (tmp_path / "run.h5").stat().st_size > beside > 0
-    with opened(tmp_path / "run.h5") as file:
+def test_the_file_of_the_result_does_not_hold_them(made: Callable[[str], Path]) -> None:
+    beside = sum(x.stat().st_size for x in rows(made("rods")))
+    assert (made("rods") / "run.h5").stat().st_size > beside > 0
+    with opened(made("rods") / "run.h5") as file:
         kept = read_before(file)["coarse"]
     assert len(kept) == 3 and all(x["rows"] and not x["values"] for x in kept)
 
 
 @pytest.mark.long
-def test_into_another_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_into_another_file(made: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those beside the source are used, and stay there: it can be resumed again."""
-    interrupted(scene(*CASES["rods"]), tmp_path / "run.h5", Stopping(monkeypatch))
-    hybrid.run(scene(*CASES["rods"]), tmp_path / "whole.h5").close()
+    Stopping(monkeypatch)
+    for file in made("rods").iterdir():
+        shutil.copy(file, tmp_path)
     hybrid.resume(tmp_path / "run.h5", tmp_path / "other.h5").close()
     assert differences(tmp_path / "whole.h5", tmp_path / "other.h5") == []
     assert len(rows(tmp_path)) == 3
@@ -152,7 +152,7 @@ def test_nothing_is_left_where_there_is_no_result(tmp_path: Path, monkeypatch: p
 
 
 @pytest.mark.long
-def test_killed_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_killed_and_resumed(made: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """kill -9 in a finer result: the files beside the first are found by another process."""
     Stopping(monkeypatch)
     code = f"""
@@ -183,5 +183,4 @@ def test_killed_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(cases.Case, "sample", lambda self, *x: computed.append(x) or sample(self, *x))
     hybrid.resume(tmp_path / "run.h5").close()
     assert not computed and not rows(tmp_path)
-    hybrid.run(scene(*CASES["rods"]), tmp_path / "whole.h5").close()
-    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+    assert differences(made("rods") / "whole.h5", tmp_path / "run.h5") == []

@@ -121,11 +121,11 @@ def test_friction_breaks_out_and_falls_to_what_is_left(dimension: int) -> None:
         "environment": {"seabed": {"z": 0, "stiffness": 1e5, "friction": friction}},
         "cable": {"sections": [{"length": 4.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e8,
                                 "damping": 0.5}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": {"travel": {"by": [-0.4, 0, 0], "over": 40.0}}},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": {"travel": {"by": [-0.2, 0, 0], "over": 20.0}}},
                  "end": "free"},
         "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}, "model": "catenary",
         "contact": {"self": False}, "mesh": {"cells": 20}, "dimension": dimension,
-        "time": {"duration": 40.0, "step": 0.02}, "output": {"every": 0.02, "points": 21, "exact": True},
+        "time": {"duration": 20.0, "step": 0.02}, "output": {"every": 0.02, "points": 21, "exact": True},
     }  # fmt: skip
     found = hybrid.run(tables)
     way = -found.position[:, 10, 0] + found.position[0, 10, 0]
@@ -135,7 +135,7 @@ def test_friction_breaks_out_and_falls_to_what_is_left(dimension: int) -> None:
     total = float(np.trapezoid(found.contact[-1], found.s))
     k = int(np.argmax(drawn))
     print(f"break-out {drawn[k]:.2f} N at {way[k] * 1e3:.2f} mm, {drawn[-1]:.2f} N behind {way[-1]:.3f} m")
-    sliding = (way > 2 * travel) & (found.t < 39.0)
+    sliding = (way > 2 * travel) & (found.t < 19.0)
     np.testing.assert_allclose(drawn[sliding], total * mu * share[sliding], rtol=2e-2)
     assert drawn[k] == pytest.approx(mu * total, rel=3e-2) and way[k] == pytest.approx(travel, rel=0.3)
 
