@@ -3,33 +3,40 @@
     pytest bench/test_bench_switch.py -m bench -n 0 -s
 
 Times by the wall clock, us: the smallest and the median of all switches of three runs, which other programs on the
-machine lengthen, and the first switch of a run, which makes the tables.
+machine lengthen, and the first switch of a run, which makes the tables.  Of several lines processor time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
 import pytest
-from test_bench_zones import MESHES, SHARE, run, touchdown
+from test_bench_zones import MESHES, SHARE, Text, run, touchdown
 
+import hybrid
 from hybrid.adapt.manager import DomainManager
+from hybrid.errors import ZONE_EVENTS
+from hybrid.kernels.mesh.cell_errors import CURVATURE
+from hybrid.simulation import initial_zones
+from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation.system_run import SystemRun
+from hybrid.simulation.system_zones import SystemZones
 from hybrid.simulation.transient import Transient
 
 pytestmark = pytest.mark.bench
 ROUNDS = 3
 
 
-def timed(call: Callable[..., Any], into: list[float]) -> Callable[..., Any]:
+def timed(call: Callable[..., Any], into: list[float], clock: Callable[[], float] = perf_counter) -> Callable[..., Any]:
     """The same, with the time (us) that it takes at the end of a list."""
 
     def with_time(*given: Any) -> Any:
-        begin = perf_counter()
+        begin = clock()
         found = call(*given)
-        into.append(1e6 * (perf_counter() - begin))
+        into.append(1e6 * (clock() - begin))
         return found
 
     return with_time
@@ -48,3 +55,41 @@ def test_switch(mesh: str, monkeypatch: pytest.MonkeyPatch) -> None:
     print(f"\n{mesh}: us, smallest and median; a review that changes zones or may, a switch; the first of a run")
     for name, x in (("review", reviews), ("switch", switches), ("first switch", first[1:])):
         print(f"  {name:14s} {np.min(x):6.0f} {np.median(x):6.0f}  of {len(x)}")
+
+
+def four_lines() -> Text:
+    """Touchdown lines in the four directions from fairleads that heave alike, in a current, and 60 s of it."""
+    one, points, lines = touchdown(True), Text(), Text()
+    heave = {"heave": {"amplitude": 2.0, "period": 8.0}, "ramp": 16.0}
+    for k, (x, y) in enumerate(((1, 0), (0, 1), (-1, 0), (0, -1))):
+        points[f"anchor{k}"] = {"position": [205.0 * x, 205.0 * y, -100.0]}
+        points[f"fairlead{k}"] = {"position": [0.0, 0.0, 0.0], "motion": heave}
+        lines[f"line{k}"] = {
+            "sections": one["cable"]["sections"], "start": f"anchor{k}", "end": f"fairlead{k}",
+            "mesh": MESHES["graded, 120 cells"], "contact": {"self": False}, "model": {"kind": "adaptive"},
+        }  # fmt: skip
+    return {
+        "environment": one["environment"], "points": points, "lines": lines, "contact": {"between": []},
+        "time": {"duration": 60.0, "step": 0.1}, "output": {"every": 1.0, "points": 201},
+    }  # fmt: skip
+
+
+def test_switch_of_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each line that changes, what follows for all of them included; the outputs that it has to write before apart."""
+    monkeypatch.setattr(initial_zones, "shares_asked", lambda *_: {CURVATURE: SHARE})
+    spent: dict[str, list[float]] = {"changes": [], "attaching": [], "outputs written": []}
+    changed = 0
+    hybrid.run(four_lines())  # the first compiles
+    calls = (SystemZones, "adapt"), (SystemRun, "_attach"), (LineResult, "write_down")
+    for (of, name), times in zip(calls, spent.values(), strict=True):
+        monkeypatch.setattr(of, name, timed(getattr(of, name), times, process_time))
+    for _ in range(ROUNDS):
+        result = hybrid.run(four_lines())
+        for line in result.lines.values():
+            changed += len({e.t for e in line.events if e.kind in ZONE_EVENTS and e.t > 0.0})
+    inside = sum(spent["changes"]) + sum(spent["attaching"])
+    written = sum(spent["outputs written"])
+    print(
+        f"\nfour lines of 120 cells, us of processor time for each of {changed // ROUNDS} changes of a line in a run: "
+        f"{inside / changed:.0f}, of which outputs that are written (those without a change included) {written / changed:.0f}"
+    )

@@ -6,6 +6,7 @@ as long as a change takes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -29,11 +30,13 @@ from hybrid.kernels.mesh.zone_switch import (
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.fields import ROD
 from hybrid.kernels.state.forces import PLANAR
-from hybrid.kernels.state.state import FIELDS, Line
+from hybrid.kernels.state.state import FIELDS, Ends, Line, State, Work
 from hybrid.kernels.step.newton import ASSEMBLY, RUN, Task
-from hybrid.simulation.envelope import marks_on
+from hybrid.simulation.envelope import Envelope, marks_on
+from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.stepper import HEAVY
 
 if TYPE_CHECKING:
@@ -44,14 +47,100 @@ if TYPE_CHECKING:
 OF_KINDS = ("h", "spin", "element", "kb", "k0", *(name for name, field in FIELDS.items() if field.rule == ROD))
 
 
-def plain(owner: Transient) -> bool:
-    """Whether zones of a run can change in compiled code: nothing that they would carry is left out there."""
-    switching, line = owner.switching, owner.model.line
-    if switching is None or not switching.compiled or owner.payout is not None or owner.correction is not None:
-        return False
+def carries_all(model: Model, switching: ZoneSwitching) -> bool:
+    """Whether kinds of a line can change in compiled code: nothing that they would carry is left out there."""
+    line = model.line
     laws = line.torsion, line.tension_twist, line.law, line.bend_law, line.wake_law, line.moved
-    bare = owner.run.contact is None and not any(x.size for x in laws)
+    bare = switching.compiled and model.payout is None and not any(x.size for x in laws)
     return bare and bool(line.bits & PLANAR or not switching.manager.twisted)
+
+
+def plain(owner: Transient) -> bool:
+    """Whether zones of a run can change in compiled code."""
+    switching = owner.switching
+    if switching is None or owner.payout is not None or owner.correction is not None:
+        return False
+    return owner.run.contact is None and carries_all(owner.model, switching)
+
+
+class Around(NamedTuple):
+    """What a run knows of a line beside its states.
+
+    envelope: extremes of all meshes, None: none are kept; marked: as of `marks_on`; nearest: (2,) the pair of cells that
+    was nearest.
+    """
+
+    work: Work
+    books: Books
+    envelope: Envelope | None
+    marked: Sequence[tuple[float, int]]
+    nearest: np.ndarray
+
+
+class LineKinds:
+    """Changes of kinds of a line in its arrays: from the second of two states, which are alike, to the first."""
+
+    def __init__(
+        self, model: Model, switching: ZoneSwitching, states: tuple[State, State], around: Around, ends: Ends
+    ) -> None:
+        """From now on the model has a line of its own, which changes; ends: conditions in the arrays of the run."""
+        assert model.layout is not None and model.on_base is not None
+        self._switching, self._numbers, self._ends = switching, np.zeros(NUMBERS), ends
+        line, layout, sea, zones = _copied(model.line), model.layout, model.sea.values, switching.zones
+        self.model = replace(model, line=line)
+        own: dict[str, Any] = {name: getattr(line, name).copy() for name in OF_KINDS}
+        self._before = line._replace(**own)
+        self._rods, self._rods_before = (layout.rod_cells.copy() for _ in range(2))
+        self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
+        self._fill, self._switch, self._renew = Table(blank_line_job), Table(blank_switch_job), Table(blank_renew_job)
+        self._fill.bind(
+            cable=model.on_base.cable, nodes=line.s, base_of_cell=layout.base_of_cell, rod=self._rods, line=line
+        )
+        (first, second), base = states, np.zeros(layout.rod.size)
+        transfer = Transfer(
+            self._before, line, second, first, layout.places, layout.places, layout.base_of_cell, layout.first,
+            switching.kinks, base, self._clamps, self._held, np.ones(1, bool), blank_match(model.cells, model.cells),
+        )  # fmt: skip
+        self._switch.bind(
+            transfer=transfer, ends=ends, sea=sea, target_sea=sea, zones=zones, target_zones=zones,
+            numbers=self._numbers, guided=switching.guided,
+        )  # fmt: skip
+        work, books, envelope, marked, nearest = around
+        nodes, piece = line.s.size, model.cable.piece(0.5 * (line.s[1:] + line.s[:-1]))
+        bounds, places, start = np.zeros((4, b.EXTREMES, 1)), np.zeros(1), np.zeros((nodes, 3))
+        if envelope is not None:
+            bounds, places, start = envelope.bounds, envelope.s, envelope.start
+        self._renew.bind(
+            s=line.s, rods=self._rods_before, to_s=line.s, to_rods=self._rods, line=line, place=layout.places,
+            of=layout.base_of_cell, first=layout.first, start=start, marked=marks_on(line.s, marked),
+            borne=1.0 + model.cable.max_strain[piece], state=first, twin=second, sea=sea, work=work, zones=zones,
+            before=books, books=books, push=NO_PUSH, new_push=NO_PUSH, next_push=NO_PUSH, envelope_s=places,
+            bounds=bounds, stays=np.zeros(nodes, np.int64), spare=np.zeros(books.extremes.size), width=np.zeros(0),
+            nearest=nearest, widths=base, scale=model.tension_scale,
+        )  # fmt: skip
+
+    def change(self, change: Change, t: float) -> float:
+        """Other kinds of cells from t (s) on: nothing moves; the energy, J, that is to be booked."""
+        switching, model, numbers = self._switching, self.model, self._numbers
+        assert model.layout is not None
+        for name in OF_KINDS:
+            getattr(self._before, name)[:] = getattr(model.line, name)
+        layout = model.layout._replace(rod=change.rod.copy())
+        self._rods_before[:], self._rods[:] = self._rods, layout.rod[model.layout.base_of_cell]
+        for k, clamp in enumerate(switching.clamps(self._ends)):
+            self._held[k] = clamp is not None
+            if clamp is not None:
+                self._clamps[k] = clamp
+        numbers[TIME], numbers[RELAXES] = t, switching.zones.counts[z.RELAXING]
+        fill_line(self._fill.numbers)
+        clear_state(self._renew.numbers)
+        begin_switch(self._switch.numbers)
+        switching.manager.adopt_rods(change.rod, change, t)
+        end_switch(self._switch.numbers)
+        renew(self._renew.numbers)
+        self.model = replace(model, layout=layout, zones=layout.zones)
+        switching.take(self.model, switching.zones)
+        return float(numbers[AFTER] - numbers[BEFORE])
 
 
 class KindChanges:
@@ -65,22 +154,23 @@ class KindChanges:
 
     def __init__(self, owner: Transient) -> None:
         """From now on the run has a line of its own, which changes."""
-        model, switching = owner.model, owner.switching
-        assert switching is not None and model.layout is not None
-        self._owner, self._switching, self._numbers = owner, switching, np.zeros(NUMBERS)
-        self._line = line = _copied(model.line)
-        own: dict[str, Any] = {name: getattr(line, name).copy() for name in OF_KINDS}
-        self._before = line._replace(**own)
-        self._of = model.layout.base_of_cell
-        self._rods, self._rods_before = (model.layout.rod_cells.copy() for _ in range(2))
-        self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
-        self._fill, self._switch, self._renew = Table(blank_line_job), Table(blank_switch_job), Table(blank_renew_job)
-        self._bind()
-        owner.run.table.bind(line=line)
+        model, switching, run, itself = owner.model, owner.switching, owner.run, owner.itself
+        assert switching is not None
+        watches = itself is not None and itself.on
+        seen = itself.itself.cells if itself is not None and watches else np.zeros(2, np.int64)
+        self._owner, self._switching = owner, switching
+        around = Around(owner.stepper.work, run.books, owner.envelope, owner.marked, seen)
+        self._kinds = LineKinds(model, switching, run.states, around, model.ends.values)
+        line = self._kinds.model.line
+        self._bound = line, run.states, run.books, model.ends.values
+        run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
+        self._task = run.table.part("task").start
+        run.table.bind(line=line)
         switching.table.bind(line=line)
-        if owner.itself is not None and owner.itself.on:
-            owner.itself.table.bind(line=line)
-        self._go_on(replace(model, line=line))
+        if itself is not None and watches:
+            itself.table.bind(line=line)
+        switching.take(self._kinds.model, switching.zones)
+        self._go_on()
 
     @property
     def fits(self) -> bool:
@@ -90,83 +180,30 @@ class KindChanges:
         same = model.line is line and run.states is states and run.books is books
         return same and model.ends.values is ends
 
-    def _bind(self) -> None:
-        """Tables of a change: from the second state of the run to the first."""
-        owner, run, model, zones = self._owner, self._owner.run, self._owner.model, self._switching.zones
-        layout, line, books, sea = model.layout, self._line, self._owner.run.books, model.sea.values
-        assert layout is not None and model.on_base is not None
-        first, second = run.states
-        self._bound = line, run.states, books, model.ends.values
-        self._fill.bind(
-            cable=model.on_base.cable, nodes=line.s, base_of_cell=layout.base_of_cell, rod=self._rods, line=line
-        )
-        base = np.zeros(layout.rod.size)
-        transfer = Transfer(
-            self._before, line, second, first, layout.places, layout.places, layout.base_of_cell, layout.first,
-            self._switching.kinks, base, self._clamps, self._held, np.ones(1, bool),
-            blank_match(model.cells, model.cells),
-        )  # fmt: skip
-        self._switch.bind(
-            transfer=transfer, ends=model.ends.values, sea=sea, target_sea=sea, zones=zones, target_zones=zones,
-            numbers=self._numbers, guided=self._switching.guided,
-        )  # fmt: skip
-        envelope, nodes, piece = owner.envelope, line.s.size, model.cable.piece(0.5 * (line.s[1:] + line.s[:-1]))
-        seen = owner.itself.itself.cells if owner.itself is not None and owner.itself.on else np.zeros(2, np.int64)
-        bounds, places, start = np.zeros((4, b.EXTREMES, 1)), np.zeros(1), np.zeros((nodes, 3))
-        if envelope is not None:
-            bounds, places, start = envelope.bounds, envelope.s, envelope.start
-        self._renew.bind(
-            s=line.s, rods=self._rods_before, to_s=line.s, to_rods=self._rods, line=line, place=layout.places,
-            of=layout.base_of_cell, first=layout.first, start=start, marked=marks_on(line.s, owner.marked),
-            borne=1.0 + model.cable.max_strain[piece], state=first, twin=second, sea=sea, work=owner.stepper.work,
-            zones=zones, before=books, books=books, push=NO_PUSH, new_push=NO_PUSH, next_push=NO_PUSH,
-            envelope_s=places, bounds=bounds, stays=np.zeros(nodes, np.int64), spare=np.zeros(books.extremes.size),
-            width=np.zeros(0), nearest=seen, widths=base, scale=model.tension_scale,
-        )  # fmt: skip
-        run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
-        self._task = run.table.part("task").start
-
     def change(self, change: Change) -> float:
         """Other kinds of cells from now on: nothing moves; the energy, J, that is booked."""
-        run, switching, model, numbers = self._owner.run, self._switching, self._owner.model, self._numbers
-        assert model.layout is not None
-        t, (first, second) = run.t, run.states
+        run, (first, second) = self._owner.run, self._owner.run.states
         before, after = (second, first) if run.count[b.PARITY] else (first, second)
-        _copy(before, after)
+        copy_into(before, after)
         if run.count[b.PARITY] and run.push.size:
             run.pushes[0][:] = run.pushes[1]
-        for name in OF_KINDS:
-            getattr(self._before, name)[:] = getattr(self._line, name)
-        layout = model.layout._replace(rod=change.rod.copy())
-        self._rods_before[:], self._rods[:] = self._rods, layout.rod[self._of]
-        for k, clamp in enumerate(switching.clamps(model.ends.at(t))):
-            self._held[k] = clamp is not None
-            if clamp is not None:
-                self._clamps[k] = clamp
-        numbers[TIME], numbers[RELAXES] = t, switching.zones.counts[z.RELAXING]
-        fill_line(self._fill.numbers)
-        clear_state(self._renew.numbers)
-        begin_switch(self._switch.numbers)
-        switching.manager.adopt_rods(change.rod, change, t)
-        end_switch(self._switch.numbers)
-        renew(self._renew.numbers)
+        self._owner.model.ends.at(run.t)
+        self._kinds.model = self._owner.model
+        booked = self._kinds.change(change, run.t)
         before_forces(run.table.numbers)
         run.table.numbers[self._task] = ASSEMBLY
         run.solver(run.table.numbers)
         run.table.numbers[self._task] = RUN
         after_forces(run.table.numbers)
-        booked = float(numbers[AFTER] - numbers[BEFORE])
         run.books.work[0, b.ZONES] += booked
-        self._go_on(replace(model, layout=layout, zones=layout.zones))
+        self._go_on()
         return booked
 
-    def _go_on(self, model: Model) -> None:
+    def _go_on(self) -> None:
         """Python knows of the line of now."""
-        switching, owner = self._switching, self._owner
-        assert model.layout is not None
-        switching.take(model, switching.zones)
-        switching.limit_steps(owner.run)
-        owner.take(model, owner.stepper.work)
+        owner = self._owner
+        self._switching.limit_steps(owner.run)
+        owner.take(self._kinds.model, owner.stepper.work)
 
 
 def _copied(line: Line) -> Line:
@@ -174,7 +211,8 @@ def _copied(line: Line) -> Line:
     return line._replace(**arrays)
 
 
-def _copy(old: NamedTuple, new: NamedTuple) -> None:
+def copy_into(old: NamedTuple, new: NamedTuple) -> None:
+    """Copy the arrays of one to those of the other."""
     for x, y in zip(old, new, strict=True):
         if isinstance(y, np.ndarray) and y.size:
             y[:] = x

@@ -327,6 +327,13 @@ class LineWatch:
             self._address = watch_itself.address(job.numbers)
         return {"itself": self._address if self.is_bent else UNBENT, "itself_table": job.numbers}
 
+    def take(self, model: Model) -> None:
+        """Go on with a line of the same cells."""
+        self._model = model
+        for job in (self._job, self._running):
+            if job is not None:
+                job.bind(line=model.line)
+
     def bends(self) -> tuple[int, dict[str, Any]]:
         """A line of a run is bent, so that every step looks from now on: bits of the last, and its job."""
         self.is_bent, job = True, self._running

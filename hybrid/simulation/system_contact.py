@@ -195,6 +195,20 @@ def renew_solver(run: SystemRun, after: str) -> None:
     run.make_solver()
     run.solver.bodies[:], run.solver.body_work[:] = bodies, work
     run.take_other()
+    _evaluate_forces(run, after)
+
+
+def go_on_as_attached(run: SystemRun, after: str) -> None:
+    """Go on with the same solver and states in mid-motion, for lines that have changed; after: as of `renew_solver`."""
+    run.gather_events()
+    turns = run.loop.turns
+    _evaluate_forces(run, after)
+    run.solver.take_turns(turns)
+    run.loop.stand_after_change()
+    run.forget_moves()
+
+
+def _evaluate_forces(run: SystemRun, after: str) -> None:
     for model in run.model.models:
         model.ends.at(run.t)
         model.sea.at(run.t)

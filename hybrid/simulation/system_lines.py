@@ -55,6 +55,7 @@ from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
+from hybrid.simulation.kind_changes import Around
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
@@ -299,6 +300,19 @@ class LineResult:
         self.books = self._blank_books(self.envelope.start_of(model.nodes))._replace(**same)
         self.books.work[:], self.books.power[:] = before.work, before.power
         self.books.velocity[:] = before.velocity
+
+    def around(self, work: Work, clock: Floats, counts: np.ndarray) -> Around:
+        """What changes of kinds have to know of the line; clock, counts: room for those of a run alone."""
+        books = self.books._replace(clock=clock, counts=counts)
+        return Around(work, books, self.envelope, self._marked, self.envelope.itself.itself.cells)
+
+    def take_kinds(self, model: Model) -> None:
+        """Go on with other kinds of the same cells, in the same arrays, after what waited has been recorded."""
+        self.model, first = model, self.observer.first_energy
+        self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
+        self.observer.first_energy = first
+        self.diagnostics.follow(model)
+        self._itself.take(model)
 
     # --- steps and outputs --------------------------------------------------------------------------
 

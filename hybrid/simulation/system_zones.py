@@ -7,7 +7,7 @@ proposes is carried out: the line has other cells then, and the system another s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -37,8 +37,9 @@ from hybrid.simulation.initial_zones import (
 )
 from hybrid.simulation.payout_zones import PaidZones
 from hybrid.simulation.system_cells import equilibrium_on_cells, following
-from hybrid.simulation.system_contact import renew_solver
+from hybrid.simulation.system_contact import go_on_as_attached, renew_solver
 from hybrid.simulation.system_contact_equilibrium import nearness_in
+from hybrid.simulation.system_kinds import SystemKinds
 from hybrid.simulation.system_start import joined_lines, solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
 from hybrid.solve.joined import SystemState, SystemTaken
@@ -56,6 +57,9 @@ HELD = (
     "zones stay rod: in equilibrium, catenary where the criteria allow it is further from the rod than the tolerance; "
     "more mesh.cells, or a larger model.tolerance, let them move"
 )
+
+
+AFTER_CHANGE = "after a change of zones"
 
 
 class Start(NamedTuple):
@@ -242,6 +246,7 @@ class SystemZones:
             self._pay(run.payout)
         self._rescues, self._rescued = 0, 0  # of the step that is tried, after so many
         self._compiled = all(x.switching.compiled for x in self.lines)
+        self._kinds: SystemKinds | None = None  # of cells that stay, with the solver of now
 
     def _pay(self, payout: SystemPayout) -> None:
         """Zones know of the winches of their lines, and these of them."""
@@ -359,7 +364,7 @@ class SystemZones:
 
         last: no shorter step is left to try.
         """
-        run, changed, step = self._run, False, int(self._run.loop.counts[b.STEPS])
+        run, changes, step = self._run, list[tuple[_LineZones, Change]](), int(self._run.loop.counts[b.STEPS])
         if step != self._rescued:
             self._rescues, self._rescued = 0, step
         for x in self.lines:
@@ -374,12 +379,10 @@ class SystemZones:
             if change is None and last:
                 change = x.switching.all_rod(how)
             if change is not None:
-                self._switch(x, change)
-                changed = True
-        self._rescues += changed
-        if changed:
-            self.go_on()
-        return changed
+                changes.append((x, change))
+        self._rescues += bool(changes)
+        self._change(changes)
+        return bool(changes)
 
     def accepted(self, dt: float) -> None:
         """After an accepted step of dt (s), with the states exchanged: energy, and what should change."""
@@ -395,13 +398,39 @@ class SystemZones:
 
     def adapt(self) -> None:
         """After the outputs of a step: carry out what is pending."""
-        changed = False
+        changes = [(x, x.pending) for x in self.lines if x.pending is not None]
         for x in self.lines:
-            if x.pending is not None:
-                self._switch(x, x.pending)
-                x.pending, changed = None, True
-        if changed:
+            x.pending = None
+        self._change(changes)
+
+    def _change(self, changes: Sequence[tuple[_LineZones, Change]]) -> None:
+        """Carry out changes of lines, in their arrays where that can be."""
+        run = self._run
+        if not changes:
+            return
+        if not SystemKinds.apply(run, [x.switching for x, _ in changes]):
+            for x, change in changes:
+                self._switch(x, change)
             self.go_on()
+            return
+        if self._kinds is None or not self._kinds.fits:
+            self._kinds = SystemKinds(run)
+        self._kinds.begin()
+        for x, change in changes:
+            run.lines[x.number].write_down()
+            model, booked = self._kinds.change(x.number, x.switching, change)
+            self._note(x, change, model, booked)
+            run.lines[x.number].take_kinds(model)
+        go_on_as_attached(run, AFTER_CHANGE)
+
+    def _note(self, x: _LineZones, change: Change, model: Model, booked: float) -> None:
+        """A line has changed: its energy (J) is booked, events tell, and the run has its model."""
+        run, k = self._run, x.number
+        run.lines[k].books.work[0, b.ZONES] += booked
+        note_change(run.lines[k].events, x.switching.manager, run.t, change, booked)
+        models = [*run.model.models]
+        models[k] = model
+        run.model = replace(run.model, models=tuple(models))
 
     def switch(self, number: int, change: Change, here: np.ndarray | None = None) -> None:
         """Give a line other zones, whose solver has still to follow; here: as of `ZoneSwitching.switch`."""
@@ -417,11 +446,10 @@ class SystemZones:
         model, state, booked = x.switching.switch(change, run.t, self._ends(x), run.state.lines[k], sea, here)
         if x.paid is not None:
             x.paid.paying.fit(model, run.t)
-        line.books.work[0, b.ZONES] += booked
-        note_change(line.events, x.switching.manager, run.t, change, booked)
-        models, states = [*run.model.models], [*run.state.lines]
-        models[k], states[k] = model, state
-        run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
+        states = [*run.state.lines]
+        states[k] = state
+        self._note(x, change, model, booked)
+        run.state = run.state._replace(lines=states)
         line.take_cells(model)
 
     def change_line(self, number: int, change: Callable[[Line], Line]) -> None:
@@ -459,7 +487,7 @@ class SystemZones:
         """Of the lines whose zones move."""
         return [x.number for x in self.lines]
 
-    def go_on(self, after: str = "after a change of zones") -> None:
+    def go_on(self, after: str = AFTER_CHANGE) -> None:
         """Another solver, for lines that have other cells, or touch themselves; after: what, for the text of a failure.
 
         What that changes of the energy of contact is booked, of lines whose zones stay as well: of others they touch.

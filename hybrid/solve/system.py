@@ -39,7 +39,7 @@ from hybrid.kernels.state.books import NOW, PARITY, Books, blank_books
 from hybrid.kernels.state.forces import FRICTION, WAVES
 from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
-from hybrid.kernels.state.state import Floats, State, Work, state_for
+from hybrid.kernels.state.state import Floats, Line, State, Work, state_for
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, Limits, Task
 from hybrid.kernels.step.step import friction_axes
@@ -202,6 +202,11 @@ class SystemSolver:
         elif self.lone:
             for table in self._joined_tables[number]:
                 table.bind(**values)
+
+    def take_line(self, number: int, line: Line) -> None:
+        """A line is in other arrays from now on."""
+        self.lines = tuple(x._replace(line=line) if k == number else x for k, x in enumerate(self.lines))
+        self.bind_line(number, line=line)
 
     def _meet(self) -> None:
         """Lines touch the bodies that carry obstacles."""

@@ -87,6 +87,10 @@ class SystemSteps:
             self._job.bind(bodies=self.body_samples, worked=self.worked)
         self.clock[b.PREVIOUS] = self.clock[b.NOW]
 
+    def stand_after_change(self) -> None:
+        """The state of now is the first of the two, of lines that have changed: of the step before nothing is known."""
+        self.clock[b.PREVIOUS], self.counts[b.PARITY] = self.clock[b.NOW], 0
+
     def move(self, solver: SystemSolver, moves: Sequence[Moves]) -> None:
         """The ends of the lines move so from now on, by their kernels."""
         for k, each in enumerate(moves):
