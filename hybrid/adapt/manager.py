@@ -152,6 +152,7 @@ class DomainManager:
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
         self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
         self.patience, self.released = np.ones(n), np.full(n, -np.inf)
+        self._review_room = np.zeros(0), np.zeros(0), np.zeros((4, 0), bool)  # what compiled reviews write
         self._table, self.on_base = Table(blank_zone_job), on_base or LineOnBase(cable, layout.base)
         self.measure(layout)
         weight = np.abs(cable.submerged_weight)
@@ -363,10 +364,13 @@ class DomainManager:
     def bind_review(self, table: Table, zone_table: NDArray[np.int64]) -> None:
         """Bind what compiled reviews of zones (adapt.zone_rules.quiet_review) know; zone_table: of their ZoneJob."""
         n = self.given.size
+        if self._review_room[0].size != n:
+            self._review_room = np.zeros(n), np.zeros(n), np.zeros((4, n), bool)
+        calm, wait, flags = self._review_room
         table.bind(
             zone_table=zone_table, base=self.layout.base, given=self.given.astype(np.int64),
             calm_since=self.calm_since, calmed=self.calmed, patience=self.patience, seen=self.seen, buffer=self.buffer,
-            off=OFF, calm=np.zeros(n), wait=np.zeros(n), flags=np.zeros((4, n), bool), shortest=SHORTEST,
+            off=OFF, calm=calm, wait=wait, flags=flags, shortest=SHORTEST,
             dwell=float(self.dwell), parts=BUFFER, light=1e-9 * self.scale, forced=FORCED_RATIO,
             pace=float(self.pace), pause=1.0 / REVIEWS, held=int(self.held),
         )  # fmt: skip

@@ -66,8 +66,8 @@ def plain(owner: Transient) -> bool:
 class Around(NamedTuple):
     """What a run knows of a line beside its states.
 
-    envelope: extremes of all meshes, None: none are kept; marked: as of `marks_on`; nearest: (2,) the pair of cells that
-    was nearest.
+    envelope: extremes of all meshes, None: none are kept; marked: as of `marks_on`; nearest: (2,) the pair of cells
+    that was nearest.
     """
 
     work: Work

@@ -205,7 +205,6 @@ def go_on_as_attached(run: SystemRun, after: str) -> None:
     _evaluate_forces(run, after)
     run.solver.take_turns(turns)
     run.loop.stand_after_change()
-    run.forget_moves()
 
 
 def _evaluate_forces(run: SystemRun, after: str) -> None:

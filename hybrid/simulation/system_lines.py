@@ -308,9 +308,7 @@ class LineResult:
 
     def take_kinds(self, model: Model) -> None:
         """Go on with other kinds of the same cells, in the same arrays, after what waited has been recorded."""
-        self.model, first = model, self.observer.first_energy
-        self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
-        self.observer.first_energy = first
+        self.model = model
         self.diagnostics.follow(model)
         self._itself.take(model)
 
@@ -402,6 +400,10 @@ class LineResult:
         """What makes values of outputs, these as computed, and the zones of all but the first where they differ."""
         if self.paying is not None:
             return self.paying.look(self.observer, self.model, batch)
+        if self.observer.zones is not self.model.zones:  # kinds have changed
+            model, first = self.model, self.observer.first_energy
+            self.observer = self.observer.on(model.line, model.sea.values, model.zones, self.books.hinges)
+            self.observer.first_energy = first
         return self.observer, self.observer.look(batch), []
 
     def judge(self, t: float | None, sharp: Sequence[float], state: State) -> None:

@@ -650,10 +650,6 @@ class SystemRun:
             self._loaded = self.loaded
             loop.load(*table_of_loads(self.model.growing_loads(self.loaded)))
 
-    def forget_moves(self) -> None:
-        """Ends move as they do now from the next step on."""
-        self._moved = []
-
     def _prepare(self, t: float) -> None:
         """Ends, loads and zones as they are at the end of a try, t (s)."""
         if self.zones is not None:

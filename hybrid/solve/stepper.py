@@ -202,7 +202,8 @@ class Stepper:
             wave_kinematics(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
             friction_axes(sea, state.r, state.e, state.slip, state.grip)
-        lie_in_soil(self.line, sea, state.r, state.soil)
+        if state.soil.size:
+            lie_in_soil(self.line, sea, state.r, state.soil)
         entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work)
         if self.line.bits & TOUCHES:
             self.work.report[SEABED_ENERGY] = stored_energy(self.line, sea, state.r)

@@ -566,7 +566,8 @@ class SystemSolver:
             if x.line.moved.size:
                 carry_obstacles(t, t, x.sea)
             self._around(x, state, work)
-            lie_in_soil(x.line, x.sea, state.r, state.soil)
+            if state.soil.size:
+                lie_in_soil(x.line, x.sea, state.r, state.soil)
         taken = self._solve(Task(ASSEMBLY, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states, t)
         if taken.outcome == Outcome.OK:
             self._settle_contact(states)
