@@ -101,8 +101,10 @@ class LineKinds:
             self._before, line, second, first, layout.places, layout.places, layout.base_of_cell, layout.first,
             switching.kinks, base, self._clamps, self._held, np.ones(1, bool), blank_match(model.cells, model.cells),
         )  # fmt: skip
+        self._keeps = zones.keeps.copy()  # of the kinds before
         self._switch.bind(
-            transfer=transfer, ends=ends, sea=sea, target_sea=sea, zones=zones, target_zones=zones,
+            transfer=transfer, ends=ends, sea=sea, target_sea=sea, zones=zones._replace(keeps=self._keeps),
+            target_zones=zones,
             numbers=self._numbers, guided=switching.guided,
         )  # fmt: skip
         work, books, envelope, marked, nearest = around
@@ -125,6 +127,7 @@ class LineKinds:
         assert model.layout is not None
         for name in OF_KINDS:
             getattr(self._before, name)[:] = getattr(model.line, name)
+        self._keeps[:] = switching.zones.keeps
         layout = model.layout._replace(rod=change.rod.copy())
         self._rods_before[:], self._rods[:] = self._rods, layout.rod[model.layout.base_of_cell]
         for k, clamp in enumerate(switching.clamps(self._ends)):

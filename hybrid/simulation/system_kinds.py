@@ -57,6 +57,7 @@ class SystemKinds:
             self._lines[number] = self._line(number, switching)
         kinds = self._lines[number]
         kinds.model = switching.model
+        self._solver.work[number].X[:] = 0.0  # kept factors of an unknown that is no more are read as zeros
         booked = kinds.change(change, self._run.t)
         return kinds.model, booked
 

@@ -89,7 +89,9 @@ class SystemSteps:
 
     def stand_after_change(self) -> None:
         """The state of now is the first of the two, of lines that have changed: of the step before nothing is known."""
+        assert self._solver is not None
         self.clock[b.PREVIOUS], self.counts[b.PARITY] = self.clock[b.NOW], 0
+        self.worked[0] = self._solver.body_work
 
     def move(self, solver: SystemSolver, moves: Sequence[Moves]) -> None:
         """The ends of the lines move so from now on, by their kernels."""
