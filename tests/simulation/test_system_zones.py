@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from bits import FEW_STEPS, Stopping, differences
 import hybrid
 import hybrid.simulation.system_run
 from hybrid.errors import SceneError
+from hybrid.simulation.system_kinds import SystemKinds
 
 ROPE = {
     "length": 60, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100,
@@ -144,6 +146,51 @@ def test_fibre_ropes_keep_their_mean_tensions_when_another_line_breaks() -> None
     rope = found.lines["rope"]
     assert np.abs(rope.position - cable.position).max() < 1e-4
     assert np.abs(rope.tension - cable.tension).max() < 1e-3 * cable.tension.max()
+
+
+def on_a_body() -> dict[str, Any]:
+    """The same ropes at a body, over a bed with friction, one of them with its foot moving: they come to rods and go."""
+    scene = mooring()
+    scene["points"].pop("float")
+    scene["points"]["east"]["motion"] = {"surge": {"amplitude": 4.0, "period": 1.6}, "ramp": 0.4}
+    for k, name in enumerate(scene["lines"]):
+        turn = 2.0 * np.pi * k / 3.0
+        scene["points"][f"f{k}"] = {"body": "float", "place": [float(np.cos(turn)), float(np.sin(turn)), -0.5]}
+        scene["lines"][name] |= {"end": f"f{k}", "model": MODEL | {"tolerance": 1e-4, "hold_time": 0.2}}
+    scene["bodies"] = {
+        "float": {
+            "initial_guess": [0, 0, 0], "mass": 3000, "inertia": [2e3] * 3,
+            "hydrostatics": {"heave": 5e4, "roll": 1e5, "pitch": 1e5},
+        },
+    }  # fmt: skip
+    scene["environment"] = SEA | {"seabed": {"z": -40, "stiffness": 1e4, "friction": 0.5}}
+    scene["time"] = {"duration": 3.0, "step": 0.02}
+    scene["output"] = {"every": 0.1, "points": 31}
+    return scene
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("make", [mooring, on_a_body], ids=["a point", "a body"])
+def test_kinds_that_change_in_the_arrays_of_a_run_are_those_of_a_new_solver(
+    make: Callable[[], dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the last bit; events of one step may come in another order."""
+    made, change = list[int](), SystemKinds.change
+
+    def counted(kinds: SystemKinds, number: int, *what: Any) -> Any:
+        made.append(number)
+        return change(kinds, number, *what)
+
+    monkeypatch.setattr(SystemKinds, "change", counted)
+    one = hybrid.run(make(), tmp_path / "one.h5")
+    assert len(made) > 10
+    monkeypatch.setattr(SystemKinds, "apply", staticmethod(lambda *_: False))
+    other = hybrid.run(make(), tmp_path / "other.h5")
+    events = [sorted((e.t, e.s_a, e.kind, e.text) for e in x.events) for x in (one, other)]
+    assert events[0] == events[1]
+    one.close()
+    other.close()
+    assert not [x for x in differences(tmp_path / "one.h5", tmp_path / "other.h5") if "/events/" not in x]
 
 
 def test_lines_go_slack_in_turn(three: hybrid.Result) -> None:
