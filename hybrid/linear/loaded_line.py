@@ -150,7 +150,7 @@ class LoadedLine:
                 change[:, -k] = 0.0
         kappa = np.einsum("fni,nki->fnk", change, axes)
         for k in (0, 1):  # what an angular spring turns is no bend of the line
-            part, along = parts_without_spring(self.line, k * (len(size) - 1), float(size[-k] * length[-k]))
+            part, along = parts_without_spring(self.line, k * (len(size) - 1), *self._bend_at_end(k))
             if self.line.element[-k] and part < RIGID:
                 size[-k] *= part
                 kappa[:, -k] *= (along, part)
@@ -164,6 +164,15 @@ class LoadedLine:
             self.line.s.copy(), 0.5 * (self.line.s[1:] + self.line.s[:-1]), omegas / (2.0 * np.pi), q[:, :, 1:4],
             q[:, 1:, 0], kappa[:, :, 0], kappa[:, :, 1], state.r.copy(), state.T.copy(), size,
         )  # fmt: skip
+
+    def _bend_at_end(self, k: int) -> tuple[float, float]:
+        """The bend, rad, of the element at end k at rest, in the axes of the section before it."""
+        length, size, axes = self.bend
+        a1, d = self.x.ends.frame.reshape(2, 3, 3)[0, :, [0, 2]]
+        if k:
+            a1, d = self.linear.state.a1[-1], self.linear.state.e[-1]
+        about = np.cross(d / np.linalg.norm(d), axes[-k, 0]) * size[-k] * length[-k]
+        return float(about @ a1), float(about @ np.cross(d / np.linalg.norm(d), a1))
 
     @cached_property
     def bend(self) -> tuple[Floats, Floats, Floats]:

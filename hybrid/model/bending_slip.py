@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bending_slip import EACH, follow_slip
+from hybrid.kernels.laws.element import NO_SPRING
 from hybrid.kernels.state.state import Line, blank_line, no_ends, no_work, state_for
 from hybrid.model.material import Material, elastic_layer
 from hybrid.scene.stretch import Layer, slopes
@@ -31,6 +32,9 @@ def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
             line.kb[i, :2] = sum(x * material.B[of[c], :2] for x, c in zip(part, sides, strict=True)) / line.hn[i]
             for x, c in zip(part, sides, strict=True):
                 rows[-1] += [x * number for layer in _of_table(material, int(of[c])) for number in layer]
+    for k, spring in enumerate(material.springs):
+        if rows[-k] and spring < np.inf:
+            rows[-k] += [0.0, give_of(spring, float(material.B[of[-k], :2].max()) / (0.5 * line.h[-k])), 0.0, 0.0]
     law = np.zeros((line.s.size, max(EACH, *map(len, rows))))
     for i, row in enumerate(rows):
         law[i, : len(row)] = row
@@ -39,6 +43,11 @@ def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
     state = state_for(blank)
     address = follow_slip.address(blank, no_ends(), state, state, no_work(), 0)
     return found._replace(slip_at=np.array([address], np.int64))
+
+
+def give_of(spring: float, half: float) -> float:
+    """How an angular spring (N m/rad) at a clamp turns, rad per N m; half: N m/rad, of half a cell there."""
+    return 1.0 / max(spring, NO_SPRING * half)
 
 
 def _of_table(material: Material, piece: int) -> list[Layer]:

@@ -276,7 +276,7 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
         loose = next((z for z in zones if z.kind != "rod" and not line.torsion.size and not free), None)
         what, why = f"twist by {scene.ends.turns:g} turns of the ends", "ends.*.turns"
         if free:
-            why = f"no effect: the swivel at s = {free[0]:g} m lets it turn back"
+            why = f"no torque: the swivel at s = {free[0]:g} m lets it turn back"
         elif loose is not None:
             why = f"no effect: the catenary zone s = {loose.s_a:g} to {loose.s_b:g} m passes no torque on; a rod does"
         entries.append(Entry(what, loose is None and not free, why, event="torque neglected" if loose else ""))

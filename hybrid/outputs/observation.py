@@ -233,9 +233,12 @@ class Observation:
         if part.min() > RIGID:
             return t
         angle = np.arccos(np.clip((t * d).sum(axis=0), -1.0, 1.0))
-        if self.line.bend_law.size:
-            n = len(self.d)
-            part = part_without_spring(self, k * n, k * (n - 1), angle)
+        n = len(self.d)
+        if self.line.slip_law.size:
+            bend = self.element_strains[k * n, :2] - self.of_line("k0", k * n)[:2]
+            part = part_without_spring(self, k * n, k * (n - 1), bend)
+        elif self.line.bend_law.size:
+            part = part_without_spring(self, k * n, k * (n - 1), np.stack([angle, 0.0 * angle]))
         between = np.sin(part * angle) * t + np.sin((1.0 - part) * angle) * d
         return np.where((part > RIGID) | (angle < 1e-6), t, between)
 

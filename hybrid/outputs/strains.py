@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bending_law import LAST_A, LAST_B, RIGID, curvature_under, parts_without_spring
+from hybrid.kernels.laws.bending_slip import beside_spring
 from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST
 from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.state.state import Floats, Line
+from hybrid.kernels.watch.observed_outputs import slipped
 from hybrid.outputs.end_layers import EndLayer, end_layers
 from hybrid.outputs.moments import across
 from hybrid.outputs.soft_rods import parts_of_stiffness, restored
@@ -140,7 +142,7 @@ def bends_without_natural(view: Observation) -> tuple[Floats, NDArray[np.bool_]]
         for k in np.flatnonzero(~bare & ~jumps & np.isin(at.node, view.end_nodes)):
             i, cell, row = int(at.node[k]), int(at.cell[k]), at.row[k]
             turn = bend[row] * view.of_line("hn", i)
-            bend[row] = turn * part_without_spring(view, i, cell, np.hypot(*turn)) / (0.5 * view.cell_lengths[cell])
+            bend[row] = bend_without_spring(view, i, cell, turn) / (0.5 * view.cell_lengths[cell])
     plain = np.zeros((nodes.size, 2, view.columns))
     plain[of_rod, 0] = np.hypot(*np.moveaxis(view.element_strains[mine, :2], 1, 0)) / view.of_line("hn", mine)
     if rods.any():
@@ -245,19 +247,32 @@ def _twist_to_node(view: Observation, cell: Integers, inner: Integers) -> Floats
 
 
 def part_without_spring(view: Observation, node: int, cell: int, bend: Floats) -> Floats:
-    """Part (outputs,) of the bend (outputs,) rad at an end that the line has, and an angular spring has not."""
+    """Part (outputs,) of the bend (2, outputs) rad at an end that the line has, and an angular spring has not."""
     line = view.line
+    if line.slip_law.size and line.slip_law[node].any():
+        now = slipped(line, view.batch)
+        each = zip(now, bend.T, strict=True)
+        return np.array([parts_without_spring(line._replace(slip_now=x), node, *map(float, y))[0] for x, y in each])
     if line.bend_law.size:
-        return np.array([parts_without_spring(line, node, float(x))[0] for x in bend])
+        return np.array([parts_without_spring(line, node, *map(float, x))[0] for x in bend.T])
     found = 0.5 * view.cell_lengths[cell] / view.of_line("hn", node)
-    return np.broadcast_to(found, bend.shape)
+    return np.broadcast_to(found, bend.shape[1:])
+
+
+def bend_without_spring(view: Observation, node: int, cell: int, bend: Floats) -> Floats:
+    """Of the bend (2, outputs) rad at an end, what is not that of an angular spring there."""
+    line = view.line
+    if line.slip_law.size and line.slip_law[node].any() and part_without_spring(view, node, cell, bend).min() < RIGID:
+        each = zip(slipped(line, view.batch), bend.T, strict=True)
+        return np.array([beside_spring(line._replace(slip_now=x), node, *map(float, y)) for x, y in each]).T
+    return np.asarray(part_without_spring(view, node, cell, bend) * bend)
 
 
 def _beside_spring(view: Observation, node: int, cell: int) -> Floats:
     """Curvature (outputs,) of the cell beside a clamp with an angular spring."""
     natural = view.of_line("k0", node)[:2]
     bend = view.element_strains[node, :2] - natural
-    bend = natural + part_without_spring(view, node, cell, np.hypot(*bend)) * bend
+    bend = natural + bend_without_spring(view, node, cell, bend)
     return np.asarray(np.hypot(*bend) / (0.5 * view.cell_lengths[cell]))
 
 

@@ -147,15 +147,6 @@ def _stretch_laws(tables: Tables) -> Iterator[Place]:
             yield (*at, *(given or ["tension_strain"])[:1])
 
 
-def _curls(section: Section) -> bool:
-    return section.intrinsic_curvature is not None and any(section.intrinsic_curvature)
-
-
-def _directed(section: Section) -> bool:
-    """Whether a section bends otherwise in another direction about its axis."""
-    return section.anisotropic or (_curls(section) and any((section.intrinsic_curvature or ())[:2]))
-
-
 def _winches(tables: Tables) -> Iterator[tuple[Place, Payout]]:
     """How line is paid out, at which end, of a cable or of a line of several."""
     ends: Ends | None = tables.get("ends")
@@ -223,9 +214,6 @@ def _attached(kind: str) -> Callable[[Tables], Iterator[Place]]:
     return find
 
 
-_swivels = _attached("swivel")
-
-
 def _tables_beside_two_stiffnesses(tables: Tables) -> Iterator[Place]:
     cable: Cable | None = tables.get("cable")
     sections = cable.sections if cable is not None else ()
@@ -253,43 +241,6 @@ def _slips(tables: Tables) -> Iterator[Place]:
             yield *at, next(given)
     yield from dict.fromkeys(at for at, _, _ in _locks(tables))
     yield from _tables_beside_two_stiffnesses(tables)
-
-
-def _springs_beside_slip(tables: Tables) -> Iterator[Place]:
-    """Angular springs at the ends of a cable whose first or last section has layers."""
-    cable: Cable | None = tables.get("cable")
-    ends: Ends | None = tables.get("ends")
-    near = SAME_LENGTH * cable.length if cable is not None else 0.0
-    locks = [(low <= near, high >= cable.length - near) for _, low, high in _locks(tables)]  # type: ignore[union-attr]
-    for name, of in (("start", 0), ("end", -1)) if cable is not None else ():
-        if not cable.sections[of].slip_layers and not any(x[of] for x in locks):  # type: ignore[union-attr]
-            continue
-        for key, table in (
-            ("ends", ends.named() if ends is not None else {}),
-            ("connections", _connections_of(tables)),
-        ):
-            if getattr(table.get(name), "bend_stiffness", None) is not None:
-                yield key, name, "bend_stiffness"
-
-
-def _connections_of(tables: Tables) -> dict[str, Any]:
-    """How the ends of a line of several are connected."""
-    held = tables.get("connections")
-    return {name: getattr(held, name) for name in ("start", "end")} if held is not None else {}
-
-
-def _swivels_beside(of: Callable[[Section], Any]) -> Callable[[Tables], Iterator[Place]]:
-    """Swivels in or beside a section of which `of` is true."""
-
-    def find(tables: Tables) -> Iterator[Place]:
-        for at in _swivels(tables):
-            cable: Cable = tables["cable"]
-            near, s = SAME_LENGTH * cable.length, cable.attachments[int(at[2])].at  # type: ignore[union-attr]
-            for end, section in zip(accumulate(x.length for x in cable.sections), cable.sections, strict=True):
-                if end - section.length - near <= s <= end + near and of(section):
-                    yield (*at[:-1], "at")
-
-    return find
 
 
 def _moving(tables: Tables) -> Iterator[Place]:
@@ -388,8 +339,6 @@ TWO_STIFFNESSES = Feature(
     "two bending stiffnesses", "bending_stiffness: [EI_1, EI_2]",
     _in_sections("bending_stiffness", of=lambda x: x.anisotropic),
 )  # fmt: skip
-CURLED = Feature("sections that are curved without load", "intrinsic_curvature",
-                 _in_sections("intrinsic_curvature", of=_curls))  # fmt: skip
 TORQUE_OF_TENSION = Feature("torque of tension", "tension_torque",
                             _in_sections("tension_torque", of=lambda x: x.tension_torque))  # fmt: skip
 STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness, syrope",
@@ -400,16 +349,10 @@ SLIP = Feature(
     "stiffnesses, a table of moment beside them",
     "bending_slip, first_loading, stiffness_per_tension, attachments: kind: bend_restrictor, moment_curvature", _slips,
 )  # fmt: skip
-SPRING_BESIDE_SLIP = Feature("an angular spring at a clamp of such a section", "bend_stiffness", _springs_beside_slip)
 DAMPED_OTHERWISE = Feature(
     "damping proportional to stiffness of laws and tables, with torque of tension, of a line clamped to what turns",
     "damping.stiffness", _damped_otherwise,
 )  # fmt: skip
-DIRECTED = Feature(
-    "sections that have a direction about their axis", "bending_stiffness: [EI_1, EI_2], intrinsic_curvature",
-    _either(TWO_STIFFNESSES, CURLED),
-)  # fmt: skip
-SWIVEL_BESIDE = Feature("swivels beside such sections", "attachments: kind: swivel", _swivels_beside(_directed))
 TURNS = Feature("turns at an end", "ends.end.turns", _turns)
 TORSION = Feature("turns at an end, torque of tension", "ends.end.turns, tension_torque",
                   _either(TURNS, TORQUE_OF_TENSION))  # fmt: skip
@@ -465,20 +408,8 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(SLIP, PAYOUT, "not worked out", "layers that slip, and stiffness by tension, do not go with {key}"),
     Refusal(
-        SPRING_BESIDE_SLIP, SLIP, "not worked out",
-        "the section there has layers that slip, or is stiffer under tension ({key})",
-        fix="leave it out, or put a short section without layers at the clamp",
-    ),
-    Refusal(
         TORSION, PLANE, "physics", "dimension is 2 and there is no torsion", "nothing or 0",
         f"leave it out, or {IN_SPACE}",
-    ),
-    Refusal(
-        SWIVEL_BESIDE, DIRECTED, "not worked out",
-        "a section beside it has a bending_stiffness of two numbers or an intrinsic_curvature, and its two sides turn "
-        "against each other",
-        "a place between straight sections of one bending_stiffness",
-        "put a short straight section with one bending_stiffness around it",
     ),
     Refusal(
         STRETCH_LAW, TORQUE_OF_TENSION, "not worked out", "tension makes a torque in this line (tension_torque)",

@@ -69,9 +69,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.TWO_STIFFNESSES, c.MOVING_ZONES): (TWO | MOVING, ""),
     (c.SLIP, c.MOVING_ZONES): (SLIPS | MOVING, ""),
     (c.SLIP, c.PAYOUT): (SLIPS | PAID, ""),
-    (c.SPRING_BESIDE_SLIP, c.SLIP): (SLIPS | {END + "bend_stiffness": 5}, ""),
     (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
-    (c.SWIVEL_BESIDE, c.DIRECTED): (SWIVEL | TWO, ""),
     (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.GOES_ITS_WAY): (TWO_LINES | {ONE + "initial": {"friction": "settled"}}, ""),
@@ -90,10 +88,8 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
 # Other examples of pairs whose one reason is that of several features.
 OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.TORSION, c.PLANE), {END + "turns": 2, "dimension": 2}, ""),
-    ((c.SWIVEL_BESIDE, c.DIRECTED), SWIVEL | CURVED, ""),
     ((c.SLIP, c.PAYOUT), TABLE_BESIDE_TWO | PAID, ""),
     ((c.SLIP, c.PAYOUT), LOCKS | PAID, ""),
-    ((c.SPRING_BESIDE_SLIP, c.SLIP), LOCKS | {"ends.start.bend_stiffness": 5}, ""),
     ((c.SLIP, c.MOVING_ZONES), {SECTION + "stiffness_per_tension": 0.01} | MOVING, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),

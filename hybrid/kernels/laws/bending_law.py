@@ -29,7 +29,7 @@ from hybrid.kernels.algebra.rotations import (
     vec_mat,
 )
 from hybrid.kernels.laws.axial_law import piece_of
-from hybrid.kernels.laws.bending_slip import slip_moment
+from hybrid.kernels.laws.bending_slip import beside_spring, give_of_spring, slip_moment, slips
 from hybrid.kernels.laws.element import bending, damped_bending, relative_rotation, turns_freely
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import BENDING_LAW, BENDING_SLIP
@@ -41,6 +41,8 @@ FIRST_A, LAST_A, HALF_A, FIRST_B, LAST_B, HALF_B, GIVE = range(7)
 CURVATURE, MOMENT, ENERGY = range(3)
 # Part of the bend at a clamp that is the line's, above which it has no angular spring.
 RIGID = 1.0 - 1e-9
+# A small change of a bend, as a part of it.
+SMALL = 1e-6
 
 
 @inner
@@ -123,11 +125,16 @@ def curvature_under(line, i, side, M):
 
 
 @kernel
-def parts_without_spring(line, i, x):
-    """Of the element at an end of a line, bent by the size x (rad): the part of its bend that is not that of an angular
+def parts_without_spring(line, i, a, b):
+    """Of the element at an end of a line, bent by a, b (rad): the part of its bend that is not that of an angular
 
     spring, and the part of a small change of it.
     """
+    x = math.sqrt(a * a + b * b)
+    if slips(line, i) and give_of_spring(line, i) > 0.0 and x > 0.0:
+        p, q = beside_spring(line, i, a, b)
+        r, s = beside_spring(line, i, (1.0 + SMALL) * a, (1.0 + SMALL) * b)
+        return (a * p + b * q) / (x * x), (a * (r - p) + b * (s - q)) / (SMALL * x * x)
     if not has_bend_law(line, i):
         part = 0.5 * line.h[min(i, line.h.shape[0] - 1)] / line.hn[i]
         return part, part

@@ -7,7 +7,14 @@ import math
 from hybrid.kernels.algebra.plane import angle_between, chord2, end_chord, row_in_plane, stiffness_about_normal
 from hybrid.kernels.algebra.rotations import frame, get3, get9
 from hybrid.kernels.laws.bending_law import RIGID, moment_share, parts_without_spring
-from hybrid.kernels.laws.bending_slip import slip_about_normal, slip_answer, slips
+from hybrid.kernels.laws.bending_slip import (
+    beside_spring,
+    components_about_normal,
+    give_of_spring,
+    slip_about_normal,
+    slip_answer,
+    slips,
+)
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import rest_strain
@@ -25,10 +32,13 @@ def strain_of(line, T, i, k, strains):
     x, y = line.kb[i, 0] * (k[0] - line.k0[i, 0]), line.kb[i, 1] * (k[1] - line.k0[i, 1])
     bend = math.sqrt((k[0] - line.k0[i, 0]) ** 2 + (k[1] - line.k0[i, 1]) ** 2)
     if i == 0 or i == line.h.shape[0]:
-        part = parts_without_spring(line, i, bend)[0]
+        part = parts_without_spring(line, i, k[0] - line.k0[i, 0], k[1] - line.k0[i, 1])[0]
         if part < RIGID:
             a = line.k0[i, 0] + part * (k[0] - line.k0[i, 0])
             b = line.k0[i, 1] + part * (k[1] - line.k0[i, 1])
+            if slips(line, i) and give_of_spring(line, i) > 0.0:  # which may bend another way than the spring
+                p, q = beside_spring(line, i, k[0] - line.k0[i, 0], k[1] - line.k0[i, 1])
+                a, b = line.k0[i, 0] + p, line.k0[i, 1] + q
             strains[i, 0] = math.sqrt(a * a + b * b) / (0.5 * line.h[min(i, line.h.shape[0] - 1)])
     strains[i, 1] = moment_share(line, i, bend) * math.sqrt(x * x + y * y)
     if slips(line, i):
@@ -61,7 +71,8 @@ def sharpest_in_plane(line, ends, e, T, a1, strains):
                 m, _, _ = slip_about_normal(line, a1, max(i - 1, 0), before if i > 0 else d, i, angle - k0)
                 strains[i, 1] = abs(share * k * (angle - k0) + m)
             if i == 0 or i == n:
-                part = parts_without_spring(line, i, abs(angle - k0))[0]
+                x, y = components_about_normal(line, a1, max(i - 1, 0), before if i > 0 else d, angle - k0)
+                part = parts_without_spring(line, i, x, y)[0]
                 if part < RIGID:
                     strains[i, 0] = abs(k0 + part * (angle - k0)) / (0.5 * line.h[min(i, n - 1)])
         if i == 0 or i == n:

@@ -23,9 +23,9 @@ from hybrid.kernels.laws.bending_law import (
     has_bend_law,
     parts_without_spring,
 )
-from hybrid.kernels.laws.bending_slip import slips
+from hybrid.kernels.laws.bending_slip import give_of_spring, slips
 from hybrid.kernels.laws.cell import chord, turning
-from hybrid.kernels.laws.element import frames_at, relative_rotation
+from hybrid.kernels.laws.element import frames_at, relative_rotation, strain_of_element
 from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, depth_of, fade, left_of, stiffness_share
 from hybrid.kernels.laws.obstacle_grip import pressure_of_obstacles
 from hybrid.kernels.laws.seabed import pressure
@@ -97,11 +97,16 @@ def second_cell(h, marks, k):
 
 
 @inner
-def beyond_spring(t, d, line, i):
+def beyond_spring(t, d, line, ends, state, i):
     """Tangent of the line at a clamp with tangent t: between it and the chord d, if an angular spring at node i turns."""
     cosine = min(max(dot(t, d), -1.0), 1.0)
     angle = math.acos(cosine)
-    part = parts_without_spring(line, i, angle)[0]
+    x, y = angle, 0.0
+    if slips(line, i) and give_of_spring(line, i) > 0.0:
+        Ra, Rb = frames_at(line, ends, state, i)
+        k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+        x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
+    part = parts_without_spring(line, i, x, y)[0]
     if part > RIGID or angle < 1e-6:
         return t
     return add(scale(math.sin(part * angle), t), scale(math.sin((1.0 - part) * angle), d))
@@ -119,7 +124,7 @@ def end_tension(line, ends, state, report, loaded, marks, k):
     t = sub(scale(1.5, d), scale(0.5, d2))
     if line.element[k * n]:
         R = get9(ends.frame, k)
-        t = beyond_spring((R[2], R[5], R[8]), d, line, k * n)
+        t = beyond_spring((R[2], R[5], R[8]), d, line, ends, state, k * n)
     at = FORCE_A + 3 * k
     return (1.0 - 2.0 * k) * dot((report[at], report[at + 1], report[at + 2]), t) / math.sqrt(dot(t, t))
 

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.rotations import log_rotation
+from hybrid.kernels.algebra.rotations import get3, log_rotation
 from hybrid.kernels.laws.bending_law import curvature_under, has_bend_law, parts_without_spring
 from hybrid.kernels.laws.bending_slip import slips
-from hybrid.kernels.laws.element import frames_at, relative_rotation
+from hybrid.kernels.laws.element import frames_at, relative_rotation, strain_of_element
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.zone_torque import FIRST, LAST
 from hybrid.kernels.march.zone_torque import TORQUE as PASSED
@@ -75,11 +75,11 @@ def bend_of_element(line, ends, state, i):
     """Curvature, 1/m, of the element at node i from what has no stress."""
     n = line.h.shape[0]
     Ra, Rb = frames_at(line, ends, state, i)
-    k = log_rotation(relative_rotation(Ra, Rb))
+    k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
     x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
     bend = math.sqrt(x * x + y * y)
     if i == 0 or i == n:
-        return parts_without_spring(line, i, bend)[0] * bend / (0.5 * line.h[min(i, n - 1)])
+        return parts_without_spring(line, i, x, y)[0] * bend / (0.5 * line.h[min(i, n - 1)])
     return bend / line.hn[i]
 
 

@@ -1,0 +1,151 @@
+"""Layers that slip beside angular springs at clamps: the spring turns by the moment over its stiffness, and nothing else."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import root
+
+import hybrid
+from hybrid.kernels.laws.bending_slip import EACH, beside_spring, slip_answer
+from hybrid.model.build import build
+from hybrid.scene.read import as_scene
+from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, S, Tables, as_system
+from tests.problems import tables_with
+
+SPRING = 30.0  # N m/rad, 1.9 of half a cell
+LAYERS = [{"stiffness": 12.0, "moment": 0.4}, {"stiffness": 5.0, "moment": 0.9}]
+CASES: dict[str, Tables] = {
+    "layers": {"bending_stiffness": 8.0, "bending_slip": LAYERS},
+    "one layer": {"bending_stiffness": 8.0, "bending_slip": LAYERS[:1]},
+    "two stiffnesses that lock": {"bending_stiffness": [20.0, 8.0]},
+}
+# (rows of) moments at the free end: along one axis and back, N m; and going round.
+AMOUNT = 1.6
+ALONG = [[0.0, 0, 0, 0], [10, 0, AMOUNT, 0], [30, 0, -AMOUNT, 0], [45, 0, 0.5 * AMOUNT, 0]]
+ROUND = [
+    [0.0, 0, 0, 0],
+    *([10 + 2.0 * k, 0, AMOUNT * np.cos(0.3 * k), AMOUNT * np.sin(0.3 * k)] for k in range(21)),
+]  # fmt: skip
+
+
+def cantilever(section: Tables, moments: list[list[float]], spring: float | None, **more: Any) -> hybrid.Result:
+    """Without weight, under a moment at its free end that changes slowly: bent evenly."""
+    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 1, 0]}
+    plain = {"length": 2.0, "mass": 1e-3, "axial_stiffness": 1e6, "torsional_stiffness": 10.0, "damping": 20.0}
+    locks = [{"kind": "bend_restrictor", "range": [0, 2], "radius": 15}] if "slip" not in str(section) else []
+    return hybrid.run({
+        "environment": {"gravity": 0}, "cable": {"sections": [plain | section], "attachments": locks},
+        "ends": {"start": start | ({"bend_stiffness": spring} if spring else {}),
+                 "end": {"kind": "free", "moment": {"history": moments}}},
+        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]},
+        "model": "rod", "contact": {"self": False}, "mesh": {"cells": 8},
+        "time": {"duration": moments[-1][0], "step": 0.1}, "output": {"every": 0.5, "points": 9, "exact": True},
+    } | more)  # fmt: skip
+
+
+def turned(r: NDArray[np.float64], about: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places (nb, n, 3) m, each output turned by the rotation vector about (nb, 3) rad."""
+    angle = np.linalg.norm(about, axis=1)[:, None, None]
+    axis = about[:, None] / np.maximum(angle, 1e-300)
+    along = (r * axis).sum(axis=-1, keepdims=True) * axis
+    return np.asarray(along + np.cos(angle) * (r - along) + np.sin(angle) * np.cross(axis, r))
+
+
+@pytest.mark.parametrize("moments", [ALONG, ROUND], ids=["along", "round"])
+@pytest.mark.parametrize("case", list(CASES))
+def test_a_spring_turns_a_bent_line_by_its_moment_and_leaves_it_its_curvature(case: str, moments: Any) -> None:
+    """Against the line on a rigid clamp, turned by M/k: places, curvature at the clamp, what layers lose, energy M^2/2k.
+
+    A moment that goes round is not turned by a rotation about itself.  What is left fades with the rate of the moment.
+    """
+    rigid, soft = (cantilever(CASES[case], moments, spring) for spring in (None, SPRING))
+    M = np.column_stack([np.interp(rigid.t, np.array(moments)[:, 0], np.array(moments)[:, k]) for k in (2, 3)])
+    about = np.column_stack([0.0 * M[:, 0], M]) / SPRING
+    size = np.abs(turned(rigid.position, about) - rigid.position).max()
+    assert size > 0.05
+    apart = np.abs(turned(rigid.position, about) - soft.position).max()
+    curved = np.abs(soft.curvature[:, 0] - rigid.curvature[:, 0]).max() / rigid.curvature.max()
+    stored = soft["energy/bending"] - rigid["energy/bending"] - 0.5 * (M**2).sum(axis=1) / SPRING
+    assert apart < 2e-3 * size and curved < 6e-4
+    assert np.abs(stored).max() < 1e-3 * rigid["energy/bending"].max()
+    if "slip" in str(CASES[case]):
+        lost = np.abs(rigid["work/hysteresis"])
+        assert lost[-1] > 0.05 * rigid["energy/bending"].max()
+        assert np.abs(soft["work/hysteresis"] - rigid["work/hysteresis"]).max() < 1e-3 * lost.max()
+
+
+REST: dict[str, Tables] = {
+    "slip": {S + "bending_stiffness": 8.0,
+             S + "bending_slip": [{"stiffness": 12.0, "moment": 0.4, "per_tension": 1e-3}, {"stiffness": 5.0, "moment": 0.5}]},
+    "tension": {S + "stiffness_per_tension": 0.03},
+    "table": {S + "moment_curvature": [[0, 0], [0.05, 1.0], [0.15, 2.0], [0.3, 3.0]], S + "first_loading": True,
+              S + "bending_stiffness": None},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("rest", list(REST))
+def test_a_clamp_on_a_spring_is_one_turned_by_its_moment(rest: str) -> None:
+    """At rest, in space, at both ends, also of several: the shape of rigid clamps that are turned by M/k.
+
+    To what it makes that the rotations of the spring and of the half cell, about axes that differ, are added.
+    """
+    springs = (SPRING, 2.0 * SPRING)
+    held = {START: CLAMP | {"bend_stiffness": springs[0]}, END: FAR | {"bend_stiffness": springs[1]},
+            "environment": {"gravity": 9.81, "fluid": {"density": 1025, "current": [0.3, 0.4, 0]}},
+            S + "drag": {"normal": 1.2}, "time": None, "output": {"points": 13, "exact": True}}  # fmt: skip
+    tables = tables_with(BASE, held | REST[rest])
+    soft = hybrid.static(tables)
+    system = as_system(tables)
+    assert system is not None
+    assert np.abs(hybrid.static(system).lines["one"].position - soft.position).max() < 1e-9
+    ends: Tables = {}
+    for key, end, moment, k in (
+        (START, CLAMP, soft["moment_start"], springs[0]),
+        (END, FAR, soft["moment_end"], springs[1]),
+    ):
+        t, M = np.array(end["tangent"], float), np.asarray(moment)[0]
+        t /= np.linalg.norm(t)
+        M = M - (M @ t) * t
+        way = {x: turned(np.array([[end[x]]], float), -M[None] / k)[0, 0].tolist() for x in ("tangent", "normal")}
+        ends[key] = end | way
+    rigid = hybrid.static(tables_with(tables, ends))
+    unturned = hybrid.static(tables_with(tables, {START: CLAMP, END: FAR}))
+    size, bent = np.abs(unturned.position - soft.position).max(), np.abs(unturned.curvature - soft.curvature).max()
+    assert size > 5e-3 and bent > 5e-3
+    assert np.abs(rigid.position - soft.position).max() < 2e-3 * size
+    assert np.abs(rigid.curvature - soft.curvature).max() < 2e-3 * bent
+
+
+def test_the_bend_beside_a_spring_is_the_root_of_its_balance() -> None:
+    """Of 200 states of two layers in two axes: against a root found otherwise; derivatives against differences."""
+    tables = tables_with(BASE, {START: CLAMP | {"bend_stiffness": SPRING}} | REST["slip"])
+    line = build(as_scene(tables)).line
+    half, noise, apart, slopes = 0.5 * line.h[0], np.random.default_rng(1), [], []
+    E = 8.0 / half
+    for _ in range(200):
+        now = line.slip_now.copy()
+        now[0, [0, 1, EACH, EACH + 1]] = 0.1 * noise.normal(size=4)
+        for j, (K, m) in enumerate(((12.0, 0.4), (5.0, 0.5))):
+            now[0, EACH * j + 2 : EACH * j + 4] = m * noise.uniform(0.3, 2.0), K
+        state, x = line._replace(slip_now=now), 0.2 * noise.normal(size=2)
+
+        def balance(z: NDArray[np.float64], now: Any = now, x: Any = x) -> NDArray[np.float64]:
+            found = E * z - SPRING * (x - z)
+            for j in (0, EACH):
+                stuck = now[0, j + 3] * (z / half - now[0, j : j + 2])
+                found = found + stuck * min(1.0, now[0, j + 2] / np.hypot(*stuck))
+            return np.asarray(found)
+
+        z = root(balance, 0.5 * x, tol=1e-14).x
+        mx, my, c11, c12, c22, _ = slip_answer(state, 0, *x)
+        moment = np.array([mx, my]) + line.kb[0, :2] * x
+        apart.append([np.abs(z - beside_spring(state, 0, *x)).max(), np.abs(moment - SPRING * (x - z)).max()])
+        ways = 1e-7 * np.eye(2)
+        each = [np.subtract(slip_answer(state, 0, *(x + d))[:2], slip_answer(state, 0, *(x - d))[:2]) for d in ways]
+        slopes.append(np.abs(np.array(each) / 2e-7 - [[c11, c12], [c12, c22]]).max())
+    assert np.max(apart) < 1e-13
+    assert np.sort(slopes)[-3] < 1e-6 * E  # but for one that begins to slip within the difference
