@@ -117,7 +117,7 @@ class KnownMotion(EndMotion):
     """How a body that is held or moved is at a time: `at` gives its origin and its axes (`EndMotion`)."""
 
     def __init__(self, body: FixedBody, around: Surroundings) -> None:
-        waves = around.values.waves, float(around.values.ramps[1]), True
+        waves = around.waves_of_vessels, float(around.values.ramps[1]), True
         self.axes = frame_of(body.rotation)  # without motion
         super().__init__(body.motion, body.position, self.axes, around.elevation, waves)
 

@@ -37,7 +37,8 @@ from hybrid.model.sections import swivels
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.accuracy import USUAL
 from hybrid.scene.body_shapes import Carried
-from hybrid.scene.schema import AdaptiveModel, RecordedWaves, Scene
+from hybrid.scene.ends import End
+from hybrid.scene.schema import AdaptiveModel, RecordedWaves, Scene, StreamFunctionWaves
 
 # Part of the variance of a record that is round-off.
 LOST = 1e-6
@@ -145,6 +146,13 @@ def _parts(scene: Scene, line: Line, rods: bool, flat: Entry) -> Iterator[Entry]
         yield Entry(f"swivels: {len(free)}", True, "cable.attachments of kind swivel: no torque passes")
     attached = len(scene.cable.attachments) + len(scene.ends.bodies())
     yield Entry(f"attachments: {attached}", attached > 0, "cable.attachments, ends of kind body")
+
+
+def _by_first_harmonic(scene: Scene, end: End) -> bool:
+    """Whether a vessel moves an end by an RAO in a wave of finite height."""
+    fluid, vessel = scene.environment.fluid, getattr(end.prescribed_motion, "vessel", None)
+    finite = fluid is not None and isinstance(fluid.waves, StreamFunctionWaves)
+    return finite and vessel is not None and vessel.rao is not None
 
 
 def followed(scene: Scene, zones: Sequence[Zone]) -> Entry:
@@ -284,6 +292,9 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = end.prescribed_motion is not None
         spring = f", by a spring of {end.spring:g} N m/rad" if end.spring < inf else ""
+        if moving and _by_first_harmonic(scene, end):
+            why = "an RAO is of linear waves: the vessel moves by the first harmonic (waves.kind: stream_function)"
+            entries.append(Entry(f"higher harmonics of the waves in the motion of ends.{name}", False, why))
         text = f"ends.{name}: {end.kind}{spring}{', moving' if moving else ''}{_let_go(scene, name)}"
         entries.append(Entry(text, True, f"ends.{name}"))
         if not line.spin[cell] and end.acts_by_moment:

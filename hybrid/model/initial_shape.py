@@ -374,7 +374,7 @@ def end_conditions(
         ]
         motion = end.prescribed_motion
         if motion is not None:
-            waves = around.values.waves, float(around.values.ramps[1]), end.held_tangent is not None
+            waves = around.waves_of_vessels, float(around.values.ramps[1]), end.held_tangent is not None
             try:
                 motions[k] = EndMotion(motion, end.held_position, base, around.elevation, waves)
             except SceneError as error:  # of a table of the motion, which does not know whose it is

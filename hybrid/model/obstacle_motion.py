@@ -45,7 +45,8 @@ class Courses(NamedTuple):
 def courses_of(scene: Scene, rows: Floats, waves: Floats, ramp: float, elevation: Elevation) -> Courses:
     """How the obstacles of a scene move; rows: (M, OBSTACLE) of them at t = 0.
 
-    waves: as `Sea.waves`, ramp: s, over which they grow; elevation: of the surface, as of scene.motion.EndMotion.
+    waves: as of `Surroundings.waves_of_vessels`, ramp: s, over which they grow; elevation: of the surface, as of
+    scene.motion.EndMotion.
     """
     if not any(x.moves for x in scene.obstacles.values()):
         return Courses(NO_MOVES, NO_CARRIED, {})

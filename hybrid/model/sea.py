@@ -68,6 +68,14 @@ class Surroundings:
             carry_obstacles(float(now[0]), float(now[0]), self.values)
         return self.values
 
+    @property
+    def waves_of_vessels(self) -> Floats:
+        """Components (W, 6) by which vessels with an RAO move, as of `Sea.waves`.
+
+        An RAO is of linear waves: of one wave of finite height, whose harmonics travel together, it is the first.
+        """
+        return self.values.waves[:1] if self.values.stretched == 0.0 else self.values.waves
+
     def roll_as(self, state: State) -> None:
         """Sheaves that turn freely are turned as in a state."""
         if state.sheave.size:
@@ -128,7 +136,7 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
 def _moved(scene: Scene, cells: int, around: Surroundings) -> Surroundings:
     """The same with the motions of obstacles."""
     sea = around.values
-    courses = courses_of(scene, sea.obstacles, sea.waves, float(sea.ramps[1]), around.elevation)
+    courses = courses_of(scene, sea.obstacles, around.waves_of_vessels, float(sea.ramps[1]), around.elevation)
     if not courses.carried.size:
         return around
     grip = np.zeros((cells + 1, EACH * len(sea.obstacles)))

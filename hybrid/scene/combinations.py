@@ -311,18 +311,6 @@ def _finite_waves(tables: Tables) -> Iterator[Place]:
         yield "environment", "fluid", "waves", "kind"
 
 
-def _by_rao(tables: Tables) -> Iterator[Place]:
-    """Ends, points and bodies that move by an RAO."""
-    ends: Ends | None = tables.get("ends")
-    holders: list[tuple[Place, Any]] = [(("ends", x), end) for x, end in ends.named().items()] if ends else []
-    if SYSTEM in tables:
-        holders = [((key, x), one) for key in ("points", "bodies") for x, one in getattr(tables[SYSTEM], key).items()]
-    for at, holder in holders:
-        vessel = getattr(getattr(holder, "motion", None), "vessel", None)
-        if vessel is not None and vessel.rao is not None:
-            yield (*at, "motion", "vessel", "rao")
-
-
 def _either(*features: Feature) -> Callable[[Tables], Iterator[Place]]:
     """Where one of several features is asked for, which are refused for one reason."""
     return lambda tables: (at for x in features for at in x.places(tables))
@@ -388,7 +376,6 @@ DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("deriva
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
-BY_RAO = Feature("a vessel that moves by an RAO", "motion.vessel.rao", _by_rao)
 
 RESPONSE_TO_MOTION = Refusal(
     OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of what is constant or a sum of harmonics",
@@ -437,11 +424,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         FINITE_WAVES, RESPONSE, "physics", "a response by frequency is linear in the waves, and these are not",
         "waves of another kind", "kind: regular has the same height and period; hybrid run computes these in time",
-    ),
-    Refusal(
-        BY_RAO, FINITE_WAVES, "physics",
-        "an RAO is of linear waves, and the harmonics of one wave of finite height ({key}) travel with it",
-        fix="waves: {{kind: regular}}, or the motion from a file",
     ),
     Refusal(
         DERIVATIVES, SETTLED_FRICTION, "physics", "friction has settled ({key}), and how depends on the way there",

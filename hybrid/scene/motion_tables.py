@@ -81,7 +81,8 @@ class Vessel(Table):
         description="CSV file, relative to the scene file: columns frequency [rad/s] and heading [deg], the "
         "direction of the waves against that of the vessel (0: from astern, 180: from ahead), surge, sway, heave "
         "(m/m), roll, pitch, yaw (deg/m), and surge_phase .. (deg behind the crest at the origin); or a dataset "
-        "of Capytaine in netCDF (.nc) with its RAO, or with what it follows from; absent: "
+        "of Capytaine in netCDF (.nc) with its RAO, or with what it follows from; a wave of finite height moves it by "
+        "its first harmonic; absent: "
         "the motion of the vessel is in `file` beside this table",
     )
     origin: Vector = Field(
