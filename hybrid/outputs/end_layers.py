@@ -44,7 +44,7 @@ def end_layers(view: Observation) -> list[EndLayer]:
     """The layers of an observation, each up to where it has faded in all outputs, or the rods or section end."""
     spans = np.array(view.grid.spans).reshape(-1, 3)
     catenary = np.array([zone.kind == "catenary" for zone in view.grid.parts])
-    ends = np.stack([np.isin(spans[:, k], view.end_nodes) for k in (0, 1)])
+    ends = np.stack([view.is_end[spans[:, k]] for k in (0, 1)])
     ends &= catenary & (spans[:, 1] - spans[:, 0] > 1)  # a catenary of one cell knows no curvature
     return [
         _layer(view, *_way_in(spans, catenary, int(first), way), way, EI, reach)

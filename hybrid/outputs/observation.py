@@ -113,6 +113,13 @@ class Observation:
         """Nodes at ends of the line."""
         return 0, self.line.h.size
 
+    @cached_property
+    def is_end(self) -> NDArray[np.bool_]:
+        """(N+1,) whether nodes are those."""
+        found = np.zeros(self.line.s.size, bool)
+        found[np.asarray(self.end_nodes)] = True
+        return found
+
     def at_end(self, x: Floats, k: int, inward: int = 0) -> Floats:
         """Of values (n, ..., nb) on cells or nodes that at end k, or so many inward: (..., nb)."""
         return x[-1 - inward if k else inward]

@@ -21,6 +21,7 @@ from hybrid.outputs.vectors import cross, directions_of
 if TYPE_CHECKING:
     from hybrid.outputs.observation import Observation
 
+FEW = 4  # outputs
 Integers = NDArray[np.int64]
 Restored = tuple[Integers, NDArray[np.bool_], Floats]
 
@@ -51,7 +52,7 @@ def restored(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.b
         whole = _whole(view, out, rows, nodes, part, K)
         at = view.grid.side_nodes[rows] - a
         curvature = whole[at] * _of_sides(view, spans[k : last + 1], K * hn)
-        bare = np.isin(nodes, view.end_nodes) & (view.line.element[nodes] == 0)  # by the moment that is given there
+        bare = view.is_end[nodes] & (view.line.element[nodes] == 0)  # by the moment that is given there
         found.append((rows[~bare[at]], soft, curvature[~bare[at]]))
         for node, row in ((a, rows[0] - 1), (b, rows[-1] + 1)):  # a catenary has the same at a joint
             if node not in view.end_nodes:
@@ -64,7 +65,7 @@ def parts_of_stiffness(view: Observation, nodes: Integers, cells: Integers) -> F
     pieces = view.grid.hinges[LINE:]
     if pieces[0, EI] <= 0.0:
         return np.ones((len(nodes), view.columns))
-    ends, bends, twists = np.isin(nodes, view.end_nodes), np.zeros((1, 1)), np.zeros((1, 1))
+    ends, bends, twists = view.is_end[nodes], np.zeros((1, 1)), np.zeros((1, 1))
     for beside in (np.where(ends, cells, nodes - 1), np.where(ends, cells, nodes)):
         middle = 0.5 * (view.of_line("s", beside) + view.of_line("s", beside + 1))
         of = pieces[np.searchsorted(pieces[:-1, END], middle, side="right")]
@@ -108,7 +109,6 @@ def _whole(view: Observation, out: Floats, rows: Integers, nodes: Integers, part
     T = np.maximum(T, SLACK * K * np.concatenate([link, link[-1:]]))
     rhs = (T * (1.0 - part) * hn)[:, None] * bend
     diagonal = T / K + np.concatenate([link, 0.0 * link[-1:]]) + np.concatenate([0.0 * link[:1], link])
-    M = np.zeros_like(rhs)
     upper = np.concatenate([link, 0.0 * link[-1:]])
     for k in (0, -1):
         cell = nodes[-1] if k else nodes[0] - 1
@@ -120,16 +120,43 @@ def _whole(view: Observation, out: Floats, rows: Integers, nodes: Integers, part
             outside = 1.0 / view.cell_lengths[cell]
             diagonal[k] += outside
             rhs[k] += (K[k] * hn[k] * outside * out[row, 0]) * view._bend_directions[row]
-    for i in range(len(nodes)):
-        if i > 0:
-            diagonal[i] -= link[i - 1] * upper[i - 1]
-            rhs[i] += link[i - 1] * rhs[i - 1]
-        upper[i], rhs[i] = upper[i] / diagonal[i], rhs[i] / diagonal[i]
-    M[-1] = rhs[-1]
-    for i in range(len(nodes) - 2, -1, -1):
-        M[i] = rhs[i] + upper[i] * M[i + 1]
+    M = _solved(diagonal, upper, link, rhs)
     whole = part[:, None] * bend + M / (K * hn)[:, None]
     return np.asarray(np.copysign(np.sqrt((whole * whole).sum(axis=1)), (whole * direction).sum(axis=1)))
+
+
+def _solved(diagonal: Floats, upper: Floats, link: Floats, rhs: Floats) -> Floats:
+    """M (m, 3 or 1, nb): diagonal M_i - upper M_i+1 - link M_i-1 = rhs, of diagonal, upper (m, nb), link (m-1, nb)."""
+    M = rhs.copy()
+    if rhs.shape[2] <= FEW:  # in numbers, to the same bits: an operation on a small array takes ten times as long
+        for k in range(rhs.shape[2]):
+            _solve_output(diagonal[:, k].tolist(), upper[:, k].tolist(), link[:, k].tolist(), M[:, :, k])
+        return M
+    pivot, factor = diagonal[0], [upper[0] / diagonal[0]]
+    M[0] /= pivot
+    for i in range(1, len(M)):
+        pivot = diagonal[i] - link[i - 1] * factor[-1]
+        factor.append(upper[i] / pivot)
+        M[i] = (M[i] + link[i - 1] * M[i - 1]) / pivot
+    for i in range(len(M) - 2, -1, -1):
+        M[i] += factor[i] * M[i + 1]
+    return M
+
+
+def _solve_output(diagonal: list[float], upper: list[float], link: list[float], M: Floats) -> None:
+    """The same of one output, in place of its right side M (m, 3 or 1)."""
+    pivots, factors = [diagonal[0]], [upper[0] / diagonal[0]]
+    for d, u, l in zip(diagonal[1:], upper[1:], link, strict=True):
+        pivots.append(d - l * factors[-1])
+        factors.append(u / pivots[-1])
+    for j in range(M.shape[1]):
+        first, *others = M[:, j].tolist()
+        solved = [first / pivots[0]]
+        for right, p, l in zip(others, pivots[1:], link, strict=True):
+            solved.append((right + l * solved[-1]) / p)
+        for i in range(len(link) - 1, -1, -1):
+            solved[i] += factors[i] * solved[i + 1]
+        M[:, j] = solved
 
 
 def _bends(view: Observation, rows: Integers, nodes: Integers) -> tuple[Floats, Floats]:

@@ -79,7 +79,7 @@ def bend_directions(view: Observation) -> Floats:
     out = directions_of(line, cross(d[inner - 1], d[np.minimum(inner, len(d) - 1)]))
     spans = np.array(view.grid.spans).reshape(-1, 3)
     rods, at = np.tile([zone.kind == "rod" for zone in view.grid.parts], 2), ends_of(spans)
-    outer = np.isin(at.node, view.end_nodes)
+    outer = view.is_end[at.node]
     beside = np.flatnonzero(outer | ~rods | (line.element[at.node] == 0))
     out[at.row[beside]] = out[at.row[beside] + at.inward[beside]]
     bent = np.flatnonzero(outer & rods & ~line.k0[at.node].any(axis=1))
@@ -95,7 +95,7 @@ def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
     if (given := np.flatnonzero(bare | jumps)).size:
         out[at.row[given]] = _strain_of_moment(view, at.node[given], at.cell[given])
     # an angular spring at a clamp bends, but does not twist
-    held = np.flatnonzero(~bare & ~jumps & np.isin(at.node, view.end_nodes))
+    held = np.flatnonzero(~bare & ~jumps & view.is_end[at.node])
     if held.size:
         part = view.of_line("hn", at.node[held]) / (0.5 * view.cell_lengths[at.cell[held]])
         out[at.row[held], 1] *= part
@@ -139,7 +139,7 @@ def bends_without_natural(view: Observation) -> tuple[Floats, NDArray[np.bool_]]
         given = np.flatnonzero(bare | jumps)
         if given.size:
             bend[at.row[given]] = _bend_of_moment(view, at.node[given], at.cell[given])[:, :2]
-        for k in np.flatnonzero(~bare & ~jumps & np.isin(at.node, view.end_nodes)):
+        for k in np.flatnonzero(~bare & ~jumps & view.is_end[at.node]):
             i, cell, row = int(at.node[k]), int(at.cell[k]), at.row[k]
             turn = bend[row] * view.of_line("hn", i)
             bend[row] = bend_without_spring(view, i, cell, turn) / (0.5 * view.cell_lengths[cell])
