@@ -224,7 +224,8 @@ _REMEDY = {
     Outcome.SINGULAR: "hold an end, or give weight, force or bending stiffness; a straight strut needs a small bow",
     Outcome.SLACK: "make this stretch a rod zone (it needs bending_stiffness), or keep it taut",
     Outcome.TURNED_TOO_FAR: "look for a jump of force at this time; add damping or bending stiffness, or add cells",
-    Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds",
+    Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds, "
+    "or give less stiffness_per_tension",
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
     Outcome.BURIED: "another start (initial.points); check stiffness and place of the bed and of obstacles",
     Outcome.TURNS_LOST: "add cells, hold the cable tauter, or turn the end in time (ends.*.motion), with damping",

@@ -14,6 +14,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.bending_slip import EACH, STIFFENING
 from hybrid.kernels.laws.obstacles import (
     bend_radii,
     cells_met,
@@ -170,6 +171,7 @@ class Diagnostics:
         self._within, self._round, self._between = 1.0, False, False
         self._off = OFF * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
+        self._stiffens = bool(model.line.slip_law.size and model.line.slip_law[:, STIFFENING::EACH].any())
         self._rested = self._left_out = self._section = self._weight = False
         self._jump = SNAP * model.tension_scale  # N
         self._put_in = self._potential = self._alive = 0.0  # J
@@ -714,16 +716,18 @@ class Diagnostics:
 
         What touches the bed and obstacles in steps that are too long bounces higher than it fell.  That counts as
         created where contact has given more than it has taken: damping takes, and only soil gives back what it had.
+        So does what a stiffness that grows with tension has given: it has no potential.
         lines: of each output a model of its cable and what it is, where they differ.
         """
         scheme, potential = values["work/scheme"], values["energy/potential"]
         given = values.get("work/contact", 0.0 * scheme)  # by contact
         bounced = np.maximum(given, 0.0) if not self._model.line.bits & SOIL else 0.0
-        gained = scheme + bounced
+        grown = np.maximum(values["work/hysteresis"], 0.0) if self._stiffens else 0.0
+        gained = scheme + bounced + grown
         alive = sum((values[x] for x in values if x.startswith("energy/")), -potential)
         if batch.t[0] == 0.0:
             self._potential, self._alive = float(potential[0]), float(alive[0])
-        put_in = np.abs(batch.work).sum(axis=1) - bounced + np.abs(potential - self._potential) + self._alive
+        put_in = np.abs(batch.work).sum(axis=1) - bounced - grown + np.abs(potential - self._potential) + self._alive
         put_in = np.maximum.accumulate(np.append(self._put_in, put_in))[1:]
         self._put_in = float(put_in[-1])
         floor = NEWTON_LEAVES * self._model.tension_scale * self._model.length
@@ -755,7 +759,8 @@ class Diagnostics:
         put_in = max(put_in, FIRST_MOMENTS * self._put_in)
         if gained > 0.0 and gained > self._gain * put_in:
             part = _percent(gained, put_in)
-            text = f"the time scheme, with contact, has created {gained:.3g} J, {part} of the energy put in"
+            what = "with stiffness by tension and contact" if self._stiffens else "with contact"
+            text = f"the time scheme, {what}, has created {gained:.3g} J, {part} of the energy put in"
             self.events.event(t, s, s, "gains energy", f"{text}: {Outcome.GAINS_ENERGY.remedy}")
 
     def rest(self, batch: Batch, values: Mapping[str, Floats]) -> None:

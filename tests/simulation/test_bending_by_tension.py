@@ -11,7 +11,7 @@ import pytest
 from bits import differences
 
 import hybrid
-from hybrid.errors import SceneError
+from hybrid.errors import ComputationError, Outcome, SceneError
 
 ANGLE, LENGTH, EI, GROWS = radians(20.0), 8.0, 1e4, 0.3  # rad, m, N m2, m2
 BEGIN, END = 5e4, 2e4  # N
@@ -83,6 +83,35 @@ def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     hybrid.run(tables | {"time": {"duration": 1.0, "step": 0.02}}, tmp_path / "part.h5")
     hybrid.resume(tmp_path / "part.h5", until=2.0)
     assert differences(tmp_path / "whole.h5", tmp_path / "part.h5") == []
+
+
+def heaved(grows: float) -> dict[str, Any]:
+    """A line that is bent to 0.4 1/m between clamps of which one is moved up and down."""
+    section = {
+        "length": 10.0,
+        "mass": 2.0,
+        "axial_stiffness": 1e6,
+        "bending_stiffness": 100.0,
+        "damping": {"mass": 0.5},
+    }
+    motion = {"heave": {"amplitude": 0.5, "period": 2.0}, "ramp": 2.0}
+    clamp = {"kind": "clamped", "tangent": [1, 0, 0]}
+    return {
+        "cable": {"sections": [section | {"stiffness_per_tension": grows}]},
+        "ends": {"start": clamp | {"position": [0, 0, 0]}, "end": clamp | {"position": [9.85, 0, 0], "motion": motion}},
+        "initial": "equilibrium", "model": "rod", "contact": {"self": False}, "mesh": {"cells": 40},
+        "time": {"duration": 4.0, "step": 0.005}, "output": {"every": 0.1, "points": 21},
+    }  # fmt: skip
+
+
+def test_energy_that_the_law_creates_is_told_or_stops_the_run() -> None:
+    """It has no potential: K_T kappa^2/2 of 4, 8 and 15 % create 3, 28 and more than 100 % of what is put in."""
+    assert "gains energy" not in {x.kind for x in hybrid.run(heaved(0.3)).events}
+    (told,) = (x for x in hybrid.run(heaved(1.0)).events if x.kind == "gains energy")
+    assert "with stiffness by tension" in told.text and "less stiffness_per_tension" in told.text
+    with pytest.raises(ComputationError) as stopped:
+        hybrid.run(heaved(2.0))
+    assert stopped.value.outcome == Outcome.GAINS_ENERGY and "stiffness_per_tension" in str(stopped.value)
 
 
 def test_no_stiffness_without_bending_and_refusals() -> None:
