@@ -32,7 +32,7 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 def pytest_sessionstart(session: pytest.Session) -> None:
     if getattr(session.config.option, "numprocesses", 0) and not hasattr(session.config, "workerinput"):
         script = Path(__file__).parent / "tests" / "compile_kernels.py"
-        commands = [[sys.executable, str(script), half] for half in ("plane", "space")]
+        commands = [[sys.executable, str(script), half, "tests"] for half in ("plane", "space")]
         for process in [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]:
             process.wait()  # what fails here fails again, with words, in a test
 

@@ -1,5 +1,8 @@
 """Compile the kernels that most tests call, one half of them: `python tests/compile_kernels.py plane`, or `space`.
 
+With `tests` behind it those, too, that few scenes call and many tests, among them what the features of scenes do: a
+wheel goes without (release/build_wheel.py).
+
 The first half is for lines in a plane, zones, cells and payout, the second for space, contact and several lines.
 Started together (conftest.py) they keep two cores busy, and each function that both need is read by numba twice, not by
 every process of the tests.
@@ -11,6 +14,7 @@ import gc
 import os
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 
@@ -57,12 +61,16 @@ BY_TABLE = {
         junctions.joined_sheaves.spin_sheaves junctions.body_contact.meet_bodies""",
 }
 
+IN_TESTS = {
+    "plane": "watch.tangents.follow_in_plane", "space": "watch.tangents.follow_in_space run.system_run.sample_system",
+}  # fmt: skip
 
-def main(half: str) -> None:
+
+def main(half: str, for_tests: bool) -> None:
     gc.disable()  # numba leaves a hundred MB of garbage per large kernel: cheaper left than searched for
     os.cpu_count = lambda: 1  # or each run below would start a process that compiles beside it
     table = np.zeros(0, np.int64)
-    for name in BY_TABLE[half].split():
+    for name in [*BY_TABLE[half].split(), *(IN_TESTS[half].split() if for_tests else ())]:
         file, function = name.rsplit(".", 1)
         getattr(import_module(f"hybrid.kernels.{file}"), function).compile_unless_busy(table)
     if half == "plane":
@@ -72,8 +80,14 @@ def main(half: str) -> None:
     else:
         hybrid.run({**SCENE, "dimension": 3}, progress=False)
         hybrid.run(LINES, progress=False)
+    if for_tests and half == "plane":
+        sys.path.insert(0, str(Path(__file__).parents[1]))
+        from tests.combinations.pairs import FEATURES, scene_of
+
+        for feature in FEATURES:
+            hybrid.run(scene_of(feature), progress=False)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1], for_tests="tests" in sys.argv[2:])
     os._exit(0)  # nor is it searched for at the end

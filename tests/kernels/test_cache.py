@@ -18,30 +18,17 @@ from hybrid.kernels.machine.cache import LEVELS, kernel_hash, processor, tempora
 
 PACKAGE = Path(hybrid.__file__).parent
 
-# The law that is edited stands in another file than the kernels that use it: numba alone would not notice.
-LAW, TWICE = "    l = math.sqrt(dot(e, e))\n", "    l = 2.0 * math.sqrt(dot(e, e))\n"
+# What is edited stands in another file than the kernel that uses it: numba alone would not notice.
+VECTOR, TWICE = "    return (A[i, 0], A[i, 1], A[i, 2])\n", "    return (2.0 * A[i, 0], A[i, 1], A[i, 2])\n"
 
-SPIN = """
+PULLED = """
 import numpy as np
-from hybrid.model.material import POINT
-from hybrid.kernels.state.state import Ends, Line, blank_state
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.laws.hanging import find_force
 
-WET = ("drag_n", "drag_t", "added_n", "added_t", "buoy", "displaced", "diameter")
-# one cell of a rod, 1 m long, whose two ends swing against each other: rotary energy ~ (turn rate)^2 ~ 1/l^2
-line = Line(
-    s=np.array([0.0, 1.0]), h=np.ones(1), ck=np.zeros(1), mass=np.zeros(2), force=np.zeros((2, 3)),
-    element=np.zeros(2, np.int8), spin=np.ones(1, np.int8), kb=np.zeros((2, 3)), k0=np.zeros((2, 3)),
-    hn=np.full(2, 0.5), rotary=np.ones(1), polar=np.ones(1), damp=np.zeros(2), tau=np.zeros(1),
-    **{x: np.zeros(1) for x in WET}, footing=np.zeros(2), point_lift=np.zeros(2), **{x: np.zeros(2) for x in POINT}, bits=16,
-)
-z = np.zeros((2, 3))
-ends = Ends(np.zeros(2, np.int8), z, np.zeros((2, 9)), z, z, z)
-state = blank_state(1)
-state.e[0], state.v[1], state.a1[0] = (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 1.0, 0.0)
-energy = np.zeros(5)
-observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, np.zeros((2, 3)), np.zeros((2, 3)), energy)
-print(energy[0])
+# A cell of 1 m and 1 N between places 2 m apart: 1 N; and 3 N where vectors are read with twice their x.
+places = np.array([[2.0, 0.0, 0.0], [0.5, 0.0, 0.0]])
+find_force(np.zeros((1, 3)), np.ones(1), np.ones(1), places, 1e-9, 50, np.zeros(6))
+print(places[1, 0])
 """
 
 SCENE = """
@@ -97,17 +84,17 @@ def test_a_copy_elsewhere_compiles_nothing_and_an_edit_in_another_file_anew(
     copy: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     """Another environment or checkout of the same version, files with another date: the machine code is the same."""
-    assert answer(copy, SPIN) == pytest.approx(2.0)
+    assert answer(copy, PULLED) == pytest.approx(1.0)
     kept = {x: x.stat().st_mtime_ns for x in compiled(copy)}
     assert kept
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     shutil.copytree(copy / "hybrid", elsewhere / "hybrid", copy_function=shutil.copyfile)
     shutil.move(copy / "cache", elsewhere / "cache")
-    assert answer(elsewhere, SPIN) == pytest.approx(2.0)
+    assert answer(elsewhere, PULLED) == pytest.approx(1.0)
     moved = {copy / x.relative_to(elsewhere): x.stat().st_mtime_ns for x in compiled(elsewhere)}
     assert moved == kept
-    edit(elsewhere, "kernels/laws/cell.py", LAW, TWICE)
-    assert answer(elsewhere, SPIN) == pytest.approx(0.5)
+    edit(elsewhere, "kernels/algebra/rotations.py", VECTOR, TWICE)
+    assert answer(elsewhere, PULLED) == pytest.approx(3.0)
     assert len(compiled(elsewhere)) > len(kept)
 
 
