@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -40,6 +42,18 @@ def differences(a: Path, b: Path) -> list[str]:
             if not np.array_equal(x.attrs.get(name), y.attrs.get(name)):
                 out.append(f"other attribute: {name}: {x.attrs.get(name)!r}, {y.attrs.get(name)!r}")
     return out
+
+
+def resumed(scene: dict[str, Any], folder: Path, at: float) -> hybrid.Result:
+    """The run of a scene, after asserting that one until `at` (s), resumed, is the same, bit for bit."""
+    time = scene["time"]
+    whole = hybrid.run(scene, folder / "whole.h5")
+    hybrid.run(scene | {"time": time | {"duration": at}}, folder / "part.h5").close()
+    hybrid.resume(folder / "part.h5", until=time["duration"]).close()
+    apart = differences(folder / "whole.h5", folder / "part.h5")
+    apart = [x for x in apart if not re.fullmatch(r"other values: lines/\w+/scene", x)]  # with a duration each
+    assert not apart, apart
+    return whole
 
 
 def machine_code() -> set[Path]:

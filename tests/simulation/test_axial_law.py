@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from bits import differences
+from bits import resumed
 from scipy.integrate import quad, solve_ivp
 
 import hybrid
@@ -188,13 +188,7 @@ def test_a_rope_that_is_cut_is_the_same_rope(section: dict[str, Any]) -> None:
 def test_a_rope_goes_on_bit_for_bit(tmp_path: Path, system: bool) -> None:
     rope = SOFT | {"dynamic_stiffness": {"constant": 8e5, "per_tension": 15, "relaxation_time": 5}}
     scene = two_lines(rope, True) if system else swing(ROPES["damped rope"], 0.01)
-    long, short = tmp_path / "long.h5", tmp_path / "short.h5"
-    hybrid.run(scene, long)
-    until = scene["time"]["duration"]
-    hybrid.run(scene | {"time": scene["time"] | {"duration": 0.5 * until}}, short)
-    hybrid.resume(short, until=until)
-    same = ("lines/rope/scene", "lines/upper/scene")  # with a duration each
-    assert [x for x in differences(long, short) if not x.endswith(same)] == []
+    resumed(scene, tmp_path, 0.5 * scene["time"]["duration"])
 
 
 @pytest.mark.long
@@ -272,11 +266,7 @@ def test_mean_tensions_go_along_where_zones_move(model: Any) -> None:
 @pytest.mark.long
 def test_a_rope_whose_zones_move_goes_on_bit_for_bit(tmp_path: Path) -> None:
     rope = SOFT | {"dynamic_stiffness": {"constant": 6e5, "per_tension": 15, "relaxation_time": 1}}
-    scene, long, short = heaved(rope, "adaptive"), tmp_path / "long.h5", tmp_path / "short.h5"
-    hybrid.run(scene, long)
-    hybrid.run(scene | {"time": scene["time"] | {"duration": 1.0}}, short)
-    hybrid.resume(short, until=2.0)
-    assert differences(long, short) == []
+    resumed(heaved(rope, "adaptive"), tmp_path, 1.0)
 
 
 def touching(law: dict[str, Any], model: Any, cells: int, step: float = 0.05) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import differences
+from bits import resumed
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
@@ -78,11 +78,7 @@ def test_a_pull_that_falls_leads_to_the_rest_under_it_and_its_energy_is_booked()
 
 
 def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    tables = falling(0.02, 2.0)
-    hybrid.run(tables, tmp_path / "whole.h5")
-    hybrid.run(tables | {"time": {"duration": 1.0, "step": 0.02}}, tmp_path / "part.h5")
-    hybrid.resume(tmp_path / "part.h5", until=2.0)
-    assert differences(tmp_path / "whole.h5", tmp_path / "part.h5") == []
+    resumed(falling(0.02, 2.0), tmp_path, 1.0)
 
 
 def heaved(grows: float) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import differences
+from bits import resumed
 
 import hybrid
 from hybrid.errors import SceneError
@@ -68,11 +68,7 @@ def test_a_table_and_a_dynamic_stiffness_creep_as_well() -> None:
 
 
 def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    tables = rope({"kind": "free", "force": [2e4, 0, 0]}, 0.5, 60.0)
-    hybrid.run(tables, tmp_path / "whole.h5")
-    hybrid.run(tables | {"time": {"duration": 30.0, "step": 0.5}}, tmp_path / "part.h5")
-    hybrid.resume(tmp_path / "part.h5", until=60.0)
-    assert differences(tmp_path / "whole.h5", tmp_path / "part.h5") == []
+    resumed(rope({"kind": "free", "force": [2e4, 0, 0]}, 0.5, 60.0), tmp_path, 30.0)
 
 
 def test_what_is_refused() -> None:

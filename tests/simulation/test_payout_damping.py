@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import resumed
 from test_payout import G, clamped, exchanged, hanging, kicks, refused, sagging
 
 import hybrid
@@ -117,13 +118,9 @@ def test_the_mirror_image_does_the_same_and_it_is_resumed_bit_for_bit(tmp_path: 
     """The same with the winch at the start; and what is resumed is what was run, to the last bit."""
     scene = damped(rod(0.8))
     scene["ends"]["end"]["payout"]["longest"] = 120.0
-    one, other = hybrid.run(scene, output=tmp_path / "whole.h5"), hybrid.run(exchanged(scene))
+    one, other = resumed(scene, tmp_path, 5.0), hybrid.run(exchanged(scene))
     assert np.abs(other["reaction_start"] - one["reaction_end"]).max() < 1e-6 * np.abs(one["reaction_end"]).max()
     assert np.abs(other.position[:, ::-1] - one.position).max() < 1e-7 * 100.0
-    hybrid.run({**scene, "time": {"duration": 5.0, "step": 0.05}}, output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=8.0)
-    for what in ("position", "tension", "reaction_end", "work/end", "work/stiffness_damping", "work/scheme"):
-        assert np.array_equal(one[what], resumed[what]), what
 
 
 def test_zones_that_move_do_as_rods() -> None:

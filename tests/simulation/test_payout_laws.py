@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import resumed
 from test_payout import G, clamped, exchanged, hanging, kicks, sagging
 
 import hybrid
@@ -63,9 +64,9 @@ def test_resumed_bit_for_bit(tmp_path: Path, name: str) -> None:
     scene["ends"]["end"]["payout"]["longest"] = 120.0
     whole = hybrid.run(scene, output=tmp_path / "whole.h5")
     hybrid.run({**scene, "time": {"duration": 5.0, "step": 0.05}}, output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=8.0)
+    again = hybrid.resume(tmp_path / "part.h5", until=8.0)
     for what in ("position", "tension", "reaction_end", "energy/stretch", "work/end", "work/zones", "work/scheme"):
-        assert np.array_equal(whole[what], resumed[what]), what
+        assert np.array_equal(whole[what], again[what]), what
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -234,12 +235,8 @@ def released(step: float = 0.05) -> dict[str, Any]:
 def test_a_release_is_resumed_bit_for_bit_and_balanced(tmp_path: Path) -> None:
     scene = released()
     scene["ends"]["end"]["payout"]["longest"] = 110.0
-    whole = hybrid.run(scene, output=tmp_path / "whole.h5")
     for until in (3.0, 5.0):
-        hybrid.run({**scene, "time": {"duration": until, "step": 0.05}}, output=tmp_path / "part.h5")
-        resumed = hybrid.resume(tmp_path / "part.h5", until=6.0)
-        for what in ("position", "tension", "reaction_start", "payout/length", "work/end", "work/zones", "work/scheme"):
-            assert np.array_equal(whole[what], resumed[what]), (until, what)
+        whole = resumed(scene, tmp_path, until)
     # Accelerations jump, so that it is of first order, as of a line of a fixed length.
     left, finer = (np.abs(x["work/scheme"]).max() for x in (whole, hybrid.run(released(0.025))))
     assert left < 1e-2 * whole["energy/kinetic"].max() and finer < 0.6 * left

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from test_payout import clamped, exchanged, sagging
+from test_payout import exchanged, sagging
 
 import hybrid
 from hybrid.errors import SceneError
@@ -63,18 +62,6 @@ def test_the_mirror_image_pays_out_the_same() -> None:
     scene["ends"]["end"]["payout"]["reel"] = reel
     one, other = hybrid.run(scene), hybrid.run(exchanged(scene))
     assert np.abs(one["reaction_end"] - other["reaction_start"]).max() < 1e-7 * np.abs(one["reaction_end"]).max()
-
-
-@pytest.mark.long
-def test_resumed_bit_for_bit(tmp_path: Path) -> None:
-    scene = paid(ROPE, model="rod", EI=2e4, step=0.1)
-    scene = clamped(scene)
-    scene["ends"]["end"]["payout"]["longest"] = 120.0
-    whole = hybrid.run(scene, output=tmp_path / "whole.h5")
-    hybrid.run({**scene, "time": {"duration": 8.0, "step": 0.1}}, output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=12.0)
-    for name in ("position", "tension", "reaction_end", "energy/stretch", "work/end", "work/zones", "work/scheme"):
-        assert np.array_equal(whole[name], resumed[name]), name
 
 
 def test_a_winch_holds_its_tension_on_a_rope() -> None:

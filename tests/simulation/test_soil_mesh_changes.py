@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import differences
+from bits import resumed
 
 import hybrid
 
@@ -61,11 +61,7 @@ def test_zones_that_move_feel_the_soil_that_rods_feel(dimension: int) -> None:
 
 @pytest.mark.long
 def test_zones_that_move_go_on_bit_for_bit(tmp_path: Path) -> None:
-    tables = laid(ADAPTIVE)
-    hybrid.run(tables, tmp_path / "whole.h5")
-    hybrid.run(tables | {"time": {"duration": 9.0, "step": 0.02}}, tmp_path / "part.h5")
-    hybrid.resume(tmp_path / "part.h5", until=16.0)
-    assert differences(tmp_path / "whole.h5", tmp_path / "part.h5") == []
+    resumed(laid(ADAPTIVE), tmp_path, 9.0)
 
 
 def test_cells_that_follow_the_curvature_feel_the_same_soil() -> None:
@@ -118,8 +114,4 @@ def test_what_lies_still_remembers_the_same_while_line_is_paid_out(side: str) ->
 
 @pytest.mark.long
 def test_a_winch_over_soil_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    tables = reeled(80, 0.02)
-    hybrid.run(tables, tmp_path / "whole.h5")
-    hybrid.run(tables | {"time": {"duration": 9.0, "step": 0.02}}, tmp_path / "part.h5")
-    hybrid.resume(tmp_path / "part.h5", until=16.0)
-    assert differences(tmp_path / "whole.h5", tmp_path / "part.h5") == []
+    resumed(reeled(80, 0.02), tmp_path, 9.0)

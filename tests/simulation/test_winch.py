@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import resumed
 from scipy.integrate import solve_ivp
 from test_payout import exchanged
 
@@ -127,12 +128,7 @@ def test_a_winch_at_the_start_does_as_one_at_the_end(model: str, dimension: int 
 
 
 def test_at_the_start_it_is_resumed_bit_for_bit(tmp_path: Path) -> None:
-    scene = exchanged(sagging("catenary", 6.0, 0.1))
-    whole = hybrid.run(scene)
-    hybrid.run({**scene, "time": {"duration": 4.0, "step": 0.1}}, output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=6.0)
-    for name in ("position", "tension", "payout/length", "work/scheme"):
-        assert np.array_equal(whole[name], resumed[name]), name
+    resumed(exchanged(sagging("catenary", 6.0, 0.1)), tmp_path, 4.0)
 
 
 def test_the_rate_is_limited() -> None:
@@ -179,12 +175,7 @@ def test_the_end_of_the_reel_stops_the_run() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("model", ["catenary", "rod"])
 def test_resumed_bit_for_bit(tmp_path: Path, model: str) -> None:
-    whole = hybrid.run(sagging(model), output=tmp_path / "whole.h5")
-    hybrid.run(sagging(model, 9.0), output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=20.0)
-    assert np.ptp(whole["payout/length"]) > 3.0
-    for name in ("position", "tension", "reaction_end", "payout/length", "payout/rate", "work/end", "work/scheme"):
-        assert np.array_equal(whole[name], resumed[name]), name
+    assert np.ptp(resumed(sagging(model), tmp_path, 9.0)["payout/length"]) > 3.0
 
 
 def test_save_and_restore_take_the_winch_back() -> None:
