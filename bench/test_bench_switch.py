@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_bench_zones import MESHES, SHARE, Text, run, touchdown
+from test_bench_zones import MESHES, SHARE, Text, per_step, riser, run, touchdown
 
 import hybrid
 from hybrid.adapt.manager import DomainManager
@@ -55,6 +55,26 @@ def test_switch(mesh: str, monkeypatch: pytest.MonkeyPatch) -> None:
     print(f"\n{mesh}: us, smallest and median; a review that changes zones or may, a switch; the first of a run")
     for name, x in (("review", reviews), ("switch", switches), ("first switch", first[1:])):
         print(f"  {name:14s} {np.min(x):6.0f} {np.median(x):6.0f}  of {len(x)}")
+
+
+@pytest.mark.parametrize("cells", [100, 400, 2000])
+def test_quiet_watching(cells: int) -> None:
+    """A riser in a current that stays catenary: a step of zones that move less one of catenaries, the smallest of ROUNDS."""
+    text = riser()
+    text["environment"]["fluid"].pop("waves")
+    text["time"] = {"duration": 100.0, "step": 0.1}
+    text["output"] = {"every": 50.0, "points": 11}
+    times: dict[str, list[float]] = {"catenary": [], "adaptive": []}
+    for _ in range(ROUNDS + 1):  # the first compiles
+        for kind, spent in times.items():
+            result = run(text, {"cells": cells}, {"kind": kind})
+            assert not any((mesh.kinds == "rod").any() for mesh in result.mesh)
+            spent.append(per_step(result))
+    catenary, adaptive = (min(x[1:]) for x in times.values())
+    print(
+        f"\n{cells} cells: {adaptive:.0f} us a step of zones that move, {catenary:.0f} of catenaries: {adaptive - catenary:.0f} "
+        f"for watching, where {10.0 + 0.1 * cells:.0f} are aimed at"
+    )
 
 
 def four_lines() -> Text:
