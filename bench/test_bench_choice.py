@@ -3,6 +3,7 @@
     HYBRID_BENCH_SEEDS=100 pytest bench/test_bench_choice.py -m bench -n 0 -s -o faulthandler_timeout=0     (30 seeds if none are given)
 
     HYBRID_BENCH_ZONES=0 leaves out zones that move, which take most of the time and are seldom the cheapest
+    OPENBLAS_NUM_THREADS=1 on a busy machine, where threads that wait for each other make 0.01 s of modes 1 s
 
 Processor times are of whole runs, all passes counted, from the scene to its result in memory.  A default that makes the
 same runs as the model that it takes (as many runs, steps and cells) costs what that costs, and the choice, a millisecond
