@@ -74,9 +74,11 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     if motion:
         values, found, errors, ways = in_motion(asked, of, by)
     else:
-        fine, ways = at_rest(asked, of), len(by) * (way_at_rest(asked),)
-        values, found = fine.values, fine.by(by)
+        fine = at_rest(asked, of)
+        values, found, ways = fine.values, fine.by(by), len(by) * (way_at_rest(asked, fine),)
         errors = OF_DIFFERENCE * np.abs(found - at_rest(asked, of, 2.0).by(by))
+        if isinstance(fine, SystemAtRest):
+            errors = np.maximum(errors, fine.off_by_contact(by, found))
         if asked.environment.seabed is not None:  # there it goes up and down with the cells: two may be alike by chance
             errors = np.maximum(errors, ON_BED * np.abs(found))
         if edges:
@@ -96,11 +98,15 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     return out
 
 
-def way_at_rest(asked: Scene | System) -> str:
-    """The way to derivatives at rest, with what is left out of them."""
+def way_at_rest(asked: Scene | System, rest: CableAtRest | SystemAtRest) -> str:
+    """The way to derivatives at rest, with what is left out of them, and lines that have only begun to touch."""
     bed = asked.environment.seabed
-    rubs = [x for x in (bed and bed.friction, *(y.friction for y in asked.obstacles.values())) if x]
-    return f"{AT_REST}, friction left out" if rubs else AT_REST
+    rubs = [bed and bed.friction, *(y.friction for y in asked.obstacles.values())]
+    contact = rest.contact if isinstance(rest, SystemAtRest) else None
+    if contact is not None and isinstance(asked, System) and asked.contact is not None:
+        rubs.append(asked.contact.friction)
+    begun = [f"lines {a} and {b} begin to touch" for a, b in contact.begins] if contact is not None else []
+    return ", ".join([AT_REST, *(["friction left out"] if any(rubs) else []), *begun])
 
 
 def at_rest(

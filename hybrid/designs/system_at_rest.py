@@ -16,6 +16,7 @@ from scipy import sparse
 
 from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
 from hybrid.designs.cable_at_rest import NO_PLACES, Places, same_places
+from hybrid.designs.contact_at_rest import ContactAtRest
 from hybrid.designs.factors import Factors
 from hybrid.designs.gradients import Gradients
 from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
@@ -35,12 +36,15 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.system_run import static_system
+from hybrid.solve.joined import SystemState
 from hybrid.solve.system import SystemSolver
+from hybrid.solve.system_statics import SystemEquilibrium
 
 OF_LINE = re.compile(r"^(?:(max|min) )?([^/@]+)/(.+)$")
 # Tables of a scene on which every line hangs; numbers of a free body on which none does.
 OF_ALL = ("environment", "obstacles", "output")
 OF_BODIES = (*OF_ALL, "points", "bodies")
+OF_CONTACT = ("self_contact", "energy/self_contact")  # results that contact of lines knows, and none of them alone
 OF_BODY = {
     "mass", "centre", "inertia", "added_mass", "damping", "volume", "centre_of_buoyancy", "hydrostatics", "members",
     "force", "moment",
@@ -84,9 +88,6 @@ class SystemAtRest(OfScene):
         resolution = replace(resolution, lines=finely)
         run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
         assert run.found is not None
-        if run.found.settled:
-            expected = "an equilibrium in which no line touches itself"
-            raise SceneError([Complaint("lines", "contact of a line with itself", expected, "a shape that is apart")])
         self.scene, self._names = system, run.model.names
         self._scenes = {name: self._scene_of(system, name) for name in self._names}
         of_lines = zip(self._names, run.model.models, strict=True)
@@ -110,12 +111,46 @@ class SystemAtRest(OfScene):
             for l, (name, model, state, free) in enumerate(rows)
         ]  # fmt: skip
         A = sparse.csc_array(self._network.stiffness + self._network.skew)
-        self._factors = Factors(A + self._bodies.stiffness_besides(A) if self._bodies.count else A)
+        self.contact = self._contact(run.found, run.state, [x for _, x in wanted])
+        if self.contact is not None:
+            A = A + self._of_unknowns(self.contact.stiffness)
+        self._matrix = A + self._bodies.stiffness_besides(A) if self._bodies.count else A
+        self._factors = Factors(self._matrix)
         self._first_body = self._network.size - 6 * self._bodies.count  # of the unknowns
         self._here = self._arms(run.model), self._bodies.own(run.model)
         self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])
         wanted_of = (l for l, x in enumerate(self.lines) if x.wanted)
         self.gradients = {l: Gradients(self.lines[l], self._bodies.turns(l)) for l in wanted_of}
+
+    def _contact(self, found: SystemEquilibrium, states: SystemState, of: Sequence[Wanted]) -> ContactAtRest | None:
+        """Contact of lines with each other, if they have any, in states at rest.  SceneError: a result is of it."""
+        if found.solver.shared is None and not found.settled:
+            return None
+        contact = ContactAtRest(found.solver, states, self._names, [x.here for x in self.lines])
+        if not contact.stiffness.nnz and not contact.begins:
+            return None
+        if names := [x.name for x in of if x.name in OF_CONTACT]:
+            expected = "a result of lines that do not touch each other in the equilibrium"
+            raise SceneError([Complaint("of", names[0], expected, "tension, position, curvature")])
+        return contact
+
+    def _of_unknowns(self, of_nodes: sparse.csr_array) -> sparse.csc_array:
+        """A matrix of all lines as one of the unknowns."""
+        return sparse.csc_array(self._network.place.T @ of_nodes @ self._network.place)
+
+    def off_by_contact(self, keys: Sequence[str], found: Floats) -> Floats:
+        """(P, W) by how much derivatives `found` may be off by the spacing of the sample points of contact."""
+        if self.contact is None:
+            return np.zeros_like(found)
+        finer = self.contact.finer()
+        if finer is None:
+            return np.abs(found)
+        kept = self._factors
+        self._factors = Factors(self._matrix + self._of_unknowns(finer[0] - self.contact.stiffness))
+        try:
+            return np.asarray(finer[1] * np.abs(self.by(keys) - found))
+        finally:
+            self._factors = kept
 
     def by(self, keys: Sequence[str]) -> Floats:
         """(P, W) derivatives of all results by numbers."""
@@ -125,6 +160,7 @@ class SystemAtRest(OfScene):
         network, rights, shifts, reports = self._network, [], [], []
         every = [x for row in zip(keys, numbers.tolist(), steps.tolist(), strict=True) for x in self._beside(*row)]
         on_bodies = _slope([x.own for x in every], steps)
+        pushes = [] if self.contact is None else [self.contact.forces(x.lines) for x in every]
         for l, line in enumerate(self.lines):
             both = [x.lines[l] for x in every]
             left, report = zip(*(line.left(x) for x in both), strict=True)
@@ -138,7 +174,10 @@ class SystemAtRest(OfScene):
                         on_bodies[b, 3:] -= network.lines[l].turned[k] @ shift.reshape(-1, len(keys))
             shifts.append(shift.reshape(-1, len(keys)))
             reports.append([*zip(both, report, strict=True)])
-        right = np.asarray(network.place.T @ np.concatenate(rights))
+        left_over = np.concatenate(rights)
+        if self.contact is not None:
+            left_over += _slope(pushes, steps)
+        right = np.asarray(network.place.T @ left_over)
         right[self._first_body :] += on_bodies.reshape(-1, len(keys))
         many = all(x.pay_for(len(keys)) for x in self.gradients.values())
         by_state = self.transposed(right, shifts) if many else self.forward(right, shifts)

@@ -356,6 +356,8 @@ GOES_ITS_WAY = Feature(
     "contact, bodies.NAME.shape, obstacles.NAME.motion",
     _either(LINES_TOUCH, SHAPES, Feature("obstacles that move", "motion", _moving_obstacles)),
 )
+BODIES_MOVED = Feature("contact with bodies, with sheaves", "bodies.NAME.shape, obstacles.NAME.bearing",
+                       _either(SHAPES, SHEAVES))  # fmt: skip
 MOVED_BY_LINES = Feature("contact of lines with each other, with bodies, with sheaves",
                          "contact, bodies.NAME.shape, obstacles.NAME.bearing",
                          _either(LINES_TOUCH, SHAPES, SHEAVES))  # fmt: skip
@@ -369,8 +371,7 @@ SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "init
                            _asks("initial", "friction",
                                  lambda x: getattr(x, "friction", "neglected") != "neglected"))  # fmt: skip
 
-ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "hybrid modes",
-                     _used("about rest", "derivatives"))  # fmt: skip
+ABOUT_REST = Feature("natural modes, response to a sea", "hybrid modes", _used("about rest"))
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
@@ -424,6 +425,10 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         FINITE_WAVES, RESPONSE, "physics", "a response by frequency is linear in the waves, and these are not",
         "waves of another kind", "kind: regular has the same height and period; hybrid run computes these in time",
+    ),
+    Refusal(
+        DERIVATIVES, BODIES_MOVED, "not worked out", "what touches ({key}) is a body or a sheave, which moves as well",
+        "lines that touch each other, the seabed and fixed obstacles at most", "hybrid run computes it in time",
     ),
     Refusal(
         DERIVATIVES, SETTLED_FRICTION, "physics", "friction has settled ({key}), and how depends on the way there",

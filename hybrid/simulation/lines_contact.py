@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import JUMP, jumps
@@ -21,12 +22,13 @@ def shared_of(model: SystemModel, rubs: bool = False) -> SharedContact | None:
     """Contact of the lines of a model with each other, with friction or without; None: they have none."""
     if model.touching is None:
         return None
-    strands = []
-    for k in model.touching.lines:
-        x = model.models[k]
-        grows = 0.0 if x.payout is None else float(np.diff(x.payout.nodes).max())
-        strands.append(TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale, grows))
-    return SharedContact(model.touching, strands, rubs)
+    return SharedContact(model.touching, [strand_in(model.models[k]) for k in model.touching.lines], rubs)
+
+
+def strand_in(x: Model) -> TouchingLine:
+    """What contact takes of the line of a model."""
+    grows = 0.0 if x.payout is None else float(np.diff(x.payout.nodes).max())
+    return TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale, grows)
 
 
 def crossed(touching: Touching, first: SystemState, last: SystemState) -> tuple[int, int] | None:

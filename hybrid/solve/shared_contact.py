@@ -14,11 +14,13 @@ from hybrid.kernels.contact.self_contact_law import DISTANCE, P, Q
 from hybrid.kernels.contact.self_contact_pairs import (
     ENERGY,
     HORIZON,
+    NARROWEST,
     POINTS,
     SHARES,
     SLIP_WITHIN,
     STORED,
     TRIED,
+    WIDEST,
     WINDOW,
 )
 from hybrid.kernels.junctions.shared_contact import MEETING, MET, MET_OTHER, MET_S, blank_shared_job, shared_task
@@ -81,6 +83,17 @@ class SharedContact(ContactBooks):
     def s(self) -> Floats:
         """(N+1,) m, arc lengths of the nodes of all of them, with gaps between two."""
         return self._line.s
+
+    def put(self, strands: Sequence[TouchingLine]) -> None:
+        """Take these lines, which differ in numbers from those here, on sample points that stay as many."""
+        of = [strand_of(*x[:4]) for x in strands]
+        for name in ("width", "stiff"):
+            getattr(self.contact, name)[:] = np.concatenate([getattr(x, name) for x in of])
+        width = self.contact.width
+        self.contact.numbers[WIDEST], self.contact.numbers[NARROWEST] = width.max(), width.min()
+        self._own = [x.line.s.copy() for x in strands]
+        self._line.s[:] = self._places(self.starts)
+        self._line.h[:] = np.diff(self._line.s)
 
     def _places(self, starts: Floats) -> Floats:
         """(N+1,) m, arc lengths of the nodes of all lines as parts of the one that begin there."""

@@ -73,6 +73,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.GOES_ITS_WAY): (TWO_LINES | {ONE + "initial": {"friction": "settled"}}, ""),
     (c.ABOUT_REST, c.MOVED_BY_LINES): (TWO_LINES, "about rest"),
+    (c.DERIVATIVES, c.BODIES_MOVED): (TWO_LINES | SHAPED, "derivatives"),
     (c.OTHER_MOTIONS, c.RESPONSE): (
         {"ends.end": {"kind": "free", "force": {"value": [1, 0, 0], "until": 2}}}, "response"
     ),
@@ -91,7 +92,6 @@ OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.SLIP, c.MOVING_ZONES), {SECTION + "stiffness_per_tension": 0.01} | MOVING, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),
-    ((c.ABOUT_REST, c.MOVED_BY_LINES), TWO_LINES, "derivatives"),
 )
 
 
