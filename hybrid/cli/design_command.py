@@ -58,7 +58,7 @@ def _as_data(found: Found) -> dict[str, Any]:
         "title": found.title, "numbers": dict(found.numbers), "start": dict(found.start),
         "kept": [dataclasses.asdict(x) for x in found.kept], "bounds": [dataclasses.asdict(x) for x in found.bounds],
         "minimised": found.minimised, "minimised_at_start": found.minimised_at_start, "equilibria": found.equilibria,
-        "runs": found.runs, "settled": found.settled, "notes": list(found.notes),
+        "runs": found.runs, "settled": found.settled, "notes": list(found.notes), "ways": dict(found.ways),
     }  # fmt: skip
 
 
@@ -83,7 +83,7 @@ def _tables(found: Found) -> Any:
         word = "" if found.settled else "no optimum: see the note"
         numbers.add_row("minimised", f"{found.minimised:.6g}", f"{found.minimised_at_start:.6g}", word)
     if not found.kept:
-        return numbers
+        return Group(numbers, *_ways(found))
     kept = Table(box=None, padding=(0, 2), title_justify="left")
     for name in ("", "result", "value", "asked", "2 x cells", "price"):
         kept.add_column(name, justify="left" if name in ("", "result") else "right", no_wrap=name not in ("", "result"))
@@ -92,7 +92,17 @@ def _tables(found: Found) -> Any:
         price = f"{row.price:.3g}" if row.active and found.minimised is not None else "active" * row.active
         finer = "" if row.finer is None else f"{row.finer:.6g}"
         kept.add_row(name, row.result, f"{row.value:.6g}", f"{WORDS[row.side]} {row.bound:.6g}", finer, price)
-    return Group(numbers, "", kept)
+    return Group(numbers, "", kept, *_ways(found))
+
+
+def _ways(found: Found) -> list[str]:
+    """How slopes of motions were found: of all cases, or of which."""
+    out = []
+    for way in dict.fromkeys(found.ways.values()):
+        cases = [case for case, x in found.ways.items() if x == way]
+        which = f" ({', '.join(cases)})" if len(cases) < len(found.ways) else ""
+        out.append(f"slopes{which} by {way}")
+    return out
 
 
 def _identified(found: Identified) -> Any:
@@ -120,7 +130,7 @@ def _identified(found: Identified) -> Any:
         for name, row in zip(found.numbers, found.correlations.tolist(), strict=True):
             related.add_row(name, *(f"{y:.3f}" if y == y else "" for y in row))
         parts += ["", related]
-    return Group(*parts)
+    return Group(*parts, *_ways(found))
 
 
 def shown(kept: tuple[Kept, ...]) -> list[Kept]:

@@ -73,6 +73,7 @@ class Found:
     value, and where the search began (None: nothing is); equilibria: that were computed; runs: what those that were are
     worth, of `moving` cases; notes: what is doubtful.
     settled: whether what is minimised is least there; False: the search ended before, and a note says why.
+    ways: by case in motion how slopes were found, of all unknowns alike: tangents, or differences of runs, and why.
     scene: with the numbers, without changes of cases; scenes: of each case; before, after: places of nodes (n, 3), m,
     by case and line, where a motion alone is asked of output points where it begins; bed: height of a level seabed, m,
     None: none; file: the scene file, "": none.
@@ -97,6 +98,7 @@ class Found:
     bed: float | None = None
     file: str = ""
     settled: bool = True
+    ways: Mapping[str, str] = field(default_factory=dict)
 
     def scene_text(self, folder: str | Path | None = None) -> str:
         """The scene as YAML; where it was read from a file, and folder is its own, that text with other numbers."""
@@ -227,6 +229,7 @@ def _common(
         "scene": scene_with(asked, equilibria.keys, point.x),
         "scenes": {case: equilibria.scene(case, point.x) for case in equilibria.scenes},
         "before": equilibria.at(space.start).shapes(), "after": point.shapes(), "bed": _bed(asked), "file": file,
+        "ways": dict(equilibria.motions.ways),
     }  # fmt: skip
 
 

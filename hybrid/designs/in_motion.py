@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from typing import Any, NamedTuple
 
@@ -22,13 +22,13 @@ from hybrid.designs.line_at_rest import AXES, refuse_parts
 from hybrid.designs.numbers import at_a_bound, number_of, scene_with, size_of
 from hybrid.designs.peaks import over_time, peaks, smoothed
 from hybrid.designs.replay import Course, course_of, replay, with_outputs
-from hybrid.designs.tangents import Others, Seen, Unfollowed, step_of
+from hybrid.designs.system_tangents import SystemOthers
+from hybrid.designs.tangents import Others, Seen, Unfollowed, has_two_sides, step_of
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.schema import Scene, Spread
 from hybrid.scene.system import System
-from hybrid.simulation.case import Begun
 
 NAME = re.compile(r"^(max|min|mean|std|last|t=\S+) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
 OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
@@ -110,11 +110,9 @@ def by_tangents(
     sizes: Mapping[str, float],
 ) -> Slopes:  # fmt: skip
     """Derivatives by tangents along the steps of one run; Unfollowed: they are not known of it."""
-    if not isinstance(asked, Scene):
-        raise Unfollowed("several lines")
     steps = {key: step_of(key, sizes[key]) for key in numbers}
 
-    def other(key: str, d: float) -> Scene:
+    def other(key: str, d: float) -> Scene | System:
         try:
             return scene_with(asked, [(key,)], np.array([numbers[key] + d]))
         except SceneError as error:
@@ -122,10 +120,11 @@ def by_tangents(
                 raise at_a_bound(key, 0.0) from error
             raise
 
-    pairs = [(other(key, h), other(key, -h)) for key, h in steps.items()]
-    base, values, off = followed(asked, wanted, course, pairs, [*steps.values()])
+    pairs = [
+        (other(key, h), other(key, -h) if has_two_sides([key], numbers[key]) else None) for key, h in steps.items()
+    ]
+    base, slopes, off = followed(asked, wanted, course, pairs, [*steps.values()])
     h = np.array([*steps.values()])[:, None]
-    slopes = (values[:, 0] - values[:, 1]) / (2.0 * h)
     size = np.array([[sizes[key]] for key in numbers])
     parts = off[:, None] + ONE_SIDED * h / size
     errors = parts * np.maximum(np.abs(slopes), WEAK * np.abs(base.values) / size)
@@ -133,22 +132,27 @@ def by_tangents(
 
 
 def followed(
-    asked: Scene, wanted: Sequence[Wanted], course: Course, pairs: Sequence[tuple[Scene, Scene]],
+    asked: Scene | System, wanted: Sequence[Wanted], course: Course, pairs: Sequence[tuple[Any, Any | None]],
     steps: Sequence[float], smooth: bool = False,
 ) -> tuple[Motion, Floats, Floats]:  # fmt: skip
-    """A run, results (P, 2, W) of scenes with more and with less of each number by a step, and parts of tangents (P,)
+    """A run, derivatives (P, W) of results by numbers, and parts of tangents (P,) by which these may be off.
 
-    by which these may be off.  smooth: as of `Motion`, with all peaks of each result in turn, so that W is more.
+    pairs: scenes with more of each number by a step, and with less of those that are to be seen from both sides.
+    smooth: as of `Motion`, with all peaks of each result in turn, so that W is more.
     """
     each_step, more = any(x.over == "t" for x in wanted), Motion.more(wanted) if smooth else None
-    scenes = [
-        (with_outputs(a, course, each_step=each_step), with_outputs(b, course, each_step=each_step)) for a, b in pairs
-    ]
-    others = Others(scenes, steps, course.lines[""], more)
+    own = with_outputs(asked, course, each_step=each_step)
+    scenes: list[Any] = [tuple(x and with_outputs(x, course, each_step=each_step) for x in pair) for pair in pairs]
+    others: Others | SystemOthers
+    if isinstance(own, System):
+        others = SystemOthers(own, scenes, steps, course.lines)
+    else:
+        others = Others(own, scenes, steps, course.lines[""], more)
     base = Motion(asked, wanted, course, smooth=smooth, begun=others.begin)
-    seen = others.results(sorted({x.name for x in wanted}))
-    values = np.array([[base.beside(x, wanted) for x in pair] for pair in seen])
-    return base, values, others.errors
+    names = {line: sorted({x.name for x in wanted if x.line == line}) for line in {x.line for x in wanted}}
+    here, *beside = [[base.beside(x, wanted) for x in each] for each in others.results(names)]
+    slopes = [(x[0] - (x[1:] or here)[0]) / (h * len(x)) for x, h in zip(beside, steps, strict=True)]
+    return base, np.array(slopes), others.errors
 
 
 def by_differences(
@@ -227,7 +231,7 @@ class Motion:
 
     def __init__(
         self, scene: Scene | System, wanted: Sequence[Wanted], course: Course, base: Motion | None = None,
-        finer: bool = False, smooth: bool = False, begun: Begun | None = None,
+        finer: bool = False, smooth: bool = False, begun: Callable[..., None] | None = None,
     ) -> None:  # fmt: skip
         """course, finer, begun: as of `replay`; smooth: extremes are those of parabolas in time and along the line,
 
@@ -260,14 +264,14 @@ class Motion:
         """Places that are wanted, m."""
         return [x.at for x in wanted if x.at is not None and np.isfinite(x.at)]
 
-    def beside(self, seen: Seen, wanted: Sequence[Wanted]) -> Floats:
-        """The same results of other outputs in these steps, of a scene with another number, of all peaks in turn:
+    def beside(self, seen: Mapping[str, Seen], wanted: Sequence[Wanted]) -> Floats:
+        """The same results of other outputs, by line, in these steps, of a scene with another number, of all peaks in
 
-        extremes are where they are in this run.  Unfollowed: there are others.
+        turn: extremes are where they are in this run.  Unfollowed: there are others.
         """
         other = copy(self)
-        other._cables, other._t = {"": seen.scene.cable}, {"": seen.t}
-        other._histories = other._read({"": seen}, wanted)
+        other._cables, other._t = {k: x.scene.cable for k, x in seen.items()}, {k: x.t for k, x in seen.items()}
+        other._histories = other._read(seen, wanted)
         if other.shapes != self.shapes:
             raise Unfollowed("outputs of a section are more or fewer")
         return other.at_peaks(wanted, self.peaks)

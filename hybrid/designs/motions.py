@@ -15,13 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.designs.in_motion import Motion, followed, parse_history, size_of
+from hybrid.designs.in_motion import DIFFERENCES, TANGENTS, Motion, followed, parse_history, size_of
 from hybrid.designs.numbers import number_of
 from hybrid.designs.replay import Course, course_of
-from hybrid.designs.tangents import Unfollowed, step_of
+from hybrid.designs.tangents import Unfollowed, has_two_sides, step_of
 from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats
-from hybrid.scene.schema import Scene
 
 # Behind the name of a result of a motion; part of a number by which runs differ: off by as much, round-off is 1e-8.
 IN_MOTION, PART = " in motion", 1e-4
@@ -93,7 +92,7 @@ class Motions:
         self.count = 0.0
         self._courses: dict[str, Course] = {}
         self._last: dict[str, tuple[Floats, list[Peaks]]] = {}  # of each case the last run whose slopes were asked for
-        self._differences: set[str] = set()  # cases whose tangents are not known
+        self.ways: dict[str, str] = {}  # by case that has slopes, how these are found
 
     def at(self, x: Floats, finer: bool = False, cases: Iterable[str] | None = None) -> OfMotion:
         """Runs with values (n,) of unknowns; cases: of which; others are foretold; None: of all."""
@@ -199,13 +198,14 @@ class Motions:
 
     def _with_tangents(self, point: OfMotion, case: str) -> bool:
         """Run a case with tangents along its steps; False: these are not known of it."""
-        if case in self._differences:
+        if self.ways.get(case, TANGENTS) != TANGENTS:
             return False
         try:
             self._take(point, case, self._tangents(point, case))
-        except Unfollowed:
-            self._differences.add(case)
+        except Unfollowed as why:
+            self.ways[case] = f"{DIFFERENCES}: {why}"
             return False
+        self.ways[case] = TANGENTS
         return True
 
     def _size(self, point: OfMotion, case: str, i: int) -> float:
@@ -215,22 +215,22 @@ class Motions:
     def _tangents(self, point: OfMotion, case: str) -> Floats:
         """Slopes (W, n) of a run that is made with tangents along its steps; Unfollowed: these are not known of it."""
         scene = self._scene_of(case, point.x)
-        if not isinstance(scene, Scene):
-            raise Unfollowed("several lines")
         if case not in self._courses:
             self._courses[case] = course_of(scene)
         each = range(point.x.size)
         steps = [min(step_of(key, self._size(point, case, i)) for key in self._keys[i]) for i in each]
 
-        def other(i: int, d: float) -> Scene:
-            found: Scene = self._scene_of(case, point.x + d * (np.arange(point.x.size) == i))
-            return found
+        def other(i: int, d: float) -> Any:
+            return self._scene_of(case, point.x + d * (np.arange(point.x.size) == i))
 
-        pairs = [(other(i, h), other(i, -h)) for i, h in zip(each, steps, strict=True)]
-        run, values, _ = followed(scene, self._of[case], self._courses[case], pairs, steps, smooth=True)
+        pairs = [
+            (other(i, h), other(i, -h) if has_two_sides(self._keys[i], float(point.x[i])) else None)
+            for i, h in zip(each, steps, strict=True)
+        ]
+        run, slopes, _ = followed(scene, self._of[case], self._courses[case], pairs, steps, smooth=True)
         self.count += 1 + TANGENT * point.x.size
         point.runs[case] = run
-        return np.asarray((values[:, 0] - values[:, 1]) / (2.0 * np.array(steps)[:, None])).T
+        return slopes.T
 
     def _difference(self, point: OfMotion, case: str, i: int) -> Floats:
         """Change of results of a case by one unknown; ComputationError: no run beside goes as this one does."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,11 +21,11 @@ from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
-from hybrid.simulation.case import Begun, Case
+from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import resolution_from
 from hybrid.simulation.system_checkpoint import kept_resolution
-from hybrid.simulation.system_run import run_system
+from hybrid.simulation.system_run import Recording, run_system
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
@@ -82,13 +82,13 @@ def course_of(scene: Scene | System) -> Course:
 
 def replay(
     scene: Scene | System, course: Course, finer: bool = False, more: Sequence[float] | None = None,
-    each_step: bool = False, begun: Begun | None = None,
+    each_step: bool = False, begun: Callable[..., None] | None = None,
 ) -> Result:  # fmt: skip
     """A run into memory, in the steps and on the nodes of a course; finer: on nodes as the scene has them, cells and
 
     steps half as long.
 
-    more, each_step: as of `with_outputs`; begun: of one cable: as of `Case.record`.
+    more, each_step: as of `with_outputs`; begun: as of `Case.record` or, of several lines, of `Recording`.
     SceneError, ComputationError: as of `hybrid.run`.
     """
     scene = with_outputs(scene, course, more, each_step, finer)
@@ -97,7 +97,8 @@ def replay(
         Case(scene, None).record(lines[""], target, begun=begun)
         return written_result(target)
     reporter = ProgressReporter(None, scene.require_time().duration)
-    run_system(scene, target, scene_text(scene), reporter, lambda: False, resolution=SystemResolution(lines))
+    recording, resolution = Recording(begun=begun), SystemResolution(lines)
+    run_system(scene, target, scene_text(scene), reporter, lambda: False, resolution=resolution, recording=recording)
     return written_result(target)
 
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.designs.line_at_rest import displaced
 from hybrid.designs.replay import at_nodes
@@ -27,7 +28,19 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, blank_books, sample_size
 from hybrid.kernels.state.forces import FRICTION, PLANAR, SELF_CONTACT, SOIL, STIFFNESS_DAMPING, VORTICES, WAVES
 from hybrid.kernels.state.report import ASSEMBLED
-from hybrid.kernels.state.state import LANES, Batch, Ends, Floats, Line, Sea, State, Work, batch_of_one, state_for
+from hybrid.kernels.state.state import (
+    LANES,
+    Batch,
+    Ends,
+    Floats,
+    Line,
+    Moves,
+    Sea,
+    State,
+    Work,
+    batch_of_one,
+    state_for,
+)
 from hybrid.kernels.watch.tangent_job import (
     BROKEN,
     FOLLOWED,
@@ -76,15 +89,38 @@ def step_of(key: str, size: float) -> float:
     return size * next((part for pattern, part in kinds if pattern.search(key)), PART)
 
 
+def has_two_sides(keys: Iterable[str], number: float) -> bool:
+    """Whether results by a number are seen from both sides: nodes go along with lengths past the places of outputs.
+
+    So is a number that is 0, which has to be allowed to be less.
+    """
+    return number == 0.0 or any(LENGTH.search(key) for key in keys)
+
+
+class Tangent(NamedTuple):
+    """Of a line by a number: tangents of its state, of the spin of its cells, sizes (kernels.watch.tangent_job), and by
+
+    how much the number of the other line is more.
+    """
+
+    rate: State
+    spin: Floats
+    sizes: Floats
+    h: float
+
+
 class Others:
     """The lines of scenes with more of each number beside the line of a run, and with less on its other side."""
 
     def __init__(
-        self, scenes: Sequence[tuple[Scene, Scene]], steps: Sequence[float], resolution: Resolution,
-        more: Sequence[float] | None = None,
+        self, scene: Scene, scenes: Sequence[tuple[Scene, Scene | None]], steps: Sequence[float],
+        resolution: Resolution, more: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
-        """scenes: with more of each number by a step, and with less; more: as of `replay.with_outputs`."""
-        self._more_points = more
+        """scene: of the run; scenes: with more of each number by a step, and with less (None: it is not looked at);
+
+        more: as of `replay.with_outputs`.
+        """
+        self._more_points, self._scene = more, scene
         self._scenes, self._steps, self._resolution = list(scenes), np.array(steps, float), resolution
         self.models = [build(more, resolution, spare=False) for more, _ in scenes]
         self._first: list[Batch] = []
@@ -100,7 +136,7 @@ class Others:
         self._lines = []
         for k, x in enumerate(self.models):
             try:
-                self._lines.append(self._line_of(x))
+                self._lines.append(line_like(x, model))
             except Unfollowed as why:
                 why.number = k
                 raise
@@ -116,28 +152,10 @@ class Others:
         reports = self._accelerate(run.state.copy(), rates, spins)
         self._attach(run, reports, rates, spins)
         ends, sea, report = model.ends.at(0.0), model.sea.at(0.0), run.run.books.report[0]
-        self._base.append(_copied(batch_of_one(0.0, ends, run.state, report, np.zeros(len(POWERS)), sea)))
-        loop.shown = lambda batch: self._base.append(_copied(batch))
+        self._base.append(copied(batch_of_one(0.0, ends, run.state, report, np.zeros(len(POWERS)), sea)))
+        loop.shown = lambda batch: self._base.append(copied(batch))
 
     # --- the start --------------------------------------------------------------------------------------
-
-    def _line_of(self, model: Model) -> Line:
-        """The line of a scene with more of a number, of the kind that the line of the run is."""
-        base, line = self._model, model.line
-        if base.line.bits & PLANAR and not line.bits & PLANAR:
-            if model.plane is None or base.plane is None or np.abs(model.plane - base.plane).max() > 1e-12:
-                raise Unfollowed("the number moves the plane of the line")
-            line = planar(line, base.plane)
-        elif line.bits & PLANAR and not base.line.bits & PLANAR:
-            raise Unfollowed("the line has left its plane")
-        pairs: Any = zip(line, base.line, strict=True)
-        for name, (x, y) in zip(line._fields, pairs, strict=True):
-            alike = x.shape == y.shape if isinstance(x, np.ndarray) else x == y
-            if not alike or (name in ("element", "spin") and not np.array_equal(x, y)):
-                raise Unfollowed(f"the number changes what the line has ({name})")
-        if not np.array_equal(model.ends.values.held, base.ends.values.held):
-            raise Unfollowed("the number changes what ends hold")
-        return line
 
     def _at_start(self, here: State, rests: bool) -> tuple[list[State], list[Floats]]:
         """Tangents of the first state, which accelerations complete; here: that state without accelerations."""
@@ -234,77 +252,54 @@ class Others:
         work = run.stepper.work._replace(X=workspace(cells, keep=True).X)
         run.take(model, work)
         compiled.table.bind(work=work)
-        room = Table(blank_other).numbers.size
-        tables, self._kept = np.zeros((len(self.models), room), np.int64), []
+        tables, self._kept = np.zeros((len(self.models), Table(blank_other).numbers.size), np.int64), []
         self._books: list[Books] = []
-        around = model.sea.values
+        around, outputs = model.sea.values, compiled.books.outputs
         same = [bool(model.line.bits & WAVES) and same_waves(around, x.sea.values) for x in self.models]
         for k, (x, report) in enumerate(zip(self.models, reports, strict=True)):
             ends, sea, there = x.ends.at(0.0), x.sea.at(0.0), beside(run.state, rates[k], spins[k], self._steps[k])
-            books = self._books_of(compiled, cells, ends, report)
+            books = books_beside(compiled.clock, outputs, int(compiled.count[b.OUTPUT]), cells, ends, report)
             self._books.append(books)
             self._first.append(batch_of_one(0.0, ends, there, report, np.zeros(len(POWERS)), sea))
-            table = Table(blank_other, tables[k])
-            table.bind(
-                line=self._lines[k], sea=x.sea.values, ends=x.ends.values, moves=x.ends.moves(), even=there,
-                odd=there.copy(), rates=rates[k], spin=spins[k], before=rates[k].copy(), spin_before=spins[k].copy(),
-                work=workspace(cells), books=books, left=np.zeros((cells + 1, 5)), sizes=self.sizes[k],
-                same_waves=int(same[k]), h=float(self._steps[k]),
-            )  # fmt: skip
-            self._kept.append(table)
-        sea = around._replace(slid=np.zeros((cells + 1, 3)), bed=np.zeros((cells + 1, 3)))
-        self._found = np.zeros(2, np.int64)
-        even, odd = compiled.states
-        own = workspace(cells)._replace(u=work.u)
-        table = Table(blank_tangent_job)
-        table.bind(
-            line=model.line, sea=sea, ends=model.ends.values, even=even, odd=odd, work=work, own=own,
-            clock=compiled.clock, counts=compiled.count, left=np.zeros((cells + 1, 5)), last=run.state.a.copy(),
-            ahead=np.zeros((cells + 1, 3)), slopes=np.zeros(((cells + 1) * any(same), SLOPES)),
-            lanes=np.zeros((PHASES + 2 * len(around.waves), LANES)), found=self._found, tables=tables,
-        )  # fmt: skip
+            of = Tangent(rates[k], spins[k], self.sizes[k], float(self._steps[k]))
+            moves = x.ends.moves()
+            self._kept.append(bind_other(tables[k], self._lines[k], ends, sea, moves, there, of, books, same[k])[0])
+        self._found, ends = np.zeros(2, np.int64), model.ends.values
+        at = compiled.clock, compiled.count, tables, self._found, any(same)
+        table, _ = bind_line(model.line, ends, around, compiled.states, work, *at)
         self._kept.append(table)
         follow = follow_in_plane if self._is_planar else follow_in_space
         compiled.table.bind(following=table.numbers, follower=follow.address(table.numbers))
 
-    def _books_of(self, compiled: Any, cells: int, ends: Ends, report: Floats) -> Books:
-        """Books of another line, whose outputs are those of the run."""
-        books, outputs = blank_books(cells), compiled.books.outputs
-        books.counts[b.OUTPUT] = compiled.count[b.OUTPUT]
-        books.report[0] = report
-        for k in (0, 1):
-            parts = (ends.position[k], ends.frame[k], ends.spin[k], ends.force[k], ends.moment[k])
-            books.imposed[0, k] = np.concatenate(parts)
-        samples = np.zeros((outputs.size - int(compiled.count[b.OUTPUT]), sample_size(cells)))
-        return books._replace(clock=compiled.clock, outputs=outputs, samples=samples)
-
     @property
     def errors(self) -> Floats:
         """(P,) parts of tangents by which they may be off: what the last corrections leave of them."""
-        sizes = np.maximum(self.sizes, 1e-300)
-        return np.maximum(sizes[:, LEFT_R] / sizes[:, LARGEST_R], sizes[:, LEFT_T] / sizes[:, LARGEST_T])
+        return parts_of_sizes(self.sizes)
 
     # --- what is found ----------------------------------------------------------------------------------
 
-    def results(self, names: Sequence[str]) -> list[tuple[Seen, Seen]]:
-        """Of every number, results by name at all outputs of the scenes with more and with less of it.  Unfollowed."""
+    def results(self, names: Mapping[str, Sequence[str]]) -> list[tuple[Mapping[str, Seen], ...]]:
+        """Results by name at all outputs of the line "", of the scene itself, then of every number of the scenes with
+
+        more of it, and with less.  Unfollowed.
+        """
         run = self._run
         if run.model is not self._model or self._found[FOLLOWED] != run.steps or self._found[BROKEN]:
             raise Unfollowed("the line, or what acts on it, becomes another one in the run")
-        return [self._seen(p, names) for p in range(len(self.models))]
+        base, line = joined(self._base), self._model.line
+        here = self._looked_at(self._scene, self._model, line, base, names[""])
+        return [({"": here},), *(self._seen(p, base, names[""]) for p in range(len(self.models)))]
 
-    def _seen(self, p: int, names: Sequence[str]) -> tuple[Seen, Seen]:
+    def _seen(self, p: int, base: Batch, names: Sequence[str]) -> tuple[Mapping[str, Seen], ...]:
         books, held, cells = self._books[p], self._model.ends.values.held, self._model.line.h.size
         rest, _ = batch_of_rows(books.samples[: int(books.counts[b.SAMPLES])], cells, held, False, 0, 0)
-        more, base = _joined([self._first[p], rest]), _joined(self._base)
-        sides: Any = zip(base, more, strict=True)
-        less = Batch(*(_opposite(x, y) for x, y in sides))
-        (scene, other), model = self._scenes[p], self.models[p]
-        beside = build(other, self._resolution, spare=False)
-        return (
-            self._looked_at(scene, model, self._lines[p], more, names),
-            self._looked_at(other, beside, self._line_of(beside), less, names),
-        )
+        more, (scene, other) = joined([self._first[p], rest]), self._scenes[p]
+        seen = {"": self._looked_at(scene, self.models[p], self._lines[p], more, names)}
+        if other is None:
+            return (seen,)
+        model = build(other, self._resolution, spare=False)
+        less = self._looked_at(other, model, line_like(model, self._model), opposite(base, more), names)
+        return seen, {"": less}
 
     def _looked_at(self, scene: Scene, model: Model, line: Line, batch: Batch, names: Sequence[str]) -> Seen:
         if self._more_points is not None:
@@ -325,7 +320,7 @@ class Seen(NamedTuple):
     t: Floats
 
 
-def _copied(batch: Batch) -> Batch:
+def copied(batch: Batch) -> Batch:
     parts: Any = [np.array(x) for x in batch]
     return Batch(*parts)
 
@@ -339,7 +334,7 @@ def _opposite(here: Any, more: Any) -> Any:
     return np.asarray(here + np.where(np.isfinite(away), away, 0.0))
 
 
-def _joined(batches: Sequence[Batch]) -> Batch:
+def joined(batches: Sequence[Batch]) -> Batch:
     """One after the other; what does not vary from output to output is that of the last one."""
     counts = [x.t.size for x in batches]
     parts: list[Any] = []
@@ -350,24 +345,116 @@ def _joined(batches: Sequence[Batch]) -> Batch:
     return Batch(*parts)
 
 
+def line_like(model: Model, base: Model) -> Line:
+    """The line of a scene with more of a number, of the kind of that of the run.  Unfollowed: it is another."""
+    line = model.line
+    if base.line.bits & PLANAR and not line.bits & PLANAR:
+        if model.plane is None or base.plane is None or np.abs(model.plane - base.plane).max() > 1e-12:
+            raise Unfollowed("the number moves the plane of the line")
+        line = planar(line, base.plane)
+    elif line.bits & PLANAR and not base.line.bits & PLANAR:
+        raise Unfollowed("the line has left its plane")
+    pairs: Any = zip(line, base.line, strict=True)
+    for name, (x, y) in zip(line._fields, pairs, strict=True):
+        alike = x.shape == y.shape if isinstance(x, np.ndarray) else x == y
+        if not alike or (name in ("element", "spin") and not np.array_equal(x, y)):
+            raise Unfollowed(f"the number changes what the line has ({name})")
+    if not np.array_equal(model.ends.values.held, base.ends.values.held):
+        raise Unfollowed("the number changes what ends hold")
+    return line
+
+
 def refuse(run: Transient) -> None:
     """Unfollowed where a run has what the kernel does not know, with what that is."""
-    model = run.model
+    refuse_what(
+        unknown_of(run.model)
+        | {
+            "zones move": run.switching is not None, "line is paid out": run.payout is not None,
+            "the line may touch itself": run.run.contact is not None,
+            "errors of the model are followed": run.correction is not None,
+        }
+    )  # fmt: skip
+
+
+def refuse_what(what: Mapping[str, bool]) -> None:
+    """Unfollowed where something of this is there."""
+    if found := [text for text, there in what.items() if there]:
+        raise Unfollowed(", ".join(found))
+
+
+def unknown_of(model: Model) -> dict[str, bool]:
+    """What kernels of tangents do not know of a line, and whether it has that."""
     line, ends = model.line, model.ends
-    what = {
-        "zones move": run.switching is not None, "line is paid out": run.payout is not None,
-        "the line may touch itself": bool(line.bits & SELF_CONTACT) or run.run.contact is not None,
+    return {
+        "the line may touch itself": bool(line.bits & SELF_CONTACT),
         "vortices follow the motion": bool(line.bits & VORTICES),
         "tension is no multiple of strain": line.law.size > 0,
         "layers slip": line.slip_law.size > 0, "tension makes a torque": line.tension_torque.size > 0,
         "a torque passes through catenary zones": line.torsion.size > 0, "obstacles move": line.moved.size > 0,
         "loads change in the run": bool(ends.breaks) or min(ends.release_times) < math.inf,
         "friction of the bed": bool(line.bits & FRICTION), "soil remembers": bool(line.bits & SOIL),
-        "errors of the model are followed": run.correction is not None,
     }  # fmt: skip
-    found = [text for text, there in what.items() if there]
-    if found:
-        raise Unfollowed(", ".join(found))
+
+
+def bind_other(
+    room: NDArray[np.int64], line: Line, ends: Ends, sea: Sea, moves: Moves, there: State, tangent: Tangent,
+    books: Books, same: bool,
+) -> tuple[Table, Floats]:  # fmt: skip
+    """Fill `room` with an OtherLine (kernels.watch.tangent_job) at `there`: its table, and its report.
+
+    same: whether its waves are those of the run.
+    """
+    cells, table = line.h.size, Table(blank_other, room)
+    work = workspace(cells)
+    table.bind(
+        line=line, sea=sea, ends=ends, moves=moves, even=there, odd=there.copy(), rates=tangent.rate,
+        spin=tangent.spin, before=tangent.rate.copy(), spin_before=tangent.spin.copy(), work=work,
+        books=books, left=np.zeros((cells + 1, 5)), sizes=tangent.sizes, same_waves=int(same), h=float(tangent.h),
+    )  # fmt: skip
+    return table, work.report
+
+
+def bind_line(
+    line: Line, ends: Ends, sea: Sea, states: tuple[State, State], work: Work, clock: Floats,
+    counts: NDArray[np.int64], tables: NDArray[np.int64], found: NDArray[np.int64], same: bool,
+) -> tuple[Table, Floats]:  # fmt: skip
+    """A TangentJob of a line of a run, whose states take turns, and the report that it works with.
+
+    same: whether waves of other lines are its own.
+    """
+    cells, table = line.h.size, Table(blank_tangent_job)
+    own = workspace(cells)._replace(u=work.u)
+    table.bind(
+        line=line, sea=sea._replace(slid=np.zeros((cells + 1, 3)), bed=np.zeros((cells + 1, 3))), ends=ends,
+        even=states[0], odd=states[1], work=work, own=own, clock=clock, counts=counts,
+        left=np.zeros((cells + 1, 5)), last=states[0].a.copy(), ahead=np.zeros((cells + 1, 3)),
+        slopes=np.zeros(((cells + 1) * same, SLOPES)), lanes=np.zeros((PHASES + 2 * len(sea.waves), LANES)),
+        found=found, tables=tables,
+    )  # fmt: skip
+    return table, own.report
+
+
+def books_beside(clock: Floats, outputs: Floats, done: int, cells: int, ends: Ends, report: Floats) -> Books:
+    """Books of another line, whose outputs are those of the run, of which so many are done."""
+    books = blank_books(cells)
+    books.counts[b.OUTPUT], books.report[0] = done, report
+    for k in (0, 1):
+        parts = (ends.position[k], ends.frame[k], ends.spin[k], ends.force[k], ends.moment[k])
+        books.imposed[0, k] = np.concatenate(parts)
+    samples = np.zeros((outputs.size - done, sample_size(cells)))
+    return books._replace(clock=clock, outputs=outputs, samples=samples)
+
+
+def parts_of_sizes(sizes: Floats) -> Floats:
+    """Parts of tangents by which they may be off, of sizes (.., TANGENT_SIZES): what the last corrections leave."""
+    sizes = np.maximum(sizes, 1e-300)
+    return np.maximum(sizes[..., LEFT_R] / sizes[..., LARGEST_R], sizes[..., LEFT_T] / sizes[..., LARGEST_T])
+
+
+def opposite(here: Batch, more: Batch) -> Batch:
+    """Outputs as far from those of the run to the other side."""
+    both: Any = zip(here, more, strict=True)
+    return Batch(*(_opposite(x, y) for x, y in both))
 
 
 def same_waves(one: Sea, other: Sea) -> bool:

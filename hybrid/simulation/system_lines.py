@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -163,6 +163,7 @@ class LineResult:
         self.manager: DomainManager | None = None  # of zones that move
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
+        self.shown: Callable[[Batch], None] | None = None  # what looks at outputs beside the recorder
         self._log: list[Floats] = []
 
     def _own_books(self, state: State) -> Books:
@@ -363,6 +364,8 @@ class LineResult:
 
     def output(self, batch: Batch) -> None:
         """Record states."""
+        if self.shown is not None:
+            self.shown(batch)
         self._waiting.append(batch)
         full = sum(len(x.t) for x in self._waiting) >= WAITING
         if full or not self._moves or self.observer.writes_criteria:

@@ -96,7 +96,7 @@ class Recording(NamedTuple):
 
     kept: whether a file gets checkpoints; source: the result to go on with, from its checkpoint, in place of a start;
     found: what was found before the run, for whoever goes on with its file; pending: what is to come when it is
-    complete (store.records); notes: events (kind, text) of the whole of the run.
+    complete (store.records); notes: events (kind, text) of the whole of the run; begun: called behind the first output.
     """
 
     kept: bool = False
@@ -104,6 +104,7 @@ class Recording(NamedTuple):
     found: Tree | None = None
     pending: str = ""
     notes: Sequence[tuple[str, str]] = ()
+    begun: Callable[[SystemRun], None] | None = None
 
 
 ALONE = Recording()
@@ -123,7 +124,7 @@ class SystemRun:
         for, or the checkpoint says; criterion: one more for zones that move (adapt.user_criterion); changes: loads and
         motions of these systems hold from some time on.
         """
-        kept, source, found, pending, notes = recording
+        kept, source, found, pending, notes, self._begun = recording
         self._before, self._pending, self._notes = found or {}, pending, notes
         end = system.require_time().duration if moves else 0.0
         self.changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < end]
@@ -565,6 +566,8 @@ class SystemRun:
         self.take_other()
         self._attach()
         self._output()
+        if self._begun is not None:
+            self._begun(self)
         self.gather_events()
         self._between = True
         self.keep()

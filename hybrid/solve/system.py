@@ -650,6 +650,24 @@ class SystemSolver:
         give = np.linalg.eigvalsh(0.5 * (C + C.T))
         return bool(give[0] > -1e-6 * NEUTRAL * give[-1])
 
+    def keep_factors(self) -> None:
+        """Keep all factors of all lines in every march from now on, for other right-hand sides."""
+        for k, (x, work) in enumerate(zip(self.lines, self.work, strict=True)):
+            self.work[k] = work._replace(X=np.zeros((x.line.h.size + 1) * (ROW + KEPT)))
+            self.bind_line(k, work=self.work[k])
+
+    def factor(self, states: SystemState, ca: float) -> bool:
+        """Leave the factors of states as they are where `keep_factors` keeps them; ca: as of `evaluate_forces`.
+
+        False: the system is singular.
+        """
+        self._gaps[:] = 0.0
+        for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
+            work.u[:] = 0.0
+            self._around(x, state, work)
+        taken = self._solve(Task(CORRECTION, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states)
+        return taken.outcome == Outcome.OK
+
     def newton_round(self, states: SystemState) -> SystemTaken:
         """Static Newton from states at rest, which it overwrites; springs of `anchor` times their mass hold nodes and
 

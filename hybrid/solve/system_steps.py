@@ -125,6 +125,10 @@ class SystemSteps:
         """These tables (W, ..) of kernels.reel.reel change the lengths of lines from now on, by pay_out at `payer`."""
         self._job.bind(paid=lines, payer=payer)
 
+    def take_tangents(self, job: np.ndarray, follower: int) -> None:
+        """After every step this kernel takes tangents along it, with a table of kernels.run.system_tangents."""
+        self._job.bind(beside=job, tangents=follower)
+
     def watch_nothing(self) -> None:
         """Look after no pair of lines."""
         self._job.bind(watcher=0)

@@ -136,6 +136,7 @@ class StepsJob(NamedTuple):
     watched_odd: NDArray[np.int64]
     followed: NDArray[np.int64]  # (Z, ..) tables of kernels.mesh.zone_step.ZoneJob, with this clock and these counts
     paid: NDArray[np.int64]  # (W, ..) likewise of kernels.reel.reel.ReelJob, of lines that are paid out
+    beside: NDArray[np.int64]  # of a kernels.run.system_tangents.SystemTangents
     solver: int = 0  # address of kernels.run.system.solve_system
     marcher: int = 0  # of the kernel that solves a step of one line
     book: int = 0  # of book_system_step
@@ -144,6 +145,7 @@ class StepsJob(NamedTuple):
     watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
     follower: int = 0  # of kernels.mesh.zone_step.follow_zones; 0: no zones move, or Python follows them
     payer: int = 0  # of kernels.reel.payout.pay_out; 0: lines keep their lengths
+    tangents: int = 0  # of kernels.run.system_tangents.follow_system; 0: none are followed
 
 
 def no_loads() -> tuple[Floats, Floats]:
@@ -159,7 +161,7 @@ def blank_steps_job() -> StepsJob:
     return StepsJob(
         none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
         np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
-        none, none, lone, lone,
+        none, none, lone, lone, none,
     )  # fmt: skip
 
 
@@ -357,6 +359,8 @@ def accept(steps, system):
             watched = steps.watched_even
         if call_watch(steps.watcher, watched) > 0:
             flags |= LINES_NEAR
+    if steps.tangents != 0:
+        call_watch(steps.tangents, steps.beside)
     counts[ROWS] += 1
     counts[WASTED], counts[PHASE] = 0, SAMPLE
     if follow_lines(steps) != 0:

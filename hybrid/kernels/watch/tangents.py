@@ -265,8 +265,18 @@ def needs_two(sizes):
 
 
 @inner
-def correct_tangent(plane, space, job, other, s, here, there_old, there):
-    """Put the other line at the tangents of the end of a step, and correct these by what its equations leave over."""
+def leave_apart(job, other, here, there):
+    """What the equations of the other line leave over (other.left), less what those of the line do, by h."""
+    h, b = other.h, other.left
+    for i in range(b.shape[0]):
+        b[i, 0] = length_left(job.line, other, here, there, other.rates, i - 1)
+        for k in range(1, 5):
+            b[i, k] = (b[i, k] - job.left[i, k]) / h
+
+
+@inner
+def leave_over(plane, space, job, other, s, here, there_old, there):
+    """Put the other line at the tangents of the end of a step, and leave over what its equations do."""
     line, h, now, was = other.line, other.h, other.rates, other.before
     work, b = other.work, other.left
     put_other(plane, space, line, here, now, other.spin, h, there)
@@ -277,19 +287,29 @@ def correct_tangent(plane, space, job, other, s, here, there_old, there):
         left_over_in_space(line, other.sea, other.ends, there_old.r, there, s.cv, s.ca, work, b)
     if plane is not None:
         left_over_in_plane(line, other.sea, other.ends, there_old.r, there, s.cv, s.ca, work, b)
-    for i in range(b.shape[0]):
-        b[i, 0] = length_left(job.line, other, here, there, now, i - 1)
-        for k in range(1, 5):
-            b[i, k] = (b[i, k] - job.left[i, k]) / h
+    leave_apart(job, other, here, there)
+
+
+@inner
+def stay_held(job, x):
+    """Held ends are not corrected: rounding would lift one that lies at the very edge of the bed."""
+    for k in range(2):
+        if job.ends.held[k] == 1:
+            i = 0 if k == 0 else x.shape[0] - 1
+            x[i, 1], x[i, 2], x[i, 3] = 0.0, 0.0, 0.0
+
+
+@inner
+def correct_tangent(plane, space, job, other, s, here, there_old, there):
+    """Put the other line at the tangents of the end of a step, and correct these by what its equations leave over."""
+    work, b = other.work, other.left
+    leave_over(plane, space, job, other, s, here, there_old, there)
     if space is not None:
         solve_again(job.work.X, job.work.W, b, work.x)
     if plane is not None:
         solve_again_planar(plane, job.work.X, b, work.x)
-    for k in range(2):
-        if job.ends.held[k] == 1:  # rounding would lift an end that lies at the very edge of the bed
-            i = 0 if k == 0 else b.shape[0] - 1
-            work.x[i, 1], work.x[i, 2], work.x[i, 3] = 0.0, 0.0, 0.0
-    correct_rates(space, work.x, s, now, other.spin)
+    stay_held(job, work.x)
+    correct_rates(space, work.x, s, other.rates, other.spin)
 
 
 @inner
@@ -322,46 +342,63 @@ def turn_over(was, now, spin_was, spin_now):
 
 
 @inner
-def advance(plane, space, job, other, s, old, new, report):
-    """The other line from the beginning of the last step of the run to its end; report: of the step."""
-    there_old, there = other.even, other.odd
-    if job.counts[PARITY] == 0:  # the run is in its even state
-        there_old, there = other.odd, other.even
-    line, sea, now, h = other.line, other.sea, other.rates, other.h
+def begin_other(space, job, other, s, there_old):
+    """Ends and sea of the other line at the end of a step, and its tangents there as they are predicted."""
+    sea, now = other.sea, other.rates
     ends_at(job.clock[NOW], other.moves, sea, other.ends, other.books.velocity)
     sea_at(job.clock[NOW], sea)
     turn_over(other.before, now, other.spin_before, other.spin)
-    predict_rates(space, line, s, other.before, other.spin_before, now, other.spin)
+    predict_rates(space, other.line, s, other.before, other.spin_before, now, other.spin)
     predict_other(job, other, s, there_old, other.work.u)
     hold_ends(job.ends, other, s, now)
+
+
+@inner
+def carry_spins(plane, space, other, old, new, there_old, there):
+    """Spins of directors that are carried to the other line, beside those of this one."""
+    line, h = other.line, other.h
     if space is not None:
         if line.bits & (ROTARY | STIFFNESS_DAMPING):
-            put_other(plane, space, line, new, now, other.spin, h, there)
+            put_other(plane, space, line, new, other.rates, other.spin, h, there)
             for c in range(old.T.shape[0]):
                 if line.spin[c]:
                     other.spin[c] += carried_apart(old, new, there_old, there, c) / h
-    solve_tangent(plane, space, job, other, s, new, there_old, there)
-    find_tangent_rates(space, line, s, other.before, now)
-    put_other(plane, space, line, new, now, other.spin, h, there)
-    mine = other.work.report
+
+
+@inner
+def end_other(plane, space, job, other, s, new, there_old, there, report):
+    """The other line stands where tangents lead, and its outputs are sampled; report: of the step of the run."""
+    line, mine = other.line, other.work.report
+    find_tangent_rates(space, line, s, other.before, other.rates)
+    put_other(plane, space, line, new, other.rates, other.spin, other.h, there)
     for j in range(mine.shape[0]):
         if j < ASSEMBLED:
             mine[j] = report[j] + mine[j] - job.own.report[j]
         else:
             mine[j] = report[j]
     keep_past(line, other.ends, there_old, other.books, mine)
-    sample_step(line, sea, there_old, there, other.books)
+    sample_step(line, other.sea, there_old, there, other.books)
 
 
 @inner
-def follow(plane, space, job):
-    """All other lines through the last step of the run."""
-    old, new = job.even, job.odd
-    if job.counts[PARITY] == 0:
-        old, new = job.odd, job.even
-    clock, found = job.clock, job.found
-    dt = clock[LAST_DT]
-    s = scheme(clock[LAST_RHO], clock[STEP_BEFORE], clock[RHO_BEFORE], dt)
+def advance(plane, space, job, other, s, old, new, report):
+    """The other line from the beginning of the last step of the run to its end; report: of the step."""
+    there_old, there = other.even, other.odd
+    if job.counts[PARITY] == 0:  # the run is in its even state
+        there_old, there = other.odd, other.even
+    begin_other(space, job, other, s, there_old)
+    carry_spins(plane, space, other, old, new, there_old, there)
+    solve_tangent(plane, space, job, other, s, new, there_old, there)
+    end_other(plane, space, job, other, s, new, there_old, there, report)
+
+
+@inner
+def keep_own(plane, space, job, s, old, new):
+    """What the equations of the line of the run leave over at the end of a step, and whether it began where the one
+
+    before had ended.
+    """
+    found = job.found
     for i in range(old.a.shape[0]):
         for k in range(3):
             if old.a[i, k] != job.last[i, k]:
@@ -374,6 +411,17 @@ def follow(plane, space, job):
         left_over_in_space(job.line, job.sea, job.ends, old.r, new, s.cv, s.ca, job.own, job.left)
     if plane is not None:
         left_over_in_plane(job.line, job.sea, job.ends, old.r, new, s.cv, s.ca, job.own, job.left)
+
+
+@inner
+def follow(plane, space, job):
+    """All other lines through the last step of the run."""
+    old, new = job.even, job.odd
+    if job.counts[PARITY] == 0:
+        old, new = job.odd, job.even
+    clock = job.clock
+    s = scheme(clock[LAST_RHO], clock[STEP_BEFORE], clock[RHO_BEFORE], clock[LAST_DT])
+    keep_own(plane, space, job, s, old, new)
     for p in range(job.tables.shape[0]):
         advance(plane, space, job, read_other(job.tables[p]), s, old, new, job.work.report)
     return 0

@@ -1,0 +1,372 @@
+"""Tangents along the steps of a run of several lines: what its results answer to numbers of the scene.
+
+As of one cable (hybrid.designs.tangents), of all lines together, with the points and bodies that they are joined to
+(kernels.run.system_tangents).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.designs.tangents import (
+    AT_START,
+    MOST_SAMPLED,
+    Seen,
+    Tangent,
+    Unfollowed,
+    at_rest,
+    beside,
+    bind_line,
+    bind_other,
+    books_beside,
+    copied,
+    joined,
+    line_like,
+    opposite,
+    parts_of_sizes,
+    refuse_what,
+    same_waves,
+    unknown_of,
+)
+from hybrid.kernels.junctions.bodies import FRAME, MASS, PIECES, V, W, X
+from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.run.system_tangents import (
+    A_OF,
+    TANGENTS,
+    TURN_OF,
+    VD_OF,
+    WA_OF,
+    WD_OF,
+    blank_bodies,
+    blank_system_tangents,
+    correct_beside,
+    follow_system,
+)
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books, sample_size
+from hybrid.kernels.state.forces import WAVES
+from hybrid.kernels.state.report import ASSEMBLED
+from hybrid.kernels.state.state import Batch, Floats, Line, State, batch_of_one, state_for
+from hybrid.kernels.watch.tangent_job import TANGENT_SIZES, blank_other
+from hybrid.model.ends import table_of_loads
+from hybrid.model.resolution import Resolution
+from hybrid.model.system import SystemModel, SystemResolution, build_system
+from hybrid.scene.system import System
+from hybrid.simulation.system_lines import HELD, observer_of
+from hybrid.simulation.system_run import SystemRun
+from hybrid.simulation.system_start import joined_lines
+from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.run import batch_of_rows
+from hybrid.solve.stepper import HEAVY, POWERS
+from hybrid.solve.system import SystemSolver
+
+
+class _Other(NamedTuple):
+    """The scene with more of a number: its model, its lines, tangents of these and of bodies (B, TANGENTS)."""
+
+    model: SystemModel
+    lines: list[Line]
+    joined: list[JoinedLine]
+    tangents: list[Tangent]
+    bodies: Floats
+    h: float
+
+
+class _Tables(NamedTuple):
+    """What kernels work with: a job, and all that it has the addresses of."""
+
+    job: Table
+    asked: NDArray[np.int64]
+    by: Floats
+    reports: list[list[Floats]]  # of the other lines, by number and line
+    own: list[Floats]  # of the lines of the run
+    kept: list[Any]
+
+
+class SystemOthers:
+    """The systems of scenes with more of each number beside that of a run, and with less on its other side."""
+
+    def __init__(
+        self, system: System, scenes: Sequence[tuple[System, System | None]], steps: Sequence[float],
+        lines: Mapping[str, Resolution],
+    ) -> None:  # fmt: skip
+        """system: of the run; scenes: as of `tangents.Others`; lines: how finely, by name."""
+        self._system = system
+        self._scenes, self._steps, self._resolution = list(scenes), list(steps), SystemResolution(lines)
+        self._models = [build_system(more, self._resolution) for more, _ in scenes]
+        self.sizes = np.zeros((len(scenes), len(lines), TANGENT_SIZES))
+        self._first: list[list[Batch]] = []  # by number and line
+        self._base: list[list[Batch]] = [[] for _ in lines]  # outputs of the run
+        self._books: list[list[Books]] = []
+        self._found = np.zeros((len(lines), 2), np.int64)
+
+    def begin(self, run: SystemRun) -> None:
+        """Stand beside the state that a run begins with, and follow its steps from there on.  Unfollowed."""
+        self._run, self._model = run, run.model
+        refuse_system(run)
+        self._others = []
+        for k, (model, h) in enumerate(zip(self._models, self._steps, strict=True)):
+            try:
+                self._others.append(self._other(model, k, h))
+            except Unfollowed as why:
+                why.number = k
+                raise
+        cells = sum(sample_size(x.line.h.size) for x in self._model.models)
+        if run.loop.outputs.size * len(self._others) * cells > MOST_SAMPLED:
+            raise Unfollowed("outputs of so many numbers do not fit into memory")
+        self._rest()
+        reports = self._accelerate()
+        self._follow(reports)
+        for l, line in enumerate(run.lines):
+            state, ends, sea = run.state.lines[l], self._ends(run.solver.lines[l], run.state.lines[l]), line.model.sea
+            self._base[l].append(
+                copied(batch_of_one(0.0, ends, state, line.books.report[0], np.zeros(len(POWERS)), sea.at(0.0)))
+            )
+            line.shown = lambda batch, l=l: self._base[l].append(copied(batch))
+
+    def _other(self, model: SystemModel, k: int, h: float) -> _Other:
+        base = self._model
+        if model.joints != base.joints or model.seats[:, :, TURNS].any() or model.rides.size:
+            raise Unfollowed("the number changes what lines are joined to")
+        lines = [line_like(x, y) for x, y in zip(model.models, base.models, strict=True)]
+        tangents = [
+            Tangent(state_for(line), np.zeros(line.h.size), self.sizes[k, l], h) for l, line in enumerate(lines)
+        ]
+        return _Other(model, lines, joined_lines(model, 0.0), tangents, np.zeros((len(base.body_places), TANGENTS)), h)
+
+    # --- the start --------------------------------------------------------------------------------------
+
+    def _rest(self) -> None:
+        """Tangents of the equilibrium that the run begins with."""
+        found = self._run.found
+        assert found is not None
+        state = self._run.state.copy()
+        for now, rests in zip(state.lines, found.state.lines, strict=True):
+            now.T[:] = rests.T
+            for x in (now.v, now.a, now.vd, now.w, now.wa, now.wd):
+                x[:] = 0.0
+        state.bodies[:, V:] = 0.0
+        for other in self._others:
+            for l, (tangent, joints) in enumerate(zip(other.tangents, self._model.joints, strict=True)):
+                for k in (0, 1):
+                    here, there = (x.models[l].ends.at(0.0) for x in (self._model, other.model))
+                    if joints[k] < 0 and here.held[k]:
+                        tangent.rate.r[-k] = (there.position[k] - here.position[k]) / other.h
+                    elif (body := joints[k] - len(self._model.places)) >= 0:
+                        frame = state.bodies[body, FRAME:V].reshape(3, 3)
+                        tangent.rate.r[-k] = (
+                            frame @ (other.model.fairleads[l, k] - self._model.fairleads[l, k]) / other.h
+                        )
+        solver = self._solver(rests=True)
+        for other in self._corrections(solver, state, solver.anchor, rests=True):
+            for tangent, work in zip(other.tangents, solver.work, strict=True):
+                tangent.rate.r[:] += work.x[:, 1:4]
+                tangent.rate.T[:] += work.x[1:, 0]
+                tangent.spin[:] += work.x[:-1, 4]
+            other.bodies[:, : TURN_OF + 3] += solver.body_work[:, X : X + 6]
+
+    def _accelerate(self) -> list[list[Floats]]:
+        """Tangents of accelerations and tensions that are consistent with loads, and reports of the other lines."""
+        run, dt = self._run, 1e-3 * self._run.resolution.one.step
+        for other in self._others:
+            for l, (tangent, joints) in enumerate(zip(other.tangents, self._model.joints, strict=True)):
+                base, more = (x.models[l].ends.acceleration(0.0, dt).copy() for x in (self._model, other.model))
+                for k in (0, 1):
+                    if joints[k] < 0 and self._model.models[l].ends.values.held[k]:
+                        tangent.rate.vd[-k] = (more[k] - base[k]) / other.h
+        solver, state = self._solver(rests=False), run.state.copy()
+        for other in self._corrections(solver, state, HEAVY, rests=False):
+            for tangent, work, line in zip(other.tangents, solver.work, other.lines, strict=True):
+                turning = (line.spin == 1) & (line.polar > 0)
+                rate, x = tangent.rate, work.x
+                rate.vd[:] += HEAVY * x[:, 1:4]
+                rate.T[:] += x[1:, 0]
+                rate.wd[turning] += HEAVY * x[:-1, 4][turning]
+                rate.a[:], rate.wa[:] = rate.vd, rate.wd
+                tangent.spin[:] += x[:-1, 4]
+            for row, here, own, x in zip(other.bodies, state.bodies, solver.bodies, solver.body_work, strict=True):
+                row[VD_OF : VD_OF + 3] += HEAVY * x[X : X + 3]
+                if own[MASS + 21 : MASS + 36].any():  # a turn without inertia has no acceleration
+                    row[WD_OF : WD_OF + 3] += HEAVY * x[X + 3 : X + 6] @ here[FRAME:V].reshape(3, 3)
+                row[A_OF : A_OF + 3], row[WA_OF : WA_OF + 3] = row[VD_OF : VD_OF + 3], row[WD_OF : WD_OF + 3]
+        reports = []
+        for p in range(len(self._others)):
+            each = [line.books.report[0].copy() for line in run.lines]
+            for report, there, own in zip(each, self._tables.reports[p], self._tables.own, strict=True):
+                report[:ASSEMBLED] += (there - own)[:ASSEMBLED]
+            reports.append(each)
+        return reports
+
+    def _solver(self, rests: bool) -> SystemSolver:
+        """For the state that the run begins with; rests: without what does not act at rest."""
+        lines = joined_lines(self._model, 0.0)
+        if rests:
+            lines = [x._replace(line=at_rest(x.line)) for x in lines]
+        solver = SystemSolver(lines, len(self._model.free), self._run.solver.bodies.copy())
+        solver.keep_factors()
+        return solver
+
+    def _corrections(self, solver: SystemSolver, state: SystemState, ca: float, rests: bool) -> Iterator[_Other]:
+        """Others in turn, for which the solver has corrections of tangents, which the caller adds."""
+        self._tables = tables = self._bind(solver, (state, state.copy()), rests)
+        if not solver.factor(state, ca):
+            raise Unfollowed("the equations of the start have no factors")
+        tables.by[:] = 0.0, ca
+        for p, other in [(-1, None), *enumerate(self._others)]:
+            tables.asked[0] = p
+            for last in [*((AT_START if other is not None else 0) * [False]), True]:
+                correct_beside(tables.job.numbers)
+                if other is not None and not last:
+                    yield other
+
+    # --- what kernels work with -------------------------------------------------------------------------
+
+    def _bind(
+        self, solver: SystemSolver, states: tuple[SystemState, SystemState], rests: bool = False,
+        clock: Floats | None = None, counts: NDArray[np.int64] | None = None,
+        books: Callable[[int, int], Books] | None = None,
+    ) -> _Tables:  # fmt: skip
+        """Tables for lines of a solver between states that take turns."""
+        number, clock = len(self._others), np.zeros(b.CLOCK_SIZE) if clock is None else clock
+        counts = np.zeros(b.COUNT_SIZE, np.int64) if counts is None else counts
+        jobs, kept, own = [], [], []
+        reports: list[list[Floats]] = [[] for _ in self._others]
+        size = Table(blank_other).numbers.size
+        for l, (x, here) in enumerate(zip(solver.lines, states[0].lines, strict=True)):
+            tables, same = np.zeros((number, size), np.int64), []
+            for p, other in enumerate(self._others):
+                there, tangent, line = other.joined[l], other.tangents[l], other.lines[l]
+                same.append(bool(line.bits & WAVES) and same_waves(x.sea, there.sea))
+                state = beside(here, tangent.rate, tangent.spin, other.h)
+                some = books(p, l) if books is not None else b.blank_books(line.h.size)
+                table, report = bind_other(
+                    tables[p], at_rest(line) if rests else line, there.ends, there.sea,
+                    other.model.models[l].ends.moves(), state, tangent, some, same[-1],
+                )  # fmt: skip
+                reports[p].append(report)
+                kept.append(table)
+            job, report = bind_line(
+                x.line, x.ends, x.sea, (here, states[1].lines[l]), solver.work[l], clock, counts, tables,
+                self._found[l], any(same),
+            )  # fmt: skip
+            own.append(report)
+            jobs.append(job)
+        turns, bodies = solver.take_turns(states), [self._bind_bodies(x, solver, states[0]) for x in self._others]
+        asked, by, table = np.zeros(1, np.int64), np.zeros(2), Table(blank_system_tangents)
+        table.bind(
+            even=turns["joined_even"], odd=turns["joined_odd"], joined=turns["joined"], lone=turns["lone_lines"],
+            lines=np.array([x.numbers for x in jobs]), bodies=np.array([x.numbers for x in bodies]), clock=clock,
+            counts=counts, asked=asked, by=by,
+        )  # fmt: skip
+        return _Tables(table, asked, by, reports, own, [*kept, *jobs, *bodies])
+
+    def _bind_bodies(self, other: _Other, solver: SystemSolver, state: SystemState) -> Table:
+        table, count = Table(blank_bodies), len(state.bodies)
+        loads, history = table_of_loads(other.model.growing_loads(0.0))
+        table.bind(
+            numbers=other.model.body_numbers(0.0), fairleads=other.model.fairleads[solver.joined].copy(), loads=loads,
+            history=history, rates=other.bodies, before=np.zeros((count, TANGENTS)), old=state.bodies.copy(),
+            new=state.bodies.copy(), work=solver.body_work.copy(), right=np.zeros((count, 6)), h=other.h,
+        )  # fmt: skip
+        return table
+
+    def _follow(self, reports: Sequence[Sequence[Floats]]) -> None:
+        """Have the run call the kernel behind every step."""
+        run = self._run
+        loop, solver = run.loop, run.solver
+        solver.keep_factors()
+        done = int(loop.counts[b.OUTPUT])
+
+        def books(p: int, l: int) -> Books:
+            x, report = self._others[p].joined[l], reports[p][l]
+            return books_beside(loop.clock, loop.outputs, done, x.line.h.size, x.ends, report)
+
+        self._books = [[books(p, l) for l in range(len(run.lines))] for p in range(len(self._others))]
+        for p, other in enumerate(self._others):
+            first = []
+            for l, (x, tangent) in enumerate(zip(other.joined, other.tangents, strict=True)):
+                there = beside(run.state.lines[l], tangent.rate, tangent.spin, other.h)
+                ends = self._ends(x, there)
+                first.append(batch_of_one(0.0, ends, there, reports[p][l], np.zeros(len(POWERS)), x.sea))
+            self._first.append(first)
+        self._found[:] = 0
+        self._tables = self._bind(
+            solver, loop.turns, clock=loop.clock, counts=loop.counts, books=lambda p, l: self._books[p][l]
+        )
+        numbers = self._tables.job.numbers
+        loop.take_tangents(numbers, follow_system.address(numbers))
+
+    def _ends(self, x: JoinedLine, state: State) -> Any:
+        """What ends of a line impose, as outputs have it: they are where its nodes are."""
+        return x.ends._replace(held=HELD, position=state.r[[0, -1]])
+
+    @property
+    def errors(self) -> Floats:
+        """(P,) parts of tangents by which they may be off: what the last corrections leave of them."""
+        return np.asarray(parts_of_sizes(self.sizes).max(axis=1))
+
+    # --- what is found ----------------------------------------------------------------------------------
+
+    def results(self, names: Mapping[str, Sequence[str]]) -> list[tuple[Mapping[str, Seen], ...]]:
+        """As of `tangents.Others`, by line.  Unfollowed."""
+        run = self._run
+        if run.model is not self._model or (self._found != [run.steps, 0]).any():
+            raise Unfollowed("a line, or what acts on it, becomes another one in the run")
+        base = {l: joined(self._base[l]) for l, name in enumerate(self._model.names) if name in names}
+        here = self._looked_at(self._system, self._model, base, names)
+        return [(here,), *(self._seen(p, base, names) for p in range(len(self._others)))]
+
+    def _seen(
+        self, p: int, base: Mapping[int, Batch], names: Mapping[str, Sequence[str]]
+    ) -> tuple[Mapping[str, Seen], ...]:
+        more = {}
+        for l in base:
+            books, cells = self._books[p][l], self._model.models[l].line.h.size
+            rest, _ = batch_of_rows(books.samples[: int(books.counts[b.SAMPLES])], cells, HELD, False, 0, 0)
+            more[l] = joined([self._first[p][l], rest])
+        scene, other = self._scenes[p]
+        seen = self._looked_at(scene, self._others[p].model, more, names)
+        if other is None:
+            return (seen,)
+        less = {l: opposite(base[l], x) for l, x in more.items()}
+        return seen, self._looked_at(other, build_system(other, self._resolution), less, names)
+
+    def _looked_at(
+        self, system: System, model: SystemModel, batches: Mapping[int, Batch], names: Mapping[str, Sequence[str]]
+    ) -> dict[str, Seen]:
+        out = {}
+        for l, batch in batches.items():
+            name, x = model.names[l], model.models[l]
+            scene = system.scene_of(name, system.carried(name), system.guesses)
+            observer = observer_of(scene, x, True)
+            observer = observer.on(line_like(x, self._model.models[l]), x.sea.values, x.zones, x.hinges)
+            observer = observer.of(names[name])
+            out[name] = Seen(scene, observer.values_of(observer.look(batch)), np.asarray(observer.s), batch.t.copy())
+        return out
+
+
+def refuse_system(run: SystemRun) -> None:
+    """Unfollowed where a run has what the kernel does not know, with what that is."""
+    model, what = run.model, dict[str, bool]()
+    for x in model.models:
+        what |= {text: there or what.get(text, False) for text, there in unknown_of(x).items()}
+    found = run.found
+    refuse_what(
+        what
+        | {
+            "lines start as they are placed": found is None,
+            "lines touch each other": (found is not None and found.settled) or run.shared is not None,
+            "zones move": run.zones is not None, "line is paid out": run.payout is not None,
+            "connections may break": bool(run.failures.all), "loads change in the run": bool(model.breaks),
+            "a line is clamped to what turns with it": bool(model.seats[:, :, TURNS].any()),
+            "a body has a shape": bool(model.rides.size),
+            "a body has members": bool((run.solver.bodies[:, PIECES] > 0.0).any()),
+            "bodies turn at first": bool(run.state.bodies[:, W : W + 3].any()),
+            "steps follow errors": run.loop.controlled,
+        }
+    )  # fmt: skip

@@ -1,0 +1,500 @@
+"""What the motion of several lines answers to numbers of its scene: tangents along the steps of a run.
+
+As of one cable (kernels.watch.tangents), line by line; what lines hand over to points and bodies is solved with the
+factors of the lines that the last iteration has left, as another right-hand side (kernels.junctions.right_sides).
+
+A body has tangents of its own: of its place r, of its turn theta (inertial), of the rotation vector n of the step, and
+of the rates of both.  With R' = R_0 exp([n]x),  theta' = theta_0' + R_0 J(n) n',  J the left Jacobian.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, SPAN
+from hybrid.kernels.algebra.kept_factors import carry_block, solve_with
+from hybrid.kernels.algebra.rotations import (
+    add,
+    cross,
+    inverse_left_jacobian,
+    jacobian_functions,
+    mat_mat,
+    mat_vec,
+    scale,
+    sub,
+    vec_mat,
+    vector,
+)
+from hybrid.kernels.junctions.bodies import (
+    FRAME,
+    NUMBERS,
+    OWN,
+    PLACE,
+    START,
+    STATE,
+    VD,
+    WA,
+    WD,
+    WORK,
+    A,
+    N,
+    U,
+    V,
+    W,
+    X,
+    matrix,
+    own_force,
+    put,
+    put_matrix,
+    rotation,
+)
+from hybrid.kernels.junctions.joined_lines import last_block, solve_dense
+from hybrid.kernels.junctions.junctions import END, assemble_junctions, correct_all, count_tensions, first_unknown
+from hybrid.kernels.junctions.junctions import START as BEGIN
+from hybrid.kernels.junctions.system_job import read_system, task_of
+from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.march.left_over import left_over_in_space
+from hybrid.kernels.run.system_run import load_bodies
+from hybrid.kernels.state.books import (
+    CLOCK_SIZE,
+    COUNT_SIZE,
+    HEAD,
+    NOW,
+    PARITY,
+    SAMPLE_POSITION,
+    SAMPLES,
+)
+from hybrid.kernels.state.forces import WAVES
+from hybrid.kernels.state.report import NET_A
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.step.generalized_alpha import scheme
+from hybrid.kernels.step.newton import with_radius
+from hybrid.kernels.watch.tangent_job import ALONE, SECOND_R, SECOND_T, STEPS, read_job, read_other
+from hybrid.kernels.watch.tangents import (
+    begin_other,
+    carry_spins,
+    correct_rates,
+    end_other,
+    is_wanted,
+    keep_own,
+    largest_correction,
+    leave_apart,
+    leave_over,
+    needs_two,
+    note_left,
+    put_other,
+    stay_held,
+)
+
+# Tangents of a body: of its place, its turn (inertial, rad), the rates of both as in its state, and n of the step.
+TURN_OF, V_OF, A_OF, VD_OF, W_OF, WA_OF, WD_OF, N_OF, TANGENTS = 3, 6, 9, 12, 15, 18, 21, 24, 27
+SMALL_TURN = 1e-3
+
+
+class OtherBodies(NamedTuple):
+    """The bodies of a scene with more of a number, beside those of the run."""
+
+    numbers: Floats  # (B, NUMBERS)
+    fairleads: Floats  # (J, 2, 3) m, of lines that are joined to what moves with them
+    loads: Floats  # as kernels.run.system_run.StepsJob.loads, history
+    history: Floats
+    rates: Floats  # (B, TANGENTS) named above, of the last step's end
+    before: Floats  # the same before the step
+    old: Floats  # (B, STATE)
+    new: Floats
+    work: Floats  # (B, WORK)
+    right: Floats  # (B, 6) what the bodies themselves add to the right-hand side
+    h: float
+
+
+class SystemTangents(NamedTuple):
+    """Arguments of `follow_system` and `correct_beside`."""
+
+    even: NDArray[np.int64]  # of a SystemJob of the lines that are joined to what moves with them, as of StepsJob
+    odd: NDArray[np.int64]
+    joined: NDArray[np.int64]  # (J,) their numbers
+    lone: NDArray[np.int64]  # and those of the others
+    lines: NDArray[np.int64]  # (L, ..) tables of a TangentJob each
+    bodies: NDArray[np.int64]  # (P, ..) tables of an OtherBodies each
+    clock: Floats
+    counts: NDArray[np.int64]
+    asked: NDArray[np.int64]  # (1,) of `correct_beside`: the number, -1: the lines of the run
+    by: Floats  # (2,) cv, ca of `correct_beside`
+
+
+def blank_bodies() -> OtherBodies:
+    """With the types that every one has."""
+    z = np.zeros
+    return OtherBodies(
+        z((1, NUMBERS)), z((1, 2, 3)), z((0, 8)), z((0, 4)), z((1, TANGENTS)), z((1, TANGENTS)), z((1, STATE)),
+        z((1, STATE)), z((1, WORK)), z((1, 6)), 1.0,
+    )  # fmt: skip
+
+
+def blank_system_tangents() -> SystemTangents:
+    """With the types that every one has."""
+    one, two = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
+    return SystemTangents(
+        one, one, one, one, two, two, np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), one, np.zeros(2)
+    )
+
+
+read_bodies, read_tangents = reader(blank_bodies()), reader(blank_system_tangents())
+
+
+# --- bodies -----------------------------------------------------------------------------------------
+
+
+@inner
+def turned_by(n, x):
+    """J(n) x, the left Jacobian of rotations by a vector."""
+    q2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2]
+    if q2 < SMALL_TURN:
+        b = 0.5 - q2 * (1 / 24 - q2 * (1 / 720 - q2 / 40320))
+        c = 1 / 6 - q2 * (1 / 120 - q2 * (1 / 5040 - q2 / 362880))
+    else:
+        q = math.sqrt(q2)
+        b, c = (1.0 - math.cos(q)) / q2, (q - math.sin(q)) / (q2 * q)
+    once = cross(n, x)
+    return add(x, add(scale(b, once), scale(c, cross(n, once))))
+
+
+@inner
+def predict_body_rates(system, other, s):
+    """Tangents of all bodies at the end of a step as they are predicted, from those before it."""
+    dt, am, af, _, be, _, ca = s
+    was, now = other.before, other.rates
+    for b in range(now.shape[0]):
+        for k in range(TANGENTS):
+            was[b, k] = now[b, k]
+        x, y = was[b], now[b]
+        for v, a, vd, shift in ((V_OF, A_OF, VD_OF, 0), (W_OF, WA_OF, WD_OF, N_OF)):
+            for k in range(3):
+                more = dt * x[v + k] + 0.5 * dt * dt * x[a + k]
+                y[shift + k] = more if shift == N_OF else x[k] + more
+                y[v + k] = x[v + k] + dt * x[a + k]
+                y[vd + k] = (am * x[a + k] - af * x[vd + k]) / (1.0 - af) + ca * be * dt * dt * x[a + k]
+        z = system.work[b]
+        turn = mat_vec(matrix(z, START), turned_by(vector(z, N), vector(y, N_OF)))
+        put(y, TURN_OF, add(vector(x, TURN_OF), turn))
+
+
+@inner
+def correct_body_rates(system, now, s):
+    """Add the corrections of bodies to tangents."""
+    for b in range(now.shape[0]):
+        y, z = now[b], system.work[b]
+        n = vector(z, N)
+        g, _ = jacobian_functions(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+        dn = mat_vec(inverse_left_jacobian(n, g), vec_mat(vector(z, X + 3), matrix(z, START)))
+        for k in range(3):
+            dr = z[X + k]
+            y[k] += dr
+            y[V_OF + k] += s.cv * dr
+            y[VD_OF + k] += s.ca * dr
+            y[TURN_OF + k] += z[X + 3 + k]
+            y[N_OF + k] += dn[k]
+            y[W_OF + k] += s.cv * dn[k]
+            y[WD_OF + k] += s.ca * dn[k]
+
+
+@inner
+def find_body_rates(other, s):
+    """Tangents of algorithmic accelerations of bodies (kernels.junctions.bodies.end_bodies)."""
+    dt, _, _, _, be, _, _ = s
+    for b in range(other.rates.shape[0]):
+        x, y = other.before[b], other.rates[b]
+        for k in range(3):
+            there = x[k] + dt * x[V_OF + k] + dt * dt * (0.5 - be) * x[A_OF + k]
+            y[A_OF + k] = (y[k] - there) / (be * dt * dt)
+            turned = dt * x[W_OF + k] + dt * dt * (0.5 - be) * x[WA_OF + k]
+            y[WA_OF + k] = (y[N_OF + k] - turned) / (be * dt * dt)
+
+
+@inner
+def put_bodies(system, other):
+    """Where the other bodies stand: those of the run and h times the tangents."""
+    h = other.h
+    for b in range(other.rates.shape[0]):
+        x, y, here, there, z, own = (
+            other.before[b], other.rates[b], system.new[b], other.new[b], system.work[b], other.work[b],
+        )  # fmt: skip
+        for k in range(3):
+            there[PLACE + k] = here[PLACE + k] + h * y[k]
+            for o, rate in ((V, V_OF), (A, A_OF), (VD, VD_OF), (W, W_OF), (WA, WA_OF), (WD, WD_OF)):
+                there[o + k] = here[o + k] + h * y[rate + k]
+            other.old[b, PLACE + k] = system.old[b, PLACE + k] + h * x[k]
+            own[U + k] = z[U + k] + h * (y[k] - x[k])
+        put_matrix(there, FRAME, mat_mat(rotation(scale(h, vector(y, TURN_OF))), matrix(here, FRAME)))
+
+
+@inner
+def reach(system, j, k, b):
+    """Where fairlead k of joined line j is from the origin of its body in the run, in space."""
+    return mat_vec(matrix(system.new[b], FRAME), vector(system.fairleads[j, k], 0))
+
+
+@inner
+def place_fairleads(system, net, p, s):
+    """Ends of the other lines at bodies are where their fairleads are."""
+    other, points = read_bodies(net.bodies[p]), system.net.shape[0]
+    for j in range(system.joints.shape[0]):
+        job = read_job(net.lines[net.joined[j]])
+        now = read_other(job.tables[p]).rates
+        for k in range(2):
+            b = system.joints[j, k] - points
+            if b >= 0:
+                i, y = k * job.line.h.shape[0], other.rates[b]
+                rho = reach(system, j, k, b)
+                apart = scale(1.0 / other.h, sub(vector(other.fairleads[j, k], 0), vector(system.fairleads[j, k], 0)))
+                more = add(cross(vector(y, TURN_OF), rho), mat_vec(matrix(system.new[b], FRAME), apart))
+                for m in range(3):
+                    shift = y[m] + more[m] - now.r[i, m]
+                    now.r[i, m] += shift
+                    now.v[i, m] += s.cv * shift
+                    now.vd[i, m] += s.ca * shift
+
+
+@inner
+def own_right_sides(system, net, p):
+    """What bodies themselves leave over beside those of the run, and by what the arms of their lines are others."""
+    other, points = read_bodies(net.bodies[p]), system.net.shape[0]
+    for b in range(other.rates.shape[0]):
+        own_force(system.bodies[b], system.old[b], system.new[b], system.work[b])
+        own_force(other.numbers[b], other.old[b], other.new[b], other.work[b])
+        for k in range(6):
+            other.right[b, k] = (system.work[b, OWN + k] - other.work[b, OWN + k]) / other.h
+    for j in range(system.joints.shape[0]):
+        job = read_job(net.lines[net.joined[j]])
+        report = read_other(job.tables[p]).work.report
+        for k in range(2):
+            b = system.joints[j, k] - points
+            if b >= 0:
+                there = mat_vec(matrix(other.new[b], FRAME), vector(other.fairleads[j, k], 0))
+                arm = scale(1.0 / other.h, sub(there, reach(system, j, k, b)))
+                moment = cross(arm, vector(report, NET_A + 3 * k))
+                for m in range(3):
+                    other.right[b, 3 + m] -= moment[m]
+
+
+# --- lines ------------------------------------------------------------------------------------------
+
+
+@inner
+def leave_over_at_rest(job, other, cv, ca):
+    """What `leave_over` does, of a state as it is, at which no step ends."""
+    work, b, there = other.work, other.left, other.even
+    put_other(None, 1, other.line, job.even, other.rates, other.spin, other.h, there)
+    for i in range(b.shape[0]):
+        for k in range(3):
+            work.u[i, k] = 0.0
+    if other.line.bits & WAVES:
+        wave_kinematics(other.sea, there.r, work.u)
+    left_over_in_space(other.line, other.sea, other.ends, there.r, there, cv, ca, work, b)
+    leave_apart(job, other, job.even, there)
+
+
+@inner
+def set_right_side(line_work, job, other, starts, ends):
+    """What is left over becomes the right-hand side of an eliminated line; starts, ends: whether these are joined."""
+    x, X_, b, n = line_work.x, line_work.X, other.left, job.line.h.shape[0]
+    there, here, h = other.work.report, job.own.report, other.h
+    for a in range(3):
+        if starts:  # the march has replaced its balance by its place
+            line_work.rows[0, (a + 1) * 24 + 23] = (here[NET_A + a] - there[NET_A + a]) / h
+        if ends:
+            b[n, 1 + a] = (here[NET_A + 3 + a] - there[NET_A + 3 + a]) / h
+    for i in range(n + 1):
+        x[i, 0] = X_[(n + 1) * ROW + i * KEPT + 62] * b[i, 0]
+        for k in range(1, SIZE):
+            x[i, k] = b[i, k]
+        carry_block(X_, line_work.W, x, i, i, n, 0, not (ends and i == n))
+        for k in range(SIZE):
+            X_[i * ROW + k * SPAN + SPAN - 1] = x[i, k]
+    if ends:
+        o = last_block(X_, n)
+        for k in range(SIZE):
+            X_[o + 64 + k] = x[n, k]
+
+
+@inner
+def answer(system, net, p, cv, ca):
+    """Corrections of all other lines and bodies: in work.x of the lines of the run and in what its bodies work with."""
+    own = read_bodies(net.bodies[p])
+    m, points = system.A.shape[1] - 1, system.net.shape[0]
+    for j in range(system.tables.shape[0]):
+        job = read_job(net.lines[net.joined[j]])
+        starts, ends = system.joints[j, BEGIN] >= 0, system.joints[j, END] >= 0
+        set_right_side(job.work, job, read_other(job.tables[p]), starts, ends)
+    if m > 0:
+        own_right_sides(system, net, p)
+        assemble_junctions(system, m, cv, ca, False)
+        first = first_unknown(points, count_tensions(system.joints), points)
+        for b in range(own.right.shape[0]):
+            for k in range(6):
+                system.A[first + 6 * b + k, m] += own.right[b, k]
+        solve_dense(system.A, m)
+        correct_all(system, points, m)
+    for k in range(net.lone.shape[0]):
+        job = read_job(net.lines[net.lone[k]])
+        solve_with(job.work.X, job.work.W, read_other(job.tables[p]).left, job.work.x, False)
+    for l in range(net.lines.shape[0]):
+        job = read_job(net.lines[l])
+        stay_held(job, job.work.x)
+
+
+@inner
+def settle(system):
+    """Ends go nowhere by themselves, and arms are those of bodies as they are."""
+    points = system.net.shape[0]
+    for j in range(system.joints.shape[0]):
+        for k in range(2):
+            b = system.joints[j, k] - points
+            if b >= 0:
+                rho = reach(system, j, k, b)
+                for m in range(3):
+                    system.arms[j, k, m] = rho[m]
+            for m in range(3):
+                system.gaps[j, k, m] = 0.0
+
+
+# --- steps ------------------------------------------------------------------------------------------
+
+
+@inner
+def old_of(job, x):
+    """Of the states of a line the one before the last step; x: the line of the run, or another one."""
+    if job.counts[PARITY] == 0:
+        return x.odd
+    return x.even
+
+
+@inner
+def new_of(job, x):
+    """And the one behind it."""
+    if job.counts[PARITY] == 0:
+        return x.even
+    return x.odd
+
+
+@inner
+def how_many(net, p):
+    """How many corrections tangents get, and whether forces are wanted of the end of the step."""
+    wanted, two = False, False
+    for l in range(net.lines.shape[0]):
+        other = read_other(read_job(net.lines[l]).tables[p])
+        wanted = wanted or is_wanted(other.books)
+        two = two or needs_two(other.sizes)
+    return (2 if two else 1) + (1 if wanted else 0), wanted
+
+
+@inner
+def correct_lines(net, p, s, k, count, wanted):
+    """Add corrections to tangents of all lines, the k-th of so many, and keep how large they are."""
+    for l in range(net.lines.shape[0]):
+        job = read_job(net.lines[l])
+        other = read_other(job.tables[p])
+        sizes = other.sizes
+        correct_rates(1, job.work.x, s, other.rates, other.spin)
+        r, T = largest_correction(job.work.x)
+        if k == 1:
+            sizes[SECOND_R], sizes[SECOND_T] = max(sizes[SECOND_R], r), max(sizes[SECOND_T], T)
+        if k == count - 1:
+            if count > 1:
+                note_left(r, T, other.work.x[0, 0], other.work.x[0, 1], wanted, other.rates, sizes)
+            sizes[STEPS] += 1.0
+            sizes[ALONE] = 1.0 if count == 1 else 0.0
+        other.work.x[0, 0], other.work.x[0, 1] = r, T  # room that is not used
+
+
+@inner
+def end_lines(net, p, s):
+    """The other lines stand where tangents lead; in their outputs ends are where nodes are."""
+    for l in range(net.lines.shape[0]):
+        job = read_job(net.lines[l])
+        other = read_other(job.tables[p])
+        books, n = other.books, other.line.h.shape[0]
+        begin = books.counts[SAMPLES]
+        end_other(None, 1, job, other, s, new_of(job, job), old_of(job, other), new_of(job, other), job.work.report)
+        for i in range(begin, books.counts[SAMPLES]):
+            row = books.samples[i]
+            for j in range(3):
+                row[SAMPLE_POSITION + j] = row[HEAD + j]
+                row[SAMPLE_POSITION + 3 + j] = row[HEAD + 3 * n + j]
+
+
+@inner
+def advance(system, net, p, s):
+    """The other lines and bodies of a number from the beginning of the last step of the run to its end."""
+    bodies = read_bodies(net.bodies[p])
+    load_bodies(bodies.numbers, bodies.loads, bodies.history, net.clock[NOW])
+    for l in range(net.lines.shape[0]):
+        job = read_job(net.lines[l])
+        other = read_other(job.tables[p])
+        begin_other(1, job, other, s, old_of(job, other))
+    predict_body_rates(system, bodies, s)
+    place_fairleads(system, net, p, s)
+    for l in range(net.lines.shape[0]):
+        job = read_job(net.lines[l])
+        other = read_other(job.tables[p])
+        carry_spins(None, 1, other, old_of(job, job), new_of(job, job), old_of(job, other), new_of(job, other))
+    count, wanted = how_many(net, p)
+    for k in range(count):
+        for l in range(net.lines.shape[0]):
+            job = read_job(net.lines[l])
+            other = read_other(job.tables[p])
+            leave_over(None, 1, job, other, s, new_of(job, job), old_of(job, other), new_of(job, other))
+        put_bodies(system, bodies)
+        answer(system, net, p, s.cv, s.ca)
+        correct_lines(net, p, s, k, count, wanted)
+        correct_body_rates(system, bodies.rates, s)
+    find_body_rates(bodies, s)
+    end_lines(net, p, s)
+
+
+@kernel
+def follow_system(table):
+    """Tangents of all lines and bodies through the last step of their run; table: of SystemTangents.  Returns 0."""
+    net = read_tangents(table)
+    own = net.even
+    if net.counts[PARITY] == 0:
+        own = net.odd
+    system = read_system(own)
+    task = task_of(system.asked)
+    task = with_radius(task, task.rho)
+    s = scheme(task.rho, task.before, task.rho_before, task.dt)
+    settle(system)
+    for l in range(net.lines.shape[0]):
+        job = read_job(net.lines[l])
+        keep_own(None, 1, job, s, old_of(job, job), new_of(job, job))
+    for p in range(net.bodies.shape[0]):
+        advance(system, net, p, s)
+    return 0
+
+
+@kernel
+def correct_beside(table):
+    """Corrections of tangents of a state as it is, by the factors of it: of the number asked[0], in what the lines and
+
+    bodies of the run work with; -1: what the lines of the run leave over is found.  Returns 0.
+    """
+    net = read_tangents(table)
+    system, p, cv, ca = read_system(net.even), net.asked[0], net.by[0], net.by[1]
+    if p < 0:
+        settle(system)
+        for l in range(net.lines.shape[0]):
+            job = read_job(net.lines[l])
+            left_over_in_space(job.line, job.sea, job.ends, job.even.r, job.even, cv, ca, job.own, job.left)
+        return 0
+    for l in range(net.lines.shape[0]):
+        job = read_job(net.lines[l])
+        leave_over_at_rest(job, read_other(job.tables[p]), cv, ca)
+    put_bodies(system, read_bodies(net.bodies[p]))
+    answer(system, net, p, cv, ca)
+    return 0
