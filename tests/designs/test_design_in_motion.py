@@ -183,6 +183,7 @@ def test_written_as_a_system_it_is_the_same():
     )  # fmt: skip
     assert found.numbers["m"] == pytest.approx(brentq(lambda m: by_hand(m) - 3500.0, 1.0, 20.0), rel=3e-3)
     assert found.kept[0].result == "max a/tension@start in motion" and found.runs <= 10
+    assert found.ways == {"": "tangents along the steps"}
 
 
 REFUSED = [
