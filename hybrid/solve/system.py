@@ -130,9 +130,10 @@ class SystemSolver:
         columns = COLUMNS if self._seats[:, :, TURNS].any() else 3
         self._first = np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64)
         self._columns = np.zeros((columns, max(sum(carried), 1), SIZE))
-        self._functional, self.net = np.zeros(FUNCTIONAL), np.zeros((points, 3))
+        self._functional, self._parts = np.zeros(FUNCTIONAL), np.zeros_like(self._columns)
+        self.net = np.zeros((points, 3))
         unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
-        self._matrix = np.zeros((unknowns + 3, unknowns + 1))
+        self._matrix = np.zeros((unknowns + 5, unknowns + 1))
         blank = Table(blank_job)
         # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
         # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.
@@ -157,10 +158,9 @@ class SystemSolver:
         self.length = max(x.length for x in lines)
         self.anchor = ANCHOR * self.scale / (mass * self.length)  # 1/s2
         room = {
-            "asked": self._asked, "columns": self._columns, "functional": self._functional, "answers": self._answers,
-            "q": self._turned, "net": self.net, "bodies": self.bodies, "work": self.body_work, "S": self._handed,
-            "G": self._follow, "A": self._matrix, "solver": self._solver,
-            "rides": self._rides,
+            "asked": self._asked, "columns": self._columns, "functional": self._functional, "parts": self._parts,
+            "answers": self._answers, "q": self._turned, "net": self.net, "bodies": self.bodies, "work": self.body_work,
+            "S": self._handed, "G": self._follow, "A": self._matrix, "solver": self._solver, "rides": self._rides,
         }  # fmt: skip
         of_lines = {
             "joints": self.joints, "fairleads": self._fairleads, "seats": self._seats, "arms": self._arms,
@@ -256,9 +256,9 @@ class SystemSolver:
         """What those share that put contact into the corrections of all lines, of jobs `numbers`."""
         return {
             "tables": numbers, "joints": self.joints, "seats": self._seats, "arms": self._arms, "first": self._first,
-            "columns": self._columns, "functional": self._functional, "answers": self._answers, "net": self.net,
-            "bodies": self.bodies, "work": self.body_work, "S": self._handed, "G": self._follow, "A": self._matrix,
-            "q": self._turned,
+            "columns": self._columns, "functional": self._functional, "parts": self._parts, "answers": self._answers,
+            "net": self.net, "bodies": self.bodies, "work": self.body_work, "S": self._handed, "G": self._follow,
+            "A": self._matrix, "q": self._turned,
         }  # fmt: skip
 
     def _touch(self) -> None:

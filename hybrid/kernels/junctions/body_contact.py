@@ -40,8 +40,8 @@ from hybrid.kernels.junctions.body_forces import (
     read_meeting,
     stiffen,
 )
-from hybrid.kernels.junctions.joined_lines import last_block, solve_dense
-from hybrid.kernels.junctions.junctions import END, START, assemble_junctions, correct_all
+from hybrid.kernels.junctions.joined_lines import last_block, substitute_dense
+from hybrid.kernels.junctions.junctions import END, START, correct_all, gather_right_sides
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.step.job import read
@@ -49,7 +49,7 @@ from hybrid.kernels.step.job import read
 # What is asked: shapes are brought to where their bodies are; forces of contact are found; these and R are put into the
 # equations of the bodies; corrections of lines and bodies are coupled; turns that contact does not hold get a spring; of other
 # corrections of the same iteration: R is put into the equations, and they are coupled.
-CARRY, PRESS, STIFFEN, COUPLE, HOLD, RESIST, AGAIN = range(7)
+CARRY, PRESS, STIFFEN, COUPLE, HOLD, AGAIN = range(6)
 
 
 @inner
@@ -118,7 +118,7 @@ def eliminate_right_side(job, l):
 
 
 @called
-def respond(job, slot, c, cv, ca):
+def respond(job, slot, c):
     """Corrections of all lines and bodies to column c of P of a body, or from 6 on to a unit force or moment on it.
 
     False if they are not finite.
@@ -130,12 +130,10 @@ def respond(job, slot, c, cv, ca):
         add_column(job, slot, c)
         for l in range(job.tables.shape[0]):
             eliminate_right_side(job, l)
-    assemble_junctions(job, m, cv, ca, False)
-    stiffen(job)
+    gather_right_sides(job, m)
     if c >= 6:
         job.A[first_of_bodies(job) + 6 * job.carriers[slot] + c - 6, m] += 1.0
-    if not solve_dense(job.A, m):
-        return False
+    substitute_dense(job.A, m)
     return correct_all(job, job.net.shape[0], m) < 0
 
 
@@ -228,7 +226,7 @@ def apply(job):
 
 
 @inner
-def couple(job, cv, ca):
+def couple(job):
     """Couple the corrections of lines and bodies that touch; 0: that fails, 1: nothing touches, 2: done."""
     last = job.coupling.shape[0]
     if job.found[0] == 0:
@@ -240,7 +238,7 @@ def couple(job, cv, ca):
     for r in range(last):
         if not touches(job, r):
             continue
-        if not respond(job, r // EACH_BODY, r % EACH_BODY, cv, ca):
+        if not respond(job, r // EACH_BODY, r % EACH_BODY):
             return 0
         keep_corrections(job, job.responses[r], job.turned[r])
         select(job, r)
@@ -292,7 +290,7 @@ def substitute_small(A, order):
 
 @kernel
 def meet_bodies(table):
-    """Do what is asked of lines that touch bodies (CARRY, PRESS, STIFFEN, COUPLE, HOLD, RESIST, AGAIN); 0: it fails."""
+    """Do what is asked of lines that touch bodies (CARRY, PRESS, STIFFEN, COUPLE, HOLD, AGAIN); 0: it fails."""
     job = read_meeting(table)
     task, phase = read(job.tables[0]).task, job.phase[0]
     if phase == CARRY:
@@ -304,11 +302,9 @@ def meet_bodies(table):
         push_bodies(job)
     elif phase == HOLD:
         hold_rolling(job)
-    elif phase == RESIST:
-        stiffen(job)
     elif phase == AGAIN:
         if job.found[0] > 0:
             apply(job)
     else:
-        return couple(job, task.cv, task.ca)
+        return couple(job)
     return 1

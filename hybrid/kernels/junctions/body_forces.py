@@ -74,6 +74,7 @@ class MeetingJob(NamedTuple):
     first: NDArray[np.int64]
     columns: Floats
     functional: Floats
+    parts: Floats
     answers: Floats
     net: Floats
     bodies: Floats
@@ -106,8 +107,8 @@ def blank_meeting_job() -> MeetingJob:
     z, whole, one = np.zeros, np.int64, np.zeros(1, np.int64)
     return MeetingJob(
         one, z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), one, z((3, 1, SIZE)),
-        z(FUNCTIONAL), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)), z((1, WORK)),
-        z((HANDED - 1, HANDED)), z((2, 6, 6)), z((4, 2)), z(COLUMNS), one, one, one, one, one, z((1, TOUCHED)),
+        z(FUNCTIONAL), z((COLUMNS, 1, SIZE)), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)), z((1, WORK)),
+        z((HANDED - 1, HANDED)), z((2, 6, 6)), z((6, 2)), z(COLUMNS), one, one, one, one, one, z((1, TOUCHED)),
         z((1, 36)), z((1, 6)), one, z((2, SIZE)), z((1, 6)), z((EACH_BODY, 2, SIZE)), z((EACH_BODY, 1, 6)), z((EACH_BODY, EACH_BODY + 1)),
         one,
     )  # fmt: skip

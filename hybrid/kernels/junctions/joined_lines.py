@@ -136,15 +136,18 @@ def moment_of_end(k, a, answer, f):
 
 
 @inner
-def carry_functional(X, columns, first, begin, n, joined, low, high, f):
+def carry_functional(X, columns, parts, first, begin, n, joined, low, high, f):
     """A functional of block `begin` and those behind it becomes one of the last block and q alone.
 
-    low, high: which of the columns there are; joined: whether the last block is left unsolved.
+    low, high: which of the columns there are; joined: whether the last block is left unsolved; parts (.., 5) gets the
+    factors of the right-hand sides of the blocks in it.
     """
     for i in range(begin, n if joined else n + 1):
         p = i * ROW
         a0, a1, a2, a3, a4 = f[0], f[1], f[2], f[3], f[4]
         q, s, t, v = p + SPAN, p + 2 * SPAN, p + 3 * SPAN, p + 4 * SPAN
+        row = parts[first + i]
+        row[0], row[1], row[2], row[3], row[4] = a0, a1, a2, a3, a4
         f[LEFT] += a0 * X[p + 8] + a1 * X[q + 8] + a2 * X[s + 8] + a3 * X[t + 8] + a4 * X[v + 8]
         for b in range(low, high):
             x = columns[b]
@@ -161,6 +164,18 @@ def carry_functional(X, columns, first, begin, n, joined, low, high, f):
                 a0 * X[p + m] + a1 * X[q + m] + a2 * X[s + m] + a3 * X[t + m] + a4 * X[v + m]
             )
             f[AFTER + j] = 0.0
+
+
+@inner
+def count_right(X, parts, first, begin, end, left):
+    """What is left of a functional with the right-hand sides X of blocks begin to end - 1; left: with none of them."""
+    for i in range(begin, end):
+        p, row = i * ROW + SPAN - 1, parts[first + i]
+        left += (
+            row[0] * X[p] + row[1] * X[p + SPAN] + row[2] * X[p + 2 * SPAN] + row[3] * X[p + 3 * SPAN]
+            + row[4] * X[p + 4 * SPAN]
+        )  # fmt: skip
+    return left
 
 
 @inner
@@ -195,12 +210,13 @@ def solve_back(X, columns, first, low, high, q, carries, place, x, joined):
 
 
 @inner
-def solve_dense(A, m):
-    """Solve m equations in the rows of A (m, m+1), the last column the right-hand side, where the solution is left.
+def factor_dense(A, m):
+    """Factor the m equations in the rows of A, for `substitute_dense`; False: they are singular.
 
-    By elimination with row pivoting, of rows and columns scaled to a largest number of about 1; False: it is singular.
+    By elimination with row pivoting, of rows and columns scaled to a largest number of about 1.
     Most numbers of many lines are 0: a pivot row is subtracted where it has others, from rows that have one in its column.
-    A has m+3 rows; the last three hold the scales of the columns, and those columns and rows of a pivot.
+    A has m+5 rows, m+1 columns; its last rows: scales of the columns; columns and rows of a pivot; scales of the rows;
+    the row that was exchanged with each.
     """
     for c in range(m):
         A[m, c] = 0.0
@@ -218,8 +234,9 @@ def solve_dense(A, m):
             big = max(big, abs(A[r, c]))
         if not big > 0.0:
             return False
-        for c in range(m + 1):
+        for c in range(m):
             A[r, c] /= big
+        A[m + 3, r] = big
     for c in range(m):
         best, where, rows, count = abs(A[c, c]), c, 0, 0
         for r in range(c + 1, m):
@@ -231,20 +248,39 @@ def solve_dense(A, m):
                     best, where = size, r
         if not best > 0.0:
             return False
+        A[m + 4, c] = where
         if where != c:
-            for j in range(c, m + 1):
+            for j in range(m):
                 A[c, j], A[where, j] = A[where, j], A[c, j]
         if rows > 0:
-            for j in range(c + 1, m + 1):
+            for j in range(c + 1, m):
                 if A[c, j] != 0.0:
                     A[m + 1, count] = j
                     count += 1
         for i in range(rows):
             r = int(A[m + 2, i])
             f = A[r, c] / A[c, c]
+            A[r, c] = f
             for k in range(count):
                 j = int(A[m + 1, k])
                 A[r, j] -= f * A[c, j]
+    return True
+
+
+@inner
+def substitute_dense(A, m):
+    """Solve the equations that `factor_dense` has factored for the right-hand side in their last column, in place."""
+    for r in range(m):
+        A[r, m] /= A[m + 3, r]
+    for c in range(m):
+        where = int(A[m + 4, c])
+        if where != c:
+            A[c, m], A[where, m] = A[where, m], A[c, m]
+    for c in range(m):
+        if A[c, m] != 0.0:
+            for r in range(c + 1, m):
+                if A[r, c] != 0.0:
+                    A[r, m] -= A[r, c] * A[c, m]
     for c in range(m - 1, -1, -1):
         y = A[c, m]
         for j in range(c + 1, m):
@@ -252,4 +288,3 @@ def solve_dense(A, m):
         A[c, m] = y / A[c, c]
     for c in range(m):
         A[c, m] *= A[m, c]
-    return True

@@ -56,6 +56,7 @@ class SpinningJob(NamedTuple):
     first: NDArray[np.int64]
     columns: Floats
     functional: Floats
+    parts: Floats
     answers: Floats
     net: Floats
     bodies: Floats
@@ -82,8 +83,8 @@ def blank_spinning_job() -> SpinningJob:
     z, whole, one = np.zeros, np.int64, np.zeros(1, np.int64)
     return SpinningJob(
         one, z(ASKED), z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), one,
-        z((3, 1, SIZE)), z(FUNCTIONAL), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)),
-        z((1, WORK)), z((HANDED - 1, HANDED)), z((2, 6, 6)), z((4, 2)), z(COLUMNS), one, one, z((2, SIZE)), z((1, 6)),
+        z((3, 1, SIZE)), z(FUNCTIONAL), z((COLUMNS, 1, SIZE)), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)),
+        z((1, WORK)), z((HANDED - 1, HANDED)), z((2, 6, 6)), z((6, 2)), z(COLUMNS), one, one, z((2, SIZE)), z((1, 6)),
         z((1, 1, 6)), z((1, 1, SIZE)), z((1, 1, 6)), one,
     )  # fmt: skip
 
@@ -176,7 +177,7 @@ def find_answer(job, k, j, cv, ca):
     row, state = first.sea.carried[k], first.new.sheave[k]
     moment, slope = moments_of_all(job, k, j, cv)
     push_along(job, j)
-    if not answer_right_sides(job, cv, ca, True):
+    if not answer_right_sides(job, True):
         return False
     draw_along(job, job.lengthened.shape[0], False)
     turn_along_all(job, j, False)
@@ -200,7 +201,7 @@ def turn_all(job, cv, ca):
     """Put winches and sheaves into the corrections of the iteration; False: not finite."""
     moved, j = read(job.tables[0]).line.moved, 0
     keep_corrections(job, job.kept, job.moved)
-    if not find_lengthenings(job, cv, ca):
+    if not find_lengthenings(job):
         return False
     for k in range(moved.shape[0]):
         if moved[k] == FREE:

@@ -62,7 +62,7 @@ def draw_along(job, count, with_left):
 
 
 @called
-def find_lengthening(job, l, w, cv, ca):
+def find_lengthening(job, l, w):
     """How all answer to 1 m more of line l, by winch number w, with those before it; False: not finite."""
     for k in range(job.tables.shape[0]):
         clear_right_side(job, k)
@@ -72,7 +72,7 @@ def find_lengthening(job, l, w, cv, ca):
     job.marks[job.begins[l] + i] = 1
     x[i, 0] = line_job.work.X[(n + 1) * ROW + i * KEPT + 62] * stage[PUTS]
     eliminate_right_side(job, l)
-    if not answer_right_sides(job, cv, ca, True):
+    if not answer_right_sides(job, True):
         return False
     draw_along(job, w, False)
     stage[YIELDING] = stage[ALONE] - x[int(stage[PULLS_AT]), 0]
@@ -81,12 +81,12 @@ def find_lengthening(job, l, w, cv, ca):
 
 
 @inner
-def find_lengthenings(job, cv, ca):
+def find_lengthenings(job):
     """How all answer to the lengths of all winches; False: not finite."""
     w = 0
     for l in range(job.tables.shape[0]):
         if waits(read(job.tables[l])):
-            if not find_lengthening(job, l, w, cv, ca):
+            if not find_lengthening(job, l, w):
                 return False
             w += 1
     return True

@@ -28,6 +28,7 @@ from hybrid.kernels.junctions.joined_lines import (
     carry_functional,
     carry_start,
     carry_turn,
+    count_right,
     end_row,
     last_block,
     moment_of_end,
@@ -114,13 +115,10 @@ def put_functional(f, low, high, joined, S, e):
 
 
 @inner
-def hand_over(l, job, system, cv, carries):
-    """What a line hands over: its rows and columns of S; cv: of this step (that in the job is being written).
-
-    carries: whether its columns are found; else they are those of the call before, with the same factors.
-    """
-    joints, seats, columns, gaps, answers, S = (
-        system.joints, system.seats, system.columns, system.gaps, system.answers, system.S,
+def hand_over(l, job, system, cv):
+    """What a line hands over: its rows and columns of S; cv: of this step (that in the job is being written)."""
+    joints, seats, columns, parts, gaps, answers, S = (
+        system.joints, system.seats, system.columns, system.parts, system.gaps, system.answers, system.S,
     )  # fmt: skip
     new, work, points = system.new, system.work, system.net.shape[0]
     for r in range(RIGHT):
@@ -134,11 +132,11 @@ def hand_over(l, job, system, cv, carries):
         if turns(seats, l, k):
             b = joints[l, k] - points
             answer_of_end(job, k, new[b], work[b], cv, answers[k])
-    if carries and start >= 0:
+    if start >= 0:
         carry_start(X_, job.work.W, columns, o, n, end >= 0)
-    if carries and starts:
+    if starts:
         carry_turn(X_, job.work.W, columns, o, n, end >= 0, answers[START])
-    if carries and ends:
+    if ends:
         carry_end_turn(X_, job.work.W, columns, o, n, answers[END])
     if start >= 0:
         for a in range(6 if starts else 3):
@@ -146,7 +144,7 @@ def hand_over(l, job, system, cv, carries):
                 balance_of_start(job.work.rows[0], a, starts, answers[START], f)
             else:
                 moment_of_end(START, a - 3, answers[START], f)
-            carry_functional(X_, columns, o, 0, n, end >= 0, low, high, f)
+            carry_functional(X_, columns, parts[a], o, 0, n, end >= 0, low, high, f)
             put_functional(f, low, high, end >= 0, S, AT[START] + a)
     if end < 0:
         return
@@ -162,7 +160,7 @@ def hand_over(l, job, system, cv, carries):
     if ends:
         for a in range(3):
             moment_of_end(END, a, answers[END], f)
-            carry_functional(X_, columns, o, n - 1, n, True, low, high, f)
+            carry_functional(X_, columns, parts[6 + a], o, n - 1, n, True, low, high, f)
             put_functional(f, low, high, True, S, AT[END] + 3 + a)
     for e in range(RIGHT):
         for b in range(3):
@@ -271,12 +269,8 @@ def twist_ends(l, seats, job, at, A):
 
 
 @inner
-def assemble_junctions(system, m, cv, ca, own):
-    """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over.
-
-    system: a kernels.run.system.SystemJob, or what has the same of it; own: whether what bodies are out of balance by
-    themselves is in the right-hand side; where it is not, that is another one for the same factors of the lines.
-    """
+def assemble_junctions(system, m, cv, ca):
+    """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over."""
     tables, joints, net, A = system.tables, system.joints, system.net, system.A
     for r in range(m):
         for c in range(m + 1):
@@ -287,16 +281,57 @@ def assemble_junctions(system, m, cv, ca, own):
         if start < 0 and end < 0:
             continue
         job = read(tables[l])
-        hand_over(l, job, system, cv, own)
+        hand_over(l, job, system, cv)
         spread(l, job, system, tensions, row if end >= 0 else -1, m)
         if end >= 0:
             row += 1
-    for r in range(m):
-        A[m, r] = A[r, m]
     add_own(system, first_unknown(points, tensions, points), m, cv, ca)
-    if not own:
-        for r in range(m):
-            A[r, m] = A[m, r]
+
+
+@inner
+def hand_over_right(l, job, system):
+    """The right-hand side of S alone, of a line with another one for the factors with which it has handed over."""
+    parts, S, X_ = system.parts, system.S, job.work.X
+    start, end = system.joints[l, START], system.joints[l, END]
+    n, o = job.line.h.shape[0], system.first[l]
+    if start >= 0:
+        for a in range(6 if turns(system.seats, l, START) else 3):
+            left = -job.work.rows[0, (a + 1) * 24 + 23] if a < 3 else 0.0
+            S[AT[START] + a, RIGHT] = -count_right(X_, parts[a], o, 0, n if end >= 0 else n + 1, left)
+    if end >= 0:
+        k = last_block(X_, n)
+        for r in range(4):
+            S[TENSION if r == 0 else AT[END] - 1 + r, RIGHT] = X_[k + 64 + r]
+        if turns(system.seats, l, END):
+            for a in range(3):
+                S[AT[END] + 3 + a, RIGHT] = -count_right(X_, parts[6 + a], o, n - 1, n, 0.0)
+
+
+@inner
+def gather_right_sides(system, m):
+    """Another right-hand side of the equations, of those in the eliminated lines, into the last column of A.
+
+    Of points and bodies themselves there is none; ends have nowhere to go.
+    """
+    tables, joints, seats, arms, points = system.tables, system.joints, system.seats, system.arms, system.net.shape[0]
+    S, G, A, row, tensions = system.S, system.G, system.A, 0, count_tensions(system.joints)
+    for r in range(m):
+        A[r, m] = 0.0
+    for l in range(tables.shape[0]):
+        if joints[l, START] < 0 and joints[l, END] < 0:
+            continue
+        hand_over_right(l, read(tables[l]), system)
+        if joints[l, END] >= 0:
+            A[row, m] = S[TENSION, RIGHT]
+            row += 1
+        for k in range(2):
+            joint = joints[l, k]
+            if joint >= 0:
+                at = first_unknown(joint, tensions, points)
+                rows, size = follow(joint, points, arms[l, k], turns(seats, l, k), G[k])
+                for j in range(size):
+                    for i in range(rows):
+                        A[at + j, m] += G[k, i, j] * S[AT[k] + i, RIGHT]
 
 
 @inner

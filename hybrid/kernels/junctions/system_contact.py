@@ -51,6 +51,7 @@ class TouchingJob(NamedTuple):
     first: NDArray[np.int64]
     columns: Floats
     functional: Floats
+    parts: Floats
     answers: Floats
     net: Floats
     bodies: Floats
@@ -81,8 +82,8 @@ def blank_touching_job() -> TouchingJob:
     z, whole = np.zeros, np.int64
     return TouchingJob(
         z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), z(1, whole), z((3, 1, SIZE)),
-        z(FUNCTIONAL), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)), z((1, WORK)),
-        z((HANDED - 1, HANDED)), z((2, 6, 6)), z((4, 2)), z(COLUMNS), z((1, 2), whole), z((1, 1), whole), z((2, SIZE)), z((1, 6)), room_for_products(),
+        z(FUNCTIONAL), z((COLUMNS, 1, SIZE)), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)), z((1, WORK)),
+        z((HANDED - 1, HANDED)), z((2, 6, 6)), z((6, 2)), z(COLUMNS), z((1, 2), whole), z((1, 1), whole), z((2, SIZE)), z((1, 6)), room_for_products(),
         z(1, whole), z(1, whole), z(1, whole), z(1, whole),
     )  # fmt: skip
 
@@ -145,7 +146,7 @@ def set_right_side(l, line_job, contact, first, joints, touches, exactly):
 
 
 @called
-def respond(job, cv, ca, with_gradient):
+def respond(job, cv, with_gradient):
     """Corrections work.x of all lines by the forces of contact at contact.x; False if they are not finite."""
     for l in range(job.tables.shape[0]):
         if touching(job, l) > 0:
@@ -156,7 +157,7 @@ def respond(job, cv, ca, with_gradient):
         if job.shared[l, 0] >= 0:
             touches = contact.counts[POINTS] > 0
         set_right_side(l, read(job.tables[l]), contact, job.shared[l, 1], job.joints, touches, with_gradient)
-    if not answer_right_sides(job, cv, ca, job.asked[0] == 0):
+    if not answer_right_sides(job, job.asked[0] == 0):
         return False
     if job.spin != 0 and cv > 0.0:
         job.phase[0] = TURN_ALONG
@@ -269,12 +270,12 @@ def combine(job, done):
 
 
 @inner
-def find_solution(job, cv, ca):
+def find_solution(job, cv):
     """GMRES from zero: contact.x = the correction of the nodes in contact of all lines; False: not finite."""
     H, rhs, solution = job.hessenberg, MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
     unknown, width = prepare_sweeps(job)
     set_unknowns(job, -1)
-    if not respond(job, cv, ca, True):
+    if not respond(job, cv, True):
         return False
     put_response(job, 0, True)
     for i in range(MOST_PRODUCTS + 1):
@@ -286,7 +287,7 @@ def find_solution(job, cv, ca):
         most = enough(s, width, unknown)
         while done < MOST_PRODUCTS and left > most:
             set_unknowns(job, done)
-            if not respond(job, cv, ca, False):
+            if not respond(job, cv, False):
                 return False
             put_response(job, done + 1, False)
             for j in range(done + 1):
@@ -344,7 +345,7 @@ def touch_system(table):
     if points == 0:
         return 1
     keep_corrections(job, False)
-    if not find_solution(job, task.cv, task.ca) or not respond(job, task.cv, task.ca, True):
+    if not find_solution(job, task.cv) or not respond(job, task.cv, True):
         return 0
     keep_corrections(job, True)
     return 2

@@ -32,6 +32,7 @@ class SystemJob(NamedTuple):
     first: NDArray[np.int64]  # (L,) where columns of a line begin that carries some
     columns: Floats  # (3, .., 5), or (COLUMNS, .., 5) where an end turns
     functional: Floats  # (FUNCTIONAL,) worked in, as what follows
+    parts: Floats  # as columns: what right-hand sides count in forces and moments on the start, moments on the end
     answers: Floats  # (2, ANSWER)
     q: Floats  # (COLUMNS,)
     net: Floats  # (P, 3) on return what does not balance at the points, N
@@ -41,7 +42,7 @@ class SystemJob(NamedTuple):
     work: Floats  # (B, WORK)
     S: Floats  # (HANDED - 1, HANDED)
     G: Floats  # (2, 6, 6)
-    A: Floats  # (m+3, m+1)
+    A: Floats  # (m+5, m+1)
     touch_table: NDArray[np.int64]  # of kernels.junctions.system_contact.touch_system
     rides: NDArray[np.int64]  # (M,) the body that carries an obstacle, -1: none does; empty: no body has a shape
     phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies and spin_sheaves
@@ -64,7 +65,7 @@ def blank_system_job() -> SystemJob:
     z, one, two = np.zeros, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
     return SystemJob(
         z(ASKED), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
-        z((1, 1, 1)), z(1), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
+        z((1, 1, 1)), z(1), z((1, 1, 1)), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
         z((2, 6, 6)), z((1, 1)), one, one, one, one, one,
     )  # fmt: skip
 

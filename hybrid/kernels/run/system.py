@@ -25,7 +25,7 @@ from hybrid.kernels.junctions.bodies import (
 )
 from hybrid.kernels.junctions.body_contact import CARRY, COUPLE, HOLD, PRESS, STIFFEN
 from hybrid.kernels.junctions.carried_frames import turns
-from hybrid.kernels.junctions.joined_lines import solve_dense
+from hybrid.kernels.junctions.joined_lines import factor_dense, substitute_dense
 from hybrid.kernels.junctions.joined_sheaves import ROLL_ON, TURN
 from hybrid.kernels.junctions.junctions import (
     END,
@@ -456,7 +456,7 @@ def solve_system(table):
                 own_force(bodies[b], old[b], new[b], work[b])
             outcome = OK
             break
-        assemble_junctions(system, m, s.cv, s.ca, True)
+        assemble_junctions(system, m, s.cv, s.ca)
         ask_bodies(system, STIFFEN)
         if task.what == JUNCTIONS:
             outcome = OK
@@ -464,9 +464,10 @@ def solve_system(table):
         if task.what == EQUILIBRIUM and it == 1:
             hold_turns(work, A, first_unknown(points, count_tensions(joints), points))
             ask_bodies(system, HOLD)
-        if m > 0 and not solve_dense(A, m):
+        if m > 0 and not factor_dense(A, m):
             outcome = SINGULAR
             break
+        substitute_dense(A, m)
         line = correct_all(system, points, m)
         if line >= 0:
             bad = read(tables[line])
