@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.kernels.contact.self_contact import blank_contact_job, contact_task
+from hybrid.kernels.contact.self_contact_energy import observe_coupled
 from hybrid.kernels.contact.self_contact_friction import AT, GRIP, HELD, PIECE
 from hybrid.kernels.contact.self_contact_law import DISTANCE, FIRST, FORCE, LAST, NORMAL, WX, WY, P, Q
 from hybrid.kernels.contact.self_contact_pairs import (
@@ -42,7 +43,17 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.forces import ROTARY
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work
+from hybrid.kernels.state.state import (
+    Ends,
+    Floats,
+    Line,
+    Sea,
+    State,
+    Work,
+    blank_line,
+    blank_state,
+    no_ends,
+)
 from hybrid.kernels.step.newton import ADDRESS, ASKED, NEAR, REST
 
 # Sample points of a piece lie at most this part of a diameter apart, but for round-off, which must not decide how many
@@ -68,6 +79,7 @@ class Strand(NamedTuple):
     stiff: Floats  # N, least size of the law
     mass: Floats  # kg/m
     rolls: float  # 1 where friction turns it about itself; 0: nothing holds its spin
+    couples: bool  # whether tension makes a torque in it
 
 
 def strand_of(line: Line, width: Floats, bending: Floats, tension_scale: float) -> Strand:
@@ -83,7 +95,7 @@ def strand_of(line: Line, width: Floats, bending: Floats, tension_scale: float) 
     return Strand(
         widths, np.maximum(np.ceil(lengths / (SPACING * widths)), 1),
         np.maximum(STIFFNESS * bends / widths**2, TENSION * tension_scale * (bends == 0.0)),
-        line.mass / pieces, float(bool(line.bits & ROTARY) or holds_twist),
+        line.mass / pieces, float(bool(line.bits & ROTARY) or holds_twist), line.tension_twist.size > 0,
     )  # fmt: skip
 
 
@@ -103,6 +115,9 @@ def contact_of_strands(strands: Sequence[Strand], friction: float) -> Contact:
     numbers = contact.numbers
     numbers[WIDEST], numbers[NARROWEST], numbers[FRICTION] = contact.width.max(), contact.width.min(), friction
     numbers[ROLLS] = contact.rolls.max()
+    if any(x.couples for x in strands):
+        one = blank_line(1), no_ends(), blank_state(1), blank_contact(1)
+        contact.observer[0] = observe_coupled.address(*one, 0, 0)
     numbers[[SINCE, FADED, BEGUN, LED]], numbers[QUIET] = np.nan, np.inf
     return contact
 

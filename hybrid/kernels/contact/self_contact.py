@@ -60,7 +60,7 @@ from hybrid.kernels.contact.self_contact_pairs import (
     look_ahead,
 )
 from hybrid.kernels.contact.self_contact_solve import solve_contact
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.books import (
     CLOCK_SIZE,
@@ -167,7 +167,7 @@ def find_spins(line, contact, clock, near, old, new, u):
             x[i, 3] = dt * old.w[i] + 0.5 * dt * ahead + (new.w[i] - old.w[i] - ahead) / cv
 
 
-@inner
+@called
 def hold_points(line, contact):
     """Friction of all points of contact at contact.x."""
     numbers = contact.numbers

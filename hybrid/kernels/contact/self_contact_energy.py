@@ -27,7 +27,8 @@ from hybrid.kernels.laws.bending_slip import stored_by_slip
 from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import couples
-from hybrid.kernels.machine.compile import called, inner
+from hybrid.kernels.machine.compile import called, inner, kernel
+from hybrid.kernels.machine.references import caller_of_six
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.march.powers import find_powers, loses
 from hybrid.kernels.march.zone_torque import twist_energy
@@ -48,6 +49,7 @@ from hybrid.kernels.state.report import (
 MOST_GAIN = 5e-4
 # Diameters that the fastest part moves, beside the mean, in the shortest step that is halved.
 LEAST_TRAVEL = 0.05
+call_observer = caller_of_six(0)
 
 
 @inner
@@ -84,13 +86,25 @@ def energy_of_line(line, ends, state):
     return moving + bent + twisted, longer
 
 
+@kernel
+def observe_coupled(line, ends, state, contact, _1, _2):
+    """Energies, J, of a line in which tension makes a torque, into contact.energy; contact.at and .move are used as room.
+
+    Called by its address (Contact.observer), so that contact of other lines compiles none of it.
+    """
+    observe(
+        line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, contact.at, contact.move, contact.energy
+    )
+    contact.counts[STALE] = 1
+    return 0
+
+
 @called
 def energy_without_weight(line, ends, contact, state, report):
     """Energy, J, of motion, strain and contact of a state with its report; contact.at and .move are used as room."""
     if couples(line):
+        call_observer(contact.observer[0], line, ends, state, contact, 0, 0)
         parts = contact.energy
-        observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, contact.at, contact.move, parts)
-        contact.counts[STALE] = 1
         held, stretched = parts[0] + parts[1] + parts[2], parts[3]
     else:
         held, stretched = energy_of_line(line, ends, state)
