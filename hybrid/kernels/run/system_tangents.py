@@ -52,8 +52,8 @@ from hybrid.kernels.junctions.bodies import (
     put_matrix,
     rotation,
 )
-from hybrid.kernels.junctions.joined_lines import last_block, solve_dense
-from hybrid.kernels.junctions.junctions import END, assemble_junctions, correct_all, count_tensions, first_unknown
+from hybrid.kernels.junctions.joined_lines import last_block, substitute_dense
+from hybrid.kernels.junctions.junctions import END, correct_all, count_tensions, first_unknown, gather_right_sides
 from hybrid.kernels.junctions.junctions import START as BEGIN
 from hybrid.kernels.junctions.system_job import read_system, task_of
 from hybrid.kernels.laws.water import wave_kinematics
@@ -324,7 +324,7 @@ def set_right_side(line_work, job, other, starts, ends):
 
 
 @inner
-def answer(system, net, p, cv, ca):
+def answer(system, net, p):
     """Corrections of all other lines and bodies: in work.x of the lines of the run and in what its bodies work with."""
     own = read_bodies(net.bodies[p])
     m, points = system.A.shape[1] - 1, system.net.shape[0]
@@ -334,12 +334,12 @@ def answer(system, net, p, cv, ca):
         set_right_side(job.work, job, read_other(job.tables[p]), starts, ends)
     if m > 0:
         own_right_sides(system, net, p)
-        assemble_junctions(system, m, cv, ca, False)
+        gather_right_sides(system, m)
         first = first_unknown(points, count_tensions(system.joints), points)
         for b in range(own.right.shape[0]):
             for k in range(6):
                 system.A[first + 6 * b + k, m] += own.right[b, k]
-        solve_dense(system.A, m)
+        substitute_dense(system.A, m)
         correct_all(system, points, m)
     for k in range(net.lone.shape[0]):
         job = read_job(net.lines[net.lone[k]])
@@ -451,7 +451,7 @@ def advance(system, net, p, s):
             other = read_other(job.tables[p])
             leave_over(None, 1, job, other, s, new_of(job, job), old_of(job, other), new_of(job, other))
         put_bodies(system, bodies)
-        answer(system, net, p, s.cv, s.ca)
+        answer(system, net, p)
         correct_lines(net, p, s, k, count, wanted)
         correct_body_rates(system, bodies.rates, s)
     find_body_rates(bodies, s)
@@ -496,5 +496,5 @@ def correct_beside(table):
         job = read_job(net.lines[l])
         leave_over_at_rest(job, read_other(job.tables[p]), cv, ca)
     put_bodies(system, read_bodies(net.bodies[p]))
-    answer(system, net, p, cv, ca)
+    answer(system, net, p)
     return 0
