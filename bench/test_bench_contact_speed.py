@@ -1,13 +1,16 @@
 """What contact of a line with itself costs: examples/plectoneme.yaml beside the same line without contact.
 
-    pytest bench/test_bench_contact_speed.py -m bench -s
+    pytest bench/test_bench_contact_speed.py -m bench -n 0 -s
+    HYBRID_OTHER=/path/to/checkout of 0.6.0 pytest bench/test_bench_contact_speed.py -m bench -n 0 -s -k plectoneme
 
-Processor time of this process, the least of several runs; ratios are taken within one run, so that machines compare.
+Processor time, the least of several runs; ratios are taken within one run, so that machines compare.
 BEFORE: the same ratios before pivot blocks were factored once, sweeps cut short and friction differentiated exactly.
+Steps without contact are shorter than they were, too: with HYBRID_OTHER, whole runs are compared with that checkout's.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -77,6 +80,20 @@ def test_a_plectoneme(cells: int, friction: float) -> None:
         f"(before {before[0]:g}), {ratio / before[0]:.2f} of before; tension {tension:.6f} N, before {before[1]:.6f}"
     )
     assert abs(tension - before[1]) < 1e-4 * before[1]
+    other = os.environ.get("HYBRID_OTHER")
+    if other:
+        here, there = (run_in(Path(x), cells, friction) for x in (Path(hybrid.__file__).parents[1], other))
+        print(f"here {here[0]:.2f} s, there {there[0]:.2f} s: {here[0] / there[0]:.2f} of it; {here[1]} and {there[1]} steps, "
+              f"tension {here[2]:.6f} and {there[2]:.6f} N")  # fmt: skip
+
+
+def run_in(checkout: Path, cells: int, friction: float) -> tuple[float, int, float]:
+    """Processor time, s, steps, tension at the end, N, in a process that imports `hybrid` from there."""
+    env = os.environ | {"PYTHONPATH": str(checkout), "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, str(Path(__file__).with_name("plectoneme_run.py")), str(cells), str(friction)]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
+    seconds, steps, tension = json.loads(done.stdout.splitlines()[-1])
+    return seconds, steps, tension
 
 
 def test_compilation(tmp_path: Path) -> None:
