@@ -77,6 +77,11 @@ def in_space(line: Line) -> Line:
     return line._replace(bits=line.bits & ~PLANAR)
 
 
+def as_begun(line: Line, dimension: int) -> Line:
+    """The line as its run began: in space, but of a scene of two dimensions; what is written goes by that."""
+    return line if dimension == 2 else in_space(line)
+
+
 def untwist(line: Line, ends: Ends, guides: tuple[bool, bool], state: State) -> None:
     """Give the rods of a planar line frames without twist against each other and against its clamps.
 

@@ -29,7 +29,7 @@ def node_torques(view: Observation) -> Floats:
     line, nodes = view.line, slice(None)
     strain = view.element_strains[:, 2] - view.of_line("k0", nodes)[:, 2]
     if line.tension_twist.size:
-        by_tension = line.tension_twist[:, None] * view.T
+        by_tension = view.of_line("tension_twist", nodes) * view.T
         strain = strain + np.pad(by_tension, ((0, 1), (0, 0))) + np.pad(by_tension, ((1, 0), (0, 0)))
     torque = np.where(line.element[:, None], view.stiffness(nodes)[:, 2] * strain, 0.0)
     for k in (0, 1):

@@ -241,9 +241,14 @@ def _layer(view: Observation, node: int, way: int, span: Integers) -> Floats:
 
 def _twist_to_node(view: Observation, cell: Integers, inner: Integers) -> Floats:
     """Twist (n, outputs) 1/m by which tension turns the middle of cells more than their ends at nodes."""
-    h, T, line = view.cell_lengths, view.T, view.line
+    h, T = view.cell_lengths, view.T
     more = (T[cell] - T[inner]) * (h[cell] / (h[cell] + h[inner]))
-    return np.asarray((2.0 * line.tension_twist[cell] / line.h[cell])[:, None] * more)
+    return _twist_per_tension(view, cell) * more
+
+
+def _twist_per_tension(view: Observation, cell: Integers) -> Floats:
+    """Twist (n, outputs or 1) 1/m of cells per tension, 1/N, without torque."""
+    return np.asarray(2.0 * view.of_line("tension_twist", cell) / view.cell_lengths[cell])
 
 
 def part_without_spring(view: Observation, node: int, cell: int, bend: Floats) -> Floats:
@@ -314,7 +319,7 @@ def _strain_of_moment(view: Observation, node: Integers, cell: Integers) -> Floa
     hn = view.of_line("hn", inner)[:, None]
     k = view.of_line("k0", inner) / hn + _bend_of_moment(view, node, cell)
     if line.tension_twist.size:
-        k[:, 2] -= (2.0 * line.tension_twist[cell] / line.h[cell])[:, None] * view.T[cell]
+        k[:, 2] -= _twist_per_tension(view, cell) * view.T[cell]
     if (
         line.slip_law.size and (slips := np.flatnonzero(line.slip_law[inner, 0])).size
     ):  # depends on the way: as beside it

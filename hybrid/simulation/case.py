@@ -24,6 +24,7 @@ from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.plan import output_times
+from hybrid.model.plane import as_begun
 from hybrid.model.resolution import (
     Reach,
     Resolution,
@@ -496,8 +497,9 @@ class Case:
             [(x.name, x.ratio) for x in CRITERIA] if self.scene.output.criteria and zones_move and not only else ()
         )
         errors = model.follows_error and wants_errors(self.scene)
-        return Observer(
-            model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only, errors,
+        observer = Observer(
+            as_begun(model.line, self.scene.dimension), model.sea.values, model.zones, s, not only, model.attached,
+            kinds, criteria, only, errors,
             self.points.jumps, section_changes(self.scene),
             model.finest_nodes if follows_curvature(self.scene) and model.layout and not only else None,
             () if only else self.scene.output.elevation or (),
@@ -505,6 +507,8 @@ class Case:
             obstacles=() if only else model.sea.names, hinges=model.hinges,
             edges=not only and wants_errors(self.scene) and bool(model.line.bits & SEABED),
         )  # fmt: skip
+        observer.line = model.line
+        return observer
 
     def _report(self, run: Transient, finished: bool) -> None:
         if self.progress.heard:

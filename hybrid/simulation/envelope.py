@@ -24,6 +24,7 @@ from hybrid.kernels.watch.extremes import fold_extremes
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene
+from hybrid.model.plane import as_begun
 from hybrid.model.sections import SECTION_LIMITS, limits_along, modules_of, section_changes
 from hybrid.model.self_reach import no_contact
 from hybrid.outputs.output_grid import Grid
@@ -118,7 +119,8 @@ class Envelope:
         later = MAY_TOUCH | MAY_MEET if moves else 0
         touching = SELF_CONTACT | later
         has |= {"self_contact"} if touches or model.line.bits & touching else set()
-        has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
+        flat = as_begun(model.line, scene.dimension).bits & PLANAR
+        has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not flat) else set()
         pipes = Pipes(scene) if moves and any(x.pipe for x in scene.cable.sections) else None
         has |= {"pipe"} if pipes is not None else set()
         self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in has}

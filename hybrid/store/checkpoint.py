@@ -13,7 +13,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -21,7 +21,7 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.store.format import Field, check_column, plain_text
 from hybrid.store.integrity import stored
-from hybrid.store.lines import of_all
+from hybrid.store.lines import GROUP, of_all
 from hybrid.store.named_arrays import DIGEST, Tree, matched, pack, unpack
 
 # What was found before the run (the error controller's runs), beside the two slots.
@@ -153,7 +153,10 @@ def check_tables(
     source: h5py.File, groups: Mapping[str, h5py.Group], all_tables: Mapping[str, Mapping[str, Sequence[Field]]],
     at: Checkpoint,
 ) -> None:  # fmt: skip
-    """ResultError unless a file has these tables, and a checkpoint their rows; groups: "" and of lines."""
+    """ResultError unless a file has these tables and no other columns, and a checkpoint their rows; groups: "" and of
+
+    lines.
+    """
     expected = {}
     for part, tables in all_tables.items():
         within = groups[part]
@@ -165,10 +168,34 @@ def check_tables(
         for group, columns in tables.items():
             for field in columns:
                 check_column(within, group, field)
+        _check_outputs(within, tables["/"], at.rows.get(f"{GROUP}/{part}/t" if part else "t", 0))
         expected[part] = {f"{group}/{columns[0].name}".lstrip("/"): 0 for group, columns in tables.items() if columns}
     if list(at.rows) != list(of_all(expected)) or not at.rows["t"] or source["t"][at.rows["t"] - 1] != at.t:
         advice = "its rows are not those of the file\n    try:      run its scene again"
         raise ResultError(f"{source.filename} has a checkpoint that does not fit\n    detail:   {advice}")
+
+
+def _check_outputs(within: h5py.Group, fields: Sequence[Field], count: int) -> None:
+    """ResultError: outputs that are none of the fields, and would end here without a word, or lack some of the rows.
+
+    Errors come later.
+    """
+    known, amiss = {field.name for field in fields}, list[str]()
+
+    def look(name: str, data: Any) -> None:
+        if not isinstance(data, h5py.Dataset) or not data.ndim or data.dims[0].label != "t":
+            return
+        if name in known and data.shape[0] < count:
+            amiss.append(f"{name} in {data.shape[0]} of {count} outputs")
+        elif name not in known and not name.startswith(("errors/", f"{GROUP}/")):
+            amiss.append(f"{name}, which this program does not write")
+
+    within.visititems(look)
+    if amiss:
+        detail = f"the result has {'; '.join(amiss)}"
+        raise ResultError(
+            f"{within.file.filename} cannot be resumed\n    detail:   {detail}\n    try:      run its scene again"
+        )
 
 
 def digest_of(path: Path) -> str:

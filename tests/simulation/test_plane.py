@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import resumed
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
@@ -132,6 +133,22 @@ def test_any_plane_where_nothing_is_heavy(axis: tuple[float, float, float]) -> N
     assert entry(asked).on
     found = hybrid.run(asked)
     assert np.abs(found.position - straight.position @ R.T).max() < SAME * straight.s[-1]
+
+
+@pytest.mark.parametrize("dimension", [None, 2])
+@pytest.mark.parametrize("model", ["rod", "catenary"])
+def test_what_is_written_in_a_plane_goes_on_after_a_stop(model: str, dimension: int | None, tmp_path: Path) -> None:
+    """Turns, torques and moments between two clamps too, which a line that may leave its plane has."""
+    clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -0.5]}
+    travel = {"motion": {"travel": {"by": [0.05, 0, 0.1], "over": 0.5}}}
+    asked: dict[str, Any] = {
+        "cable": {"sections": [{"length": 12.0, "mass": 2.0, "bending_stiffness": 20.0, "torsional_stiffness": 15.0}]},
+        "ends": {"start": clamp, "end": clamp | {"position": [10, 0, 3], "tangent": [1, 0, 0.8]} | travel},
+        "initial": "equilibrium", "model": model, "mesh": {"cells": 12},
+        "time": {"duration": 0.5, "step": 2**-5}, "output": {"every": 2**-3},
+    }  # fmt: skip
+    whole = resumed(asked if dimension is None else asked | {"dimension": dimension}, tmp_path, 0.25)
+    assert ("turns/link" in whole) == (dimension is None)
 
 
 @pytest.mark.slow  # 4 s

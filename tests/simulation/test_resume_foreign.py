@@ -35,6 +35,16 @@ def replace(name: str, **made: object) -> Callable[[h5py.File], None]:
     return change
 
 
+def output(name: str, rows: int) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        if name in file:
+            del file[name]
+        data = file.create_dataset(name, data=np.zeros(rows), chunks=(4,), maxshape=(None,))
+        data.dims[0].label = "t"
+
+    return change
+
+
 def set_status(file: h5py.File) -> None:
     file.attrs["status"] = b"\xff\xfe"
 
@@ -46,6 +56,8 @@ CHANGES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
         replace("tension", data=np.zeros((11, 3)), chunks=(4, 3), maxshape=(None, None)),
         r"tension: float64 of shape \(11, 3\)",
     ),
+    "output of another program": (output("other", 11), "has other, which"),
+    "output that has ended": (output("work/drag", 7), "has work/drag in 7 of 11 outputs"),
     "no text": (set_status, "attribute 'status'.*\n.*UTF-8"),
 }
 

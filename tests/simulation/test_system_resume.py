@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import FEW_STEPS, Stopping, differences
+from bits import FEW_STEPS, Stopping, differences, went_on
 
 import hybrid
 import hybrid.simulation.system_run
 from hybrid.errors import ResultError, SceneError
+from tests.combinations.pairs import as_system, scene_of
 
 WAVES = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 5.0}
 SEA = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0, "waves": WAVES}}
@@ -221,3 +222,12 @@ def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path, mon
             assert part.status == "running" and len(part.times)
         hybrid.resume(path).close()
         assert differences(whole, path) == []
+
+
+def test_twist_beside_ends_goes_by_the_cells_of_each_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lengths of cells blend, and outputs that wait are looked at together: by those of the last, twist was off."""
+    scene, stopping = as_system(scene_of("cells that follow", "torque of tension")), Stopping(monkeypatch)
+    assert scene is not None
+    hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
+    assert went_on(scene, tmp_path / "run.h5", stopping, [7, 8]) == 2
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
