@@ -77,7 +77,7 @@ def in_space(line: Line) -> Line:
     return line._replace(bits=line.bits & ~PLANAR)
 
 
-def as_begun(line: Line, dimension: int) -> Line:
+def as_begun(line: Line, dimension: int | None) -> Line:
     """The line as its run began: in space, but of a scene of two dimensions; what is written goes by that."""
     return line if dimension == 2 else in_space(line)
 

@@ -226,8 +226,8 @@ def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path, mon
 
 def test_twist_beside_ends_goes_by_the_cells_of_each_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lengths of cells blend, and outputs that wait are looked at together: by those of the last, twist was off."""
-    scene, stopping = as_system(scene_of("cells that follow", "torque of tension")), Stopping(monkeypatch)
-    assert scene is not None
+    scene: Any = as_system(scene_of("cells that follow", "torque of tension"))
+    stopping = Stopping(monkeypatch)
     hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
     assert went_on(scene, tmp_path / "run.h5", stopping, [7, 8]) == 2
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
