@@ -96,6 +96,11 @@ class Observation:
             return np.moveaxis(self._varied[name][:, at], 0, -1)
         return np.asarray(getattr(self.line, name)[at][..., None])
 
+    def lines(self) -> list[Line]:
+        """The line of each output, where it is another one in every output; else none."""
+        each = range(self.batch.t.size if self._varied else 0)
+        return [self.line._replace(**{name: x[k] for name, x in self._varied.items()}) for k in each]
+
     # ---- how its arrays are laid out ----------------------------------------------------------
 
     @property

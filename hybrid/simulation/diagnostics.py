@@ -30,7 +30,7 @@ from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION, SOIL
 from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RIDES
 from hybrid.kernels.state.report import BEND, TWIST_NODE
-from hybrid.kernels.state.state import Batch, Ends, Floats, Sea, State, ends_in, state_in
+from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model
 from hybrid.model.first_state import HUNG
@@ -683,22 +683,24 @@ class Diagnostics:
 
     def _bends_by_weight(self, seen: Observation) -> None:
         """Bends of a rod almost without tension that are shorter than its cells."""
-        line, batch = self._model.line, seen.batch
-        nodes, l, limits = too_long_for_weight(self._model.cable, line)
-        if not nodes.size:
-            return
-        turns = turns_by_weight(line, seen, nodes, limits)
-        bent = np.flatnonzero(turns.max(axis=0) > TURNS)
-        if bent.size:
-            k, worst = int(bent[0]), int(np.argmax(turns[:, bent[0]]))
-            node, at = int(nodes[worst]), nodes[turns[:, k] > TURNS]
-            longest = float(line.h[node - 1 : node + 1].max())
-            text = weight_text(
-                float(l[worst]), float(line.s[node]), longest, float(turns[worst, k]), self._asks(node, "`mesh.cells`")
-            )
-            s_a, s_b = float(line.s[at[0] - 1]), float(line.s[at[-1] + 1])
-            self.events.event(float(batch.t[k]), s_a, s_b, "unresolved slack bend", text)
-            self._weight = True
+        each: list[tuple[Line, slice]] = [(self._model.line, slice(None))]
+        if lines := seen.lines():
+            each = [(line, slice(k, k + 1)) for k, line in enumerate(lines)]
+        for line, outputs in each:
+            nodes, l, limits = too_long_for_weight(self._model.cable, line)
+            if not nodes.size:
+                continue
+            turns = turns_by_weight(line, seen, nodes, limits)[:, outputs]
+            bent = np.flatnonzero(turns.max(axis=0) > TURNS)
+            if bent.size:
+                k, worst = int(bent[0]), int(np.argmax(turns[:, bent[0]]))
+                node, at = int(nodes[worst]), nodes[turns[:, k] > TURNS]
+                longest, asks = float(line.h[node - 1 : node + 1].max()), self._asks(node, "`mesh.cells`")
+                text = weight_text(float(l[worst]), float(line.s[node]), longest, float(turns[worst, k]), asks)
+                s_a, s_b = float(line.s[at[0] - 1]), float(line.s[at[-1] + 1])
+                self.events.event(float(seen.batch.t[outputs][k]), s_a, s_b, "unresolved slack bend", text)
+                self._weight = True
+                return
 
     def tension(self, t: float, state: State) -> None:
         """Catenary cells without tension, where friction holds them or the scene asks to go on with them."""

@@ -231,3 +231,17 @@ def test_twist_beside_ends_goes_by_the_cells_of_each_output(tmp_path: Path, monk
     hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
     assert went_on(scene, tmp_path / "run.h5", stopping, [7, 8]) == 2
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+def test_slack_bends_at_a_winch_are_those_of_the_cells_of_each_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The event named the cell at the winch as long as it was when outputs were looked at: 1.9 m for 1.1 m."""
+    cable = scene_of("payout")
+    cable["ends"]["end"]["payout"] = {"rate": 2.0, "ramp": 0.1}
+    scene: Any = as_system(cable)
+    stopping = Stopping(monkeypatch)
+    whole = hybrid.run(scene, tmp_path / "whole.h5", progress=stopping)
+    assert [x.kind for x in whole.lines["one"].events] == ["unresolved slack bend"]
+    assert went_on(scene, tmp_path / "run.h5", stopping, [7, 8]) == 2
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
