@@ -379,11 +379,6 @@ def test_a_line_in_high_waves_is_one_of_several_and_is_turned_with_them():
     assert np.ptp(one.position[:, 0, 2]) > 1.0 and np.abs(one.position[..., 0]).max() > 0.05
 
 
-def test_what_is_linear_is_refused_beside_high_waves(tmp_path: Path):
+def test_what_is_linear_is_refused_beside_high_waves():
     with pytest.raises(SceneError, match="a response by frequency is linear"):
         hybrid.response(scene(HIGH))
-    (tmp_path / "rao.csv").write_text("frequency,heading,heave\n0.1,0,1\n9,0,1\n0.1,180,1\n9,180,1\n")
-    vessel = {"rao": str(tmp_path / "rao.csv"), "origin": [0, 0, 0], "fairlead": [0, 0, 0]}
-    start = {"kind": "pinned", "position": [0, 0, 0], "motion": {"vessel": vessel}}
-    with pytest.raises(SceneError, match="an RAO is of linear waves"):
-        scene(HIGH, ends={"start": start, "end": "free"})

@@ -71,8 +71,8 @@ def sharpest_in_plane(line, ends, e, T, a1, strains):
                 m, _, _ = slip_about_normal(line, a1, max(i - 1, 0), before if i > 0 else d, i, angle - k0)
                 strains[i, 1] = abs(share * k * (angle - k0) + m)
             if i == 0 or i == n:
-                x, y = components_about_normal(line, a1, max(i - 1, 0), before if i > 0 else d, angle - k0)
-                part = parts_without_spring(line, i, x, y)[0]
+                along, across = components_about_normal(line, a1, max(i - 1, 0), before if i > 0 else d, angle - k0)
+                part = parts_without_spring(line, i, along, across)[0]
                 if part < RIGID:
                     strains[i, 0] = abs(k0 + part * (angle - k0)) / (0.5 * line.h[min(i, n - 1)])
         if i == 0 or i == n:
