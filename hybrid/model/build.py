@@ -79,6 +79,7 @@ class Model:
     kept_in: Floats | None = None  # (3,) normal of the plane that it must not leave, though it is computed in space
     follows_error: bool = False  # whether the error of leaving bending out is followed
     payout: PayoutPlan | None = None  # of a line that is paid out or taken in
+    held: Line | None = None  # the line as its ends held it before the first of them was let go
 
     @property
     def mesh(self) -> Layout | tuple[Floats, tuple[Zone, ...]]:

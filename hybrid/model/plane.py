@@ -77,9 +77,13 @@ def in_space(line: Line) -> Line:
     return line._replace(bits=line.bits & ~PLANAR)
 
 
-def as_begun(line: Line, dimension: int | None) -> Line:
-    """The line as its run began: in space, but of a scene of two dimensions; what is written goes by that."""
-    return line if dimension == 2 else in_space(line)
+def as_begun(line: Line, held: Line | None, dimension: int | None) -> Line:
+    """The line as its run began: in space, but of a scene of two dimensions; what is written goes by that.
+
+    held: as it was before an end was let go, if one was.
+    """
+    found = line if held is None else held
+    return found if dimension == 2 else in_space(found)
 
 
 def untwist(line: Line, ends: Ends, guides: tuple[bool, bool], state: State) -> None:

@@ -16,7 +16,8 @@ NAMES = ("start", "end")
 
 def without_hold(model: Model, k: int, t: float) -> Model:
     """The same model with end k (0 or 1) free from t (s) on; its motion is over.  The old one is as it was."""
-    return replace(unclamped(model, k), ends=model.ends.released_at(k, t))
+    held = model.line if model.held is None else model.held
+    return replace(unclamped(model, k), ends=model.ends.released_at(k, t), held=held)
 
 
 def unclamped(model: Model, k: int) -> Model:

@@ -498,8 +498,8 @@ class Case:
         )
         errors = model.follows_error and wants_errors(self.scene)
         observer = Observer(
-            as_begun(model.line, self.scene.dimension), model.sea.values, model.zones, s, not only, model.attached,
-            kinds, criteria, only, errors,
+            as_begun(model.line, model.held, self.scene.dimension), model.sea.values, model.zones, s, not only,
+            model.attached, kinds, criteria, only, errors,
             self.points.jumps, section_changes(self.scene),
             model.finest_nodes if follows_curvature(self.scene) and model.layout and not only else None,
             () if only else self.scene.output.elevation or (),

@@ -119,8 +119,8 @@ class Envelope:
         later = MAY_TOUCH | MAY_MEET if moves else 0
         touching = SELF_CONTACT | later
         has |= {"self_contact"} if touches or model.line.bits & touching else set()
-        flat = as_begun(model.line, scene.dimension).bits & PLANAR
-        has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not flat) else set()
+        begun = as_begun(model.line, model.held, scene.dimension)
+        has |= {"torsion"} if "rod" in has or (begun.torsion.size and not begun.bits & PLANAR) else set()
         pipes = Pipes(scene) if moves and any(x.pipe for x in scene.cable.sections) else None
         has |= {"pipe"} if pipes is not None else set()
         self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in has}

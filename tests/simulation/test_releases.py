@@ -226,6 +226,7 @@ def test_a_twisted_catenary_is_let_go_with_its_twist(model: str, tmp_path: Path)
     hybrid.run(tables_with(tables, {"time.duration": 0.75}), short).close()
     with hybrid.resume(short, until=1.0) as more:
         assert np.array_equal(more.position, position)
+    assert differences(tmp_path / "run.h5", short) == []
 
 
 @pytest.mark.long
