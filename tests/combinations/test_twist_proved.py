@@ -99,21 +99,3 @@ def test_layers_that_slip_do_not_feel_the_twist_of_a_swivel() -> None:
         found = hybrid.run(tables_with(BASE, slip | {END + ".turns": turns}))
         assert np.abs(found.position - plain.position).max() < 1e-9
         assert np.abs(found["torque"]).max() < 1e-9
-
-
-def test_a_swivel_at_a_clamp_holds_no_direction_of_the_section() -> None:
-    """The clamp rolled about its tangent by any angle: the same line, without torque beside the clamp."""
-    two = {"sections": [BESIDE | {"bending_stiffness": [20.0, 8.0]}]}
-    c, s = np.cos(np.deg2rad(200.0)), np.sin(np.deg2rad(200.0))
-    along = np.array(CLAMP["tangent"]) / np.linalg.norm(CLAMP["tangent"])
-    across = np.array([0.0, 1.0, 0.0])
-    rolled = (c * across + s * np.cross(along, across)).tolist()
-    plain, turned = (
-        hybrid.run(tables_with(BASE, {
-            "cable": two, START: CLAMP | {"swivel": True, "normal": normal}, END: FAR, "mesh": {"cells": 24}, "model": "rod",
-        }))
-        for normal in ([0.0, 1.0, 0.0], rolled)
-    )  # fmt: skip
-    assert np.abs(plain.position - turned.position).max() < 1e-9
-    assert np.abs(plain["bending_moment"] - turned["bending_moment"]).max() < 1e-7
-    assert np.abs(plain["torque"][:, 0]).max() < 1e-9

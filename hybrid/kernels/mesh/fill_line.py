@@ -83,10 +83,7 @@ def fill_point(line, i, points, j, blank):
 
 @inner
 def round_and_straight(line, i):
-    """The element at node i of a swivel, on the line or at a clamp, whose sides have no direction in common: it bends as
-
-    on average of its axes.
-    """
+    """The element at node i of a swivel, whose sides have no direction in common: it bends as on average of its axes."""
     line.k0[i, 0], line.k0[i, 1] = 0.0, 0.0
     if line.kb[i, 0] != line.kb[i, 1]:
         bends = 2.0 / (1.0 / line.kb[i, 0] + 1.0 / line.kb[i, 1])
@@ -108,7 +105,8 @@ def fill_element(line, i, made, a, ha, b, hb, turns):
             line.k0[i, k] = one * made[a, kappa] + two * made[b, kappa]
     if turns:
         line.kb[i, 2] = 0.0
-        round_and_straight(line, i)
+        if ha > 0.0 and hb > 0.0:
+            round_and_straight(line, i)
 
 
 @inner
