@@ -148,6 +148,13 @@ def _parts(scene: Scene, line: Line, rods: bool, flat: Entry) -> Iterator[Entry]
     yield Entry(f"attachments: {attached}", attached > 0, "cable.attachments, ends of kind body")
 
 
+def _swivel_holds(scene: Scene, end: End, cell: int) -> bool:
+    """Whether the section at a clamp with a swivel has a direction, which the element there then holds."""
+    section = scene.cable.sections[cell]
+    curved = section.intrinsic_curvature is not None and any(section.intrinsic_curvature)
+    return end.kind == "clamped" and not end.holds_twist and (section.anisotropic or curved)
+
+
 def _by_first_harmonic(scene: Scene, end: End) -> bool:
     """Whether a vessel moves an end by an RAO in a wave of finite height."""
     fluid, vessel = scene.environment.fluid, getattr(end.prescribed_motion, "vessel", None)
@@ -295,6 +302,9 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
         if moving and _by_first_harmonic(scene, end):
             why = "an RAO is of linear waves: the vessel moves by the first harmonic (waves.kind: stream_function)"
             entries.append(Entry(f"higher harmonics of the waves in the motion of ends.{name}", False, why))
+        if _swivel_holds(scene, end, cell) and (line.spin[cell] or isinstance(scene.model, AdaptiveModel)):
+            why = "its twist counts as bend there, by two bending stiffnesses or an intrinsic_curvature"
+            entries.append(Entry(f"free turning at the swivel of ends.{name}", False, why, event="ignored"))
         text = f"ends.{name}: {end.kind}{spring}{', moving' if moving else ''}{_let_go(scene, name)}"
         entries.append(Entry(text, True, f"ends.{name}"))
         if not line.spin[cell] and end.acts_by_moment:

@@ -99,3 +99,13 @@ def test_layers_that_slip_do_not_feel_the_twist_of_a_swivel() -> None:
         found = hybrid.run(tables_with(BASE, slip | {END + ".turns": turns}))
         assert np.abs(found.position - plain.position).max() < 1e-9
         assert np.abs(found["torque"]).max() < 1e-9
+
+
+@pytest.mark.parametrize("stiffness", [20.0, [20.0, 8.0]])
+def test_a_swivel_at_a_clamp_that_holds_a_direction_says_so(stiffness: Any) -> None:
+    tables = tables_with(BASE, {
+        "cable": {"sections": [BESIDE | {"bending_stiffness": stiffness}]}, START: CLAMP | {"swivel": True}, END: FAR,
+        "mesh": {"cells": 24}, "model": "rod", "time.duration": 0.1,
+    })  # fmt: skip
+    told = [e.text for e in hybrid.run(tables).events if e.kind == "ignored"]
+    assert any("free turning at the swivel of ends.start" in x for x in told) == isinstance(stiffness, list)
