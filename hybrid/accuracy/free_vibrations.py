@@ -29,7 +29,6 @@ from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_a
 from hybrid.linear.rest import CABLE, Rest, line_at_rest, system_at_rest
 from hybrid.model.system import SystemResolution
 from hybrid.scene.analysis import Equilibrium
-from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -134,7 +133,6 @@ def lost_vibrations(asked: Scene | System, rest: Callable[[], Rest], times: Floa
     if not begins or None in begins or not (still and starts) or len(times) < 2:
         return {}
     try:
-        refuse_use(asked, "about rest")
         found = rest()
     except (ComputationError, SceneError):
         return {}
@@ -191,7 +189,7 @@ class Vibrations:
 
     def __init__(self, rest: Rest) -> None:
         self.rest = rest
-        network = linear_network(rest.solver, rest.states, rest.names, sticks=True)
+        network = linear_network(rest.solver, rest.states, rest.names, sticks=True, touching=rest.touching)
         omegas = frequencies_of(rest.models)
         self.lines = [
             LoadedLine(x, linear, model, omegas)
@@ -220,6 +218,7 @@ class Vibrations:
             rows_at_rest(x.line, x.x, x.x.ends, x.linear.state, (1.0, ANCHOR), moving)
             blocks.append(sparse_rows(moving - still))
         found = network.place.T @ sparse.block_diag(blocks, format="csr") @ network.place
+        found = found + network.whole.T @ network.touching.damping @ network.whole
         frames = [np.kron(np.eye(2), state[FRAME:V].reshape(3, 3)) for state in self.rest.states.bodies]
         own = [
             R @ row[DAMPING:][:36].reshape(6, 6) @ R.T for R, row in zip(frames, self.rest.solver.bodies, strict=True)

@@ -10,15 +10,17 @@ shapes of the lines.  What lines leave over at their ends comes through the plac
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy import sparse
 
-from hybrid.designs.line_at_rest import Frames
+from hybrid.designs.line_at_rest import LEFT_OUT, Beside, Frames
 from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V
 from hybrid.kernels.junctions.carried_frames import TURNS
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.obstacle_rows import RADIUS
+from hybrid.kernels.state.state import Floats, Line
 from hybrid.linear.loaded_members import stiffness_by_water
 from hybrid.model.bodies import loads_of
 from hybrid.model.system import SystemModel, bodies_of
@@ -74,6 +76,20 @@ class BodiesAtRest:
         finally:
             self._solver.bodies[:] = self._numbers
 
+    def pressed(self, lines: Sequence[Beside]) -> Floats:
+        """(B, 6) N, N m, of lines that touch bodies on these, of the same shapes, with the numbers of other scenes.
+
+        What bodies carry is brought to where they are in the seas of the lines.
+        """
+        out = np.zeros((self.count, 6))
+        if self._solver.meets:
+            both = zip(self._solver.lines, lines, strict=True)
+            of = [x._replace(line=smooth(y.model.line), sea=y.sea) for x, y in both]
+            solver = SystemSolver(of, self._points, self._numbers)
+            _, _, wrench, carriers = solver.pressed_bodies(self._states)
+            out[carriers] = wrench
+        return out
+
     def stiffness_besides(self, stiffness: sparse.csc_array) -> sparse.csc_array:
         """What the matrix of the network (q, q) leaves out of its bodies, the last of q: water around members that is
 
@@ -81,10 +97,12 @@ class BodiesAtRest:
         """
         first = stiffness.shape[0] - 6 * self.count
         blocks = [sparse.csc_array((first, first))]
-        diagonal = np.abs(stiffness.diagonal()[first:].reshape(-1, 6))
+        diagonal, x = np.abs(stiffness.diagonal()[first:].reshape(-1, 6)), self._solver.lines[0]
         for b in range(self.count):
             block = self._by_water(b)
             stiffest = float(diagonal[b, 3:].max())
+            if (mine := np.flatnonzero(x.rides == b)).size:  # what touches it may roll
+                stiffest = max(stiffest, float(diagonal[b, :3].max() * x.sea.obstacles[mine, RADIUS].max() ** 2))
             block[3:, 3:] += SOFTEST * (stiffest or 1.0) * np.eye(3)
             blocks.append(sparse.csc_array(block))
         return sparse.csc_array(sparse.block_diag(blocks, format="csc"))
@@ -93,6 +111,11 @@ class BodiesAtRest:
         """(6, 6) stiffness of the water around the members of a body; zeros: it has none."""
         members = self._model.bodies[b].members if b < len(self._model.bodies) else None
         return np.zeros((6, 6)) if members is None else stiffness_by_water(self._solver, self._states, b, members)
+
+
+def smooth(line: Line) -> Line:
+    """A line without what does not act at rest, or depends on the way there."""
+    return line._replace(bits=line.bits & ~LEFT_OUT)
 
 
 def with_bodies(model: SystemModel, system: System) -> SystemModel:

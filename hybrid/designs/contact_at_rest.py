@@ -16,10 +16,10 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.contact.self_contact_pairs import OVERFLOW, POINTS
 from hybrid.kernels.state.state import Floats
+from hybrid.linear.touching import stiffness_between
 from hybrid.model.scales import tension_scale
 from hybrid.model.sections import merged_sections
 from hybrid.simulation.lines_contact import strand_in
-from hybrid.solve.contact_stability import contact_stiffness
 from hybrid.solve.joined import SystemState
 from hybrid.solve.shared_contact import TouchingLine
 from hybrid.solve.system import SystemSolver
@@ -55,14 +55,10 @@ class ContactAtRest:
 
     def _stiffness(self) -> sparse.csr_array:
         """(unknowns of all lines) N/m, of contact as it was looked at last."""
-        nodes, second = contact_stiffness(self._shared.contact)
-        nodes = self._node_of[nodes]
-        if np.isin(nodes, self._ends).any():
+        found = stiffness_between(self._shared.contact, self._node_of, SIZE * int(self._nodes.sum()))
+        if np.isin(found.nonzero()[0] // SIZE, self._ends).any():
             raise _refused("contact at an end of a line", "what touches does so away from the ends of lines")
-        at = (SIZE * nodes[:, :, None] + 1 + np.arange(3)).reshape(-1, 18)
-        entries = second.ravel(), (np.repeat(at, 18, axis=1).ravel(), np.tile(at, (1, 18)).ravel())
-        size = SIZE * int(self._nodes.sum())
-        return sparse.csr_array(sparse.coo_array(entries, shape=(size, size)))
+        return found
 
     def finer(self) -> tuple[sparse.csr_array, float] | None:
         """The stiffness with more sample points, and by how much more than what it changes derivatives may be off.

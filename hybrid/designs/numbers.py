@@ -19,12 +19,15 @@ from hybrid.scene.system import System
 AnyScene = TypeVar("AnyScene", bound=Scene | System)
 PART = re.compile(r"[^.\[\]]+")
 # Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.  Lengths are
-# changed by less: a place that is at a node would see the cell to one side of it as much as that to the other.
-OF_NUMBER, OF_LENGTH, LENGTH = 1e-4, 1e-5, re.compile(r"\blength$")
+# changed by less: a place that is at a node would see the cell to one side of it as much as that to the other.  So are
+# diameters, on which it depends how deep a line lies in obstacles.
+OF_NUMBER, OF_LENGTH, LENGTH = 1e-4, 1e-5, re.compile(r"\b(length|diameter)$")
 # Coordinates: what they are depends on where the origin is.  Where the bed and obstacles are counts in parts of how
 # deep a line lies in them: they are changed by this part, coordinates by this part of the longest line.
 PLACE = re.compile(r"(position\[\d\]|centre\[\d\]|\.z|\.surface|\.at\[\d\]|\.depth\[\d+\]\[\d+\])$")
-TOUCHED = re.compile(r"^(obstacles|environment\.seabed)\.(?!.*(stiffness|damping|friction|soil))|\.surface$")
+TOUCHED = re.compile(
+    r"^(obstacles|environment\.seabed|bodies\.[^.]+\.shape)\.(?!.*(stiffness|damping|friction|soil))|\.surface$"
+)
 OF_TOUCHED = 3e-8
 # What runs, and equilibria far apart, differ by parts of: of coordinates this part of the longest line, of angles (deg)
 # at least a radian.

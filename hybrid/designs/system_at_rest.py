@@ -23,12 +23,14 @@ from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest,
 from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
+from hybrid.kernels.state.obstacle_rows import ROLLED
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.matrices import linear_network
+from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, same_nodes
 from hybrid.model.nearby_clamped import nearby_clamped, seats_know_no_shape, shaped_anew
-from hybrid.model.system import SystemModel, SystemResolution
+from hybrid.model.system import SystemModel, SystemResolution, with_surfaces
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.points import Fairlead
@@ -117,7 +119,8 @@ class SystemAtRest(OfScene):
         self._matrix = A + self._bodies.stiffness_besides(A) if self._bodies.count else A
         self._factors = Factors(self._matrix)
         self._first_body = self._network.size - 6 * self._bodies.count  # of the unknowns
-        self._here = self._arms(run.model), self._bodies.own(run.model)
+        own = self._bodies.own(run.model) + self._bodies.pressed([x.here for x in self.lines])
+        self._here = self._arms(run.model), own
         self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])
         wanted_of = (l for l, x in enumerate(self.lines) if x.wanted)
         self.gradients = {l: Gradients(self.lines[l], self._bodies.turns(l)) for l in wanted_of}
@@ -177,6 +180,9 @@ class SystemAtRest(OfScene):
         left_over = np.concatenate(rights)
         if self.contact is not None:
             left_over += _slope(pushes, steps)
+        touching, shifted = network.touching.stiffness, np.concatenate(shifts)
+        left_over -= touching[: len(shifted), : len(shifted)] @ shifted
+        on_bodies.reshape(-1, len(keys))[:] -= touching[len(shifted) :, : len(shifted)] @ shifted
         right = np.asarray(network.place.T @ left_over)
         right[self._first_body :] += on_bodies.reshape(-1, len(keys))
         many = all(x.pay_for(len(keys)) for x in self.gradients.values())
@@ -326,12 +332,25 @@ class SystemAtRest(OfScene):
             if model is None:
                 raise _other_cells(key)
             out.append(line.beside(scene, model, frames))
-        if built is None:
+        if system.surfaces:
+            out = self._on_surfaces(system, out, (self._model if built is None else built).bodies)
+        if built is None and all(x is line.here for x, line in zip(out, self.lines, strict=True)):
             return _Changed(out, *self._here)
+        whole = self._model if built is None else built
         try:
-            return _Changed(out, self._arms(built), self._bodies.own(built))
+            return _Changed(out, self._arms(whole), self._bodies.own(whole) + self._bodies.pressed(out))
         except ValueError:
             raise _other_cells(key) from None
+
+    def _on_surfaces(self, system: System, lines: Sequence[Beside], bodies: Sequence[BodyModel]) -> list[Beside]:
+        """Lines of a changed scene on obstacles as hard as all of it asks for, with bodies that carry some at rest."""
+        models = with_surfaces(system, [x.model for x in lines], bodies)
+        out = [x._replace(model=model, sea=model.sea.at(np.inf)) for x, model in zip(lines, models, strict=True)]
+        self._bodies.pressed(out)
+        return [
+            x if x is line.here and _as_hard(x, new) else new
+            for x, new, line in zip(lines, out, self.lines, strict=True)
+        ]
 
 
 def _moves_lines(body: RigidBody, of: RigidBody) -> bool:
@@ -342,6 +361,12 @@ def _moves_lines(body: RigidBody, of: RigidBody) -> bool:
     return not isinstance(of, FreeBody) or any(
         getattr(body, x) is not getattr(of, x) for x in fields if x not in OF_BODY
     )
+
+
+def _as_hard(x: Beside, y: Beside) -> bool:
+    """Whether what two lines may touch is the same."""
+    same = zip((x.sea.obstacles, x.sea.carried[:, :ROLLED]), (y.sea.obstacles, y.sea.carried[:, :ROLLED]), strict=True)
+    return all(np.array_equal(a, b) for a, b in same)
 
 
 def _on_same_cells(model: Model, of: Model) -> Model | None:

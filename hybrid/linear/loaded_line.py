@@ -31,6 +31,7 @@ class LoadedLine:
         self.name, self.linear, self.x, self.hinges = linear.name, linear, x, model.cable.hinges
         self.line, state, self.sea = linear.line, linear.state, model.sea.at(np.inf)
         self.obstacles = model.sea.names
+        self.carried: dict[int, Floats] = {}  # (F, N+1, 3) m, motions of obstacles that bodies carry, at the nodes
         count, calm = self.line.s.size, _without_drag(self.line)
 
         rows = np.zeros((count, SIZE * WIDTH))

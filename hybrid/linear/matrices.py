@@ -31,6 +31,7 @@ from hybrid.kernels.state.report import MOMENT_A
 from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State, no_torsion
 from hybrid.kernels.step.step import friction_axes
 from hybrid.linear.memory import by_layers, with_layers, with_soil
+from hybrid.linear.touching import TouchingLines, TouchingParts, touching_parts
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.stability import ANCHOR as STATIC_ANCHOR
 from hybrid.solve.system import SystemSolver
@@ -84,7 +85,7 @@ class LinearNetwork:
     """A network about its equilibrium: A q = lambda M q for what is free.
 
     lines: of the network; at: (L + 1,) where the unknowns of each line begin among those of all lines; place: sparse
-    (all lines, q) how they follow q; points, bodies: how many are free, the last of q; frames: (bodies, 3, 3) axes.
+    (all lines, q) how they follow q; points, bodies: how many are free, the last of q, behind the angles of sheaves.
     """
 
     lines: tuple[LinearLine, ...]
@@ -98,6 +99,8 @@ class LinearNetwork:
     bodies: int
     slow: float  # 1/s^2, a size of w^2 of what swings slowly: the largest tension over mass and length
     tensions: Floats  # (q,) m/N, a compliance that changes no mode, of unknowns that are tensions; else 0
+    touching: TouchingParts  # what touches, over other unknowns, which follow q by
+    whole: sparse.csr_array  # (all lines, 6 of each body, angles of sheaves; q)
 
     @property
     def size(self) -> int:
@@ -330,11 +333,12 @@ def _hat(a: Floats) -> Floats:
 
 
 def linear_network(
-    solver: SystemSolver, states: SystemState, names: Sequence[str], sticks: bool, quick: bool = True
-) -> LinearNetwork:
+    solver: SystemSolver, states: SystemState, names: Sequence[str], sticks: bool, quick: bool = True,
+    touching: TouchingLines | None = None,
+) -> LinearNetwork:  # fmt: skip
     """The network of lines, points and bodies that a solver holds about an equilibrium; sticks, quick: as of
 
-    `linear_line`.
+    `linear_line`.  touching: lines that touch each other, or themselves, in it.
     """
     lines = tuple(
         linear_line(x, name, state, sticks, quick)
@@ -342,8 +346,10 @@ def linear_network(
     )
     at = np.concatenate([[0], np.cumsum([x.free.size for x in lines])])
     points, bodies = len(solver.net), len(solver.bodies)
-    own = int(sum(x.free.sum() for x in lines))
-    own -= 3 * sum(j >= 0 for joined in solver.lines for j in joined.joints)
+    parts = touching_parts(solver, states, sticks, touching)
+    of_lines = int(sum(x.free.sum() for x in lines))
+    of_lines -= 3 * sum(j >= 0 for joined in solver.lines for j in joined.joints)
+    own = of_lines + len(parts.sheaves)
     size = own + 3 * points + 6 * bodies
     entries, column = _Entries(), 0
     extra: list[tuple[int, Floats]] = []  # body, its stiffness by the forces and frames of ends
@@ -368,21 +374,25 @@ def linear_network(
                 entries.add(rows[c], first + c, 1.0)
                 for d in range(3):
                     entries.add(rows[c], first + 3 + d, shifted[c, d])
-            f = x.net[k]
+            f = x.net[k] + parts.forces[(at[l] if k == 0 else at[l + 1] - SIZE) // SIZE]
             extra.append((b, x.held_moment[k] - _hat(f) @ _hat(arm)))
             if x.turned[k].any():
                 coupling.append((l, b, x.turned[k]))
         own_rows = at[l] + np.flatnonzero(free.ravel())
         entries.add(own_rows, np.arange(column, column + own_rows.size), np.ones(own_rows.size))
         column += own_rows.size
-    assert column == own, (column, own)
+    assert column == of_lines, (column, of_lines)
     place = entries.matrix(int(at[-1]), size)
+    ones = sparse.eye_array(size, format="csr")
+    whole = sparse.csr_array(sparse.vstack([place, ones[own + 3 * points :], ones[of_lines:own]], format="csr"))
     A = sparse.block_diag([x.stiffness for x in lines], format="csr")
     M = sparse.block_diag([x.mass for x in lines], format="csr")
     standing = sparse.block_diag([x.standing for x in lines], format="csr")
     bodies_alone = _masses(solver, states, own + 3 * points, size)
+    bodies_alone = bodies_alone + whole.T @ parts.mass @ whole
     M, apart = (sparse.csr_array(place.T @ each @ place) + bodies_alone for each in (M, standing))
     A = sparse.csr_array(place.T @ A @ place) + _couplings(coupling, at, place, own + 3 * points)
+    A = A + whole.T @ parts.stiffness @ whole
     A = A + _of_bodies(solver, states, extra, own + 3 * points, size)
     pull = max(float(np.abs(x.state.T).max()) for x in lines)
     layers = sparse.csr_array(place.T @ sparse.block_diag([x.by_layers for x in lines], format="csr") @ place)
@@ -390,7 +400,7 @@ def linear_network(
     return LinearNetwork(
         lines, at, place, sparse.csc_array(0.5 * (A + A.T)), sparse.csc_array(0.5 * (A - A.T) + layers),
         sparse.csc_array(0.5 * (M + M.T)), apart, points, bodies, slow,
-        np.asarray(place.T @ _lent(lines, solver)),
+        np.asarray(place.T @ _lent(lines, solver)), parts, whole,
     )  # fmt: skip
 
 

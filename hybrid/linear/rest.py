@@ -6,25 +6,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.junctions.bodies import MASS
+from hybrid.kernels.state.state import Floats
+from hybrid.linear.touching import TouchingLines
 from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model
+from hybrid.model.lines_contact import Touching
 from hybrid.model.resolution import Resolution
-from hybrid.model.system import SystemResolution
+from hybrid.model.system import SystemModel, SystemResolution
 from hybrid.scene.read import scene_text
 from hybrid.scene.system import System
+from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import static_system
 from hybrid.solve.joined import JoinedLine, SystemState
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.system import NO_BODIES, SystemSolver
+from hybrid.solve.system_contact_statics import touching_solver
 
 CABLE = "cable"  # name of the line of a scene of one
 
 
 @dataclass(frozen=True)
 class Rest:
-    """The equilibrium of a scene as a network; points and bodies that are free by name, models of lines and bodies."""
+    """The equilibrium of a scene as a network; points and bodies that are free by name, models of lines and bodies.
+
+    touching: lines that touch each other or themselves in it; may_touch: which may touch each other.
+    """
 
     solver: SystemSolver
     states: SystemState
@@ -33,28 +40,27 @@ class Rest:
     points: tuple[str, ...] = ()
     bodies: tuple[str, ...] = ()
     floats: tuple[BodyModel, ...] = ()
+    touching: TouchingLines | None = None
+    may_touch: Touching | None = None
 
 
 def line_at_rest(case: StaticCase, resolution: Resolution) -> Rest:
-    """One line, as a system of one.
-
-    SceneError: it touches itself; ComputationError: there is no equilibrium.
-    """
+    """One line, as a system of one; ComputationError: there is no equilibrium."""
     model, found = case.at_rest(resolution)
-    if found.touch.size:
-        _refuse_contact("contact.self")
     x = JoinedLine(
         model.line, model.sea.at(np.inf), model.ends.at(np.inf), model.length, model.tension_scale, -np.inf, (-1, -1)
     )  # fmt: skip
-    return Rest(SystemSolver([x], 0), SystemState([found.state]), (CABLE,), (model,))
+    touching = None
+    if found.touch.size:
+        solver = touching_solver([x], 0, NO_BODIES, lambda: ([contact_of(model)], None))
+        touching = TouchingLines(solver, np.full((1, 1), case.scene.contact.friction))
+    return Rest(SystemSolver([x], 0), SystemState([found.state]), (CABLE,), (model,), touching=touching)
 
 
 def system_at_rest(system: System, resolution: SystemResolution) -> Rest:
     """Several lines; errors as of `line_at_rest`."""
     run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
     assert run.found is not None
-    if run.found.settled:
-        _refuse_contact("lines")
     bodies = (*(body.name for body in run.model.bodies), *run.model.rigid)
     found = run.found.solver  # which knows neither waves nor friction
     lines = [x._replace(line=model.line) for x, model in zip(found.lines, run.model.models, strict=True)]
@@ -62,9 +68,16 @@ def system_at_rest(system: System, resolution: SystemResolution) -> Rest:
         body.take_added_mass(state)  # as it is wet at rest
         row[MASS : MASS + 36] = body.numbers[MASS : MASS + 36]
     solver, model = SystemSolver(lines, len(found.net), found.bodies), run.model
-    return Rest(solver, run.state, tuple(model.names), model.models, tuple(model.free), bodies, model.bodies)
+    touching = TouchingLines(found, friction_between(model)) if run.found.settled else None
+    return Rest(
+        solver, run.state, tuple(model.names), model.models, tuple(model.free), bodies, model.bodies, touching,
+        model.touching,
+    )  # fmt: skip
 
 
-def _refuse_contact(where: str) -> None:
-    expected = "an equilibrium in which no line touches itself, about which modes are known"
-    raise SceneError([Complaint(where, "contact of a line with itself", expected, "a shape that is apart")])
+def friction_between(model: SystemModel) -> Floats:
+    """(L, L) coefficients of friction of lines with each other and with themselves."""
+    found = np.diag([model.scenes[name].contact.friction for name in model.names])
+    if model.touching is not None:
+        found[np.ix_(model.touching.lines, model.touching.lines)] = model.touching.friction
+    return found

@@ -13,17 +13,14 @@ from hybrid.accuracy.api import resolution_at_rest
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import FRAME, MASS, V
-from hybrid.kernels.laws.obstacles import distances, thinner_nodes
-from hybrid.kernels.state.forces import OBSTACLES
-from hybrid.kernels.state.obstacle_rows import ONSET_OF
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.eigen import Eigen, lowest_modes
 from hybrid.linear.matrices import LinearLine, LinearNetwork, linear_network
 from hybrid.linear.rest import Rest, line_at_rest, system_at_rest
+from hybrid.modal.touching_validity import name_of, obstacle_of
 from hybrid.model.payout import payout_of
 from hybrid.model.system import SystemResolution
 from hybrid.scene.base import Table
-from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_tables import Harmonic
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
@@ -54,7 +51,7 @@ class Mode:
     period: s; error: of the period, s, by a mesh of half the cells, None: not known.  what: in words, by where most of
     the kinetic energy is, of which `energy` has the parts.  mass: (3,) kg, effective masses along x, y, z.
     The shape, in the scale that its largest shift is 1 m: shifts (N+1, 3) m and twists (N,) rad by the name of a line,
-    points (3,) m, bodies (6,) m and rad by name.
+    points (3,) m, bodies (6,) m and rad, sheaves that lines turn rad by name.
     """
 
     period: float
@@ -66,6 +63,7 @@ class Mode:
     twists: Mapping[str, Floats]
     points: Mapping[str, Floats] = field(default_factory=dict)
     bodies: Mapping[str, Floats] = field(default_factory=dict)
+    sheaves: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def frequency(self) -> float:
@@ -99,16 +97,19 @@ class _Found:
     points: tuple[str, ...]
     bodies: tuple[str, ...]
     axes: tuple[tuple[Floats, Floats], ...]  # of each body: axes (3, 3), and its mass matrix (6, 6) in these
-    touched: tuple[str, ...]  # obstacles that lines lie on
+    touched: tuple[str, ...]  # obstacles and bodies that lines lie on
+    together: tuple[str, ...]  # lines that touch each other, or themselves
+    sheaves: tuple[str, ...]  # which lines turn
 
 
 def modes(scene: SceneLike | System, count: int = 10, near: float | None = None, friction: bool = True) -> Modes:
     """Natural modes about the equilibrium under full loads: the longest periods, or those nearest to `near` (s).
 
-    Drag and damping are left out; contact with the bed and obstacles is as it is in the equilibrium.  friction: whether
-    that of these holds what lies there, elastically, as before a line slides; else it has none.  Errors are those of
-    the mesh, by one of half the cells.  SceneError: the scene is refused, or its equilibrium touches itself;
-    ComputationError: it has none, or nothing can move.
+    Drag and damping are left out; contact with the bed, obstacles, bodies and lines is as it is in the equilibrium.
+    friction: whether that of these holds what lies there, elastically, as before a line slides; else it has none, and
+    lines turn no sheaves.  Errors are those of
+    the mesh, by one of half the cells.  SceneError: the scene is refused; ComputationError: it has no equilibrium, or
+    nothing can move.
     """
     asked = as_scene_or_system(scene)
     _check(count, near)
@@ -148,33 +149,25 @@ def _found(asked: Scene | System, cells: float, count: int, near: float | None, 
     They are more than `count`: what nothing holds is told apart from them, such as lines that turn about their axis.
     """
     rest = equilibrium_of(asked, cells)
-    network = linear_network(rest.solver, rest.states, rest.names, sticks)
+    network = linear_network(rest.solver, rest.states, rest.names, sticks, touching=rest.touching)
     count += 2 + len(rest.names) + 3 * network.bodies
     eigen = lowest_modes(network, count, None if near is None else 2.0 * math.pi / near)
     axes = tuple(
         (row[FRAME:V].reshape(3, 3), numbers[MASS : MASS + 36].reshape(6, 6))
         for row, numbers in zip(rest.states.bodies, rest.solver.bodies, strict=True)
     )
-    return _Found(network, eigen, rest.points, rest.bodies, axes, tuple(dict.fromkeys(_touched(rest))))
-
-
-def _touched(rest: Rest) -> Iterator[str]:
-    """Names of the obstacles that lines lie on in an equilibrium."""
-    for x, model, state in zip(rest.solver.lines, rest.models, rest.states.lines, strict=True):
-        rows = x.sea.obstacles
-        if x.line.bits & OBSTACLES:
-            near = (distances(x.sea, state.r) + thinner_nodes(rows, x.line.s)).min(axis=1)
-            yield from (
-                name for name, d, row in zip(model.sea.names, near, rows, strict=True) if d < 0.5 * row[ONSET_OF]
-            )
+    touches, names = network.touching.touches, rest.models[0].sea.names
+    touched = tuple(dict.fromkeys(obstacle_of(x, rest) for x in touches if x.obstacle))
+    together = tuple(dict.fromkeys(name_of(x, rest) for x in touches if not x.obstacle))
+    sheaves = tuple(names[k] for k in network.touching.sheaves)
+    return _Found(network, eigen, rest.points, rest.bodies, axes, touched, together, sheaves)
 
 
 def equilibrium_of(asked: Scene | System, cells: float = 1.0) -> Rest:
     """The equilibrium on the usual mesh, or on one whose cells are so many times as long.
 
-    SceneError: a line touches itself in it, another one, a body or a sheave; ComputationError: there is none.
+    SceneError: the scene is refused; ComputationError: there is none.
     """
-    refuse_use(asked, "about rest", given="modes")
     if isinstance(asked, Scene):
         case = StaticCase(asked)
         resolution = resolution_at_rest(case)
@@ -198,6 +191,8 @@ class _Shape:
         }
         first = network.size - 3 * network.points - 6 * network.bodies
         points, bodies = vector[first : first + 3 * network.points], vector[first + 3 * network.points :]
+        turns = vector[first - len(found.sheaves) : first].tolist()
+        self.sheaves = dict(zip(found.sheaves, turns, strict=True))
         self.points = dict(zip(found.points, points.reshape(-1, 3), strict=True))
         self.bodies = dict(zip(found.bodies, bodies.reshape(-1, 6), strict=True))
         self.vector = vector
@@ -218,6 +213,7 @@ class _Shape:
             period, None if error is None else error * period, self.what, energy, factor**2,
             {k: x / largest for k, x in shifts.items()}, {k: x / largest for k, x in twists.items()},
             {k: x / largest for k, x in self.points.items()}, {k: x / largest for k, x in self.bodies.items()},
+            {k: x / largest for k, x in self.sheaves.items()},
         )  # fmt: skip
 
     def _sign(self, shifts: Mapping[str, Floats]) -> float:
@@ -237,6 +233,7 @@ class _Shape:
                 out[name + word] = float(moved.ravel() @ (mass @ moved.ravel()))
         first = network.size - 3 * network.points - 6 * network.bodies
         for kind, begin, size, names in (
+            ("sheave", first - len(self.sheaves), 1, self.found.sheaves),
             ("point", first, 3, self.found.points),
             ("body", first + 3 * network.points, 6, self.found.bodies),
         ):
@@ -364,7 +361,9 @@ def _doubts(found: _Found, unstable: int, free: list[str], chosen: np.ndarray) -
     if any(x.line.torsion.size for x in network.lines):
         yield "twist passes through catenary zones as through a torsion spring; what their shape adds is left out"
     for name in found.touched:
-        yield f"contact with obstacle {name} stays as it is at rest: swings that lift the line off have other periods"
+        yield f"contact with {name} stays as it is at rest: swings that lift the line off have other periods"
+    for name in found.together:
+        yield f"contact of {name} stays as it is at rest: swings that part what touches have other periods"
 
 
 def _meetings(asked: Scene | System, found: list[Mode]) -> Iterator[str]:

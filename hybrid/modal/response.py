@@ -18,7 +18,7 @@ from scipy import sparse
 
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
-from hybrid.kernels.junctions.bodies import DAMPING, FRAME, V
+from hybrid.kernels.junctions.bodies import DAMPING, FRAME, PLACE, V
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.complex_solver import ComplexSolver
 from hybrid.linear.excitation import frequencies_of, refuse_motions
@@ -30,6 +30,7 @@ from hybrid.linear.rest import Rest
 from hybrid.modal.api import equilibrium_of, of_first_length
 from hybrid.modal.check import compared
 from hybrid.modal.left_out import left_out
+from hybrid.modal.touching_validity import closing_doubts, name_of, touching_doubts
 from hybrid.modal.validity import doubts_of
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene_or_system
@@ -82,7 +83,7 @@ class _Linear:
 
     def __init__(self, rest: Rest, omegas: Floats, sticks: bool) -> None:
         self.rest, self.omegas = rest, omegas
-        self.network = linear_network(rest.solver, rest.states, rest.names, sticks)
+        self.network = linear_network(rest.solver, rest.states, rest.names, sticks, touching=rest.touching)
         self.lines = [
             LoadedLine(x, linear, model, omegas)
             for x, linear, model in zip(rest.solver.lines, self.network.lines, rest.models, strict=True)
@@ -99,6 +100,7 @@ class _Linear:
                 self.members[b] = LoadedMembers(rest.bodies[b], members, state, omegas)
                 stiffness[b] = stiffness_by_water(rest.solver, rest.states, b, members)
         self.damping, self.by_water = damping, self._of_bodies(stiffness)
+        self.by_touch = self.network.whole.T @ self.network.touching.damping @ self.network.whole
         dragged = bool(self.members) or any(
             x.x.joints[k] >= 0 and x.point_drag[-k] > 0.0 for x in self.lines for k in (0, 1)
         )
@@ -138,7 +140,8 @@ class _Linear:
         P = self.network.place
         dampings = [x.full_damping() for x in self.lines]
         of_bodies = [x + self.members[b].damping() if b in self.members else x for b, x in enumerate(self.damping)]
-        C = sparse.csc_array(P.T @ sparse.block_diag(dampings, format="csr") @ P) + self._of_bodies(of_bodies)
+        C = sparse.csc_array(P.T @ sparse.block_diag(dampings, format="csr") @ P + self.by_touch)
+        C = C + self._of_bodies(of_bodies)
         if self.solver is None or not self.solver.replace(2, C):
             stiffness = self.network.stiffness + self.network.skew + self.by_water
             self.solver = ComplexSolver([stiffness, self.network.mass, C])
@@ -147,6 +150,9 @@ class _Linear:
         )
         for b, members in self.members.items():
             right[self.first + 6 * b : self.first + 6 * b + 6] += members.loads(which)
+        touching, held = self.network.touching, self._held(which)
+        by_rates = touching.damping @ held * (-1j * self.omegas[which])
+        right = right - self.network.whole.T @ (touching.stiffness @ held + by_rates)
         for column, f in enumerate(which):
             self.vectors[f] = self.answer(self.omegas[f], right[:, column])
         whole = (P @ self.vectors[which].T).T
@@ -154,6 +160,15 @@ class _Linear:
             x.take(which, whole[:, a:b].reshape(which.size, -1, SIZE))
         for b, members in self.members.items():
             members.q[which] = self.vectors[which, self.first + 6 * b : self.first + 6 * b + 6]
+
+    def _held(self, which: np.ndarray) -> Any:
+        """(unknowns of what touches, F) m, of ends that are held and move."""
+        moved = np.zeros((self.network.whole.shape[0], which.size), complex)
+        for x, a, b in zip(self.lines, self.network.at[:-1], self.network.at[1:], strict=True):
+            for k, at in ((0, a), (1, b - SIZE)):
+                if x.x.joints[k] < 0:
+                    moved[at + 1 : at + 4] = x.shifts[which, k].T
+        return moved
 
     def answer(self, w: float, right: Any) -> Any:
         """Amplitudes (q,) of exp(-i w t) by loads (q,), with the drag as it was found last; w: 1/s."""
@@ -179,8 +194,23 @@ class _Linear:
         first = self.first
         return {name: self.vectors[:, first + 6 * k : first + 6 * k + 6] for k, name in enumerate(self.rest.bodies)}
 
+    def _carry_obstacles(self) -> None:
+        """Let lines know how obstacles move that bodies carry."""
+        moves = [self.vectors[:, self.first + 6 * b : self.first + 6 * b + 6] for b in range(self.network.bodies)]
+        for x in self.lines:
+            for k, b in enumerate(x.x.rides):
+                if b >= 0:
+                    arms = x.linear.r - self.rest.states.bodies[b, PLACE:FRAME]
+                    x.carried[k] = moves[b][:, None, :3] + np.cross(moves[b][:, None, 3:], arms)
+
     def notes(self, found: Mapping[str, LineResponse]) -> Iterator[str]:
         """Where the motion is too large to be linear."""
+        every = np.arange(len(self.omegas))
+        moved = self.network.whole @ self.vectors.T + self._held(every)
+        for touch in self.network.touching.touches:
+            yield from (f"not valid: {text}" for text in touching_doubts(touch, name_of(touch, self.rest), moved))
+        yield from (f"not valid: {text}" for text in closing_doubts(self.rest, found))
+        self._carry_obstacles()
         for x in self.lines:
             name = f"line {x.name}: " if len(self.lines) > 1 else ""
             yield from (f"{name}not valid: {text}" for text in doubts_of(x, found[x.name]))

@@ -168,13 +168,10 @@ def _on_obstacles(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     r = found.mean_position
     step = NEAR * float(x.line.s[-1])
     sides = [(distances(x.sea, r + d) - distances(x.sea, r - d)) / (2.0 * step) for d in step * np.eye(3)]
-    for name, gap, n in zip(
-        x.obstacles,
-        distances(x.sea, r) + thinner_nodes(x.sea.obstacles, x.line.s),
-        np.stack(sides, axis=-1),
-        strict=True,
-    ):
-        yield from _crossing(x, gap, np.einsum("fni,ni->fn", found.position, n), f"obstacle {name}")
+    gaps = distances(x.sea, r) + thinner_nodes(x.sea.obstacles, x.line.s)
+    for k, (name, gap, n) in enumerate(zip(x.obstacles, gaps, np.stack(sides, axis=-1), strict=True)):
+        way, kind = (found.position - x.carried[k], "body") if k in x.carried else (found.position, "obstacle")
+        yield from _crossing(x, gap, np.einsum("fni,ni->fn", way, n), f"{kind} {name}")
 
 
 def _crossing(x: LoadedLine, gap: Floats, way: Floats, what: str) -> Iterator[str]:

@@ -60,6 +60,7 @@ def nearby(
     else:
         inertia = WITH_SECTIONS if model.line.bits & ROTARY else NO_INERTIA
         line = line_on(cable, s, model.line.spin == 1, model.line.bits & ~PLANAR, inertia, without)
+        line = line._replace(moved=model.line.moved)
         if model.line.bits & PLANAR & ~without:
             line = planar(line, model.line.plane)
     sea = _sea(model, of, scene)

@@ -217,6 +217,18 @@ def build_system(
     )  # fmt: skip
 
 
+def with_surfaces(system: System, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
+    """Models of the lines of a system with what they may touch as `build_system` has it, in arrays of their own.
+
+    Bodies that carry some are where they are first.
+    """
+    scenes = [system.scene_of(name, system.carried(name)) for name in system.lines]
+    around = [surroundings(scene, x.line.h.size) for scene, x in zip(scenes, models, strict=True)]
+    models = _on_obstacles(system, [replace(x, sea=sea) for x, sea in zip(models, around, strict=True)], bodies)
+    _leave_own_bodies(system, models)
+    return models
+
+
 def _kept_in_plane(system: System, models: Sequence[Model]) -> list[Model]:
     """The models, whose lines must not leave the plane in which all of them are."""
     scenes = [system.scene_of(name, system.carried(name)) for name in system.lines]

@@ -27,7 +27,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "about rest", "response", "derivatives"]
+Use = Literal["", "response", "derivatives"]
 LEAVE_OUT = "leave it out"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
 
@@ -275,12 +275,6 @@ def _shapes(tables: Tables) -> Iterator[Place]:
     return (("bodies", name, "shape") for name in (tables[SYSTEM].shaped if SYSTEM in tables else ()))
 
 
-def _free_sheaves(tables: Tables) -> Iterator[Place]:
-    """Obstacles that turn freely."""
-    found = tables.get("obstacles") or {}
-    return (("obstacles", name, "bearing") for name, x in found.items() if getattr(x, "bearing", None) is not None)
-
-
 def _moving_obstacles(tables: Tables) -> Iterator[Place]:
     """Obstacles that move, turn or are set from outside."""
     return (("obstacles", name) for name, x in (tables.get("obstacles") or {}).items() if getattr(x, "moves", False))
@@ -349,18 +343,12 @@ PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
 PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
-SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sheaves)
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
 GOES_ITS_WAY = Feature(
     "contact of lines with each other, with bodies, with obstacles that move",
     "contact, bodies.NAME.shape, obstacles.NAME.motion",
     _either(LINES_TOUCH, SHAPES, Feature("obstacles that move", "motion", _moving_obstacles)),
 )
-BODIES_MOVED = Feature("contact with bodies, with sheaves", "bodies.NAME.shape, obstacles.NAME.bearing",
-                       _either(SHAPES, SHEAVES))  # fmt: skip
-MOVED_BY_LINES = Feature("contact of lines with each other, with bodies, with sheaves",
-                         "contact, bodies.NAME.shape, obstacles.NAME.bearing",
-                         _either(LINES_TOUCH, SHAPES, SHEAVES))  # fmt: skip
 ACCURACY = Feature("accuracy", "accuracy", lambda tables: iter([("accuracy",)] if tables.get("accuracy") else []))
 ERRORS = Feature("estimated errors", "output.errors", _asks("output", "errors", lambda x: getattr(x, "errors", None)))
 CHOSEN_STEPS = Feature("steps that an accuracy chooses", "no time.step",
@@ -371,7 +359,6 @@ SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "init
                            _asks("initial", "friction",
                                  lambda x: getattr(x, "friction", "neglected") != "neglected"))  # fmt: skip
 
-ABOUT_REST = Feature("natural modes, response to a sea", "hybrid modes", _used("about rest"))
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
@@ -415,20 +402,11 @@ REFUSALS: tuple[Refusal, ...] = (
         "what touches ({key}) is a line, a body or an obstacle that moves, whose friction is neglected in equilibria",
         "neglected",
     ),
-    Refusal(
-        ABOUT_REST, MOVED_BY_LINES, "not worked out",
-        "what touches ({key}) is a line, a body or a sheave, which moves as well",
-        "lines that touch the seabed and fixed obstacles at most", "hybrid run computes it in time",
-    ),
     # --- response and derivatives ---
     RESPONSE_TO_MOTION,
     Refusal(
         FINITE_WAVES, RESPONSE, "physics", "a response by frequency is linear in the waves, and these are not",
         "waves of another kind", "kind: regular has the same height and period; hybrid run computes these in time",
-    ),
-    Refusal(
-        DERIVATIVES, BODIES_MOVED, "not worked out", "what touches ({key}) is a body or a sheave, which moves as well",
-        "lines that touch each other, the seabed and fixed obstacles at most", "hybrid run computes it in time",
     ),
     Refusal(
         DERIVATIVES, SETTLED_FRICTION, "physics", "friction has settled ({key}), and how depends on the way there",

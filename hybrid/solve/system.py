@@ -183,6 +183,7 @@ class SystemSolver:
             if k in self._lone_tables:
                 self._lone_tables[k].bind(task=Task(RUN, limits=limits._replace(most=MOST_OF_STEP)))
         self._pressing: NDArray[np.int64] = np.zeros(0, np.int64)
+        self._pressed: dict[str, Any] = {}
         self._phase = np.zeros(1, np.int64)
         self._meeting = [Table(blank_meeting_job), Table(blank_meeting_job)] if self._rides.size else []
         if self._rides.size:
@@ -226,6 +227,7 @@ class SystemSolver:
             "turned": np.zeros((rows, len(self.bodies), 6)), "coupling": np.zeros((rows, rows + 1)),
             "order": np.zeros(rows, np.int64),
         }  # fmt: skip
+        self._pressed = room
         for job, meeting, numbers in zip(self._jobs, self._meeting, self._numbers, strict=True):
             meeting.bind(**self._of_lines(numbers), **room)
             job.bind(
@@ -393,6 +395,17 @@ class SystemSolver:
     def presses_bodies(self) -> bool:
         """Whether a line touched a free body in the last march."""
         return bool(self._pressing.any())
+
+    def pressed_bodies(self, states: SystemState, cv: float = 0.0) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
+        """What lines that touch bodies do to them in states at rest: rows (n, TOUCHED) of nodes, how that changes as
+        each body moves (S, 36), what it is (S, 6), and the numbers of these bodies (S,).  cv: 1/s, of the damping.
+        """
+        self.evaluate_forces(states, 0.0)
+        if cv:
+            self._solve(Task(ASSEMBLY, cv=cv, limits=Limits(1.0, 1.0, 1)), states, states)
+        rows = self._pressed["touched"][: self._pressing[0]]
+        own, wrench = (self._pressed[x].copy() for x in ("own", "wrench"))
+        return rows.copy(), own, wrench, self._pressed["carriers"]
 
     @property
     def _touching_lines(self) -> set[int]:
