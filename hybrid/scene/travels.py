@@ -6,7 +6,7 @@ import heapq
 import math
 from collections.abc import Iterator, Mapping
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hybrid.scene.base import Finding
 from hybrid.scene.bodies import FixedBody
@@ -26,11 +26,9 @@ def travel_findings(system: System) -> Iterator[Finding]:
     duration = system.time.duration if system.time is not None and not breaks else 0.0
     placed = {name: system.first_place(name) for name in system.points if not system.is_joined(name)}
     motions = {name: _motion(system, name) for name in placed}
-    ways = {name: _reaches(system, name) for name in placed}
-    for a, b in combinations(placed, 2):
-        name, other = (a, b) if motions[a] is not None else (b, a)
-        reach, between = ways[name].get(other, (math.inf, ()))
-        if not between or _beside(system, a, b):
+    beside = _neighbours(system)
+    for name, other, reach, between in _held_pairs(placed, motions, beside):
+        if not between or _beside(system, name, other):
             continue
         most = reach * (1.0 + SAME_LENGTH)
         distance, t = farthest((placed[name], placed[other]), (motions[name], motions[other]), duration, most)
@@ -64,30 +62,58 @@ def _beside(system: System, a: str, b: str) -> bool:
     return any(isinstance(x, FixedBody) and x.motion is not None for x in bodies)
 
 
-def _reaches(system: System, begin: str) -> Mapping[str, tuple[float, tuple[str, ...]]]:
-    """How far (m) each point may at most be from one that is held, along lines and bodies that are free, and which
+# Points beside each point: how far (m) they may be from it at most, and the line between them, if it is one.
+Neighbours = Mapping[str, list[tuple[str, float, tuple[str, ...]]]]
 
-    lines these are.
-    """
-    ways: dict[str, list[tuple[str, float, tuple[str, ...]]]] = {name: [] for name in system.points}
+
+def _neighbours(system: System) -> Neighbours:
+    """Points beside each point, along a line or on the same free body."""
+    beside: dict[str, list[tuple[str, float, tuple[str, ...]]]] = {name: [] for name in system.points}
     for key, line in system.lines.items():
         if line.connections.start.payout is not None or line.connections.end.payout is not None:
             continue
         far = line.cable.length if line.cable.inextensible else line.cable.reach
-        ways[line.start].append((line.end, far, (key,)))
-        ways[line.end].append((line.start, far, (key,)))
-    on = [(name, x) for name, x in system.points.items() if isinstance(x, Fairlead) and system.is_joined(name)]
-    for (a, one), (b, two) in combinations(on, 2):
-        if one.body == two.body:
+        beside[line.start].append((line.end, far, (key,)))
+        beside[line.end].append((line.start, far, (key,)))
+    on: dict[str, list[tuple[str, Fairlead]]] = {}
+    for name, x in system.points.items():
+        if isinstance(x, Fairlead) and system.is_joined(name):
+            on.setdefault(x.body, []).append((name, x))
+    for same in on.values():
+        for (a, one), (b, two) in combinations(same, 2):
             apart = math.dist(one.place, two.place)
-            ways[a].append((b, apart, ()))
-            ways[b].append((a, apart, ()))
+            beside[a].append((b, apart, ()))
+            beside[b].append((a, apart, ()))
+    return beside
+
+
+def _held_pairs(
+    placed: Mapping[str, Any], motions: Mapping[str, Motion | None], beside: Neighbours
+) -> Iterator[tuple[str, str, float, tuple[str, ...]]]:
+    """Each two points that are held and that lines or bodies join: the one that moves, if one does, the other, how far
+
+    (m) it may be, and the lines between them.  In the order of the scene.
+    """
+    order = {name: i for i, name in enumerate(placed)}
+    ways = {name: _reaches(beside, name) for name in placed}
+    for a, i in order.items():
+        for b in sorted((x for x in ways[a] if order.get(x, -1) > i), key=order.__getitem__):
+            name, other = (a, b) if motions[a] is not None else (b, a)
+            reach, between = ways[name][other]
+            yield name, other, reach, between
+
+
+def _reaches(beside: Neighbours, begin: str) -> Mapping[str, tuple[float, tuple[str, ...]]]:
+    """How far (m) each point may at most be from one that is held, along lines and bodies that are free, and which
+
+    lines these are.
+    """
     reach: dict[str, tuple[float, tuple[str, ...]]] = {}
     queue: list[tuple[float, str, tuple[str, ...]]] = [(0.0, begin, ())]
     while queue:
         far, name, lines = heapq.heappop(queue)
         if name not in reach:
             reach[name] = far, lines
-            for other, more, by in ways[name]:
+            for other, more, by in beside[name]:
                 heapq.heappush(queue, (far + more, other, lines + by))
     return reach
