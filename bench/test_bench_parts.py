@@ -18,7 +18,7 @@ from hybrid.model.build import build
 from hybrid.model.plane import planar, untwist
 from hybrid.solve.plane_stability import seed
 from hybrid.solve.run import CompiledRun
-from hybrid.solve.statics import solve_statics
+from hybrid.solve.statics import Search, solve_statics
 from hybrid.solve.stepper import Stepper
 
 pytestmark = pytest.mark.bench
@@ -72,7 +72,13 @@ class Line:
         model = build(asked)
         self.sea, self.ends = model.sea.at(0.0), model.ends.at(0.0)
         found = solve_statics(
-            model.line, self.sea, self.ends, model.start, model.length, model.tension_scale, others=model.other_starts
+            model.line,
+            self.sea,
+            self.ends,
+            model.start,
+            model.length,
+            model.tension_scale,
+            search=Search(others=model.other_starts),
         )
         self.start, line = found.state, model.line
         if dimension == 2:
@@ -91,8 +97,8 @@ class Line:
         run, line = CompiledRun(0.5, np.zeros(0), self.extremes), self.line
         nodes, unbroken = np.arange(self.cells + 1), np.full(self.cells, np.inf)
         run.attach(
-            line, self.sea, self.ends, self.model.ends.moves(), self.stepper.work, self.stepper.limits,
-            self.start.copy(), unbroken, nodes, np.zeros(nodes.size, np.int8),
+            self.stepper, self.sea, self.ends, self.model.ends.moves(), self.start.copy(), unbroken, nodes,
+            np.zeros(nodes.size, np.int8),
         )  # fmt: skip
         if self.watched:
             push = seed(line.s, self.model.length / self.model.time_scale)

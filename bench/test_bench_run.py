@@ -27,7 +27,7 @@ from hybrid.model.plane import planar, untwist
 from hybrid.outputs import output_grid
 from hybrid.solve.plane_stability import seed
 from hybrid.solve.run import CompiledRun
-from hybrid.solve.statics import solve_statics
+from hybrid.solve.statics import Search, solve_statics
 from hybrid.solve.stepper import Stepper
 
 pytestmark = pytest.mark.bench
@@ -161,7 +161,7 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
     model = build(scenes[1])
     sea, ends = model.sea.at(0.0), model.ends.at(0.0)
     start = solve_statics(
-        model.line, sea, ends, model.start, model.length, model.tension_scale, others=model.other_starts
+        model.line, sea, ends, model.start, model.length, model.tension_scale, search=Search(others=model.other_starts)
     ).state
     assert model.plane is not None
     line = planar(model.line, model.plane)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.store.header import Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Field, Recorder
 
@@ -85,8 +86,8 @@ def reported(
     ]
     memory = io.BytesIO()
     recorder = Recorder(
-        memory, grid_s=s, fields=fields, step_fields=log if steps and outputs > 1 else [], attributes=attributes,
-        texts={"scene": scene}, fixed=fixed, outputs=outputs,
+        memory, Header(s, fields, log if steps and outputs > 1 else [], attributes, {"scene": scene}, fixed),
+        outputs=outputs,
     )  # fmt: skip
     for t in np.linspace(0.0, DURATION, outputs) if outputs > 1 else np.zeros(outputs):
         wave = np.sin(0.2 * np.pi * t)

@@ -74,6 +74,35 @@ class Change(NamedTuple):
     same: bool = False  # whether cells change and nothing else
 
 
+class Allowed(NamedTuple):
+    """What leaving bending out, and lengths of cells, may make wrong.
+
+    tolerance: m, of position.  curvature_error: part of the largest curvature that the length of cells, which follow
+    it, may make it wrong by; None: they stay as they are.  asked: parts of the largest tension, curvature and moment
+    (numbers of mesh.cell_errors) that leaving bending out may make, where one is asked.  fineness: cells that follow
+    the curvature are so many times as short as that asks for.
+    """
+
+    tolerance: float
+    curvature_error: float | None = None
+    asked: Mapping[int, float] = MappingProxyType({})
+    fineness: float = 1.0
+
+
+class Times(NamedTuple):
+    """Times of zones, s.
+
+    hold: how long a rod must have been below its thresholds; ramp: of bending stiffness, None: hold.  edge: for which
+    the way of a contact edge is foreseen, None: ramp.  period: the longest of the motion, over some of which its
+    largest values count.
+    """
+
+    hold: float
+    ramp: float | None = None
+    edge: float | None = None
+    period: float = 0.0
+
+
 def _number(k: int, text: str) -> Any:
     """A number of the clock of zones."""
     return property(
@@ -105,31 +134,17 @@ class DomainManager:
         self,
         cable: Material,
         layout: Layout,
-        tolerance: float,
-        dwell: float,
         given: np.ndarray,
         scale: float,
+        allowed: Allowed,
+        times: Times,
         user: UserCriterion | None = None,
-        pace: float | None = None,
         on_base: LineOnBase | None = None,
-        curvature_error: float | None = None,
-        asked: Mapping[int, float] = MappingProxyType({}),
-        fineness: float = 1.0,
-        edge_time: float | None = None,
-        period: float = 0.0,
     ) -> None:
-        """tolerance: m; given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N.
-
-        dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell); on_base: of the model.
-        curvature_error: part of the largest curvature that the length of cells, which follow it, may make it wrong by;
-        None: they stay as they are.  asked: parts of the largest tension, curvature and moment (numbers of
-        mesh.cell_errors) that leaving bending out may make, where one is asked.  fineness: cells that follow the
-        curvature are so many times as short as that asks for.  edge_time: s, for which the way of a contact edge is
-        foreseen (None: pace).  period: s, the longest of the motion, over some of which its largest values count.
-        """
+        """given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N; on_base: of the model."""
         n = layout.rod.size
-        self.cable, self.layout, self.dwell, self.given = cable, layout, dwell, given
-        self.pace, self.held = pace or dwell, False
+        self.cable, self.layout, self.dwell, self.given = cable, layout, times.hold, given
+        self.pace, self.held = times.ramp or times.hold, False
         self.kinked = False  # whether it has been said that kinks of joints count as bends
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
         places = layout.starts[-1] + 1
@@ -137,13 +152,13 @@ class DomainManager:
             here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64),
             waves=np.zeros(places),
         )  # fmt: skip
-        self.zones.clock[z.SHARE], self.zones.clock[z.FINENESS] = curvature_error or 0.0, fineness
-        self.tolerance, self.zones.clock[z.LEFT] = tolerance, 1.0
-        for quantity, part in asked.items():
+        self.zones.clock[z.SHARE], self.zones.clock[z.FINENESS] = allowed.curvature_error or 0.0, allowed.fineness
+        self.tolerance, self.zones.clock[z.LEFT] = allowed.tolerance, 1.0
+        for quantity, part in allowed.asked.items():
             self.zones.asked[quantity] = part
         self.zones.clock[z.PACE] = self.pace
-        self.zones.clock[z.EDGE_TIME] = self.pace if edge_time is None else edge_time
-        self.zones.clock[z.MEMORY] = FADE * max(self.pace, period)
+        self.zones.clock[z.EDGE_TIME] = self.pace if times.edge is None else times.edge
+        self.zones.clock[z.MEMORY] = FADE * max(self.pace, times.period)
         self.zones.clamped[:] = cable.held_tangent
         self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
         self.foreseen = np.zeros(n)  # what catenaries will lack, by a pre-run, over what is allowed

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from hybrid.kernels.march.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twis
 from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea, remembers
 from hybrid.model.mesh import Zone
-from hybrid.model.output_points import NEAR
+from hybrid.model.output_points import NEAR, OutputPoints
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
 from hybrid.outputs.observation import Observation
@@ -194,6 +194,42 @@ def elevation(sea: Sea, places: Floats, now: Floats) -> Floats:
     return np.asarray(now[:, 2:3] * (np.cos(turned) @ (A * np.cos(angle)).T + np.sin(turned) @ (A * np.sin(angle)).T))
 
 
+class Recorded(NamedTuple):
+    """What of a line is recorded.
+
+    work: whether works are; only: names of probes, None: all; criteria: name and description of those that are written
+    as well; errors: whether what leaving bending out makes of the results is written.  `values_of` gets the criteria,
+    and for the latter the shift.  edges: whether what cells miss beside edges of contact is written
+    (outputs.edge_errors); gauges: places (x, y), m, where the elevation of the sea is; quantities: what the scene asks
+    for beside the usual.
+    """
+
+    work: bool
+    only: Sequence[str] | None = None
+    criteria: Sequence[tuple[str, str]] = ()
+    errors: bool = False
+    edges: bool = False
+    gauges: Sequence[tuple[float, float]] = ()
+    quantities: Quantities | None = None
+
+
+class Features(NamedTuple):
+    """What a line has along it, or may have in the course of a run.
+
+    loads: arc lengths of point loads, m; changes: those where one section ends and the next begins; hinges: (2 + K, 3)
+    as of `Material`; kinds: of zones that there may be, None: those that there are; finest: m, all nodes that there may
+    be, where cells follow the curvature; payout: whether the line is paid out; obstacles: their names.
+    """
+
+    loads: Sequence[float] = ()
+    changes: Sequence[float] = ()
+    hinges: Floats = NO_HINGES
+    kinds: set[str] | None = None
+    finest: Floats | None = None
+    payout: bool = False
+    obstacles: Sequence[str] = ()
+
+
 class Observer:
     """Fields and values for one run: what its line has, on its output grid."""
 
@@ -202,64 +238,41 @@ class Observer:
         line: Line,
         sea: Sea,
         zones: Sequence[Zone],
-        s: Floats,
-        with_work: bool,
-        loads: Sequence[float] = (),
-        kinds: set[str] | None = None,
-        criteria: Sequence[tuple[str, str]] = (),
-        only: Sequence[str] | None = None,
-        errors: bool = False,
-        jumps: Sequence[float] | Floats = (),
-        changes: Sequence[float] = (),
-        finest: Floats | None = None,
-        gauges: Sequence[tuple[float, float]] = (),
-        payout: bool = False,
-        quantities: Quantities | None = None,
-        obstacles: Sequence[str] = (),
-        hinges: Floats = NO_HINGES,
-        edges: bool = False,
+        points: OutputPoints,
+        features: Features,
+        recorded: Recorded,
     ) -> None:
-        """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
-
-        criteria: name and description of those that are written as well; only: names of probes, None: all.
-        errors: whether what leaving bending out makes of the results is written.  `values_of` gets the criteria, and
-        for the latter the shift.
-        jumps: arc lengths, m, inside the line and in s where a quantity may have two values; changes: those where one
-        section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
-        gauges: places (x, y), m, where the elevation of the sea is recorded.
-        payout: whether the line is paid out; quantities: what the scene asks for beside the usual;
-        obstacles: their names; hinges: (2 + K, 3) as of `Material`; edges: whether what cells miss beside edges of
-        contact is written (outputs.edge_errors).
-        """
+        s, jumps = points
+        loads, finest, only, criteria = features.loads, features.finest, recorded.only, recorded.criteria
         self._finest = finest
-        self._hinges = hinges.copy()
-        self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
+        self._hinges = features.hinges.copy()
+        self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(features.changes)
         near = NEAR * line.s[-1]
         self._unloaded = tuple(x for x in jumps if all(abs(x - y) > near for y in loads))
         self.jumps = np.array(jumps, float)
         self._place(line, sea, zones, s)
         has = {"torsion"} if line.torsion.size and not line.bits & PLANAR else set()
-        has |= (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
+        has |= (features.kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         has |= {"link"} if holds_twist(line) and not line.bits & PLANAR else set()
-        has |= {"payout"} if payout else set()
+        has |= {"payout"} if features.payout else set()
         has |= {"obstacles"} if line.bits & OBSTACLES else set()
-        has |= {"self_contact"} if line.bits & (SELF_CONTACT | (MAY_TOUCH | MAY_MEET) * with_work) else set()
+        has |= {"self_contact"} if line.bits & (SELF_CONTACT | (MAY_TOUCH | MAY_MEET) * recorded.work) else set()
         self._probes = {
             name: p
             for name, p in PROBES.items()
             if (not p.needs or has.intersection(p.needs.split())) and (only is None or name in only)
         }
-        self._touched = tuple(obstacles)
+        self._touched = tuple(features.obstacles)
         self._obstacles = self._touched if line.moved.size else ()
-        self.quantities = quantities
+        self.quantities = recorded.quantities
         may_be_nan: tuple[str, ...] = MAY_BE_NAN
         if self.quantities is not None:
             self._probes |= self.quantities.probes()
             may_be_nan += tuple(self.quantities.wanted)
-        self._errors = errors
-        self._edges = tuple(x for x in MISSED if edges and x in self._probes)
+        self._errors = recorded.errors
+        self._edges = tuple(x for x in MISSED if recorded.edges and x in self._probes)
         self.first_energy: float | None = None  # J, at the first output
-        self._with_work = with_work
+        self._with_work = recorded.work
         sizes = {"s": s.size, "xyz": 3, "edge": 2}
         fields = [
             Field(name, p.unit, p.description, tuple(sizes[x] for x in p.dims), p.dims, p.frame, name in may_be_nan)
@@ -272,14 +285,14 @@ class Observer:
                     description=f"{f.description}, just after the point") for f in right
         ]  # fmt: skip
         self._right = [f.name for f in right]
-        if with_work:
+        if recorded.work:
             fields += [Field(f"work/{x}", "J", WORK[x]) for x in works_of(line)]
         self._criteria = [f"criteria/{name}" for name, _ in criteria]
         fields += [
             Field(name, "", f"largest since the last output: {text}", (s.size,), _S)
             for name, (_, text) in zip(self._criteria, criteria, strict=True)
         ]
-        if errors:
+        if recorded.errors:
             fields += [
                 Field(
                     f"errors/model/{name}",
@@ -301,7 +314,7 @@ class Observer:
                 (s.size,), _S,
             ) for x in self._edges
         ]  # fmt: skip
-        self.gauges = np.array(gauges, float).reshape(-1, 2)
+        self.gauges = np.array(recorded.gauges, float).reshape(-1, 2)
         if len(self.gauges):
             fields.append(elevation_field(self.gauges))
         fields += obstacle_fields(self._obstacles) + obstacle_force_fields(self._touched)

@@ -37,7 +37,7 @@ from hybrid.model.resolution import (
 from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import self_reach, without_contact
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
-from hybrid.outputs.probes import Observer
+from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.obstacles import files_of
 from hybrid.scene.read import scene_text
@@ -81,10 +81,10 @@ from hybrid.store.hdf5_file import is_result, open_file, opened
 from hybrid.store.late_file import LateFile
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import Result, open_result, written_result
-from hybrid.store.records import ERROR_ESTIMATE, THERE
+from hybrid.store.records import ERROR_ESTIMATE, PENDING, RODS_AT_START, THERE
 from hybrid.store.stored_array import StoredArray
 from hybrid.store.stored_rows import RowsRecorder, rows_path
-from hybrid.store.writer import Recorder
+from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 
 # Of every step, what extremes of the end forces follow from.
 FORCES = ("t", "end_force_start", "end_force_end")
@@ -152,7 +152,7 @@ class Case:
         begin = self._begin_result(resolution, first)
         kept = before or {} if isinstance(target, Path) else None
         late = not (first and self.progress.heard)
-        loop, recorder, equilibrium = self.prepare(resolution, target, kept, late, unseen=not first)
+        loop, recorder, equilibrium = self.prepare(resolution, target, WriteMode(kept, late, unseen=not first))
         loop.recorder = recorder
         if isinstance(recorder, Recorder):
             recorder.amended = self.beside_result is not None
@@ -188,19 +188,16 @@ class Case:
         return waits
 
     def prepare(
-        self, resolution: Resolution, target: Target, kept: Tree | None = None, late: bool = False, unseen: bool = False
+        self, resolution: Resolution, target: Target, mode: WriteMode = AT_ONCE
     ) -> tuple[TimeLoop, Recorder | ArrayRecorder, Equilibrium | None]:
-        """The loop of a run, its result, and the equilibrium that it starts from.
-
-        kept, late, unseen: as `before`, `late` and `unseen` of `Recorder`.
-        """
+        """The loop of a run, its result, and the equilibrium that it starts from; mode: of a file."""
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, target)
         assert loop.run.envelope is not None
+        notes = {PENDING: ERROR_ESTIMATE if mode.before else "", RODS_AT_START: reasons_at_start(switching)}
         recorder = result_recorder(
             self.scene, model, loop.observer, target, self._texts, equilibrium, loop.run.envelope,
-            len(output_times(self.scene)), kept, late, ERROR_ESTIMATE if kept else "", reasons_at_start(switching),
-            unseen,
+            len(output_times(self.scene)), mode, notes,
         )  # fmt: skip
         recorder.files = self._files
         for kind, text in self.notes:
@@ -497,16 +494,20 @@ class Case:
             [(x.name, x.ratio) for x in CRITERIA] if self.scene.output.criteria and zones_move and not only else ()
         )
         errors = model.follows_error and wants_errors(self.scene)
-        observer = Observer(
-            as_begun(model.line, model.held, self.scene.dimension), model.sea.values, model.zones, s, not only,
-            model.attached, kinds, criteria, only, errors,
-            self.points.jumps, section_changes(self.scene),
-            model.finest_nodes if follows_curvature(self.scene) and model.layout and not only else None,
-            () if only else self.scene.output.elevation or (),
-            model.payout is not None, None if only else quantities_of(self.scene),
-            obstacles=() if only else model.sea.names, hinges=model.hinges,
-            edges=not only and wants_errors(self.scene) and bool(model.line.bits & SEABED),
+        finest = model.finest_nodes if follows_curvature(self.scene) and model.layout and not only else None
+        features = Features(
+            model.attached, section_changes(self.scene), model.hinges, kinds, finest, model.payout is not None,
+            () if only else model.sea.names,
         )  # fmt: skip
+        recorded = Recorded(
+            not only, only, criteria, errors,
+            edges=not only and wants_errors(self.scene) and bool(model.line.bits & SEABED),
+            gauges=() if only else self.scene.output.elevation or (),
+            quantities=None if only else quantities_of(self.scene),
+        )  # fmt: skip
+        line = as_begun(model.line, model.held, self.scene.dimension)
+        points = self.points._replace(s=s)
+        observer = Observer(line, model.sea.values, model.zones, points, features, recorded)
         observer.line = model.line
         return observer
 

@@ -289,8 +289,8 @@ def of_equilibrium(
     run.books.loaded[:] = model.loaded_ends
     run.books = run.books._replace(hinges=model.hinges)
     run.attach(
-        line, sea, ends, model.ends.moves(), stepper.work, stepper.limits, found.state, np.full(model.cells, np.inf),
-        np.zeros(0, int), marks_of(scene, model),
+        stepper, sea, ends, model.ends.moves(), found.state, np.full(model.cells, np.inf), np.zeros(0, int),
+        marks_of(scene, model),
     )  # fmt: skip
     run.books.report[0] = found.report
     if found.touch.size:

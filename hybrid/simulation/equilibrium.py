@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -27,7 +26,7 @@ from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.solve.flaws import behind_obstacles, overstretched_cell, passed_obstacles
 from hybrid.solve.stability import is_stable
-from hybrid.solve.statics import PUSHED, Equilibrium, solve_statics
+from hybrid.solve.statics import PUSHED, Equilibrium, Search, solve_statics
 
 # Turns that close the frames of the initial shape, at most, and round-off; the twist of a cell, rad, that is resolved.
 CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
@@ -118,34 +117,25 @@ def _count_link(model: Model, t: float, state: State, where: str, s: float) -> N
         raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
 
 
-def solve_model(
-    model: Model, t: float, start: State, settle: str, quick: bool = False, take_slack: bool = False,
-    others: Sequence[tuple[str, State]] = (), refused: Callable[[State], tuple[Outcome, int]] | None = None,
-) -> Equilibrium:  # fmt: skip
-    """Equilibrium of a model with the loads of time t: in its plane where it holds in space too, else in space.
-
-    settle, quick, take_slack, others, refused: as of `solve_statics`.
-    """
+def solve_model(model: Model, t: float, start: State, search: Search) -> Equilibrium:
+    """Equilibrium of a model with the loads of time t: in its plane where it holds in space too, else in space."""
     sea, ends = model.sea.at(t), model.ends.at(t)
     rest = model.length, model.tension_scale, model.slack_floor
     if model.line.bits & PLANAR:
-        start, others = _untwisted(model, model.line, start), [(x, _untwisted(model, model.line, y)) for x, y in others]
+        start = _untwisted(model, model.line, start)
+        search = search._replace(others=[(x, _untwisted(model, model.line, y)) for x, y in search.others])
     elif model.plane is not None and not leaves_plane(model.plane, start, model.length):
         line = planar(model.line, model.plane)
         flat = _untwisted(model, line, start)
         try:
-            found = solve_statics(
-                line, sea, ends, flat, *rest, shape=model.start_shape, settle=settle, quick=True, refused=refused
-            )
+            at_once = search._replace(quick=True, take_slack=False, others=())
+            found = solve_statics(line, sea, ends, flat, *rest, model.start_shape, at_once)
             judged = line if found.with_friction else line._replace(bits=line.bits & ~FRICTION)
             if is_stable(judged, sea, ends, found.state, model.length, model.tension_scale):
                 return found
         except ComputationError:  # there are more ways in space
             pass
-    return solve_statics(
-        model.line, sea, ends, start, *rest, take_slack=take_slack, shape=model.start_shape, settle=settle,
-        others=others, quick=quick, refused=refused,
-    )  # fmt: skip
+    return solve_statics(model.line, sea, ends, start, *rest, model.start_shape, search)
 
 
 def _untwisted(model: Model, line: Line, start: State) -> State:
@@ -156,8 +146,7 @@ def _untwisted(model: Model, line: Line, start: State) -> State:
 
 
 def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:
-    settle = settling(scene)
-    slack = model.slack == "warn" and not quick
+    search = Search(settling(scene), quick, model.slack == "warn" and not quick, model.other_starts)
 
     def keeps_turns(state: State) -> bool:
         try:
@@ -186,14 +175,14 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
         node = next((node for _, node in others), -1)
         return (Outcome.BURIED, node) if node >= 0 else (Outcome.OK, -1)
 
-    solve = partial(solve_model, model, t, model.start, settle, quick, slack, model.other_starts)
+    solve = partial(solve_model, model, t, model.start)
     if lies and model.start_shape in (HUNG, GIVEN):
         try:
-            return solve(elsewhere)
+            return solve(search._replace(refused=elsewhere))
         except ComputationError:  # where no way leads to the side of the span, or of the shape, the other may be meant
             if quick:
                 raise
-    return solve(refused if counts or lies else None)
+    return solve(search._replace(refused=refused if counts or lies else None))
 
 
 def _settles(scene: Scene, model: Model, t: float) -> bool:
@@ -202,7 +191,7 @@ def _settles(scene: Scene, model: Model, t: float) -> bool:
 
 
 def settling(scene: Scene) -> str:
-    """How friction is to settle, as of `solve_statics`: a shape that the scene gives is where the line was laid."""
+    """How friction is to settle, as of `Search`: a shape that the scene gives is where the line was laid."""
     asked = scene.initial
     if not isinstance(asked, StaticStart) or asked.friction != "settled":
         return ""

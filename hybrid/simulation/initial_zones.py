@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.manager import Allowed, DomainManager, Times
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.march.torque_transfer import carry_torque
@@ -29,7 +29,7 @@ from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.contact_equilibrium import nearness, settled_from
 from hybrid.simulation.equilibrium import MANY, equilibrium_of, solve_model
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
-from hybrid.solve.statics import Equilibrium
+from hybrid.solve.statics import Equilibrium, Search
 
 # Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps;
 # and of a line that moves to and fro so many periods, lest what is let go comes back, up to so many ramp times.
@@ -160,12 +160,13 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     foreseen = min(ramp, STRAIGHT * period) if period and curvature_error is None else ramp
     if curvature_error is not None and wanted.hold_time is None and model.payout is None:
         hold = math.inf  # a rod that bends little has cells as long as a catenary: a change of zones costs more
+    asked = shares_asked(scene, curvature_error, resolution.bends)
+    allowed = Allowed(resolution.zones * model.length, curvature_error, asked, resolution.fineness)
+    times = Times(hold, ramp, foreseen, period if curvature_error is None else 0.0)
+    given = _given(scene, model, ramp)
     manager = DomainManager(
-        model.cable, model.layout, resolution.zones * model.length, hold, _given(scene, model, ramp),
-        model.tension_scale, criterion, ramp,
-        model.on_base, curvature_error, shares_asked(scene, curvature_error, resolution.bends), resolution.fineness,
-        foreseen, period if curvature_error is None else 0.0,
-    )  # fmt: skip
+        model.cable, model.layout, given, model.tension_scale, allowed, times, criterion, model.on_base
+    )
     manager.load(model.ends.moments)
     base = model.layout.base
     for a, b, lack in resolution.rods:
@@ -284,7 +285,7 @@ def _equilibrium(model: Model, t: float, start: State, like: Equilibrium) -> Equ
     """like: what it is compared with, and is found as: with friction on the bed, or in contact with itself."""
     if like.touch.size:
         return settled_from(model, t, start, near=True)
-    return solve_model(model, t, start, settle="start" if like.with_friction else "")
+    return solve_model(model, t, start, Search("start" if like.with_friction else ""))
 
 
 def on_fewer(state: State, full: Line, line: Line, ends: Ends) -> State:

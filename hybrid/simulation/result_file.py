@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,14 +40,13 @@ from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import Scene
 from hybrid.simulation.envelope import Envelope
 from hybrid.solve.statics import Equilibrium
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
+from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.capacity import CORNERS
 from hybrid.store.code_checks import ROWS
 from hybrid.store.format import Field
-from hybrid.store.named_arrays import Tree
+from hybrid.store.header import Header, Text
 from hybrid.store.recorder import BaseRecorder
-from hybrid.store.records import PENDING
-from hybrid.store.writer import Recorder
+from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 
 if TYPE_CHECKING:
     from hybrid.scene.quantities import Quantity
@@ -77,27 +77,20 @@ def result_recorder(
     found: Equilibrium | SystemEquilibrium | None,
     envelope: Envelope,
     outputs: int = 0,
-    before: Tree | None = None,
-    late: bool = False,
-    pending: str = "",
-    rods: str = "",
-    unseen: bool = False,
+    mode: WriteMode = AT_ONCE,
+    notes: Mapping[str, str] = MappingProxyType({}),
 ) -> Recorder | ArrayRecorder:
     """A new result, in a file or in memory; whether a file may be replaced was asked before anything was computed.
 
     found: the equilibrium at the start; envelope: of what is computed, its values not yet known; outputs: after the
-    first, 0 of an equilibrium; before, late, unseen: as of `Recorder`; pending: what is to come when it is complete;
-    rods: why the first ones are, as of `reasons_at_start`.
+    first, 0 of an equilibrium; mode: of a file; notes: texts that are attributes of the file unless they are empty.
     """
     attributes: dict[str, str | float | int] = {
         "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
     }  # fmt: skip
     if found is not None:
         attributes |= {"static_path": found.summary, "static_residual": found.residual}
-    if pending:
-        attributes[PENDING] = pending
-    if rods:
-        attributes["rods_at_start"] = rods
+    attributes |= {name: text for name, text in notes.items() if text}
     fixed = [*_surroundings(model), *_limits(scene, observer), *envelope.fixed(), *mesh_fields(model)]
     if scene.output.history:
         points = np.array(scene.output.history)
@@ -111,18 +104,13 @@ def result_recorder(
         fixed.append((Field("right/s", "m", text, observer.jumps.shape, ("right/s",)), observer.jumps))
     steps = STEP_FIELDS if outputs else ()
     recorder: Recorder | ArrayRecorder
+    header = Header(observer.s, observer.fields, steps, attributes, texts, fixed)
     if isinstance(target, MemoryTarget):
-        recorder = ArrayRecorder(
-            target, grid_s=observer.s, fields=observer.fields, step_fields=steps, attributes=attributes, texts=texts,
-            fixed=fixed,
-        )  # fmt: skip
+        recorder = ArrayRecorder(target, header)
     else:
         recorder = Recorder(
-            target, grid_s=observer.s, fields=observer.fields, step_fields=steps, attributes=attributes, fixed=fixed,
-            texts={name: x if isinstance(x, str) else x() for name, x in texts.items()}, outputs=outputs + 1,
-            overwrite=True, before=before, templates=cache_folder().parent, late=late,
-            unseen=unseen,
-        )  # fmt: skip
+            target, header, outputs=outputs + 1, overwrite=True, mode=mode, templates=cache_folder().parent
+        )
     if model.layout is not None:
         _note_neglected_bending(scene, model, recorder)
     return recorder

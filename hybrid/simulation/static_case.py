@@ -21,7 +21,7 @@ from hybrid.model.resolution import Resolution, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.edge_errors import edge_errors
 from hybrid.outputs.layer_errors import layer_errors
-from hybrid.outputs.probes import Observer
+from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
@@ -39,7 +39,7 @@ from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import POWERS
 from hybrid.store.array_recorder import Target
-from hybrid.store.records import ERROR_ESTIMATE
+from hybrid.store.records import ERROR_ESTIMATE, PENDING, RODS_AT_START
 
 
 class StaticCase:
@@ -59,10 +59,8 @@ class StaticCase:
             refuse_contact(model, where)
         envelope = Envelope(self.scene, model, moves=False)
         pending = ERROR_ESTIMATE if wants_errors(self.scene) else ""
-        why = reasons_at_start(switching)
-        with result_recorder(
-            self.scene, model, observer, target, texts, found, envelope, pending=pending, rods=why
-        ) as recorder:
+        notes = {PENDING: pending, RODS_AT_START: reasons_at_start(switching)}
+        with result_recorder(self.scene, model, observer, target, texts, found, envelope, notes=notes) as recorder:
             ends, events = model.ends.at(np.inf), EventLog()
             diagnostics = Diagnostics(model, events)
             diagnostics.begin()
@@ -151,16 +149,17 @@ class StaticCase:
 
     def observer(self, model: Model, only: Sequence[str] | None = None, at: Floats | None = None) -> Observer:
         """at: places, m, instead of the output points."""
-        points, jumps = output_points(self.scene)
-        s = points if at is None else at
-        errors = model.follows_error and wants_errors(self.scene)
-        return Observer(
-            model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
-            jumps=jumps, changes=section_changes(self.scene),
+        points = output_points(self.scene)
+        points = points if at is None else points._replace(s=at)
+        features = Features(
+            model.attached, section_changes(self.scene), model.hinges, obstacles=() if only else model.sea.names
+        )
+        recorded = Recorded(
+            False, only, errors=model.follows_error and wants_errors(self.scene),
             gauges=() if only else self.scene.output.elevation or (),
-            quantities=None if only else quantities_of(self.scene), obstacles=() if only else model.sea.names,
-            hinges=model.hinges,
+            quantities=None if only else quantities_of(self.scene),
         )  # fmt: skip
+        return Observer(model.line, model.sea.values, model.zones, points, features, recorded)
 
 
 def refuse_contact(model: Model, where: str) -> None:

@@ -47,7 +47,7 @@ from hybrid.model.output_points import output_points
 from hybrid.model.resolution import follows_curvature, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.observation import Observation
-from hybrid.outputs.probes import Observer
+from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
@@ -68,6 +68,7 @@ from hybrid.solve.system_flaws import slack_cell
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.records import PENDING
 from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:
@@ -98,20 +99,23 @@ def twist_at_rest(x: JoinedLine, state: State) -> float:
 
 def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | None = None) -> Observer:
     """What records the outputs of a line; moves: whether it does, or is in equilibrium; only: quantities, None: all."""
-    s, jumps = output_points(scene)
+    points = output_points(scene)
     if moves and model.payout is not None:
-        s, jumps = output_points(scene, model.payout.longest, not model.payout.side)
+        points = output_points(scene, model.payout.longest, not model.payout.side)
     zones_move = moves and model.layout is not None
     kinds = {"rod", "catenary"} if zones_move else None
     criteria = [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zones_move and only is None else ()
     finest = model.finest_nodes if zones_move and follows_curvature(scene) and only is None else None
-    return Observer(
-        model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, kinds, criteria,
-        only=only, jumps=jumps, changes=section_changes(scene), finest=finest,
-        payout=moves and model.payout is not None, quantities=None if only else quantities_of(scene),
-        obstacles=() if only else model.sea.names, hinges=model.hinges,
-        edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
+    features = Features(
+        model.attached, section_changes(scene), model.hinges, kinds, finest, moves and model.payout is not None,
+        () if only else model.sea.names,
     )  # fmt: skip
+    recorded = Recorded(
+        moves and only is None, only, criteria,
+        edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
+        quantities=None if only else quantities_of(scene),
+    )  # fmt: skip
+    return Observer(model.line, model.sea.values, model.zones, points, features, recorded)
 
 
 class LineStep(NamedTuple):
@@ -152,7 +156,7 @@ class LineResult:
         if target is not None:
             to, texts = self.target or io.BytesIO(), {"scene": partial(scene_text, scene)}
             recorder = result_recorder(
-                scene, model, self.observer, to, texts, found, self.envelope, outputs, pending=pending
+                scene, model, self.observer, to, texts, found, self.envelope, outputs, notes={PENDING: pending}
             )
             if isinstance(recorder, Recorder):
                 recorder.lay_by()

@@ -74,14 +74,15 @@ from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.solve.system_steps import SystemSteps
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
+from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.format import Field
 from hybrid.store.hdf5_file import opened
+from hybrid.store.header import Header, Text
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import PENDING
-from hybrid.store.writer import Recorder
+from hybrid.store.writer import Recorder, WriteMode
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_payout import SystemPayout
@@ -269,17 +270,13 @@ class SystemRun:
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
         fixed = [*self.quantities.limits, *self.quantities.ranges, *places_of_elevation(gauges_of(self.system))]
+        header = Header(np.zeros(1), self._fields, (), attributes, {"scene": text} | self._told, fixed)
         if isinstance(self.target, MemoryTarget):
-            return ArrayRecorder(
-                self.target, grid_s=np.zeros(1), fields=self._fields, step_fields=(), attributes=attributes,
-                fixed=fixed, texts={"scene": text} | self._told,
-                parts={line.name: line.target for line in self.lines if line.target is not None},
-            )  # fmt: skip
+            targets = {line.name: line.target for line in self.lines if line.target is not None}
+            return ArrayRecorder(self.target, header, targets)
         recorder = Recorder(
-            self.target, grid_s=np.zeros(1), fields=self._fields, step_fields=(), attributes=attributes, fixed=fixed,
-            texts={"scene": text if isinstance(text, str) else text()} | self._told,
-            outputs=len(self.times) + 1, overwrite=True,
-            before=self._before if self.kept else None, templates=cache_folder().parent, parts=self._parts,
+            self.target, header, outputs=len(self.times) + 1, overwrite=True,
+            mode=WriteMode(self._before if self.kept else None), templates=cache_folder().parent, parts=self._parts,
         )  # fmt: skip
         recorder.files = self._files
         return recorder

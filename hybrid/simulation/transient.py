@@ -650,9 +650,9 @@ class Transient:
         books.hinges[:] = model.hinges
         self.run.clock[b.WAVE_STEP] = wave_step(model.line, model.tension_scale)
         self.run.attach(
-            model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,
-            self.stepper.limits, state, 1.0 + borne_strain(model), model.always,
-            marks_on(model.line.s, self.marked), self.correction.corrector if self.correction is not None else None,
+            self.stepper, model.sea.values, model.ends.values, model.ends.moves(), state, 1.0 + borne_strain(model),
+            model.always, marks_on(model.line.s, self.marked),
+            self.correction.corrector if self.correction is not None else None,
         )  # fmt: skip
         if touches:
             let_touch_itself(self.run, self.scene, model, self.stepper.work)

@@ -39,10 +39,11 @@ from hybrid.kernels.state.state import (
     sampled_size,
 )
 from hybrid.kernels.step.job import blank_job
-from hybrid.kernels.step.newton import RUN, Limits, Task
+from hybrid.kernels.step.newton import RUN, Task
 from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.bending_corrector import Corrector
 from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.stepper import Stepper
 
 # Steps and samples that a call may take before Python writes them down.
 ROWS = 512
@@ -95,15 +96,16 @@ class CompiledRun:
     # --- what is computed ---------------------------------------------------------------------------
 
     def attach(
-        self, line: Line, sea: Sea, ends: Ends, moves: Moves, work: Work, limits: Limits, state: State, borne: Floats,
-        first: np.ndarray, marks: np.ndarray, corrector: Corrector | None = None,
+        self, stepper: Stepper, sea: Sea, ends: Ends, moves: Moves, state: State, borne: Floats, first: np.ndarray,
+        marks: np.ndarray, corrector: Corrector | None = None,
     ) -> None:  # fmt: skip
-        """Go on with a line (as at the start, after a change of zones, in space after a plane) from `state`.
+        """Go on from `state` with the line of a stepper: at the start, after a change of zones, in space after a plane.
 
         borne: (N,) length over unstretched length that cells bear; first: nodes of the base mesh; marks: (N+1,) of
         kernels.state.books, what nodes have; corrector: of the model error, if it is followed.  Extremes are kept anew;
         displacements count from `books.start`, which the caller fills.
         """
+        line, work = stepper.line, stepper.work
         check_turns(line, state)
         cells = line.h.size
         followed = corrector.sampled if corrector is not None else np.zeros((2, 0))
@@ -145,8 +147,8 @@ class CompiledRun:
         old, new = self.states
         was, now = self.pushes
         self.table.bind(
-            task=Task(RUN, limits=limits), line=line, sea=sea, ends=ends, moves=moves, old=old, new=new, was=was,
-            now=now, work=work, books=books, follower=0,
+            task=Task(RUN, limits=stepper.limits), line=line, sea=sea, ends=ends, moves=moves, old=old, new=new,
+            was=was, now=now, work=work, books=books, follower=0,
         )  # fmt: skip
         if corrector is not None:
             following = corrector.bind(line, sea, ends, self.states, self.clock, self.count, work)

@@ -344,6 +344,26 @@ def _attempts(
                 yield noted((f"{PUSHED}, along its softest motion", *solver.newton(solver.line, ends, state)))
 
 
+class Search(NamedTuple):
+    """How an equilibrium is searched, and which one counts.
+
+    settle: on a bed with friction, "start": let it come to rest from the start and try nothing else, "pull": pull it
+    tight from where it would lie without tension along the equilibrium without friction, else the same; quick: try
+    nothing but Newton from the start; take_slack: whether a slack solution will do; others: further starts with their
+    names; refused: why a state in balance is not the one that is sought, and its cell or node; the next way is tried
+    then.
+    """
+
+    settle: str = ""
+    quick: bool = False
+    take_slack: bool = False
+    others: Sequence[tuple[str, State]] = ()
+    refused: Callable[[State], tuple[Outcome, int]] | None = None
+
+
+ALL_WAYS = Search()
+
+
 def solve_statics(
     line: Line,
     sea: Sea,
@@ -352,26 +372,19 @@ def solve_statics(
     length: float,
     scale: float,
     floor: float | None = None,
-    take_slack: bool = False,
     shape: str = "the starting shape",
-    settle: str = "",
-    others: Sequence[tuple[str, State]] = (),
-    quick: bool = False,
-    refused: Callable[[State], tuple[Outcome, int]] | None = None,
+    search: Search = ALL_WAYS,
 ) -> Equilibrium:
     """Equilibrium of a line from a starting shape, however poor.
 
     length: m; scale: the tension scale, N; floor: what counts as no tension in motion, N
     (None: 1e-6 of the scale); at rest a catenary needs LEAST_TENSION times that; shape: what the
-    start is, for people; settle: on a bed with friction, "start": let it come to rest from the start and try nothing
-    else, "pull": pull it tight from where it would lie without tension along the equilibrium without friction, else
-    the same; others: further starts with their names; quick: try nothing but Newton from the start;
-    refused: why a state in balance is not the one that is sought, and its cell or node; the next way is tried then.
+    start is, for people.
 
     Tries Newton; then a soft line that is hardened; then Newton with turning chords along
     ladders of end loads; then a damped motion that settles, and Newton again; then a push
     off an unstable equilibrium.  Raises ComputationError when none of them arrives; with
-    `take_slack` a slack solution is taken when there is no taut one.
+    `search.take_slack` a slack solution is taken when there is no taut one.
     """
     # at rest a catenary needs more than no tension: without any, every shape is an equilibrium
     floor = LEAST_TENSION * abs(1e-6 * scale if floor is None else floor)
@@ -379,12 +392,13 @@ def solve_statics(
     smooth = _Solver(rough.line._replace(bits=rough.line.bits & ~FRICTION), sea, length, scale, floor)
     path: list[str] = []
     failed: list[tuple[Outcome, int, State]] = []
+    settle, quick, refused = search.settle, search.quick, search.refused
     if line.bits & FRICTION and not ends.held.any():
         settle = "start"
 
     def roads() -> Iterator[tuple[_Solver, tuple[str, Outcome, int, State]]]:
         rubs = bool(line.bits & FRICTION)
-        plain = _attempts(smooth, ends, start, shape, others)
+        plain = _attempts(smooth, ends, start, shape, search.others)
         if not (settle and rubs):
             yield from ((smooth, road) for road in (islice(plain, 1) if quick else plain))
         elif settle == "pull":
@@ -409,7 +423,7 @@ def solve_statics(
     ):  # what says most about the line comes first
         for outcome, _, state in failed:
             # what a continuation has left on its way is not balanced
-            if outcome == worst == Outcome.SLACK and take_slack and smooth.is_balanced(ends, state):
+            if outcome == worst == Outcome.SLACK and search.take_slack and smooth.is_balanced(ends, state):
                 return _found(smooth, ends, state, path)
         for outcome, where, state in failed:
             if outcome == worst:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -19,10 +19,8 @@ from hybrid.store.format import (
     values_of_fixed,
     write_attributes,
 )
+from hybrid.store.header import Header, Text, made
 from hybrid.store.table import Table
-
-# A text, or what makes it when it is asked for: YAML takes a tenth of the equilibrium of some lines.
-Text = str | Callable[[], str]
 
 
 class ArrayDataset:
@@ -89,8 +87,7 @@ class ArrayContents:
         return np.asarray(self.data[name].values)
 
     def text(self, name: str) -> str:
-        text = self.texts.get(name, "")
-        return text if isinstance(text, str) else text()
+        return made(self.texts.get(name, ""))
 
     def close(self) -> None:
         """Let go of all arrays; those that were asked for stay with the result."""
@@ -102,19 +99,17 @@ class ArrayContents:
 class HeldValues:
     """What a result in memory holds besides its tables: values that do not grow, attributes and texts."""
 
-    def __init__(
-        self, grid_s: np.ndarray, fields: Sequence[Field], fixed: Sequence[tuple[Field, np.ndarray]],
-        attributes: Mapping[str, str | float | int], texts: Mapping[str, Text],
-    ) -> None:  # fmt: skip
-        """Arguments and errors as of `store.writer.Recorder`."""
-        scales = scales_of(np.size(grid_s), fields, [field for field, _ in fixed])
+    def __init__(self, header: Header) -> None:
+        """Errors as of `store.writer.Recorder`."""
+        fixed = header.fixed
+        scales = scales_of(np.size(header.grid_s), header.fields, [field for field, _ in fixed])
         self.fixed = {name: ArrayDataset(field, (name,), scale_values(field)) for name, field in scales.items()}
         self.fixed |= {f.name: ArrayDataset(f, f.dims, np.zeros(0)) for f, _ in fixed if f.name not in scales}
-        for name, values in values_of_fixed(np.asarray(grid_s, float), fixed).items():
+        for name, values in values_of_fixed(np.asarray(header.grid_s, float), fixed).items():
             self.fixed[name].values = values.copy()
         self.attributes: dict[str, Any] = dict(attributes_of_format()) | status_attributes("running", "")
-        write_attributes(SimpleNamespace(attrs=self.attributes), attributes)
-        self.texts = {name: text for name, text in texts.items() if text}
+        write_attributes(SimpleNamespace(attrs=self.attributes), header.attributes)
+        self.texts = {name: text for name, text in header.texts.items() if text}
 
     def contents(
         self, groups: Iterable[str], tables: Iterable[Table], replaced: Mapping[str, np.ndarray], status: str,

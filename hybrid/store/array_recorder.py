@@ -6,15 +6,16 @@ HDF5 takes a third of a short run: to write some ninety datasets, to open them a
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
 import numpy as np
 
-from hybrid.store.array_contents import ArrayContents, HeldValues, Text
-from hybrid.store.format import Field, check_names, tables_of
+from hybrid.store.array_contents import ArrayContents, HeldValues
+from hybrid.store.format import check_names, tables_of
+from hybrid.store.header import Header
 from hybrid.store.recorder import STATUS, BaseRecorder, pause
 
 
@@ -29,20 +30,16 @@ Target = Path | io.BytesIO | MemoryTarget
 
 
 class ArrayRecorder(BaseRecorder):
-    """Keeps one result in memory; arguments and errors as of `store.writer.Recorder`.  It has no checkpoints.
+    """Keeps one result in memory; errors as of `store.writer.Recorder`.  It has no checkpoints.
 
     parts: where results of lines go that are parts of this one; they are closed before it.
     """
 
-    def __init__(
-        self, target: MemoryTarget, *, grid_s: np.ndarray, fields: Sequence[Field], step_fields: Sequence[Field],
-        attributes: Mapping[str, str | float | int], texts: Mapping[str, Text],
-        fixed: Sequence[tuple[Field, np.ndarray]] = (), parts: Mapping[str, MemoryTarget] | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, target: MemoryTarget, header: Header, parts: Mapping[str, MemoryTarget] | None = None) -> None:
         self._parts = dict(parts or {})
-        check_names(fields, step_fields, fixed)
-        self._target, self._held = target, HeldValues(grid_s, fields, fixed, attributes, texts)
-        self._begin(None, tables_of(fields, step_fields))
+        check_names(header.fields, header.step_fields, header.fixed)
+        self._target, self._held = target, HeldValues(header)
+        self._begin(None, tables_of(header.fields, header.step_fields))
         self._flushed, self._pause, self.closed = -np.inf, pause(0.0), False
 
     @property

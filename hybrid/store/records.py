@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Attribute of a result that is complete and to which more will be added, and what that is.
 PENDING, ERROR_ESTIMATE, FINER_RESULT = "pending", "error estimate", "finer result"
+# Attribute of a result with zones that move: which rods there are at first and why, as JSON.
+RODS_AT_START = "rods_at_start"
 
 UNKNOWN = "error not known: not converged"  # in place of the figure of an error that says nothing
 

@@ -54,6 +54,7 @@ from hybrid.store.hdf5_file import (
     in_memory,
     unwritable,
 )
+from hybrid.store.header import Header, made
 from hybrid.store.integrity import sign
 from hybrid.store.late_file import LateFile
 from hybrid.store.lines import GROUP, add_parts, in_turn, of_all, of_part
@@ -70,6 +71,23 @@ _PART = 50.0
 _MOST_WAITING = 16_000_000
 
 
+class WriteMode(NamedTuple):
+    """How a file is written while its result is computed.
+
+    before: what was found before the run, for whoever goes on with it; None: nobody can, it has no checkpoints.
+    late: whether there is no file before the first flush; without one it is written when the recorder is closed, and if
+    that is "complete" and `amended`, it waits in `late_file` for whoever puts it in its place.
+    unseen: whether nobody reads it before it is complete: outputs wait until they are many.
+    """
+
+    before: Tree | None = None
+    late: bool = False
+    unseen: bool = False
+
+
+AT_ONCE = WriteMode()  # the file is there from the start, nobody goes on with it
+
+
 class Late(NamedTuple):
     """A result that has no file as yet."""
 
@@ -83,19 +101,11 @@ class Late(NamedTuple):
 class Recorder(BaseRecorder):
     """Writes one result file; a context manager that closes it with the right status.
 
-    target: path, or a BytesIO for a result in memory.  grid_s: (ns,) output arc lengths, m,
-    unstretched.  fields: what `save` brings.  step_fields: what `log` brings, time first.
-    attributes: more root attributes, `title` among them.  texts: "scene" as YAML, and others.
-    fixed: quantities that do not depend on time, with their values; one whose only dimension
-    is its own name becomes a dimension scale (the arc lengths of some probes, say).
+    target: path, or a BytesIO for a result in memory.
     outputs: the number of outputs if it is known; it only makes small files smaller.
     overwrite: replace an existing result.  Another program's file is never replaced.
-    before: what was found before the run, for whoever goes on with it; None: nobody can, it has no checkpoints.
     templates: folder where templates of files are kept (store.template); None: in this process alone.
     parts: results of lines, laid by in memory, that are groups of this file from now on and are written with it.
-    late: whether there is no file before the first flush; without one it is written when this is closed, and if that
-    is "complete" and `amended`, it waits in `late_file` for whoever puts it in its place.
-    unseen: whether nobody reads it before it is complete: outputs wait until they are many.
     """
 
     late_file: LateFile | None = None
@@ -106,44 +116,39 @@ class Recorder(BaseRecorder):
     def __init__(
         self,
         target: str | Path | io.BytesIO,
+        header: Header,
         *,
-        grid_s: np.ndarray,
-        fields: Sequence[Field],
-        step_fields: Sequence[Field],
-        attributes: Mapping[str, str | float | int],
-        texts: Mapping[str, str],
-        fixed: Sequence[tuple[Field, np.ndarray]] = (),
         outputs: int | None = None,
         overwrite: bool = False,
-        before: Tree | None = None,
+        mode: WriteMode = AT_ONCE,
         templates: Path | None = None,
         parts: Mapping[str, Recorder] | None = None,
-        late: bool = False,
-        unseen: bool = False,
     ) -> None:
+        fields, step_fields, fixed, before = header.fields, header.step_fields, header.fixed, mode.before
         check_names(fields, step_fields, fixed)
+        texts = {name: made(text) for name, text in header.texts.items()}
         self._memory = target if isinstance(target, io.BytesIO) else None
         path = None if isinstance(target, io.BytesIO) else Path(target).expanduser().resolve()
         if path is not None:
             check_target(path, overwrite)
 
-        def made() -> h5py.File:
-            points, shape = np.size(grid_s), [field for field, _ in fixed]
+        def make() -> h5py.File:
+            points, shape = np.size(header.grid_s), [field for field, _ in fixed]
             file = in_memory(template(points, fields, step_fields, shape, outputs, before is not None, templates))
-            write_attributes(file, attributes)
+            write_attributes(file, header.attributes)
             write_texts(file, texts)
-            write_fixed(file, np.asarray(grid_s, dtype=float), fixed)
+            write_fixed(file, np.asarray(header.grid_s, dtype=float), fixed)
             write_before(file, before)
             return file
 
-        if late and path is not None:
+        if mode.late and path is not None:
             self._write_to(None, path, tables_of(fields, step_fields))
-            self._unseen = unseen
-            held = HeldValues(grid_s, fields, fixed, attributes, texts)
-            self._late = Late(held, made, {} if before is not None else None, before, templates)
+            self._unseen = mode.unseen
+            held = HeldValues(header._replace(texts=texts))
+            self._late = Late(held, make, {} if before is not None else None, before, templates)
             self._flushed = monotonic()
             return
-        file = made()
+        file = make()
         if parts:
             add_parts(file, {name: part._take_image for name, part in parts.items()})
         if path is not None:

@@ -12,6 +12,7 @@ from typing import Any
 
 from hybrid.store.envelope import NOT_VERIFIED, UNITS
 from hybrid.store.reader import Result
+from hybrid.store.records import RODS_AT_START
 from hybrid.store.statistics_table import rows_of
 from hybrid.view.decimate import Store
 from hybrid.view.figure import Map, Panel
@@ -280,7 +281,7 @@ def statistics_html(result: Result) -> str:
 
 def settings_html(result: Result) -> str:
     """What was chosen, by the scene or by the program, and with which versions."""
-    hidden = {"title", "status", "message", "format", "format_version", "fairleads", "rods_at_start"}
+    hidden = {"title", "status", "message", "format", "format_version", "fairleads", RODS_AT_START}
     given = {k: v for k, v in result.attributes.items() if k not in hidden and not k.startswith(("version_", "error_"))}
     rows = [
         (_SETTINGS.get(k, k.replace("_", " ")), f"{short(v, 6)}" if isinstance(v, float) else v)

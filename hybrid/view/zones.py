@@ -18,7 +18,7 @@ import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, weight_of_event
 from hybrid.store.reader import Result
-from hybrid.store.records import Event, Zone
+from hybrid.store.records import RODS_AT_START, Event, Zone
 from hybrid.view.decimate import Kept, even
 from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Text
 from hybrid.view.projections import STILL, free_edges, whole_zones
@@ -71,7 +71,7 @@ class Rod(NamedTuple):
 
 def rods_at_start(result: Result) -> list[Rod]:
     """The first rods of zones that move; of results that do not say why, none."""
-    found = json.loads(str(result.attributes.get("rods_at_start", "[]")))
+    found = json.loads(str(result.attributes.get(RODS_AT_START, "[]")))
     return [Rod(a, b, tuple(WHY.get(name, name) for name in asks)) for a, b, asks in found]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from problems import Scene, free, pinned, scene, straight
 
-from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.manager import Allowed, DomainManager, Times
 from hybrid.adapt.state_transfer import Remapped, remap
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
 from hybrid.model.layout import Layout
@@ -182,7 +182,7 @@ def weighed(
     scale: float = 1.0, line: Line | None = None,
 ) -> Floats:  # fmt: skip
     """The ratios (criteria, base cells) of a state; before: the state a step dt ago."""
-    manager = DomainManager(what, zones, tolerance, dwell, np.zeros(zones.rod.size, int), scale)
+    manager = DomainManager(what, zones, np.zeros(zones.rod.size, int), scale, Allowed(tolerance), Times(dwell))
     line = line or on(what, zones, bits)
     sea, ends = sea or no_sea(line.h.size), ends or still()
     if before is not None:

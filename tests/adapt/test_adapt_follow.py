@@ -12,7 +12,7 @@ from adapt_cases import along, bight, cable, hanging, helix, layout, on, state_o
 from problems import order
 
 import hybrid
-from hybrid.adapt.manager import Change, DomainManager
+from hybrid.adapt.manager import Allowed, Change, DomainManager, Times
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.machine import binding
 from hybrid.kernels.machine.binding import Table
@@ -50,7 +50,7 @@ def planned(curvature_error, shape, n=8, parts=64, length=10.0, twist=None, rod=
         d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
         angle = np.append(0.0, np.cumsum(twist))[:, None]
         state.a1[:] = np.cos(angle) * state.a1 + np.sin(angle) * np.cross(d, state.a1)
-    manager = DomainManager(what, zones, 1e-2, 1.0, np.ones(n, int), 1.0, curvature_error=curvature_error)
+    manager = DomainManager(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, curvature_error), Times(1.0))
     manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
     manager.zones.next_rod[:] = rod
     table = Table(blank_zone_job())
@@ -64,7 +64,7 @@ def test_where_tension_is_lost_is_read_on_the_cells_of_now() -> None:
     """Cells that follow change between two reviews, and the manager knows the layout of the last one."""
     what = cable(10.0)
     before, now = (layout(np.linspace(0.0, 10.0, 9), parts, "R" * 8) for parts in (4, 1))
-    managers = [DomainManager(what, x, 1e-2, 1.0, np.zeros(8, int), 1e12, curvature_error=0.03) for x in (before, now)]
+    managers = [DomainManager(what, x, np.zeros(8, int), 1e12, Allowed(1e-2, 0.03), Times(1.0)) for x in (before, now)]
     manager, other = managers
     manager.take(before, other.zones)  # as a change of cells leaves it
     manager.zones.counts[z.KNOWN], manager.zones.past[:], manager.age = 1, 100.0, 1.0
@@ -118,7 +118,7 @@ def test_chords_become_as_long_as_arcs_to_fourth_order(shape: str) -> None:
         what, zones = cable(), layout(np.linspace(0, 10, n + 1), 1, "R" * n)
         line = on(what, zones)
         state = state_on(line, curve)
-        manager = DomainManager(what, zones, 1e-2, 1.0, np.ones(n, int), 1.0, curvature_error=0.05)
+        manager = DomainManager(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, 0.05), Times(1.0))
         table = Table(blank_zone_job())
         table.bind(line=line, new=state, zones=manager.zones)
         take_arcs(table.numbers)

@@ -10,7 +10,7 @@ from adapt_cases import along, cable, layout, on, state_on, still
 from test_cell_errors import pinned, scene
 
 import hybrid
-from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.manager import Allowed, DomainManager, Times
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.mesh import cell_errors as e
@@ -49,7 +49,7 @@ def watched(velocity, fineness=1.0, tolerance=1e-3):
     line = on(what, zones)
     state = state_on(line, along((1.0, 0.0, 0.0)), 1e4)
     state.v[:, 2] = velocity(line.s)
-    manager = DomainManager(what, zones, tolerance, 1.0, np.ones(8, int), 1.0, curvature_error=SHARE, fineness=fineness)
+    manager = DomainManager(what, zones, np.ones(8, int), 1.0, Allowed(tolerance, SHARE, fineness=fineness), Times(1.0))
     manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
     manager.zones.next_rod[:] = True
     table = Table(blank_zone_job())

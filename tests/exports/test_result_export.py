@@ -20,6 +20,7 @@ from hybrid.cli.commands import main
 from hybrid.errors import ResultError
 from hybrid.exports.api import SUFFIXES, export
 from hybrid.store.format import Field
+from hybrid.store.header import Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
 
@@ -61,9 +62,10 @@ def made(
     if bed:
         fixed.append((Field("seabed", "", "plane", (4,), ("plane",)), np.array([0.0, 0.0, 1.0, -50.0])))
     recorder = Recorder(
-        target or memory, grid_s=S, fields=fields, step_fields=log if steps else [],
-        attributes={"title": "Schwingt, 5 µm", "cells": 20}, texts={"scene": SCENE}, fixed=fixed, overwrite=True,
-    )  # fmt: skip
+        target or memory,
+        Header(S, fields, log if steps else [], {"title": "Schwingt, 5 µm", "cells": 20}, {"scene": SCENE}, fixed),
+        overwrite=True,
+    )
     for i in range(round(duration / every) + 1):
         t, x = i * every, np.zeros(NS)
         angle = np.pi / 2 + 0.1 * np.cos(2 * np.pi * t / PERIOD) * S**2 / (2 * LENGTH)
@@ -606,7 +608,7 @@ def test_a_missing_package_is_named_with_its_command(
 
 def test_a_result_without_outputs_and_a_closed_one(tmp_path: Path) -> None:
     memory = io.BytesIO()
-    Recorder(memory, grid_s=S, fields=[], step_fields=[], attributes={"title": ""}, texts={}).close("failed", "why")
+    Recorder(memory, Header(S, [], [], {"title": ""})).close("failed", "why")
     for kind in FORMATS:
         with pytest.raises(ResultError, match=r"holds no output yet.*failed: why"):
             export(open_result(memory), tmp_path / f"x{SUFFIXES[kind]}", format=kind)
@@ -624,10 +626,10 @@ def test_a_killed_run_is_exported_as_far_as_it_came(tmp_path: Path) -> None:
     code = f"""
 import os, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
-from test_result_export import SCENE, S, Field, Recorder, np
+from test_result_export import SCENE, S, Field, Header, Recorder, np
 step = [Field("t", "s", "end of the step")]
 fields = [Field("tension", "N", "d", (21,), ("s",))]
-recorder = Recorder("run.h5", grid_s=S, fields=fields, step_fields=step, attributes={{"title": ""}}, texts={{"scene": SCENE}})
+recorder = Recorder("run.h5", Header(S, fields, step, {{"title": ""}}, {{"scene": SCENE}}))
 for i in range(5):
     recorder.save(float(i), {{"tension": i + S}}, [("rod", 0.0, 10.0)])
 recorder.flush()

@@ -13,6 +13,7 @@ from hybrid.model.build import Model, build
 from hybrid.scene.schema import Scene
 from hybrid.simulation.equilibrium import equilibrium_of, solve_model
 from hybrid.solve.flaws import FOLDED, folds
+from hybrid.solve.statics import Search
 
 
 def hairpin(cells: int, model: str = "rod", apart: float = 0.0, **more: Any) -> dict[str, Any]:
@@ -35,7 +36,7 @@ def test_no_rod_stands_on_a_fold() -> None:
     """Newton's first answer on 21 cells turns by 173 deg into a cell that presses with 10.1 N, more than its weight."""
     scene, model = model_of(hairpin(21))
     with pytest.raises(ComputationError) as refused:
-        solve_model(model, 0.0, model.start, "", quick=True)
+        solve_model(model, 0.0, model.start, Search(quick=True))
     assert refused.value.outcome == Outcome.FOLDED
     assert refused.value.s == pytest.approx(10.0, abs=2.0)
     assert "would show the bend" in str(refused.value)

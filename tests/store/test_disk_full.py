@@ -23,10 +23,11 @@ import resource, sys
 sys.path[:0] = [{here!r}]
 resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
 from hybrid.errors import ResultError
+from hybrid.store.writer import WriteMode
 from test_result_file import ONE, TWO, recorder, values
 kept = []  # nothing is let go of before the end
 try:
-    with recorder({path!r}, before={{}}) as r:
+    with recorder({path!r}, mode=WriteMode({{}})) as r:
         kept.append(r)
         for i in range(4000):
             r.log({{"t": float(i), "residual": 0.0, "dt": 1.0, "iterations": 1}})
@@ -66,9 +67,10 @@ LATE = """
 import os, resource, sys
 sys.path[:0] = [{here!r}]
 from hybrid.errors import ResultError
+from hybrid.store.writer import WriteMode
 from test_result_file import ONE, recorder, values
 def write():
-    with recorder({path!r}, before={{}}, late=True, overwrite=True) as r:
+    with recorder({path!r}, mode=WriteMode({{}}, late=True), overwrite=True) as r:
         for i in range(1000):
             r.save(float(i), values(float(i)), ONE)
 write()
@@ -100,6 +102,7 @@ LINES = """
 import io, resource, sys
 sys.path[:0] = [{here!r}]
 from hybrid.errors import ResultError
+from hybrid.store.writer import WriteMode
 from test_result_file import ONE, recorder, values
 parts = {{name: recorder(io.BytesIO()) for name in ("a", "b", "c")}}
 for part in parts.values():

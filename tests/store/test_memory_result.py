@@ -11,6 +11,7 @@ import pytest
 import hybrid
 from hybrid.store.array_recorder import ArrayContents, ArrayRecorder, MemoryTarget
 from hybrid.store.format import Field
+from hybrid.store.header import Header
 from hybrid.store.reader import Result, written_result
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -67,10 +68,8 @@ def test_closed_it_keeps_what_was_read_and_nothing_else() -> None:
 
 
 def _recorder(target: MemoryTarget) -> ArrayRecorder:
-    return ArrayRecorder(
-        target, grid_s=np.array([0.0, 1.0]), fields=[Field("x", "m", "a place", (2,), ("s",))], step_fields=(),
-        attributes={"title": "t"}, texts={"scene": "a: 1"}, fixed=[(Field("k", "", "a number"), np.array(2.0))],
-    )  # fmt: skip
+    fields, fixed = [Field("x", "m", "a place", (2,), ("s",))], [(Field("k", "", "a number"), np.array(2.0))]
+    return ArrayRecorder(target, Header(np.array([0.0, 1.0]), fields, (), {"title": "t"}, {"scene": "a: 1"}, fixed))
 
 
 def test_a_run_that_fails_says_so() -> None:
@@ -90,11 +89,6 @@ def test_what_cannot_be_kept_is_refused() -> None:
     with pytest.raises(hybrid.ResultError, match="k has shape"):
         recorder.close()
     with pytest.raises(hybrid.ResultError, match="increasing"):
-        ArrayRecorder(
-            MemoryTarget(), grid_s=np.array([1.0, 0.0]), fields=(), step_fields=(), attributes={}, texts={}
-        )  # fmt: skip
+        ArrayRecorder(MemoryTarget(), Header(np.array([1.0, 0.0]), (), (), {}))
     with pytest.raises(hybrid.ResultError, match="written by the recorder itself"):
-        ArrayRecorder(
-            MemoryTarget(), grid_s=np.array([0.0, 1.0]), fields=(), step_fields=(), attributes={"status": "x"},
-            texts={},
-        )  # fmt: skip
+        ArrayRecorder(MemoryTarget(), Header(np.array([0.0, 1.0]), (), (), {"status": "x"}))

@@ -9,6 +9,7 @@ import numpy as np
 
 import hybrid
 from hybrid.store.format import Field
+from hybrid.store.header import Header
 from hybrid.store.names import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
 from hybrid.store.writer import Recorder
 
@@ -19,9 +20,8 @@ def written(path: Path, old: bool) -> Path:
     log = [Field("t", "s", "end of the step"), Field(f"{word}_end", "N", "force at the end")]
     fields = [Field(f"errors/model/{word}_end", "N", "error of it")]
     recorder = Recorder(
-        path, grid_s=np.array([0.0, 1.0]), fields=fields, step_fields=log,
-        attributes={"title": "", f"error_total_{word}": 3.0}, texts={"scene": ""},
-    )  # fmt: skip
+        path, Header(np.array([0.0, 1.0]), fields, log, {"title": "", f"error_total_{word}": 3.0}, {"scene": ""})
+    )
     kinds = {"turned in": "end rotated in", "snap": "snap"}
     with recorder:
         for k in range(3):

@@ -14,16 +14,17 @@ from hybrid.simulation import system_run
 from hybrid.simulation.system_lines import LineResult
 from hybrid.store import array_recorder, writer
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget
+from hybrid.store.header import Header
 
-GIVEN: Any = {"grid_s": np.zeros(1), "fields": (), "step_fields": (), "attributes": {}, "texts": {}}
+GIVEN = Header(np.zeros(1), (), (), {})
 
 
 @pytest.fixture(params=["memory", "file"])
 def recorder(request: pytest.FixtureRequest, tmp_path: Path, now: list[float]) -> Iterator[Any]:
     if request.param == "memory":
-        yield ArrayRecorder(MemoryTarget(), **GIVEN)
+        yield ArrayRecorder(MemoryTarget(), GIVEN)
         return
-    with writer.Recorder(tmp_path / "x.h5", **GIVEN) as recorder:
+    with writer.Recorder(tmp_path / "x.h5", GIVEN) as recorder:
         yield recorder
 
 

@@ -21,6 +21,7 @@ from hybrid.exports.api import export
 from hybrid.store.envelope import stored_window
 from hybrid.store.format import Field
 from hybrid.store.hdf5_file import SLOTS, created, hold_metadata, in_memory
+from hybrid.store.header import Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.records import Event, Zone
 from hybrid.store.selection import MARK
@@ -46,14 +47,9 @@ TWO = [("catenary", 0.0, 1.0), ("rod", 1.0, 2.0)]
 
 
 def recorder(target: object, **more: object) -> Recorder:
-    given = {
-        "grid_s": S,
-        "fields": FIELDS,
-        "step_fields": STEPS,
-        "attributes": {"title": "Tëst", "seed": 7},
-        "texts": {"scene": "title: Tëst\n"},
-    }
-    return Recorder(target, **(given | more))  # type: ignore[arg-type]
+    given = Header(S, FIELDS, STEPS, {"title": "Tëst", "seed": 7}, {"scene": "title: Tëst\n"})
+    stated = {name: more.pop(name) for name in Header._fields if name in more}
+    return Recorder(target, given._replace(**stated), **more)  # type: ignore[arg-type]
 
 
 def values(t: float) -> dict[str, np.ndarray]:

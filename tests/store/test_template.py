@@ -10,6 +10,7 @@ import pytest
 
 from hybrid.store import template as store
 from hybrid.store.format import Field
+from hybrid.store.header import Header
 from hybrid.store.reader import open_result
 from hybrid.store.writer import Recorder
 
@@ -23,9 +24,8 @@ def write(folder: Path, path: Path, fields: tuple[Field, ...] = FIELDS, length: 
     s = np.linspace(0.0, length, 5)
     fixed = [(HEIGHTS, np.array([0.0, -length]))]
     with Recorder(
-        path, grid_s=s, fields=fields, step_fields=(), attributes={"title": "made up"}, texts={"scene": "a: 1"},
-        fixed=fixed, overwrite=True, templates=folder,
-    ) as recorder:  # fmt: skip
+        path, Header(s, fields, (), {"title": "made up"}, {"scene": "a: 1"}, fixed), overwrite=True, templates=folder
+    ) as recorder:
         recorder.save(0.0, {f.name: np.ones(f.shape) for f in fields}, [("rod", 0.0, length)])
 
 

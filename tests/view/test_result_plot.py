@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 import hybrid
 from hybrid.errors import ResultError
 from hybrid.store.format import Field
+from hybrid.store.header import Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
 from hybrid.view import panels
@@ -66,10 +67,7 @@ def made(
         fields.append(Field("touchdown", "m", "d", (2,), ("edge",), nan_ok=True))
         fields.append(Field("touchdown_position", "m", "d", (2, 3), ("edge", "xyz"), "inertial", nan_ok=True))
     memory = io.BytesIO()
-    recorder = Recorder(
-        memory, grid_s=s, fields=fields, step_fields=[], attributes={"title": title}, texts={},
-        fixed=fixed, outputs=nt,
-    )  # fmt: skip
+    recorder = Recorder(memory, Header(s, fields, [], {"title": title}, fixed=fixed), outputs=nt)
     for t in np.linspace(0.0, 10.0, nt):
         values = {
             "position": np.stack([np.broadcast_to(x, s.shape) for x in position(s, t)], axis=1),
