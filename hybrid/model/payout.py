@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.kernels.reel import winch as w
 from hybrid.kernels.reel.reel import LEAVES
 from hybrid.kernels.state.forces import SOIL
-from hybrid.kernels.state.state import Floats, Line
+from hybrid.kernels.state.state import Floats, Line, slip_size
 from hybrid.model.layout import Layout
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of
 from hybrid.model.line_on_base import LineOnBase
@@ -148,8 +148,9 @@ class PayoutPlan:
         rod = np.array([x.kind == "rod" for x in self.zones])
         rods = rod[np.minimum(np.searchsorted(ends, middle), len(ends) - 1)]
         line = line_on(cable, s, rods, like.bits & SOIL)
-        footing = self._footing(like, s.size)
-        return line._replace(bits=like.bits, plane=like.plane, moved=like.moved, footing=footing)
+        flow = np.zeros((s.size if line.slip_law.size else 0, max(slip_size(line), 2)))
+        like_it: dict[str, Any] = {"bits": like.bits, "plane": like.plane, "moved": like.moved, "slip_flow": flow}
+        return line._replace(footing=self._footing(like, s.size), **like_it)
 
     def layout(self, count: int, length: float, rod: np.ndarray, here: np.ndarray | None = None) -> Layout:
         """The cells of `count` material nodes and a length, m, where zones move; rod, here: as of a Layout."""

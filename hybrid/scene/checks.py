@@ -135,6 +135,9 @@ def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
 # What all that is on a reel has as the section at the winch.
 OF_A_REEL = {
     "moment_curvature": "the moment over curvature",
+    "bending_slip": "the layers that slip",
+    "first_loading": "the layers that slip",
+    "stiffness_per_tension": "the stiffness by tension",
     "tension_torque": "the torque of tension",
     "vortices": "the vortices",
     "creep": "the creep",

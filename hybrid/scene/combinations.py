@@ -381,7 +381,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "zones move (model), and a catenary forgets how far layers have slipped, and what tension adds to stiffness",
         fix="leave it out, or write `model: rod`",
     ),
-    Refusal(SLIP, PAYOUT, "not worked out", "layers that slip, and stiffness by tension, do not go with {key}"),
     Refusal(
         TORSION, PLANE, "physics", "dimension is 2 and there is no torsion", "nothing or 0",
         f"leave it out, or {IN_SPACE}",

@@ -26,6 +26,7 @@ from hybrid.kernels.reel.payout import (
     stand_still,
     take_forces_off,
 )
+from hybrid.kernels.reel.payout_layers import carry_layers
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
 from hybrid.kernels.reel.reel import MovingZones, Reel, blank_reel, blank_reel_job
 from hybrid.kernels.run.payout_run import energy_of
@@ -33,7 +34,7 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import CLOCK_SIZE
 from hybrid.kernels.state.forces import FRICTION, STIFFNESS_DAMPING, TOUCHES
 from hybrid.kernels.state.report import LENGTH_OUT, PAYOUT_RATE
-from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, state_for
+from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, slip_size, state_for
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout, on_other_parts
 from hybrid.model.line_on_base import LineOnBase
@@ -76,6 +77,7 @@ class PayingOut:
         self.law, self.winch = self.plan.law.copy(), self.plan.winch.copy()
         self.count = self.plan.count(self.plan.first)  # material nodes that are out; of base cells, where these are cut
         self._nodes = self.plan.nodes if model.layout is None else self.plan.nodes_of(model.layout)
+        self._slips = slip_size(model.line) // 2  # layers that do
         self.reel = self._blank(model.cells - self.rides)
         # Rate, m/s, by which the rods of zones that move have been given at the winch: at the start, or by the last
         # node that has entered or left.
@@ -89,8 +91,9 @@ class PayingOut:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
         plan = self.plan
         reel = blank_reel(
-            material + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.solves_twice, self.damped
-        )
+            material + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.solves_twice, self.damped,
+            self._slips,
+        )  # fmt: skip
         numbers = reel.numbers
         numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
         numbers[p.SPRING] = plan.cable.springs[plan.side]
@@ -258,6 +261,8 @@ class PayingOut:
             tension=run.tension, nodes=self._nodes,
         )  # fmt: skip
         carry_node(self._carrying.numbers)
+        if out.layers.size:
+            carry_layers(model.line, changed.line, state, out, old, reel)
         if out.wake.size and more_nodes > 0:
             self._blend_phases(model.line.s, out)
         reel.true[material - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]

@@ -118,7 +118,8 @@ class NodeChanges:
         """Whether nodes of a run can enter and leave so: nothing asks Python on the way."""
         line = owner.model.line
         plain = not any(
-            getattr(line, name).size for name in ("torsion", "tension_twist", "law", "bend_law", "wake_law", "moved")
+            getattr(line, name).size
+            for name in ("torsion", "tension_twist", "law", "bend_law", "slip_law", "wake_law", "moved")
         )
         return owner.pays_out and owner.correction is None and plain and not line.bits & REMEMBERS
 

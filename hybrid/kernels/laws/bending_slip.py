@@ -280,6 +280,8 @@ def follow_slip(line, ends, old, new, work, part):
                 rest = part == LOADED_FIRST
                 for m in range(KEPT):
                     now[i, j + FROM + m] = 0.0 if rest else old.layers[i, at + m]
+                    if line.slip_flow.shape[0] > 0 and not rest:
+                        now[i, j + FROM + m] += line.slip_flow[i, at + m]
                 T = pull_at(new, i) if rest else pull_at(old, i)
                 now[i, j + MOST] = law[i, j + MOMENT] + law[i, j + PER_TENSION] * T
                 now[i, j + STIFF] = law[i, j + STIFFNESS] + law[i, j + STIFFENING] * T

@@ -36,7 +36,7 @@ from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.element import frames_at, relative_rotation
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.mesh.fill_line import FIRST, PER_LENGTH
-from hybrid.kernels.reel.paid_length import cell, growing, lack_rate, node
+from hybrid.kernels.reel.paid_length import cell, flows, growing, lack_rate, node, shift_layers
 from hybrid.kernels.reel.reel import FAR, FLOW, LENGTH_OF, RATE, SIDE, STRAIN_OF, TURN_FLOW
 from hybrid.kernels.state.report import FORCE_A, MOMENT_A, NET_A, STIFFNESS_DAMPING_POWER
 
@@ -179,6 +179,8 @@ def put_flow_on(line, ends, state, reel, t):
         i = node(line, reel, k)
         for j in range(3):
             line.k0[i, j] += damping_time(line, i) * flow[i, TURN_FLOW + j]
+        if flows(line):
+            shift_layers(line, flow, i, -1.0)
 
 
 # --- energy ---------------------------------------------------------------------------------------

@@ -14,10 +14,11 @@ import numpy as np
 
 from hybrid.kernels.laws.axial_law import has_law
 from hybrid.kernels.laws.bending_law import HALF_A, HALF_B, LAST_A, LAST_B
+from hybrid.kernels.laws.bending_slip import EACH, FROM, KEPT, give_of_spring, layered
 from hybrid.kernels.laws.element import put_spring
 from hybrid.kernels.laws.tension_torque import couples
 from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B
-from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.mesh.fill_line import B_1, COLUMNS, fill_cell, fill_element, fill_node
 from hybrid.kernels.reel.reel import (
     ACCELERATION,
@@ -26,6 +27,7 @@ from hybrid.kernels.reel.reel import (
     EASING,
     FAR,
     LENGTH,
+    LENGTH_BEFORE,
     LENGTH_OF,
     LIFT,
     PLACE,
@@ -94,6 +96,18 @@ def node(line, reel, i):
 def cell(line, reel, c):
     """The number in the line of a cell counted from the far end."""
     return c if reel.numbers[SIDE] > 0.0 else line.h.shape[0] - 1 - c
+
+
+@inner
+def place_of(line, reel, i):
+    """Place, m, of a node."""
+    return reel.numbers[SIDE] * (line.s[node(line, reel, i)] - reel.numbers[FAR])
+
+
+@inner
+def length_that_came(reel):
+    """Length, m, that has come out since the last step, up to the end of the try."""
+    return reel.numbers[LENGTH] - reel.numbers[LENGTH_BEFORE]
 
 
 @inner
@@ -196,6 +210,26 @@ def find_length(reel, t):
 
 
 @inner
+def flows(line):
+    """Whether layers slip of a line that is paid out (kernels.reel.payout_layers)."""
+    return line.slip_flow.shape[0] > 0
+
+
+@called
+def shift_layers(line, flow, i, sign):
+    """The layers at node i, bent as without the flow of damping that is in its strain without stress: -1; 1: and back."""
+    law, give, c = line.slip_law, give_of_spring(line, i), min(i, line.h.shape[0] - 1)
+    for a in range(KEPT):
+        more = sign * (line.k0[i, a] - flow[i, STRAIN_OF + a])
+        more *= 2.0 * (1.0 - give * line.kb[i, a]) / flow[c, LENGTH_OF] if give > 0.0 else 1.0 / line.hn[i]
+        for j in range(0, law.shape[1], EACH):
+            if not layered(line, i, j):
+                break
+            line.slip_now[i, j + FROM + a] += more
+            line.slip_flow[i, j // EACH * KEPT + a] += more
+
+
+@inner
 def take_flow_off(line, reel):
     """The line without it, to the last bit."""
     flow = reel.flow
@@ -203,6 +237,8 @@ def take_flow_off(line, reel):
         line.h[i] = flow[i, LENGTH_OF]
     for k in range(growing(line, reel), line.h.shape[0] + 1):
         i = node(line, reel, k)
+        if flows(line):
+            shift_layers(line, flow, i, 1.0)
         for j in range(3):
             line.k0[i, j] = flow[i, STRAIN_OF + j]
 

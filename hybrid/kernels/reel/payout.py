@@ -33,6 +33,7 @@ from hybrid.kernels.reel.paid_length import (
     cell,
     eased,
     find_length,
+    flows,
     growing,
     length_at,
     node,
@@ -43,6 +44,13 @@ from hybrid.kernels.reel.paid_length import (
 )
 from hybrid.kernels.reel.payout_balance import find_balance
 from hybrid.kernels.reel.payout_contact import let_material_rub, rubs
+from hybrid.kernels.reel.payout_layers import (
+    find_what_comes,
+    layers_that_came,
+    let_layers_flow,
+    lost_at_clamp,
+    stop_flow,
+)
 from hybrid.kernels.reel.payout_work import book, book_contact, end_of, leave_to_reel, remember, work_of_balance
 from hybrid.kernels.reel.reel import (
     ACCELERATION,
@@ -237,6 +245,23 @@ def correct_force(line, sea, ends, state, velocity, reel, report, t):
 # --- energy ---------------------------------------------------------------------------------------
 
 
+@inner
+def book_layers(job, before, state):
+    """Energy of layers that came in with material through an accepted step; nothing flows any more."""
+    lost, end = lost_at_clamp(job.reel), end_of(job.reel)
+    job.work[0, end] += layers_that_came(job.line, job.ends, before, state, job.reel) + lost
+    job.work[0, b.HYSTERESIS] -= lost
+    stop_flow(job.line, job.reel)
+
+
+@inner
+def remember_all(job, state):
+    """What the books of the next step ask of a state, and what comes off the reel in it."""
+    remember(job.line, job.ends, state, job.reel)
+    if flows(job.line):
+        find_what_comes(job.line, job.ends, state, job.reel)
+
+
 # --- entries --------------------------------------------------------------------------------------
 
 
@@ -278,6 +303,8 @@ def pay_out(table):
             )
         prepare(line, reel, clock[b.TRY_END])
         put_balance_on(line, reel, clock[b.TRY_END])
+        if flows(line):
+            let_layers_flow(line, job.new if count[b.PARITY] else job.old, reel)
         return 0
     if phase == b.JUDGE:
         tried = job.old if count[b.PARITY] else job.new
@@ -300,7 +327,9 @@ def pay_out(table):
     job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock[b.NOW], clock[b.LAST_DT])
     if line.bits & TOUCHES:
         book_contact(line, job.sea, before, state, reel, job.work)
-    remember(line, job.ends, state, reel)
+    if flows(line):
+        book_layers(job, before, state)
+    remember_all(job, state)
     if count[b.CONTROLLED]:
         limit_step(reel, clock)
     last = reel.true[growing(line, reel)]
@@ -317,6 +346,8 @@ def correct_length(job, change):
     numbers[ACCELERATION] += winch[CA] * change
     prepare(job.line, job.reel, t)
     put_balance_on(job.line, job.reel, t)
+    if flows(job.line):
+        let_layers_flow(job.line, job.new if job.counts[b.PARITY] else job.old, job.reel)
 
 
 @inner
@@ -407,7 +438,7 @@ def lengthen(table):
     job = read(table)
     find_length(job.reel, job.clock[b.NOW])
     prepare(job.line, job.reel, job.clock[b.NOW])
-    remember(job.line, job.ends, job.new if job.counts[b.PARITY] else job.old, job.reel)
+    remember_all(job, job.new if job.counts[b.PARITY] else job.old)
     leave_to_reel(job.line, job.zones, job.reel)
 
 
@@ -456,7 +487,7 @@ def stand(job):
     if damped:
         job.reel.numbers[FLUX] += power_of_flow(job.line, job.ends, state, job.reel)
     note_pull(job.reel, t, pull)
-    remember(job.line, job.ends, state, job.reel)
+    remember_all(job, state)
 
 
 @kernel

@@ -16,8 +16,8 @@ from hybrid.kernels.laws.obstacle_motion import put_vector, row3, row9, transpos
 from hybrid.kernels.laws.obstacles import normal_at, stored_along
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.reel.paid_length import cell, changes_length, growing, node
-from hybrid.kernels.reel.reel import LENGTH, LENGTH_BEFORE, SIDE
+from hybrid.kernels.reel.paid_length import cell, changes_length, growing, length_that_came, node
+from hybrid.kernels.reel.reel import SIDE
 from hybrid.kernels.state.forces import FRICTION, TOUCHES
 from hybrid.kernels.state.obstacle_rows import EACH, FORCE, SWEEP, TRAVEL
 
@@ -38,12 +38,6 @@ def tangent(line, state, reel, i):
         a, b = math.sqrt(dot(x, x)), math.sqrt(dot(y, y))
         e = (x[0] / a + y[0] / b, x[1] / a + y[1] / b, x[2] / a + y[2] / b)
     return scale(reel.numbers[SIDE] / math.sqrt(dot(e, e)), e)
-
-
-@inner
-def length_that_came(reel):
-    """Length, m, that has come out since the last step, up to the end of the try."""
-    return reel.numbers[LENGTH] - reel.numbers[LENGTH_BEFORE]
 
 
 @inner

@@ -21,14 +21,13 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.mesh.fill_line import COMPLIANCE
 from hybrid.kernels.reel.damping import strain_at
-from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node
+from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node, place_of
 from hybrid.kernels.reel.payout import slope_at, velocity_at
 from hybrid.kernels.reel.payout_contact import put_travels
 from hybrid.kernels.reel.reel import (
     CHANGED,
     EASING,
     ENTERS,
-    FAR,
     FEWEST_STEPS,
     LEAVES,
     LENGTH,
@@ -160,6 +159,8 @@ def move_state(state, out, forward, cut, step):
         move_rows(state.grip, out.grip, forward, cut, step)
     if state.soil.shape[0] > 0:
         move_rows(state.soil, out.soil, forward, cut, step)
+    if state.layers.shape[0] > 0:
+        move_rows(state.layers, out.layers, forward, cut, step)
     for k in range(state.sheave.shape[0]):
         for j in range(state.sheave.shape[1]):
             out.sheave[k, j] = state.sheave[k, j]
@@ -182,12 +183,6 @@ def chord_at(line, state, reel, c):
 @inner
 def put_chord(line, state, reel, c, e):
     put(state.e, cell(line, reel, c), scale(reel.numbers[SIDE], e))
-
-
-@inner
-def place_of(line, reel, i):
-    """Place, m, of a node."""
-    return reel.numbers[SIDE] * (line.s[node(line, reel, i)] - reel.numbers[FAR])
 
 
 @inner

@@ -46,6 +46,7 @@ NO_TABLE: Floats = np.zeros((0, 3))
 NO_BEND_LAW: Floats = np.zeros((0, 7))
 # Of a line without layers that slip (kernels.laws.bending_slip has the columns).
 NO_SLIP: Floats = np.zeros((0, 4))
+NO_SLIP_FLOW: Floats = np.zeros((0, 2))
 NO_LAYERS: Floats = np.zeros((0, 0))
 # Of a line without vortices (kernels.laws.vortices has the columns).
 NO_WAKE_LAW: Floats = np.zeros((0, 8))
@@ -135,6 +136,9 @@ class Line(NamedTuple):
     slip_law: Annotated[Floats, node(columns=4, optional=True)] = NO_SLIP
     slip_now: Annotated[Floats, node(columns=4, optional=True)] = NO_SLIP
     slip_at: NDArray[np.int64] = NO_ADDRESS  # (1,) address of kernels.laws.bending_slip.follow_slip; empty: none
+    # (N+1, 2 L) 1/m, by how much State.layers is another in a step because material flows past nodes
+    # (kernels.reel.payout_layers); empty: the line is not paid out
+    slip_flow: Annotated[Floats, node(columns=2, optional=True)] = NO_SLIP_FLOW
     # (N+1,) m, diameter with which nodes lie in soil (kernels.laws.soil); empty: there is none
     bed_width: Annotated[Floats, node(optional=True)] = NO_PEAK
     moved: NDArray[np.int8] = (
