@@ -67,7 +67,6 @@ PAID_LINE = {ONE + "connections.start.payout": {"rate": 0.1, "ramp": 1.0}}
 EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.TWO_STIFFNESSES, c.MOVING_ZONES): (TWO | MOVING, ""),
     (c.SLIP, c.MOVING_ZONES): (SLIPS | MOVING, ""),
-    (c.SLIP, c.PAYOUT): (SLIPS | PAID, ""),
     (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
     (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
@@ -85,8 +84,8 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
 # Other examples of pairs whose one reason is that of several features.
 OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.TORSION, c.PLANE), {END + "turns": 2, "dimension": 2}, ""),
-    ((c.SLIP, c.PAYOUT), TABLE_BESIDE_TWO | PAID, ""),
-    ((c.SLIP, c.PAYOUT), LOCKS | PAID, ""),
+    ((c.SLIP, c.MOVING_ZONES), TABLE_BESIDE_TWO | MOVING, ""),
+    ((c.SLIP, c.MOVING_ZONES), LOCKS | MOVING, ""),
     ((c.SLIP, c.MOVING_ZONES), {SECTION + "stiffness_per_tension": 0.01} | MOVING, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),

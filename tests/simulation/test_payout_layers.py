@@ -1,0 +1,187 @@
+"""Layers that slip, and stiffness by tension, of lines that are paid out: how far they have slipped goes with the line."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import resumed
+from test_payout import clamped, exchanged, kicks, sagging
+from test_system_payout import as_system, assert_same
+
+import hybrid
+from hybrid.errors import SceneError
+
+LAYERS = [{"stiffness": 1e4, "moment": 60.0}, {"stiffness": 8e3, "moment": 100.0, "per_tension": 1e-2}]
+SECTIONS: dict[str, dict[str, Any]] = {
+    "layers": {"bending_stiffness": 2e3, "bending_slip": LAYERS},
+    "tension": {"bending_stiffness": 2e4, "stiffness_per_tension": 4.0},
+    "table": {"moment_curvature": [[0, 0], [0.004, 80.0], [0.012, 120.0], [0.05, 300.0]], "first_loading": True},
+    "damped": {"bending_stiffness": 2e3, "bending_slip": LAYERS, "damping": {"stiffness": 0.05}},
+}  # fmt: skip
+SPRING = {"bend_stiffness": 4e3}
+
+
+def paid(name: str = "layers", rate: float = 0.8, step: float = 0.05, clamp: bool = True, **more: Any) -> dict[str, Any]:
+    """100 m over 80 m, from a winch that surges; clamped there, or pinned."""
+    scene = sagging("rod", 2e6, None, rate, step, **({"duration": 8.0} | more))
+    scene = clamped(scene) if clamp else scene
+    scene["cable"]["sections"][0] |= {"torsional_stiffness": 1e4} | SECTIONS[name]
+    return deepcopy(scene)
+
+
+# --- against exact answers ------------------------------------------------------------------------
+
+PULL, MASS, PHI, SPEED = 1000.0, 1.0, 0.05, 1.0
+EI, STUCK, SLIP = 1000.0, 3000.0, 24.0  # N m2, N m2, N m: it slips at 0.008 1/m
+
+
+def taut(rate: float, cells: int, dimension: int = 2, **section: Any) -> dict[str, Any]:
+    """20 m of taut rod without weight, that leave a clamp at the angle PHI to the pull."""
+    own = {"bending_stiffness": EI, "bending_slip": [{"stiffness": STUCK, "moment": SLIP}], "torsional_stiffness": 500.0}
+    return {
+        "environment": {"gravity": 0.0},
+        "cable": {"sections": [{"length": 20.0, "mass": MASS, "damping": {"mass": 1.0}} | own | section]},
+        "ends": {
+            "start": {"kind": "free", "force": [-PULL, 0, 0]},
+            "end": {"kind": "clamped", "position": [0, 0, 0], "tangent": [np.cos(PHI), 0, np.sin(PHI)],
+                    "payout": {"rate": rate, "ramp": 2.0}},
+        },
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells}, "dimension": dimension,
+        "time": {"duration": 12.0, "step": 0.04}, "output": {"every": 1.0},
+    }  # fmt: skip
+
+
+def at_the_clamp(rate: float) -> float:
+    """The moment, N m, at the clamp where nothing changes any more.
+
+    kappa dM = P sin(theta) dtheta along the rod: the integral of kappa over M, from where the rod is straight to the
+    clamp, is P (1 - cos(PHI)).  What is taken in is loaded for the first time on its way to the clamp.  What is paid out
+    slips as it is bent there to kappa_0, and then comes back along twice the first loading.
+    """
+    pull, slips = PULL - MASS * rate**2, SLIP / STUCK
+    work = pull * (1.0 - np.cos(PHI))
+    if rate < 0.0:
+        return float(np.sqrt(2.0 * (work - 0.5 * STUCK * slips**2) / EI) * EI + SLIP)
+    a, b, c = 0.5 * EI, 2.0 * STUCK * slips, -2.0 * STUCK * slips**2 - work  # kappa_0 > 2 slips
+    return float((-b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a) * EI + SLIP)
+
+
+@pytest.mark.parametrize(("rate", "dimension"), [(SPEED, 2), (-SPEED, 2), (SPEED, 3)])
+def test_what_is_paid_out_has_slipped_at_the_clamp_and_what_is_taken_in_has_not(rate: float, dimension: int) -> None:
+    """The free end is off the line of the clamp by M/P, however much that is of the other way: of order 2 in the cells."""
+    exact, other = at_the_clamp(rate), at_the_clamp(-rate)
+    assert abs(other / exact - 1.0) > 0.25
+    off = []
+    for cells in (20, 40):
+        found = hybrid.run(taut(rate, cells, dimension))
+        off.append(abs(found.position[-1, 0, 2]) * (PULL - MASS * rate**2) / exact - 1.0)
+    print(f"offset over the exact one, less 1: {off}")
+    assert abs(off[1]) < 0.01 and abs(off[1]) < 0.5 * abs(off[0])
+
+
+@pytest.mark.parametrize("clamp", [True, False])
+@pytest.mark.parametrize("name", ["layers", "damped"])
+def test_a_rate_of_zero_is_a_fixed_line(name: str, clamp: bool) -> None:
+    scene = paid(name, 0.0, clamp=clamp, duration=2.0)
+    still = hybrid.run(scene)
+    del scene["ends"]["end"]["payout"]
+    fixed = hybrid.run(scene)
+    assert fixed["work/hysteresis"][-1] < -0.01
+    for one in ("position", "reaction_end", "moment", "work/hysteresis"):
+        assert np.abs(still[one] - fixed[one]).max() <= 1e-10 * np.abs(fixed[one]).max(), one
+
+
+# --- energy ---------------------------------------------------------------------------------------
+
+
+@cache
+def moved(name: str, rate: float, step: float, clamp: bool, spring: bool = False) -> hybrid.Result:
+    scene = paid(name, rate, step, clamp)
+    scene["ends"]["end"] |= SPRING if spring else {}
+    return hybrid.run(scene)
+
+
+@pytest.mark.parametrize(
+    ("name", "rate", "clamp", "spring"),
+    [
+        ("layers", 0.8, True, False), ("layers", -0.8, True, False), ("layers", 0.8, False, False),
+        ("layers", -0.8, False, False), ("layers", 0.8, True, True), ("tension", 0.8, True, False),
+        ("table", -0.8, True, False), ("damped", 0.8, True, False),
+    ],
+)  # fmt: skip
+def test_energy_is_balanced(name: str, rate: float, clamp: bool, spring: bool) -> None:
+    """What no work accounts for falls faster than the step, through nodes that enter and leave."""
+    one, two = (moved(name, rate, step, clamp, spring) for step in (0.1, 0.05))
+    left = [float(np.abs(x["work/scheme"]).max()) for x in (one, two)]
+    print(f"{name} {rate:g}: left {left} J of {np.abs(two['work/end']).max():.1f}")
+    assert left[1] < 1e-3 * np.abs(two["work/end"]).max()
+    assert left[0] > 2.0 * left[1]
+    if name != "tension":
+        assert (np.diff(two["work/hysteresis"]) <= 1e-12).all() and two["work/hysteresis"][-1] < -0.1
+
+
+# --- the same said otherwise ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "clamp"), [("layers", True), ("layers", False), ("tension", True), ("damped", True)])
+def test_the_mirror_image_pays_out_the_same(name: str, clamp: bool) -> None:
+    one, other = moved(name, 0.8, 0.05, clamp), hybrid.run(exchanged(paid(name, clamp=clamp)))
+    for mine, its in (("reaction_end", "reaction_start"), ("work/end", "work/start")):
+        assert np.abs(other[its] - one[mine]).max() < 1e-6 * np.abs(one[mine]).max(), mine
+    assert np.abs(other.position[:, ::-1] - one.position).max() < 1e-7 * 100.0
+    assert np.abs(other["work/hysteresis"] - one["work/hysteresis"]).max() < 1e-6 * np.ptp(one["work/hysteresis"])
+
+
+def test_in_space_as_in_the_plane() -> None:
+    one, other = moved("layers", 0.8, 0.05, True), hybrid.run(paid(dimension=3))
+    assert np.abs(other.position - one.position).max() < 1e-7 * 100.0
+    assert np.abs(other["moment"] - one["moment"]).max() < 1e-5 * np.abs(one["moment"]).max()
+
+
+@pytest.mark.parametrize(("name", "rate"), [("layers", 0.8), ("damped", -0.8)])
+def test_a_line_of_several_as_a_cable(name: str, rate: float) -> None:
+    scene = paid(name, rate, duration=6.0, dimension=3, contact={"self": False})
+    one = hybrid.run(scene)
+    assert_same(one, hybrid.run(as_system(scene)).lines["one"], 1e-6)
+
+
+@pytest.mark.parametrize("name", ["layers", "damped"])
+def test_resumed_bit_for_bit(tmp_path: Path, name: str) -> None:
+    """Behind a clamp with an angular spring, through nodes that enter."""
+    scene = paid(name)
+    scene["ends"]["end"] |= SPRING
+    scene["ends"]["end"]["payout"]["longest"] = 120.0
+    resumed(scene, tmp_path, 5.0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("clamp", [True, False])
+def test_a_node_that_enters_does_not_kick(clamp: bool) -> None:
+    assert max(kicks(paid(clamp=clamp, duration=14.0))) < 2e-3
+
+
+def test_a_winch_that_holds_a_tension() -> None:
+    """What layers lose comes of the motion of the line: energy is balanced where the length is an unknown, too."""
+    scene, left = paid(), []
+    scene["ends"]["end"]["payout"] = {"longest": 130, "winch": {"tension": 2500, "inertia": 300, "damping": 900}}
+    for step in (0.1, 0.05):
+        scene["time"]["step"] = step
+        found = hybrid.run(scene)
+        left.append(np.abs(found["work/scheme"]).max())
+    assert left[1] < 1e-3 * np.abs(found["work/end"]).max() and left[0] > 2.0 * left[1]
+
+
+@pytest.mark.parametrize("key", ["bending_slip", "stiffness_per_tension", "first_loading"])
+def test_other_layers_on_the_reel_are_refused(key: str) -> None:
+    scene = paid("table" if key == "first_loading" else "layers")
+    own = scene["cable"]["sections"][0]
+    other = {"bending_slip": LAYERS[:1], "stiffness_per_tension": 2.0, "first_loading": False}[key]
+    scene["ends"]["end"]["payout"]["reel"] = [own | {key: other}]
+    with pytest.raises(SceneError, match="of the section at the winch") as refused:
+        hybrid.plan(scene)
+    assert f"ends.end.payout.reel[0].{key}" in str(refused.value) or key == "first_loading"
