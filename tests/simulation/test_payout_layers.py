@@ -36,7 +36,7 @@ def paid(name: str = "layers", rate: float = 0.8, step: float = 0.05, clamp: boo
 
 # --- against exact answers ------------------------------------------------------------------------
 
-PULL, MASS, PHI, SPEED = 1000.0, 1.0, 0.05, 1.0
+PULL, MASS, PHI, SPEED = 1000.0, 0.05, 0.05, 1.0
 EI, STUCK, SLIP = 1000.0, 3000.0, 24.0  # N m2, N m2, N m: it slips at 0.008 1/m
 
 

@@ -45,10 +45,9 @@ from hybrid.kernels.reel.paid_length import (
 from hybrid.kernels.reel.payout_balance import find_balance
 from hybrid.kernels.reel.payout_contact import let_material_rub, rubs
 from hybrid.kernels.reel.payout_layers import (
-    find_what_comes,
     layers_that_came,
     let_layers_flow,
-    lost_at_clamp,
+    remember_bend,
     stop_flow,
 )
 from hybrid.kernels.reel.payout_work import book, book_contact, end_of, leave_to_reel, remember, work_of_balance
@@ -248,18 +247,16 @@ def correct_force(line, sea, ends, state, velocity, reel, report, t):
 @inner
 def book_layers(job, before, state):
     """Energy of layers that came in with material through an accepted step; nothing flows any more."""
-    lost, end = lost_at_clamp(job.reel), end_of(job.reel)
-    job.work[0, end] += layers_that_came(job.line, job.ends, before, state, job.reel) + lost
-    job.work[0, b.HYSTERESIS] -= lost
+    job.work[0, end_of(job.reel)] += layers_that_came(job.line, job.ends, before, state, job.reel)
     stop_flow(job.line, job.reel)
 
 
 @inner
 def remember_all(job, state):
-    """What the books of the next step ask of a state, and what comes off the reel in it."""
+    """What the books of the next step ask of a state."""
     remember(job.line, job.ends, state, job.reel)
     if flows(job.line):
-        find_what_comes(job.line, job.ends, state, job.reel)
+        remember_bend(job.line, job.ends, state, job.reel)
 
 
 # --- entries --------------------------------------------------------------------------------------

@@ -7,8 +7,8 @@
 Volumes of nodes that ride, and the end of that of the last material node, move through the material.  p of one is the
 mean over it of what the volumes of before had: constant there plus a limited slope, so that nothing is lost however far
 they move.  Where a node enters or leaves they are divided otherwise.  Line comes off the reel straight, with p = 0, and
-slips at once where a clamp bends it at the fairlead by more than it bears; at a pin, over its half cell, p = 0.  What
-goes on the reel is forgotten.  Nodes, cells and volumes count from the far end.
+slips in the half cell at a clamp as that bends it; at a pin, over its half cell, p = 0.  What goes on the reel is
+forgotten.  Nodes, cells and volumes count from the far end.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from hybrid.kernels.laws.bending_slip import (
     KEPT,
     MOMENT,
     MOST,
-    PER_TENSION,
     STIFF,
     STIFFENING,
     STIFFNESS,
@@ -34,12 +33,10 @@ from hybrid.kernels.laws.bending_slip import (
 )
 from hybrid.kernels.laws.element import frames_at, strain_of_element
 from hybrid.kernels.machine.compile import called, inner, kernel
-from hybrid.kernels.reel.paid_length import cell, growing, length_that_came, node, place_of
+from hybrid.kernels.reel.paid_length import growing, length_that_came, node, place_of
 
 # Columns of Reel.volumes: where a volume begins, m from the far end; p of all layers, then its slopes, 1/m2.
 BEGINS, MEAN = 0, 1
-# Numbers of Reel.comes behind p of all layers that come: lost per length, J/m; bend at the clamp, rad, without its spring.
-LOST, BEND, MORE = 0, 1, 3
 # Volumes before the cell that grows whose p counts: that of the last but two nodes for a slope.
 BEFORE = 2
 
@@ -73,37 +70,6 @@ def stick(line, state, i):
         now[i, j + STIFF] = law[i, j + STIFFNESS] + law[i, j + STIFFENING] * T
 
 
-# --- what comes off the reel -------------------------------------------------------------------------
-
-
-@called
-def find_what_comes(line, ends, state, reel):
-    """How far layers of the material slip that a clamp bends as it comes off the reel, and what that loses, into reel.comes."""
-    n, comes, law = line.h.shape[0], reel.comes, line.slip_law
-    i, k, more = node(line, reel, n), node(line, reel, n - 1), comes.shape[0] - MORE
-    for j in range(comes.shape[0]):
-        comes[j] = 0.0
-    if not (line.element[i] and slips(line, i)):
-        return
-    stick(line, state, i)
-    x, y = bend_of(line, ends, state, i)
-    u, v = bend_of(line, ends, state, k)
-    comes[more + BEND], comes[more + BEND + 1] = x, y
-    # the half cell has the curvature of a quarter of the cell
-    one, other, T = 2.0 / line.h[cell(line, reel, n - 1)], 1.0 / line.hn[k], pull_at(state, i)
-    x, y = one * x + (one * x - other * u) / 3.0, one * y + (one * y - other * v) / 3.0
-    bent = math.sqrt(x * x + y * y)
-    for j in range(0, law.shape[1], EACH):
-        if not layered(line, i, j):
-            break
-        K = law[i, j + STIFFNESS] + law[i, j + STIFFENING] * T
-        most = law[i, j + MOMENT] + law[i, j + PER_TENSION] * T
-        if law[i, j + MOMENT] >= 0.0 and K * bent > most:
-            part = 1.0 - most / (K * bent)
-            comes[j // EACH * KEPT], comes[j // EACH * KEPT + 1] = part * x, part * y
-            comes[more + LOST] += most * part * bent
-
-
 # --- how it flows -----------------------------------------------------------------------------------
 
 
@@ -131,8 +97,6 @@ def find_volumes(line, state, reel, back):
             volumes[k, MEAN + columns + j] = 0.0
             if k < n or (k == n and held):
                 volumes[k, MEAN + j] = state.layers[node(line, reel, k), j]
-            elif k > n and back > 0.0:
-                volumes[k, MEAN + j] = reel.comes[j]
     last = n if held else n - 1
     end = volumes[n + 1, BEGINS]
     for k in range(first + 1, last + 1):
@@ -214,6 +178,15 @@ def carry_layers(line, target, state, out, reel, new):
 # --- energy -----------------------------------------------------------------------------------------
 
 
+@called
+def remember_bend(line, ends, state, reel):
+    """The bend at a clamp that is the fairlead, for the books of the next step."""
+    i = node(line, reel, line.h.shape[0])
+    if line.element[i] and slips(line, i):
+        stick(line, state, i)
+        reel.bent[0], reel.bent[1] = bend_of(line, ends, state, i)
+
+
 @inner
 def length_of(reel, k):
     """Length, m, of volume k before the step."""
@@ -229,16 +202,16 @@ def squared(x, y, h, p, q):
 @inner
 def bend_before(line, ends, old, reel, k):
     """Bend, rad, of the element at node k before a step, with the strain without stress of then."""
-    i, n, more = node(line, reel, k), line.h.shape[0], reel.comes.shape[0] - MORE
-    if k == n:
-        return reel.comes[more + BEND], reel.comes[more + BEND + 1]
+    i = node(line, reel, k)
+    if k == line.h.shape[0]:
+        return reel.bent[0], reel.bent[1]
     x, y = bend_of(line, ends, old, i)
     return x + line.k0[i, 0] - reel.before[i, 6], y + line.k0[i, 1] - reel.before[i, 7]
 
 
 @kernel
 def layers_that_came(line, ends, old, new, reel):
-    """Energy, J, of layers that came in with material through an accepted step: less what slips at the fairlead.
+    """Energy, J, of layers that came in with material through an accepted step.
 
     As the stiffness of elements (kernels.reel.payout_work): what lengths and p that flow change of it at the bend
     before, and at that behind the step, on average.
@@ -266,9 +239,3 @@ def layers_that_came(line, ends, old, new, reel):
             more += squared(u, v, h, p, q) - squared(u + dx, v + dy, was, p - f, q - w)
             came += 0.25 * K * more
     return came
-
-
-@inner
-def lost_at_clamp(reel):
-    """Work, J, that layers lose in a step as a clamp bends what comes off the reel."""
-    return max(length_that_came(reel), 0.0) * reel.comes[reel.comes.shape[0] - MORE + LOST]

@@ -94,10 +94,10 @@ class Reel(NamedTuple):
     # elements strain without stress and flow, rad/s (kernels.reel.damping)
     flow: Floats
     columns: Floats  # (3, N+1, 5) that such a winch at the start, or at a clamp, works in; else empty
-    # Of a line with L layers that slip (kernels.reel.payout_layers), else empty: (N+2, 1 + 4 L) volumes of elements, and
-    # (2 L + 3,) what comes off the reel.
-    volumes: Floats
-    comes: Floats
+    volumes: (
+        Floats  # (N+2, 1 + 4 L) of a line with L layers that slip (kernels.reel.payout_layers), else empty: of elements
+    )
+    bent: Floats  # (2,) rad, bend at a clamp of such a line before the last step, without its spring
 
 
 def blank_reel(
@@ -117,7 +117,7 @@ def blank_reel(
         z(3), z(REPORT_SIZE), z((2, COLUMNS)), z(1) if layer is None else layer,
         z((1 if layer is None else layer.size, 3)), z(STAGE), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
         z((cells + 1 if damped else 0, FLOWS)), z((3, cells + 1, 5) if columns else (3, 0, 5)),
-        z((cells + 2 if slips else 0, 1 + 4 * slips)), z(2 * slips + 3 if slips else 0),
+        z((cells + 2 if slips else 0, 1 + 4 * slips)), z(2),
     )  # fmt: skip
 
 
