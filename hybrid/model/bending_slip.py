@@ -32,10 +32,13 @@ def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
             line.kb[i, :2] = sum(x * material.B[of[c], :2] for x, c in zip(part, sides, strict=True)) / line.hn[i]
             for x, c in zip(part, sides, strict=True):
                 rows[-1] += [x * number for layer in _of_table(material, int(of[c])) for number in layer]
+    widths = [EACH, *map(len, rows)]
     for k, spring in enumerate(material.springs):
+        if spring < np.inf:  # as many columns when the clamp is let go
+            widths.append(sum(map(len, layers[of[-k]])) + EACH)
         if rows[-k] and spring < np.inf:
             rows[-k] += [0.0, give_of(spring, float(material.B[of[-k], :2].max()) / (0.5 * line.h[-k])), 0.0, 0.0]
-    law = np.zeros((line.s.size, max(EACH, *map(len, rows))))
+    law = np.zeros((line.s.size, max(widths)))
     for i, row in enumerate(rows):
         law[i, : len(row)] = row
     found = line._replace(slip_law=law, slip_now=np.zeros_like(law))
