@@ -42,12 +42,12 @@ def paid(
 
 # --- against exact answers ------------------------------------------------------------------------
 
-PULL, MASS, PHI, SPEED = 1000.0, 0.05, 0.05, 1.0
+PULL, MASS, PHI, SPEED = 1000.0, 0.05, 0.05, 0.5
 EI, STUCK, SLIP = 1000.0, 3000.0, 24.0  # N m2, N m2, N m: it slips at 0.008 1/m
 
 
 def taut(rate: float, cells: int, dimension: int = 2, **section: Any) -> dict[str, Any]:
-    """20 m of taut rod without weight, that leave a clamp at the angle PHI to the pull."""
+    """24 m of taut rod without weight, that leave a clamp at the angle PHI to the pull."""
     own = {
         "bending_stiffness": EI,
         "bending_slip": [{"stiffness": STUCK, "moment": SLIP}],
@@ -55,14 +55,14 @@ def taut(rate: float, cells: int, dimension: int = 2, **section: Any) -> dict[st
     }
     return {
         "environment": {"gravity": 0.0},
-        "cable": {"sections": [{"length": 20.0, "mass": MASS, "damping": {"mass": 1.0}} | own | section]},
+        "cable": {"sections": [{"length": 24.0, "mass": MASS, "damping": {"mass": 2.0}} | own | section]},
         "ends": {
             "start": {"kind": "free", "force": [-PULL, 0, 0]},
             "end": {"kind": "clamped", "position": [0, 0, 0], "tangent": [np.cos(PHI), 0, np.sin(PHI)],
                     "payout": {"rate": rate, "ramp": 2.0}},
         },
         "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells}, "dimension": dimension,
-        "time": {"duration": 12.0, "step": 0.04}, "output": {"every": 1.0},
+        "time": {"duration": 20.0, "step": 0.02}, "output": {"every": 1.0},
     }  # fmt: skip
 
 
@@ -81,18 +81,20 @@ def at_the_clamp(rate: float) -> float:
     return float((-b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a) * EI + SLIP)
 
 
-@pytest.mark.parametrize(("rate", "dimension"), [(SPEED, 2), (-SPEED, 2), (SPEED, 3)])
-def test_what_is_paid_out_has_slipped_at_the_clamp_and_what_is_taken_in_has_not(rate: float, dimension: int) -> None:
-    """The free end is off the line of the clamp by M/P, where it is a quarter more or less the other way.
+@pytest.mark.parametrize(("rate", "dimension", "cells"), [(SPEED, 2, 24), (-SPEED, 2, 48), (SPEED, 3, 24)])
+def test_what_is_paid_out_has_slipped_at_the_clamp_and_what_is_taken_in_has_not(
+    rate: float, dimension: int, cells: int
+) -> None:
+    """The free end is off the line of the clamp by M/P; the other way that is a quarter more or less.
 
-    Of first order in the cell at the clamp, in which what comes slips.
+    Of first order in the cell at the clamp, in which what comes slips, and of second order in the others.
     """
-    exact, other = at_the_clamp(rate), at_the_clamp(-rate)
-    assert abs(other / exact - 1.0) > 0.25
+    exact = at_the_clamp(rate)
+    assert abs(at_the_clamp(-rate) / exact - 1.0) > 0.25
     off = []
-    for cells in (20, 40):
-        found = hybrid.run(taut(rate, cells, dimension))
-        off.append(abs(found.position[-1, 0, 2]) * (PULL - MASS * rate**2) / exact - 1.0)
+    for count in (cells, 2 * cells):
+        found = hybrid.run(taut(rate, count, dimension))
+        off.append(np.abs(found.position[-5:, 0, 2]).mean() * (PULL - MASS * rate**2) / exact - 1.0)
     print(f"offset over the exact one, less 1: {off}")
     assert abs(off[1]) < 0.01 and abs(off[1]) < 0.5 * abs(off[0])
 
