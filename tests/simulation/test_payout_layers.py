@@ -178,6 +178,7 @@ def test_what_is_let_go_at_the_winch_is_resumed_bit_for_bit(tmp_path: Path) -> N
     """And its energy is balanced: the spring of the clamp is gone, layers bear what they bore."""
     scene = paid(duration=6.0)
     scene["ends"]["end"] |= SPRING | {"release_at": {"time": 3.0}}
+    scene["ends"]["end"]["payout"]["longest"] = 120.0
     found = resumed(scene, tmp_path, 4.5)
     assert np.abs(found["work/scheme"]).max() < 1e-3 * found["energy/kinetic"].max()
 
