@@ -140,6 +140,22 @@ def test_energy_is_balanced(name: str, rate: float, clamp: bool, spring: bool) -
         assert (np.diff(two["work/hysteresis"]) <= 1e-12).all() and two["work/hysteresis"][-1] < -0.1
 
 
+@pytest.mark.parametrize("clamp", [True, False])
+def test_zones_by_hand(clamp: bool) -> None:
+    """A rod at the winch behind a catenary, and a catenary at the winch: energy, and the mirror image."""
+    zones: list[dict[str, Any]] = [{"rod": 20, "cells": 10}, {"catenary": 40, "cells": 16}, {"rod": 40, "cells": 40}]
+    zones, left = zones if clamp else [{"rod": 50, "cells": 25}, {"catenary": 50, "cells": 25}], []
+    for step in (0.1, 0.05):
+        scene = paid(step=step, clamp=clamp)
+        del scene["mesh"]
+        found = hybrid.run(scene | {"model": {"kind": "zones", "zones": zones}})
+        left.append(np.abs(found["work/scheme"]).max())
+    assert left[1] < 1e-3 * np.abs(found["work/end"]).max() and left[0] > 2.0 * left[1]
+    assert found["work/hysteresis"][-1] < -1.0
+    other = hybrid.run(exchanged(scene) | {"model": {"kind": "zones", "zones": zones[::-1]}})
+    assert np.abs(other.position[:, ::-1] - found.position).max() < 1e-9 * 100.0
+
+
 # --- the same said otherwise ------------------------------------------------------------------------
 
 
