@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.axial_law import SHIFT, follow_law
+from hybrid.kernels.laws.axial_law_with_torque import follow_law_with_torque
 from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
@@ -223,5 +224,6 @@ def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Fl
     table = np.concatenate(rows)
     blank = blank_line(1)._replace(law=law, law_table=table)
     state = state_for(blank)
-    address = follow_law.address(blank, state, state, no_work(), 0.0, 0.0)
+    follow = follow_law_with_torque if material.tension_torque.size else follow_law
+    address = follow.address(blank, state, state, no_work(), 0.0, 0.0)
     return law, table, np.array([address], np.int64)

@@ -501,7 +501,7 @@ class Section(Table):
                 ("axial_stiffness", "N", "lengthens a cable that turns"),
                 ("torsional_stiffness", "N m^2", "turns it"),
             )
-            if not getattr(self, key)
+            if not getattr(self, key) and (key != "axial_stiffness" or self.curve is None)
         ]
         most = math.inf if self.diameter is None else self.diameter
         if abs(self.tension_torque) > most:

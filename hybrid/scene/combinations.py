@@ -140,13 +140,6 @@ def _in_sections(*key: str, of: Callable[[Section], Any]) -> Callable[[Tables], 
     return lambda tables: ((*at, *key) for at, section in _sections(tables) if of(section))
 
 
-def _stretch_laws(tables: Tables) -> Iterator[Place]:
-    for at, section in _sections(tables):
-        if section.curve is not None:
-            given = [key for key in ("syrope", "dynamic_stiffness", "creep") if getattr(section, key) is not None]
-            yield (*at, *(given or ["tension_strain"])[:1])
-
-
 def _winches(tables: Tables) -> Iterator[tuple[Place, Payout]]:
     """How line is paid out, at which end, of a cable or of a line of several."""
     ends: Ends | None = tables.get("ends")
@@ -323,8 +316,6 @@ TWO_STIFFNESSES = Feature(
 )  # fmt: skip
 TORQUE_OF_TENSION = Feature("torque of tension", "tension_torque",
                             _in_sections("tension_torque", of=lambda x: x.tension_torque))  # fmt: skip
-STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness, syrope",
-                      _stretch_laws)  # fmt: skip
 VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortices", of=lambda x: x.vortices))
 SLIP = Feature(
     "layers that slip as a line bends, a bending stiffness that grows with tension, a bend restrictor on two bending "
@@ -384,10 +375,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         TORSION, PLANE, "physics", "dimension is 2 and there is no torsion", "nothing or 0",
         f"leave it out, or {IN_SPACE}",
-    ),
-    Refusal(
-        STRETCH_LAW, TORQUE_OF_TENSION, "not worked out", "tension makes a torque in this line (tension_torque)",
-        "axial_stiffness alone", "give axial_stiffness alone",
     ),
     # --- obstacles, and other lines ---
     Refusal(

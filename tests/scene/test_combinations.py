@@ -68,7 +68,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.TWO_STIFFNESSES, c.MOVING_ZONES): (TWO | MOVING, ""),
     (c.SLIP, c.MOVING_ZONES): (SLIPS | MOVING, ""),
     (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
-    (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.GOES_ITS_WAY): (TWO_LINES | {ONE + "initial": {"friction": "settled"}}, ""),
     (c.OTHER_MOTIONS, c.RESPONSE): (

@@ -136,27 +136,35 @@ def strain_of(e, h):
 
 
 @inner
-def rest_and_fast(line, state, i, peak):
-    """Strain at rest under the mean tension of a cell; the tension (N) above that which its chord has; and what of that
-
-    the fast spring does not give up when the mean tension grows, over the growth.
-    """
+def fast_of_chord(line, state, i, peak):
+    """Tension, N, above the mean one that the chord of a cell has."""
     at, _, _ = rest_at(line.law, line.law_table, i, state.slow[i], peak)
-    E, b = stiffness_at(line.law, i, state.slow[i])
-    part = strain_of(get3(state.e, i), line.h[i]) - at
-    return at, E * part, part * (1.0 + 0.5 * part * b)
+    E, _ = stiffness_at(line.law, i, state.slow[i])
+    return E * (strain_of(get3(state.e, i), line.h[i]) - at)
 
 
 @inner
-def lost_in_step(line, old, new, i, peak):
+def rest_and_kept(line, state, i, peak, fast):
+    """Strain at rest under the mean tension of a cell; and what of the tension `fast` (N) above that the fast spring
+
+    does not give up when the mean tension grows, over the growth.
+    """
+    at, _, _ = rest_at(line.law, line.law_table, i, state.slow[i], peak)
+    E, b = stiffness_at(line.law, i, state.slow[i])
+    part = fast / E
+    return at, part * (1.0 + 0.5 * part * b)
+
+
+@inner
+def lost_in_step(line, old, new, i, peak, fast_before, fast_after):
     """Work per length, J/m, that a cell which remembers its peak has lost in a step: its mean tensions are known.
 
-    By way, not by power: that jumps where the peak is passed.
+    fast_before, fast_after: N, elastic tensions above them.  By way, not by power: that jumps where the peak is passed.
     """
     law, table = line.law, line.law_table
     lost = lost_below(law, table, i, max(peak, new.slow[i])) - lost_below(law, table, i, peak)
-    before, fast_before, kept_before = rest_and_fast(line, old, i, peak)
-    after, fast_after, kept_after = rest_and_fast(line, new, i, peak)
+    before, kept_before = rest_and_kept(line, old, i, peak, fast_before)
+    after, kept_after = rest_and_kept(line, new, i, peak, fast_after)
     lost += 0.5 * (fast_before + fast_after) * (after - before)
     return lost - 0.5 * (kept_before + kept_after) * (new.slow[i] - old.slow[i])
 
@@ -186,6 +194,18 @@ def stiffness_at(law, i, mean):
 def crept(law, i, t):
     """Strain that cell i has crept by at the time t (s)."""
     return law[i, CREEP] * math.log10(1.0 + max(t, 0.0) / law[i, LOADED]) if law[i, CREEP] > 0.0 else 0.0
+
+
+@inner
+def sliding_power(line, state, i, fast):
+    """Power per length, W/m, that a cell with a dynamic stiffness loses as its mean tension follows its tension; fast: N,
+
+    its elastic tension above the mean one.
+    """
+    mean = state.slow[i]
+    _, c, _ = rest_at(line.law, line.law_table, i, mean, 0.0)
+    E, b = stiffness_at(line.law, i, mean)
+    return (state.T[i] - mean) / line.law[i, RELAXATION] * fast * (c - 1.0 / E - 0.5 * fast * b / (E * E))
 
 
 @kernel
@@ -243,10 +263,10 @@ def follow_law(line, old, new, work, dt, t):
         if law[i, WORKING] > 0.0:
             new.peak[i] = max(peak, mean)
             if dt > 0.0:
-                lost += h * lost_in_step(line, old, new, i, peak)
+                before, after = fast_of_chord(line, old, i, peak), fast_of_chord(line, new, i, peak)
+                lost += h * lost_in_step(line, old, new, i, peak, before, after)
             continue
-        slides = (T - mean) / law[i, RELAXATION] * fast * (c - 1.0 / E - 0.5 * fast * b / (E * E))
-        law[i, LOSS] += h * slides
+        law[i, LOSS] += h * sliding_power(line, new, i, fast)
     work.report[STRETCH_ENERGY] = energy
     work.report[LOST_WORK] = -lost
     return 0
@@ -259,9 +279,20 @@ def has_law(line, i):
 
 
 @inner
+def is_dynamic(line, i):
+    """Whether a cell with a law has a dynamic stiffness."""
+    return line.law[i, DYNAMIC] > 0.0
+
+
+@inner
 def strain_and_energy(line, state, i):
     """Strain of cell i under its tension, of which nothing is of damping, and its energy per length, J/m."""
-    T = state.T[i]
+    return strain_and_energy_at(line, state, i, state.T[i])
+
+
+@inner
+def strain_and_energy_at(line, state, i, T):
+    """The same under a tension T (N) that is not the state's."""
     if not has_law(line, i):
         return line.ck[i] * T, 0.5 * line.ck[i] * T * T
     law, first, last = line.law, int(line.law[i, FIRST]), int(line.law[i, LAST])
@@ -275,6 +306,21 @@ def strain_and_energy(line, state, i):
 
 
 @inner
+def softness_of_damping(line, state, i, late):
+    """Compliance of cell i, 1/N, over the strain `late` by which damping makes its tension more than elastic."""
+    T = state.T[i]
+    if not has_law(line, i):
+        return line.ck[i]
+    if line.law[i, DYNAMIC] > 0.0:
+        E, _ = stiffness_at(line.law, i, state.slow[i])
+        return 1.0 / E
+    first, last = int(line.law[i, FIRST]), int(line.law[i, LAST])
+    strain, c, _ = strain_at(line.law_table, first, last, T)
+    damped = T - tension_at(line.law_table, first, last, strain - late)
+    return late / damped if damped != 0.0 else c
+
+
+@inner
 def stretch_work(line, state, c):
     """Energy per length, N, that a cell takes up when its unstretched length grows and its ends stay."""
     strain, energy = strain_and_energy(line, state, c)
@@ -283,8 +329,21 @@ def stretch_work(line, state, c):
 
 @kernel
 def stretch_energy(line, state):
-    """Energy, J, of the stretch of a line without damping, from its tensions."""
+    """Energy, J, of the stretch of a line without damping, from its tensions.
+
+    Where tension makes a torque, that of torsion is not in it (docs/theory.md, 15).
+    """
     total = 0.0
     for i in range(line.h.shape[0]):
-        total += line.h[i] * strain_and_energy(line, state, i)[1]
+        strain, stored = strain_and_energy(line, state, i)
+        total += line.h[i] * stored
+        if line.tension_twist.shape[0] > 0:
+            total += energy_by_twist(line, state, i, strain)
     return total
+
+
+@inner
+def energy_by_twist(line, state, i, strain):
+    """What the torque of tension adds to the energy of stretch of cell i, J; strain: that of its law."""
+    e, h, T = get3(state.e, i), line.h[i], state.T[i]
+    return T * (math.sqrt(dot(e, e)) - h * (1.0 + strain)) - line.tension_twist[i] * line.tension_torque[i] * T * T

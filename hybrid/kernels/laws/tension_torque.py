@@ -7,9 +7,10 @@
     p        how the twist of an element answers to the turns of its cells        3      -
     s        twist of an element by tension, g_a T_a + g_b T_b                    -      rad
 
-With W = EA (eps + c tau)^2/2 + GJ tau^2/2 per length, Q = GJ tau + c T and T = EA (eps + c tau).  The torque of an
-element is kb (k - k0 + s), so that tension takes part of the strain without stress, and the law of length of a cell is
-    l - h - h ck T - 2 g c T + g (Q_i + Q_{i+1}) = 0.
+With W = F(eps + c tau) + GJ tau^2/2 per length, Q = GJ tau + c T and T = F'(eps + c tau); F is EA/2 times a square, or
+what a law of tension over strain stores (kernels.laws.axial_law_with_torque).  The torque of an element is kb (k - k0 + s), so that tension takes part of the strain without stress, and the law of length of a cell is
+    l - h - h ck T - 2 g c T + g (Q_i + Q_{i+1}) = 0,
+of a law of tension over strain with that strain in place of ck T.
 Both follow from one function of k, l and T, so that no energy is lost.
 
 A block row does not reach the tension of the cell after next, which the spin and the force of a cell know: in these rows
@@ -32,7 +33,7 @@ from hybrid.kernels.algebra.rotations import (
     mat_vec,
     scale,
 )
-from hybrid.kernels.laws.axial_law import strain_and_energy
+from hybrid.kernels.laws.axial_law import softness_of_damping, strain_and_energy
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import relative_rotation, turns_freely
 from hybrid.kernels.machine.compile import inner, kernel
@@ -41,7 +42,9 @@ from hybrid.kernels.machine.compile import inner, kernel
 # (with a minus sign) of the cell before it; kb; Q; rate of twist, 1/s.
 AXIS, AFTER, SPIN_AFTER, BEFORE, SPIN_BEFORE, STIFF, TORQUE, RATE = 0, 3, 6, 7, 10, 11, 12, 13
 COUPLES = 14
-ZONE_FIRST, ZONE_LAST, ZONE_TORQUE = 0, 1, 1  # of Line.torsion and State.turn, as kernels.march.zone_torque has them
+# Of Line.torsion, and of State.turn, as kernels.march.zone_torque has them.
+ZONE_FIRST, ZONE_LAST, ZONE_COMPLIANCE, ZONE_FREE, ZONE_TAU = range(5)
+ZONE_TURN, ZONE_TORQUE = 0, 1
 
 
 @inner
@@ -150,15 +153,27 @@ def couple_length(couple, line, i, T):
     return more, more * T - g * (couple[i, TORQUE] + couple[i + 1, TORQUE])
 
 
+@inner
+def turn_rate(couple, line, i):
+    """Rate of the twist over cell i of a rod, 1/s: half of that of each element, of one at an end all."""
+    n = line.h.shape[0]
+    return couple[i, RATE] * (1.0 if i == 0 else 0.5) + couple[i + 1, RATE] * (1.0 if i + 1 == n else 0.5)
+
+
+@inner
+def damped_compliance(line, state, i, along):
+    """Compliance, m/N, of cell i against damping, without twist; along: rate, m/s, of what its tension stretches."""
+    return line.h[i] * softness_of_damping(line, state, i, line.tau[i] * along / line.h[i])
+
+
 @kernel
-def damping_loss(couple, line, i, along):
+def damping_loss(couple, line, state, i, along):
     """Power, W, that damping takes out of cell i but for the torsion of its elements; along: rate of its length, m/s."""
-    n, hck, c = line.h.shape[0], line.h[i] * line.ck[i], line.tension_torque[i]
     if line.spin[i]:
-        turn = couple[i, RATE] * (1.0 if i == 0 else 0.5) + couple[i + 1, RATE] * (1.0 if i + 1 == n else 0.5)
-        along += c * turn
-    else:
-        hck += 2.0 * line.tension_twist[i] * c
+        along += line.tension_torque[i] * turn_rate(couple, line, i)
+    hck = damped_compliance(line, state, i, along)
+    if not line.spin[i]:
+        hck += 2.0 * line.tension_twist[i] * line.tension_torque[i]
     return line.tau[i] * along * along / hck
 
 
@@ -238,10 +253,34 @@ def stretch_energy(line, i, longer, low, high):
 @inner
 def stretch_factor(line, state, c, torque):
     """Length of cell c over its unstretched length under its tension and a torque (N m)."""
-    if couples(line):
-        return 1.0 + compliance(line, c) * state.T[c] - 2.0 * line.tension_twist[c] / line.h[c] * torque
     strain, _ = strain_and_energy(line, state, c)
+    if couples(line):
+        strain += 2.0 * line.tension_twist[c] / line.h[c] * (line.tension_torque[c] * state.T[c] - torque)
     return 1.0 + strain
+
+
+@inner
+def zone_of(line, c):
+    """The catenary zone that cell c is of and that a torque passes through; -1: none."""
+    for z in range(line.torsion.shape[0]):
+        if line.torsion[z, ZONE_FIRST] <= c < line.torsion[z, ZONE_LAST]:
+            return z
+    return -1
+
+
+@inner
+def twist_of_tensions(line, T, first, z):
+    """Twist, rad, of zone z by tensions: T[c + first] of cell c."""
+    total, g = 0.0, line.tension_twist
+    if couples(line):
+        a, b = int(line.torsion[z, ZONE_FIRST]), int(line.torsion[z, ZONE_LAST])
+        for c in range(a, b):
+            total += 2.0 * g[c] * T[c + first]
+        if a > 0:
+            total += g[a - 1] * T[a - 1 + first]
+        if b < line.h.shape[0]:
+            total += g[b] * T[b + first]
+    return total
 
 
 @kernel
@@ -249,9 +288,9 @@ def torque_beside(line, state, c):
     """Torque, N m, at a node of cell c, where tension makes one; else 0."""
     if not couples(line):
         return 0.0
-    for z in range(line.torsion.shape[0]):
-        if line.torsion[z, ZONE_FIRST] <= c < line.torsion[z, ZONE_LAST]:
-            return state.turn[z, ZONE_TORQUE]
+    z = zone_of(line, c)
+    if z >= 0:
+        return state.turn[z, ZONE_TORQUE]
     n = line.h.shape[0]
     i = c if c > 0 and line.element[c] else c + 1
     if i >= n or not line.element[i]:

@@ -212,7 +212,7 @@ def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, couple, re
         gap -= late
         along = dot(d, cell.e1)
         if couple.shape[0] > 0:
-            report[STIFFNESS_DAMPING_POWER] += damping_loss(couple, line, i, along)
+            report[STIFFNESS_DAMPING_POWER] += damping_loss(couple, line, state, i, along)
         elif not bits & AXIAL_LAW:
             report[STIFFNESS_DAMPING_POWER] += line.tau[i] * along * along / hck
     if bits & AXIAL_LAW:

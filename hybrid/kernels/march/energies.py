@@ -34,6 +34,7 @@ def observe(line, ends, e, v, a1, w, T, turn, M, strain, energy):
     """
     n = e.shape[0]
     coupled, torque, zone = couples(line), 0.0, 0
+    stretches = coupled and not line.bits & AXIAL_LAW
     for j in range(4):
         energy[j] = 0.0
     for i in range(n + 1):
@@ -68,7 +69,7 @@ def observe(line, ends, e, v, a1, w, T, turn, M, strain, energy):
                 elif i == 0 or i == n:
                     d, _, _ = chord(get3(e, min(i, n - 1)))
                     torque = dot(get3(M, i), d)
-                if left:
+                if left and stretches:
                     energy[3] += stretch_of(line, e, i - 1, torque_before, torque)
             continue
         Ra, Rb = get9(ends.frame, 0), get9(ends.frame, 1)
@@ -92,7 +93,7 @@ def observe(line, ends, e, v, a1, w, T, turn, M, strain, energy):
         energy[2] += 0.5 * kb[2] * x[2] * x[2]
         if coupled:
             torque = kb[2] * x[2]
-            if left:
+            if left and stretches:
                 energy[3] += stretch_of(line, e, i - 1, torque_before, torque)
         if line.bits & STIFFNESS_DAMPING:
             tau = 0.5 * (line.tau[max(i - 1, 0)] + line.tau[min(i, n - 1)])

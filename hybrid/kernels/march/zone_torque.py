@@ -25,7 +25,7 @@ from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.algebra.kept_factors import solve_with
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale, sub
 from hybrid.kernels.laws.cell import chord
-from hybrid.kernels.laws.tension_torque import COUPLES, compliance, couples
+from hybrid.kernels.laws.tension_torque import COUPLES, compliance, couples, damped_compliance, twist_of_tensions
 from hybrid.kernels.laws.tension_torque import TORQUE as NODE_TORQUE
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import JOINED
@@ -148,21 +148,6 @@ def turn_rates(line, ends, state, torsion, z):
 
 
 @inner
-def twist_of_tensions(line, T, first, z):
-    """Twist, rad, of zone z by tensions: T[c + first] of cell c (kernels.laws.tension_torque)."""
-    total, g = 0.0, line.tension_twist
-    if couples(line):
-        a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
-        for c in range(a, b):
-            total += 2.0 * g[c] * T[c + first]
-        if a > 0:
-            total += g[a - 1] * T[a - 1 + first]
-        if b < line.h.shape[0]:
-            total += g[b] * T[b + first]
-    return total
-
-
-@inner
 def find_torques(line, ends, state, work):
     """Turn and torque of every zone, and what rods beside them feel."""
     torsion = work.torsion
@@ -205,8 +190,9 @@ def finish(line, ends, state, torsion):
             if couples(line):  # what stretch in its cells has lost by itself is that of a line that turns freely
                 for c in range(int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])):
                     d, _, _ = chord(get3(state.e, c))
-                    g, hck = 2.0 * line.tension_twist[c], line.h[c] * compliance(line, c)
-                    drive += g * dot(d, sub(get3(state.v, c + 1), get3(state.v, c))) / hck
+                    along, g = dot(d, sub(get3(state.v, c + 1), get3(state.v, c))), 2.0 * line.tension_twist[c]
+                    hck = damped_compliance(line, state, c, along) + g * line.tension_torque[c]
+                    drive += g * along / hck
                     soft -= g * g / hck
             loss += line.torsion[z, TAU] * drive * drive / soft
     return loss

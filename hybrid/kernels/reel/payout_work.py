@@ -9,6 +9,7 @@ from hybrid.kernels.laws.axial_law import has_law, stretch_work
 from hybrid.kernels.laws.bending_law import energy_share, has_bend_law
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.laws.tension_torque import couples, rest_strain
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.reel.damping import damped_stretch_work
 from hybrid.kernels.reel.paid_length import cell, changes_length, eased, growing, node
@@ -38,18 +39,40 @@ def turn_at(line, ends, state, i):
 
 
 @inner
-def bend_that_came(line, turn, i, k, before):
+def bend_that_came(line, state, reel, turn, i, k):
     """Twice the energy, J, that a change k of its stiffness (N m) and one of its strain without load make of the element
-    at node i, turned by `turn`, rad; before: (10,) of `Reel.before`.
+    at node i, turned by `turn`, rad; reel.before: of the line before.
 
     With x the strain now and d what it was more before:  (kb + k) x^2 - kb (x + d)^2 = k x^2 - kb (2 x + d) d.
     """
-    x, d = sub(turn, get3(line.k0, i)), sub(get3(line.k0, i), (before[6], before[7], before[8]))
+    before = reel.before[i]
+    x, d = sub(turn, rest_strain(line, state.T, i)), sub(get3(line.k0, i), (before[6], before[7], before[8]))
+    if couples(line):
+        d = (d[0], d[1], d[2] - twist_that_came(line, reel, state.T, i))
     if has_bend_law(line, i):
         return bend_by_table_that_came(line, i, x, d, k, before)
     straight = before[3] * (2.0 * x[0] + d[0]) * d[0] + before[4] * (2.0 * x[1] + d[1]) * d[1]
     straight += before[5] * (2.0 * x[2] + d[2]) * d[2]
     return k[0] * x[0] * x[0] + k[1] * x[1] * x[1] + k[2] * x[2] * x[2] - straight
+
+
+@inner
+def twist_that_came(line, reel, T, i):
+    """Twist, rad, of the element at node i by tensions T (N,) that longer cells beside it add."""
+    more = 0.0
+    for c in range(max(i - 1, 0), min(i + 1, line.h.shape[0])):
+        if changes_length(line, reel, c):
+            more += line.tension_twist[c] * (1.0 - reel.before[c, 0] / line.h[c]) * T[c]
+    return more
+
+
+@inner
+def stretch_that_came(line, state, c):
+    """Energy per length, N, that cell c takes up as it grows and its ends stay, but for the torsion beside it."""
+    taken = stretch_work(line, state, c)
+    if couples(line):
+        taken += line.tension_twist[c] / line.h[c] * line.tension_torque[c] * state.T[c] * state.T[c]
+    return taken
 
 
 @inner
@@ -102,7 +125,7 @@ def book(line, ends, old, new, reel, dt):
             if reel.flow.shape[0] > 0:
                 taken = damped_stretch_work(line, old, c, before[c, 0]) + damped_stretch_work(line, new, c, line.h[c])
             else:
-                taken = stretch_work(line, old, c) + stretch_work(line, new, c)
+                taken = stretch_that_came(line, old, c) + stretch_that_came(line, new, c)
             booked -= 0.5 * more * taken
         softer = line.ck[c] - before[c, 9]
         if softer != 0.0 and cell(line, reel, c) >= growing(line, reel) and not has_law(line, c):
@@ -116,8 +139,8 @@ def book(line, ends, old, new, reel, dt):
             more = (line.kb[i, 0] - before[i, 3], line.kb[i, 1] - before[i, 4], line.kb[i, 2] - before[i, 5])
             if more[0] != 0.0 or more[1] != 0.0 or more[2] != 0.0:
                 was = (reel.clamp[0], reel.clamp[1], reel.clamp[2]) if j == n else turn_at(line, ends, old, i)
-                done = bend_that_came(line, was, i, more, before[i])
-                booked += 0.25 * (done + bend_that_came(line, turn_at(line, ends, new, i), i, more, before[i]))
+                done = bend_that_came(line, old, reel, was, i, more)
+                booked += 0.25 * (done + bend_that_came(line, new, reel, turn_at(line, ends, new, i), i, more))
     return booked
 
 

@@ -454,6 +454,7 @@ def solve_system(table):
         if task.what == ASSEMBLY:
             for b in range(work.shape[0]):
                 own_force(bodies[b], old[b], new[b], work[b])
+            follow_laws(tables, s)  # rates of twist are known now
             outcome = OK
             break
         assemble_junctions(system, m, s.cv, s.ca)

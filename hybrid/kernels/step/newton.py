@@ -288,7 +288,7 @@ def solve(
             left = size
     if task.what == STEP:
         find_rates(space, line, sea, old, new, work.u, s)
-    if task.what != ASSEMBLY:
+    if task.what != ASSEMBLY or work.couple.shape[0] > 0:  # rates of twist are known now
         follow_law(line, sea, old, new, work, task.dt, cv, ca)
     if task.what == STEP or task.what == EQUILIBRIUM:
         end_slip(line, ends, old, new, work, BEHIND_STEP if task.what == STEP else BEHIND_REST)
