@@ -8,11 +8,13 @@ from kernels.test_zone_torque import residual as zone_residual
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.kept_factors import solve_again
+from hybrid.kernels.laws.axial_law_with_torque import follow_law_with_torque
 from hybrid.kernels.march.configuration import update
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace_of
-from hybrid.kernels.state.forces import ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.state.state import blank_state
+from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.state.report import STRETCH_ENERGY
+from hybrid.kernels.state.state import NO_LAW, blank_state
 
 LAST = [5 * i + 4 for i in range(N + 1)]
 
@@ -23,6 +25,19 @@ def with_torque(line, seed=5):
     c, twist = g.uniform(-0.4, 0.8, (2, N))
     c[3] = twist[3] = 0.0
     return line._replace(tension_torque=c, tension_twist=np.abs(twist) * np.sign(c))
+
+
+def with_law(line, st):
+    """The same, of which all cells but the second have a table of tension over strain; its state."""
+    strain, tension = np.array([[-0.4, -1.1], [-0.1, -0.3], [0.1, 0.2], [0.5, 2.0]]).T
+    energy = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(strain) * (tension[1:] + tension[:-1]))])
+    law = np.zeros((N, NO_LAW.shape[1]))
+    law[:, 1] = 4.0
+    law[1] = 0.0
+    line = line._replace(bits=line.bits | AXIAL_LAW, law=law, law_table=np.column_stack([strain, tension, energy]))
+    st = st._replace(slow=np.zeros(N))
+    address = follow_law_with_torque.address(line, st, st, workspace_of(line), 0.0, 0.0)
+    return line._replace(law_at=np.array([address], np.int64)), st
 
 
 def residual(line, sea, ends, st, x):
@@ -63,10 +78,13 @@ def march_of(line, sea, ends, st):
 
 
 @pytest.mark.parametrize("bits", [0, ROTARY, STIFFNESS_DAMPING | ROTARY])
+@pytest.mark.parametrize("law", [False, True], ids=["stiffness", "law"])
 @pytest.mark.parametrize("zones", ["rod", "rod-catenary", "catenary"])
-def test_the_matrix_is_the_derivative_of_the_residual(zones, bits):
+def test_the_matrix_is_the_derivative_of_the_residual(zones, law, bits):
     line, sea, ends, st = random_case(3, ZONES[zones], bits)
     line = with_torque(line)
+    if law:
+        line, st = with_law(line, st)
     J = march_of(line, sea, ends, st)
     exact = folded(-differences(lambda x: residual(line, sea, ends, st, x), 5 * (N + 1)), line, sea, ends, st)
     missing = [0] + [k for i, k in enumerate(LAST) if i == N or not line.spin[i]]
@@ -79,11 +97,14 @@ def test_the_matrix_is_the_derivative_of_the_residual(zones, bits):
     assert np.abs(J - plain).max() > 1e-3 * np.abs(J).max()
 
 
+@pytest.mark.parametrize("law", [False, True], ids=["stiffness", "law"])
 @pytest.mark.parametrize("name", LINES)
-def test_zones_pass_it(name):
+def test_zones_pass_it(name, law):
     """The corrected solution is that of the differences, with the torque of zones in the lengths of their cells."""
     line, sea, ends, st, _ = twisted_case(name, 0)
     line = with_torque(line)
+    if law:
+        line, st = with_law(line, st)
     work = workspace_of(line)
     rhs, _ = zone_residual(line, sea, ends, st, work, np.zeros((N + 1, 5)))
     J = folded(-differences(lambda x: zone_residual(line, sea, ends, st, work, x)[0], 5 * (N + 1)), line, sea, ends, st)
@@ -105,16 +126,20 @@ def test_kept_factors_solve_for_another_right_hand_side():
     np.testing.assert_allclose(march_of(line, sea, ends, st) @ x.ravel(), b.ravel(), atol=1e-9)
 
 
-def energy_of(line, ends, st):
-    found, room = np.zeros(5), np.zeros((2, N + 1, 3))
+def energy_of(line, sea, ends, st):
+    found, room, work = np.zeros(5), np.zeros((2, N + 1, 3)), workspace_of(line)
     observe(line, ends, st.e, st.v, st.a1, st.w, st.T, st.turn, *room, found)
-    return found[1:4].sum()
+    assembly(line, sea, ends, st, 0.0, 0.0, work)
+    return found[1:4].sum() + work.report[STRETCH_ENERGY]
 
 
-def test_forces_and_torques_follow_from_the_energy():
+@pytest.mark.parametrize("law", [False, True], ids=["stiffness", "law"])
+def test_forces_and_torques_follow_from_the_energy(law):
     """Of tensions that the lengths and twists ask for, forces are the derivatives of the energy by nodes and spins."""
     line, sea, ends, st = random_case(3, ZONES["rod"], 0)
     line = with_torque(line)._replace(mass=np.zeros(N + 1), force=np.zeros((N + 1, 3)))
+    if law:
+        line, st = with_law(line, st)
     ends.force[:], ends.moment[:] = 0.0, 0.0
     st.v[:], st.vd[:] = 0.0, 0.0
 
@@ -136,7 +161,7 @@ def test_forces_and_torques_follow_from_the_energy():
         for sign in (-1.0, 1.0):
             x = np.zeros((N + 1, 5))
             x[i, k] = sign * t
-            E.append(energy_of(line, ends, settled(x)[0]))
+            E.append(energy_of(line, sea, ends, settled(x)[0]))
         assert left[i, k] == pytest.approx((E[1] - E[0]) / (2.0 * t), rel=1e-6, abs=1e-6)
 
 

@@ -39,6 +39,13 @@ def scene(surface=15.0, attachments=(), without=(), current=(0.5, 0.1, 0.0), mor
 
 SCENES = {
     "torque of tension": lambda: scene(tension_torque=0.05),
+    "torque of tension by a table": lambda: scene(
+        tension_torque=0.05, tension_strain=[[0, 0], [0.01, 2e4], [0.03, 2e5]], without=["axial_stiffness"]
+    ),
+    "torque of tension, a rope that creeps": lambda: scene(
+        tension_torque=0.05, dynamic_stiffness={"constant": 3e6, "per_tension": 20.0, "relaxation_time": 10.0},
+        creep={"per_decade": 1e-3, "loaded": 10.0},
+    ),
     "two stiffnesses, curled": lambda: scene(bending_stiffness=[400, 900], intrinsic_curvature=[0.02, 0.01, 0.005]),
     "moment by a table": lambda: scene(
         moment_curvature=[[0, 0], [0.02, 8], [0.2, 40], [1, 100]], without=["bending_stiffness"]
