@@ -33,10 +33,7 @@ from tests.combinations.pairs import (
 NAMES = [*((name,) for name in FEATURES), *pairs()]
 REASONS = [re.escape(x.why).replace(r"\{key\}", r"[\w.\[\]]+") for x in REFUSALS]
 # What one of the two asks of the other, and what is not a matter of two features that can be computed.
-ASKED = (
-    "tension_torque lengthens a cable that turns",  # so it has a stiffness that is a number
-    "this end of the line is a catenary, which has no moment",
-)
+ASKED = ("this end of the line is a catenary, which has no moment",)
 
 
 def refusal(tables: Tables) -> str:

@@ -42,6 +42,12 @@ def twisting(step: float = 0.05) -> dict[str, Any]:
     return paid(TORQUE, step=step, model="rod", EA=2e6, EI=2e4)
 
 
+def armour(step: float = 0.05) -> dict[str, Any]:
+    """By a table, with as much stretch by its twist as a third of that by its tension."""
+    law = {"tension_strain": CURVE, "axial_stiffness": None, "tension_torque": 0.04, "torsional_stiffness": 2e3}
+    return paid(law, step=step, model="rod", EA=2e6, EI=2e4)
+
+
 def polyester(step: float = 0.05) -> dict[str, Any]:
     return paid(POLYESTER, False, step)
 
@@ -54,7 +60,7 @@ def creeping(step: float = 0.05) -> dict[str, Any]:
     return paid({"axial_stiffness": 2e6, "creep": {"per_decade": 2e-3, "loaded": 1.0}}, False, step)
 
 
-SCENES = {"creep": creeping, "torque": twisting, "polyester": polyester, "vortices": shedding}
+SCENES = {"creep": creeping, "torque": twisting, "armour": armour, "polyester": polyester, "vortices": shedding}
 
 
 @pytest.mark.long
@@ -77,7 +83,7 @@ def test_energy_is_balanced(name: str) -> None:
     assert left[0] > 2.0 * left[1]
 
 
-@pytest.mark.parametrize("name", ["torque", "polyester"])
+@pytest.mark.parametrize("name", ["torque", "armour", "polyester"])
 def test_the_mirror_image_pays_out_the_same(name: str) -> None:
     scene = SCENES[name](0.05)
     one, other = hybrid.run(scene), hybrid.run(exchanged(scene))

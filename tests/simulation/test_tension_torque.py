@@ -125,7 +125,6 @@ def test_it_is_left_out_where_nothing_has_it():
         ({"axial_stiffness": None}, "axial_stiffness"),
         ({"torsional_stiffness": None}, "torsional_stiffness"),
         ({"tension_torque": 2.0}, "tension_torque"),
-        ({"tension_strain": [[0, 0], [0.1, 1e4]], "axial_stiffness": None}, "axial_stiffness"),
     ],
 )
 def test_what_it_needs(change, where):
