@@ -86,12 +86,12 @@ def test_a_straight_line_that_is_pulled_and_twisted(name: str, model: str) -> No
         assert found.position[0, -1, 0] == pytest.approx(L * (1.0 + at_rest(name, T) - C * tau), rel=1e-11)
         np.testing.assert_allclose(found["torque"][0], GJ * tau + C * T, rtol=1e-8)
         np.testing.assert_allclose(found["tension"][0], T, rtol=1e-8)
-        energy = float(found["energy/stretch"][0] + found["energy/torsion"][0])
+        energy = strain_energy(found)
         assert energy == pytest.approx(L * (stored_at_rest(name, T) + 0.5 * GJ * tau * tau), rel=1e-6)
         found = hybrid.static(pulled(LAWS[name], MODELS[model], "free", T))
         longer = at_rest(name, T) + C * C * T / GJ
         assert found.position[0, -1, 0] == pytest.approx(L * (1.0 + longer), rel=1e-11)
-        energy = float(found["energy/stretch"][0] + found["energy/torsion"][0])
+        energy = strain_energy(found)
         assert energy == pytest.approx(L * (stored_at_rest(name, T) + 0.5 * (C * T) ** 2 / GJ), rel=1e-6)
 
 
@@ -105,6 +105,11 @@ def test_two_laws_laid_against_each_other() -> None:
     first, second = (torque - C * T) / GJ, (torque + 2e-3 * T) / soft
     x = 20.0 * (1.0 + at_rest("table", T) - C * first) + L * (1.0 + T / EA + 2e-3 * second)
     assert found.position[0, -1, 0] == pytest.approx(x, rel=1e-11)
+
+
+def strain_energy(found: hybrid.Result) -> float:
+    """At rest, J; of a catenary that turns freely all is of stretch."""
+    return float(sum(found[x][0] for x in ("energy/stretch", "energy/torsion") if x in found))
 
 
 FORCES = [[0.0, 150], [1.0, 150], [1.5, 420], [4.0, 420], [4.5, 90], [7.0, 90], [7.5, 500], [10.0, 500]]
@@ -141,13 +146,13 @@ def test_the_history_of_a_law_is_that_of_its_tension(name: str) -> None:
 def test_a_twisted_rope_creeps() -> None:
     """Under a constant pull, held with turns: eps = T/EA + creep - c tau, the same torque; the pull's work is lost."""
     pull, turns = 300.0, 2.0
-    bar = section(LAWS["creep"], damping=5.0)
+    bar = section(LAWS["creep"], damping=1.0)
     found = hybrid.run(
         pulled({}, "rod", "guided", pull, turns, sections=[bar], time={"duration": 60.0, "step": 0.1},
                output={"every": 5.0, "points": 6})
     )  # fmt: skip
     tau, crept = 2.0 * np.pi * turns / L, PER * np.log10(1.0 + found.t / LOADED)
-    assert np.abs(found.position[:, -1, 0] - L * (1.0 + pull / EA + crept - C * tau)).max() < 2e-5 * L * PER * 60
+    assert np.abs(found.position[:, -1, 0] - L * (1.0 + pull / EA + crept - C * tau)).max() < 5e-5
     np.testing.assert_allclose(found["torque"][:], GJ * tau + C * pull, rtol=1e-4)
     assert float(found["work/hysteresis"][-1]) == pytest.approx(-pull * L * crept[-1], rel=1e-3)
 

@@ -40,6 +40,8 @@ LINEAR, BY_STIFFNESS, QUADRATIC, EXPONENTIAL = 1.0, 2.0, 3.0, 4.0
 STRAIGHT = 1e-3
 # Columns of Line.law_table: strain; tension, N; energy per length from the first point on, J/m.
 STRAIN, TENSION, ENERGY = range(3)
+# Part of a tension below which what is of damping is round-off beside a point of the table.
+NO_DAMPING = 1e-9
 # Below this part of the relaxation time a step takes the series of what would cancel.
 SHORT = 1e-3
 
@@ -316,8 +318,9 @@ def softness_of_damping(line, state, i, late):
         return 1.0 / E
     first, last = int(line.law[i, FIRST]), int(line.law[i, LAST])
     strain, c, _ = strain_at(line.law_table, first, last, T)
-    damped = T - tension_at(line.law_table, first, last, strain - late)
-    return late / damped if damped != 0.0 else c
+    elastic = tension_at(line.law_table, first, last, strain - late)
+    one = piece_of(line.law_table, first, last, TENSION, T) == piece_of(line.law_table, first, last, TENSION, elastic)
+    return c if one or not abs(T - elastic) > NO_DAMPING * abs(T) else late / (T - elastic)
 
 
 @inner
