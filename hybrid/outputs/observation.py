@@ -500,7 +500,9 @@ class Observation:
         """
         kinetic, bending, torsion, stretch, potential = self._observed[2]
         if self.batch.turn.size:
-            torsion = torsion + torsion_energy(self.line, self.batch.turn[:, :, TURN], self.batch.T)
+            # One by one: the last digit of a product over a batch depends on its size, and so would a resumed run's.
+            each = zip(self.batch.turn[:, :, TURN], self.batch.T, strict=True)
+            torsion = torsion + np.array([torsion_energy(self.line, turn, T) for turn, T in each])
         if self.line.law.size:
             stretch = self.batch.report[:, STRETCH_ENERGY]
         return {
