@@ -222,7 +222,7 @@ def test_what_hangs_on_first_shapes():
 TORQUES = {
     "stiffness": {},
     "table": {"tension_strain": [[0, 0], [0.01, 2e4], [0.03, 2e5]], "axial_stiffness": None},
-    "rope": {"dynamic_stiffness": {"constant": 3e6, "per_tension": 20.0, "relaxation_time": 10.0}},
+    "rope": {"dynamic_stiffness": {"constant": 2e7, "per_tension": 20.0, "relaxation_time": 10.0}},
 }  # fmt: skip
 
 

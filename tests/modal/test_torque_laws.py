@@ -45,7 +45,7 @@ def same(law: str) -> tuple[dict[str, Any], dict[str, Any]]:
         given, gravity, x = {"tension_strain": TABLE}, 9.81, 60.4
     else:  # straight and of one tension, about which it is as stiff as it is fast
         a, b = T / EA - T / E, 1.0 / E
-        given, gravity, x = ROPE, 0.0, LENGTH * (1.0 + T / EA)
+        given, gravity, x = ROPE, 0.0, LENGTH * (1.0 + T / EA) - 2.0 * np.pi * C
     return line(given, gravity, x), line({"axial_stiffness": (1.0 + a) / b}, gravity, x, 1.0 + a)
 
 
