@@ -21,6 +21,7 @@ import pytest
 import hybrid
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.step.step import States
 from hybrid.kernels.watch import observed_outputs
 from hybrid.model.build import build
 from hybrid.model.plane import planar, untwist
@@ -150,9 +151,8 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
         begin = time.process_time()
         for k in range(1, steps + 1):
             sea, ends, old, new, was, now = model.sea.at(0.1 * k), model.ends.at(0.1 * k), new, old, now, was
-            outcome, iterations, *_ = entry.step(
-                line, sea, ends, old, new, 0.1, 0.1 * (k > 1), 0.5, stepper.limits, was, now, stepper.work, 0.5
-            )
+            task = entry.step_task(0.1, 0.1 * (k > 1), 0.5, stepper.limits, 0.5)
+            outcome, iterations, *_ = entry.step(task, line, sea, ends, States(old, new, was, now), stepper.work)
             assert outcome == hybrid.Outcome.OK
             total += iterations
         return time.process_time() - begin, total

@@ -31,7 +31,7 @@ from hybrid.kernels.state.report import (
     USED_RHO,
 )
 from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State
-from hybrid.kernels.step.step import friction_axes
+from hybrid.kernels.step.step import States, friction_axes
 from hybrid.solve.workspaces import workspace_of
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
@@ -111,10 +111,10 @@ class Stepper:
         before: s, the length of the step that led to `old`; 0 if it is a start, with consistent accelerations.
         rho_before: its spectral radius, `Taken.rho` of it; that of equal steps where none is given.
         """
+        task = entry.step_task(dt, before, rho, self.limits, rho if rho_before is None else rho_before)
         outcome, iterations, left, where = entry.step(
-            self.line, sea, ends, old, new, dt, before, rho, self.limits, NO_PUSH, NO_PUSH, self.work,
-            rho if rho_before is None else rho_before,
-        )  # fmt: skip
+            task, self.line, sea, ends, States(old, new, NO_PUSH, NO_PUSH), self.work
+        )
         self.told = told = self.work.report.tolist()
         if outcome == OK and not told[SLACKEST] > self.floor:
             outcome, where = Outcome.SLACK, int(told[SLACKEST_CELL])

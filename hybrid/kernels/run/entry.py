@@ -31,6 +31,7 @@ from hybrid.kernels.state.state import (
 )
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task
+from hybrid.kernels.step.step import States
 
 NO_PUSH: Floats = np.zeros((0, 4))
 NO_STRAINS: Floats = np.zeros((0, 3))
@@ -47,12 +48,10 @@ class _OfThread(threading.local):
 _here = _OfThread()
 
 
-def _solve(
-    task: Task, line: Line, sea: Sea, ends: Ends, old: State, new: State, was: Floats, now: Floats, work: Work
-) -> tuple[int, int, float, int]:
+def _solve(task: Task, line: Line, sea: Sea, ends: Ends, states: States, work: Work) -> tuple[int, int, float, int]:
     """As kernels.step.newton.solve, by the kernel for the line's kind."""
-    check_turns(line, new)
-    table = _here.table
+    check_turns(line, states.new)
+    table, (old, new, was, now) = _here.table, states
     table.bind(task=task, line=line, sea=sea, ends=ends, old=old, new=new, was=was, now=now, work=work)
     found: tuple[int, int, float, int] = (in_plane if line.bits & PLANAR else in_space)(table.numbers)
     return found
@@ -130,13 +129,14 @@ def out_of_balance(line: Line, rows: Floats) -> Floats:
     return np.asarray(-rows.reshape(-1, SIZE, WIDTH)[:, 1:4, -1])
 
 
-def step(
-    line: Line, sea: Sea, ends: Ends, old: State, new: State, dt: float, before: float, rho: float, limits: Limits,
-    was: Floats, now: Floats, work: Work, rho_before: float,
-) -> tuple[int, int, float, int]:  # fmt: skip
-    """One step in time from `old` to `new` (overwritten)."""
-    task = Task(STEP, dt, before, rho, 0.0, 0.0, False, limits, False, rho_before)
-    return _solve(task, line, sea, ends, old, new, was, now, work)
+def step_task(dt: float, before: float, rho: float, limits: Limits, rho_before: float) -> Task:
+    """The task of one step: s, its length and that of the one before; rho, rho_before: their spectral radii."""
+    return Task(STEP, dt, before, rho, limits=limits, rho_before=rho_before)
+
+
+def step(task: Task, line: Line, sea: Sea, ends: Ends, states: States, work: Work) -> tuple[int, int, float, int]:
+    """One step in time from states.old to states.new (overwritten)."""
+    return _solve(task, line, sea, ends, states, work)
 
 
 def equilibrium(
@@ -144,7 +144,7 @@ def equilibrium(
 ) -> tuple[int, int, float, int]:
     """One static solve from state.r + work.u; ca: 1/s2, of springs of that times the mass."""
     task = Task(EQUILIBRIUM, ca=ca, turning=turning, limits=limits)
-    return _solve(task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
+    return _solve(task, line, sea, ends, States(state, state, NO_PUSH, NO_PUSH), work)
 
 
 def assembly(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
@@ -160,11 +160,11 @@ def correction(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: fl
 def assembly_of_step(line: Line, sea: Sea, ends: Ends, old: State, new: State, cv: float, ca: float, work: Work) -> int:
     """As `assembly`, of a step from `old` by work.u to `new`, whose friction and rates count from there."""
     task = Task(ASSEMBLY, cv=cv, ca=ca, limits=ONE_MARCH)
-    outcome, _, _, where = _solve(task, line, sea, ends, old, new, NO_PUSH, NO_PUSH, work)
+    outcome, _, _, where = _solve(task, line, sea, ends, States(old, new, NO_PUSH, NO_PUSH), work)
     return -1 if outcome == OK else max(where, 0)
 
 
 def _one_march(what: int, line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
     task = Task(what, cv=cv, ca=ca, limits=ONE_MARCH)
-    outcome, _, _, where = _solve(task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
+    outcome, _, _, where = _solve(task, line, sea, ends, States(state, state, NO_PUSH, NO_PUSH), work)
     return -1 if outcome == OK else max(where, 0)

@@ -77,8 +77,9 @@ from hybrid.kernels.step.job import (
     call_zones,
     read,
 )
-from hybrid.kernels.step.newton import ADDRESS, GAIN, OK, RUN, STEP, Limits, Task, ask_contact, solve
+from hybrid.kernels.step.newton import ADDRESS, GAIN, OK, RUN, STEP, Calls, Limits, Task, ask_contact, solve
 from hybrid.kernels.step.sampling import sample_step
+from hybrid.kernels.step.step import States
 from hybrid.kernels.step.step_control import begin_step, end_of_try, take_past
 from hybrid.kernels.watch.extremes import first_strains, note_extremes
 
@@ -195,10 +196,8 @@ def solve_job(plane, space, job):
             limits = Limits(limits.reach, limits.scale, min(left, limits.most))
         fixed = job.books.counts[CONTROLLED] == 0
         task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, limits, cut, clock[RHO_BEFORE], fixed)
-    return solve(
-        plane, space, task, job.line, job.sea, job.ends, old, new, was, now, job.work, job.books.strains, job.contact,
-        job.contact_table, iterated, job.reel_table,
-    )  # fmt: skip
+    states, calls = States(old, new, was, now), Calls(job.contact, job.contact_table, iterated, job.reel_table)
+    return solve(plane, space, task, job.line, job.sea, job.ends, states, job.work, job.books.strains, calls)
 
 
 @kernel

@@ -93,7 +93,7 @@ from hybrid.kernels.step.newton import (
     round_off_tension,
     with_radius,
 )
-from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
+from hybrid.kernels.step.step import LARGEST_STEP_TURN, States, begin_step, end_step, find_rates
 from hybrid.kernels.watch.extremes import first_strains, note_extremes
 
 JUNCTIONS = 5
@@ -277,10 +277,8 @@ def end_lines(tables, joints, floors, s, task, good):
             touches = job.contact[ADDRESS] > 0
             if touches:
                 job.work.report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, FINISH)
-            turn, cell = end_step(
-                None, 1, job.line, job.sea, job.ends, job.old, job.new, s, task, job.was, job.now, job.work,
-                job.books.strains,
-            )  # fmt: skip
+            states = States(job.old, job.new, job.was, job.now)
+            turn, cell = end_step(None, 1, job.line, job.sea, job.ends, states, s, task, job.work, job.books.strains)
             if not turn < most_turn(job.contact):
                 return l, turn, cell
             report = job.work.report

@@ -11,6 +11,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hybrid.kernels.algebra.block_elimination import substitute
 from hybrid.kernels.algebra.block_elimination_plane import substitute_planar
 from hybrid.kernels.laws.bending_slip import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST
@@ -64,6 +67,19 @@ class Task(NamedTuple):
     cut: bool = False  # whether a step is taken as the last iteration has left it, converged or not
     rho_before: float = 0.0  # spectral radius of the step that led to its start
     fixed: bool = False  # whether steps have a fixed length, but for parts of one
+
+
+class Calls(NamedTuple):
+    """What is called by its address while a step is solved, and its tables.
+
+    contact: of a step of a line in space that may meet itself (kernels.contact.self_contact); its address is 0 for
+    others.  reel: address of kernels.reel.payout.iterate, for a line that is paid out; 0: iterations need nothing of it.
+    """
+
+    contact: NDArray[np.int64]
+    contact_table: NDArray[np.int64]
+    reel: int
+    reel_table: NDArray[np.int64]
 
 
 # Newton stops when the next correction, predicted from the last two by quadratic
@@ -196,25 +212,21 @@ def start_step(plane, space, task, line, sea, old, new, work, contact, contact_t
 
 
 @inner
-def solve(
-    plane, space, task, line, sea, ends, old, new, was, now, work, strains, contact, contact_table, reel, reel_table
-):  # fmt: skip
-    """Do a task at the configuration `new`, of a step that starts at old.r.
+def solve(plane, space, task, line, sea, ends, states, work, strains, calls):
+    """Do a task at the configuration `new` of `States`, of a step that starts at old.r.
 
-    STEP            predict `new` from `old`, solve, find the rates; was, now: a push out of the plane before and
-                    after (kernels.laws.out_of_plane), empty where there is none; strains: of the elements, empty: not wanted
+    STEP            predict `new` from `old`, solve, find the rates; strains: of the elements, empty: not wanted
     EQUILIBRIUM     solve from the prediction in work.u and `new`
     ASSEMBLY        one march, for its report and its block rows
     CORRECTION      one march and the solution of its equations, into work.x
-
-    contact: of a step of a line in space that may meet itself (kernels.contact.self_contact); its address is 0 for others.
-    reel: address of kernels.reel.payout.iterate, for a line that is paid out; 0: iterations need nothing of it.
 
     Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
     prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
     may end on a branch that has nothing to do with it.  With task.cut a step whose last iteration made a full correction
     is taken though it has not converged (CUT_SHORT); its report is of the iterate before that correction.
     """
+    old, new, _, _ = states
+    contact, contact_table, reel, reel_table = calls
     reach, scale, most = task.limits
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
@@ -297,7 +309,7 @@ def solve(
         if outcome == OK:
             if contact[ADDRESS] != 0:
                 work.report[SELF_CONTACT_ENERGY] = ask_contact(contact, contact_table, FINISH)
-            turn, cell = end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains)
+            turn, cell = end_step(plane, space, line, sea, ends, states, s, task, work, strains)
             if not turn < most_turn(contact):
                 outcome, where = TURNED_TOO_FAR, cell
             elif cut_short:

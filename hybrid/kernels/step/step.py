@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from hybrid.kernels.algebra.block_elimination import ROW
 from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE
@@ -39,6 +40,7 @@ from hybrid.kernels.state.report import (
     USED_RHO,
     WRONG_PIVOTS,
 )
+from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.generalized_alpha import weights
 
 # A step in which a chord turns (or is predicted to turn) by more than this, in rad, is repeated in parts; so is one in
@@ -46,6 +48,18 @@ from hybrid.kernels.step.generalized_alpha import weights
 LARGEST_STEP_TURN = 1.0
 # What counts as a turn too large: a node that goes through an obstacle, or deep into it.
 THROUGH = 2.0 * LARGEST_STEP_TURN
+
+
+class States(NamedTuple):
+    """The states before and after a step; was, now: (N+1, 4) a push out of the plane before and after it, empty where
+
+    there is none (kernels.laws.out_of_plane).
+    """
+
+    old: State
+    new: State
+    was: Floats
+    now: Floats
 
 
 @inner
@@ -264,12 +278,13 @@ def largest_spin(line, ends, old, new, s):
 
 
 @inner
-def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains):
+def end_step(plane, space, line, sea, ends, states, s, task, work, strains):
     """Report of a step that Newton has solved, and strains of its elements.
 
     Returns its largest turn of a chord, rad, and the cell; or the spin of a cell against the next one, where that is
     more than LARGEST_STEP_TURN: half a turn more or less would not show in the twist of the element between them.
     """
+    old, new, was, now = states
     u, report, dt = work.u, work.report, s.dt
     sharp = (0.0, -1, 0.0, -1)
     if space is not None:
