@@ -20,6 +20,7 @@ gradient phi' J^T n, and with the foot eliminated the second derivative
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from hybrid.kernels.algebra.rotations import dot, get3, scale, sub
 from hybrid.kernels.machine.compile import inner
@@ -136,12 +137,21 @@ PLACE, DISTANCE, SPRING, FOOT_PLACE = 21, 22, 23, 24
 POINT = 25
 
 
-@inner
-def note_point(kind, r, p, u, q, v, stays, width, size, weight, row):
-    """Fill the row of a point at u of piece p, and its foot at v of piece q; returns its energy, J.
+class Foot(NamedTuple):
+    """Where another strand is nearest to a point: at v of piece q; stays: whether it is kept at an end of the cable."""
 
-    weight: m, length that the point stands for; stays: whether the foot is kept at an end of the cable.
+    q: int
+    v: float
+    stays: bool
+
+
+@inner
+def note_point(kind, r, p, u, nearest, width, size, weight, row):
+    """Fill the row of a point at u of piece p, and of its `Foot` on another strand; returns its energy, J.
+
+    weight: m, length that the point stands for.
     """
+    q, v, stays = nearest
     w, wy = spline_weights(kind, p, u), spline_weights(kind, q, v)
     away = sub(spline_point(r, p, w), spline_point(r, q, wy))
     d = math.sqrt(dot(away, away))

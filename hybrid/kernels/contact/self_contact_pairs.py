@@ -22,6 +22,7 @@ from hybrid.kernels.contact.self_contact_law import (
     OUTER,
     POINT,
     WITHIN,
+    Foot,
     P,
     Q,
     end_factors,
@@ -363,7 +364,7 @@ def gather(line, contact, p, q, width):
         length = (
             0.5 * ((1.0 - u) * before * line.h[p - 1] + u * after * line.h[p]) / count
         )  # half: each strand has points
-        energy = note_point(kind, r, p, u, q, v, side != 0, width, size, length, row)
+        energy = note_point(kind, r, p, u, Foot(q, v, side != 0), width, size, length, row)
         numbers[ENERGY] += energy
         a, b = contact.of[p], contact.of[q]
         contact.shares[a, WITHIN_LINE if a == b else BETWEEN] += 0.5 * energy

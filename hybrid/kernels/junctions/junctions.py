@@ -13,6 +13,8 @@ A point that lines are clamped to is a body without mass.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from hybrid.kernels.algebra.rotations import cross, hat, mat_mat, vector
 from hybrid.kernels.junctions.bodies import LINES, X, add_own, reach_out
 from hybrid.kernels.junctions.carried_frames import TURNS, WITH_POINT, answer_of_end, place_frame, turns
@@ -38,6 +40,7 @@ from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.march.zone_torque import torsional_stiffness
 from hybrid.kernels.state.report import MOMENT_A, NET_A
+from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.job import read
 
 START, END = 0, 1
@@ -190,12 +193,22 @@ def follow(joint, points, arm, clamped, G):
     return 6 if clamped else 3, 6
 
 
-@inner
-def add_row(S, r, part, A, e, m, tension, at, rows, size, G):
-    """A part of row r of S into row e of A; tension: its column there, -1: none.
+class Followers(NamedTuple):
+    """How both ends of a line follow the points and bodies that they are joined to.
 
-    at, rows, size: where the unknowns of both ends begin, rows and columns of their G.
+    at: where the unknowns of those begin; rows, size: how many rows and columns of their G, (2, 6, 6), count.
     """
+
+    at: tuple[int, int]
+    rows: tuple[int, int]
+    size: tuple[int, int]
+    G: Floats
+
+
+@inner
+def add_row(S, r, part, A, e, m, tension, followers):
+    """A part of row r of S into row e of A; tension: its column there, -1: none; followers: of the line's ends."""
+    at, rows, size, G = followers
     if tension >= 0:
         A[e, tension] += part * S[r, TENSION]
     A[e, m] += part * S[r, RIGHT]
@@ -222,13 +235,14 @@ def spread(l, job, system, tensions, row, m):
     rows, size = (rows0, rows1), (size0, size1)
     at = (first_unknown(max(start, 0), tensions, points), first_unknown(max(end, 0), tensions, points))
     twist_ends(l, seats, job, at, A)
+    followers = Followers(at, rows, size, G)
     if row >= 0:
-        add_row(S, TENSION, 1.0, A, row, m, row, at, rows, size, G)
+        add_row(S, TENSION, 1.0, A, row, m, row, followers)
     for k in range(2):
         for j in range(size[k]):
             for i in range(rows[k]):
                 if G[k, i, j] != 0.0:
-                    add_row(S, AT[k] + i, G[k, i, j], A, at[k] + j, m, row, at, rows, size, G)
+                    add_row(S, AT[k] + i, G[k, i, j], A, at[k] + j, m, row, followers)
         if size[k] == 6:
             o = NET_A + 3 * k
             T = mat_mat(hat((report[o], report[o + 1], report[o + 2])), hat(vector(arms[l, k], 0)))

@@ -16,6 +16,7 @@ of its velocity u relative to the water and of the water's acceleration a there;
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.kernels.machine.compile import inner
@@ -30,12 +31,19 @@ def at(row, o):
     return (row[o], row[o + 1], row[o + 2])
 
 
+class PieceForce(NamedTuple):
+    """Force f, N, on a piece, and the parts of its derivative by u: -p (1 - d d^T) - q un un^T - s d d^T."""
+
+    f: Any
+    un: Any
+    p: float
+    q: float
+    s: float
+
+
 @inner
 def piece_force(row, o, d, u):
-    """Force on the piece at o of a row, direction d, relative velocity u (inertial), and the parts of its derivative by
-
-    u: -p (1 - d d^T) - q un un^T - s d d^T.
-    """
+    """`PieceForce` on the piece at o of a row, direction d, relative velocity u (inertial)."""
     w, cn, ct = row[o + WET], row[o + CN], row[o + CT]
     ut = dot(d, u)
     un = sub(u, scale(ut, d))
@@ -43,12 +51,13 @@ def piece_force(row, o, d, u):
     push = scale(row[o + CM], sub(a, scale(dot(d, a), d)))
     f = sub(scale(w, push), add(scale(w * cn * size, un), scale(w * ct * abs(ut) * ut, d)))
     q = w * cn / size if size > 0.0 else 0.0
-    return f, un, w * cn * size, q, 2.0 * w * ct * abs(ut)
+    return PieceForce(f, un, w * cn * size, q, 2.0 * w * ct * abs(ut))
 
 
 @inner
-def piece_change(f, un, p, q, s, c, d, u, a, du, turn):
-    """Change of the force f of a piece by du and by a turn of its direction, inertial; c: w cm, a: of the water."""
+def piece_change(force, c, d, u, a, du, turn):
+    """Change of the `PieceForce` of a piece by du and by a turn of its direction, inertial; c: w cm, a: of the water."""
+    f, un, p, q, s = force
     dv = sub(du, cross(turn, u))  # as seen from the piece
     t = dot(d, dv)
     n = sub(dv, scale(t, d))
@@ -66,7 +75,7 @@ def members_force(row, first, count, R, v, spin):
         o = first + PIECE * k
         arm, d = mat_vec(R, at(row, o + MIDDLE)), mat_vec(R, at(row, o + ALONG))
         here = add(v, cross(spin, arm))
-        f, _, _, _, _ = piece_force(row, o, d, sub(here, at(row, o + WATER)))
+        f = piece_force(row, o, d, sub(here, at(row, o + WATER))).f
         F, M, power = add(F, f), add(M, cross(arm, f)), power + dot(f, here)
     return F, M, power
 
@@ -80,8 +89,8 @@ def members_change(row, first, count, R, v, spin, dv, dspin, turn):
         arm, d = mat_vec(R, at(row, o + MIDDLE)), mat_vec(R, at(row, o + ALONG))
         darm = cross(turn, arm)
         u = sub(add(v, cross(spin, arm)), at(row, o + WATER))
-        f, un, p, q, s = piece_force(row, o, d, u)
+        force = piece_force(row, o, d, u)
         du, c, a = add(dv, add(cross(dspin, arm), cross(spin, darm))), row[o + WET] * row[o + CM], at(row, o + PUSH)
-        df = piece_change(f, un, p, q, s, c, d, u, a, du, turn)
-        dF, dM = add(dF, df), add(dM, add(cross(darm, f), cross(arm, df)))
+        df = piece_change(force, c, d, u, a, du, turn)
+        dF, dM = add(dF, df), add(dM, add(cross(darm, force.f), cross(arm, df)))
     return dF, dM
