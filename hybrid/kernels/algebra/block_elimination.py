@@ -29,6 +29,7 @@ last block keep the pivot block itself, which lines that are joined need (kernel
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from hybrid.kernels.machine.compile import inner, kernel
 
@@ -38,6 +39,25 @@ SPAN = 9  # columns of X_i
 ROW = SIZE * SPAN  # numbers of X_i
 KEPT = 73  # numbers kept of a block, for another right-hand side
 IN_ORDER = 0 | 1 << 3 | 2 << 6 | 3 << 9 | 4 << 12  # rows of a pivot block as they stand
+
+
+class Length(NamedTuple):
+    """The law of length of the cell before node i, row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap."""
+
+    row: Any
+    hck: float
+    gap: float
+
+
+class NarrowBalance(NamedTuple):
+    """The balance of a node without bending, L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} = b."""
+
+    back: Any
+    L: Any
+    D: Any
+    ahead: Any
+    U: Any
+    b: Any
 
 
 @inner
@@ -227,12 +247,13 @@ def eliminate_wide(W, X, i, kept, size, couples):
 
 
 @inner
-def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, X, i, kept, size):
-    """Eliminate a block of four unknowns (dT_{i-1}, dr_i); X_i keeps zeros elsewhere.  kept, size: as of a wide one.
+def eliminate_narrow(length, node, X, i, kept, size):
+    """Eliminate a block of four unknowns (dT_{i-1}, dr_i); X_i keeps zeros elsewhere.
 
-    length   row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap
-    balance  L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} = b
+    length, node: its `Length` and `NarrowBalance`; kept, size: as of a wide one.
     """
+    row, hck, gap = length
+    back, L, D, ahead, U, b = node
     # rows of dT_{i-1}, dr_i | dT_i, dr_{i+1} | right-hand side
     A0 = (-hck, row[0], row[1], row[2], gap)
     A1 = (back[0], D[0], D[1], D[2], b[0])

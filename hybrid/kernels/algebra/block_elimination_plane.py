@@ -67,12 +67,14 @@ def keep(X, k, size, K, lower, pivot):
 
 
 @inner
-def eliminate2(row, hck, gap, K, L, back, D, ahead, U, V, b, X, i, kept, size):
-    """Eliminate the block of node i; False when it is singular.  kept: where its factors are kept in X, 0: nowhere.
+def eliminate2(length, node, X, i, kept):
+    """Eliminate the block of node i; False when it is singular.
 
-    length   row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap
-    balance  K dr_{i-2} + L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} + V dr_{i+2} = b
+    length: `Length` of the cell before it; node: its `Balance` (kernels.march.assembly_plane); kept: where its factors
+    are kept in X, 0: nowhere.
     """
+    row, hck, gap = length
+    K, L, back, D, ahead, U, V, b, size = node
     t1, t2 = 0.0, 0.0
     L1, L2, D1, D2, b1, b2 = (L[0], L[1]), (L[2], L[3]), (D[0], D[1]), (D[2], D[3]), b[0], b[1]
     if i >= 2:
@@ -126,8 +128,10 @@ def subtract_chain(A, m, X, p, q):
 
 
 @inner
-def eliminate_chain(row, hck, gap, L, back, D, ahead, U, b, X, i, kept, size):
+def eliminate_chain(length, node, X, i, kept):
     """As `eliminate2` where nothing bends: X_i keeps zeros for dr_{i+2}."""
+    row, hck, gap = length
+    _, L, back, D, ahead, U, _, b, size = node
     B0 = (-hck, row[0], row[1], gap)
     B1 = (back[0], D[0], D[1], b[0])
     B2 = (back[1], D[2], D[3], b[1])

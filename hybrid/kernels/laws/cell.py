@@ -33,6 +33,13 @@ class Chord(NamedTuple):
     il: float
 
 
+class Rates(NamedTuple):
+    """How velocities and accelerations answer to positions in the time scheme: dv'/dr', 1/s, and dvd'/dr', 1/s2."""
+
+    cv: float
+    ca: float
+
+
 @inner
 def chord(e):
     """Direction d, length l and 1/l of a chord."""

@@ -21,7 +21,8 @@ import math
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.laws.bed import bed_under
-from hybrid.kernels.laws.node_forces import Z3, body_water
+from hybrid.kernels.laws.cell import Rates
+from hybrid.kernels.laws.node_forces import Z3, Water, body_water
 from hybrid.kernels.laws.seabed import pressure
 from hybrid.kernels.laws.soil import borne_length
 from hybrid.kernels.laws.water import current_at
@@ -49,7 +50,7 @@ def body_force(line, sea, i, x, state):
             af = (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
             w, b = sub(w, get3(sea.flow, i)), sub(b, af)
             eta += sea.flow[i, 6]
-        f, _, _ = body_water(line, i, x[2], eta, w, U1, v, b, af, 0.0, 0.0)
+        f, _, _ = body_water(line, i, Water(x[2], eta, w, U1, b, af), v, Rates(0.0, 0.0))
         F = add(F, f)
     if line.bits & SEABED and line.footing[i] > 0.0:
         n, p = bed_under(sea, x)

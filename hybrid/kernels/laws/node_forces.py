@@ -6,6 +6,8 @@ and kernels.laws.seabed.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mat_vec, mscale, outer, scale, sub
 from hybrid.kernels.laws.bed import bed_before, bed_beside, bed_under, depth_falls
 from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
@@ -37,13 +39,26 @@ Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 UP = (0.0, 0.0, 1.0)
 
 
-@inner
-def half_cell_water(line, c, side, z, eta, u, U1, vi, b, af, chord, cv, ca, report):
-    """Force of the water on the half cell c before (side -1) or after (+1) a node: f, D (dr_i), L (chord).
+class Water(NamedTuple):
+    """The water at a node, in space or in a plane: heights z of the node and eta of the surface, and how it moves.
 
-    z: height of the node; u: velocity relative to the water; b: acceleration relative to it; af: of the water.
+    u, b: velocity and acceleration of the node relative to it; U1: slope of the current over height; af: its own
+    acceleration.
     """
-    bits = line.bits
+
+    z: float
+    eta: float
+    u: Any
+    U1: Any
+    b: Any
+    af: Any
+
+
+@inner
+def half_cell_water(line, c, side, water, vi, chord, rates, report):
+    """Force of the water on the half cell c before (side -1) or after (+1) a node: f, D (dr_i), L (chord)."""
+    bits, (cv, ca) = line.bits, rates
+    z, eta, u, U1, b, af = water
     d, l, il = chord
     f, D, L = Z3, Z9, Z9
     if bits & DRAG:
@@ -98,9 +113,10 @@ def wet_parts(line, i, z, eta):
 
 
 @inner
-def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca):
+def body_water(line, i, water, vi, rates):
     """Force of the water on a body at node i, D, and its powers: of drag, of added mass, of waves and buoyancy."""
-    bits = line.bits
+    bits, (cv, ca) = line.bits, rates
+    z, eta, u, U1, b, af = water
     f, B = body_drag(u, line.point_drag[i])
     D = mscale(cv, B)
     if bits & FLOW:
@@ -220,12 +236,12 @@ def seabed_forces(line, sea, i, x, u, v, state, cv, report):
 
 
 @inner
-def inertia_and_water(line, sea, i, z, vi, vdi, before, after, cv, ca, report):
+def inertia_and_water(line, sea, i, z, vi, vdi, before, after, rates, report):
     """Weight, inertia, damping and water on node i at height z: F, and its derivatives D (dr_i), GL, GR (chords).
 
     before, after: the chords beside the node.
     """
-    m = line.mass[i]
+    m, (cv, ca) = line.mass[i], rates
     F = sub(get3(line.force, i), scale(m, vdi))
     c = -ca * m
     D = (c, 0.0, 0.0, 0.0, c, 0.0, 0.0, 0.0, c)
@@ -248,14 +264,15 @@ def inertia_and_water(line, sea, i, z, vi, vdi, before, after, cv, ca, report):
             w, af = sub(w, get3(sea.flow, i)), (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
             b = sub(b, af)
             eta += sea.flow[i, 6]
+        water = Water(z, eta, w, U1, b, af)
         if i > 0:
-            f, Df, GL = half_cell_water(line, i - 1, -1.0, z, eta, w, U1, vi, b, af, before, cv, ca, report)
+            f, Df, GL = half_cell_water(line, i - 1, -1.0, water, vi, before, rates, report)
             F, D = add(F, f), madd(D, Df)
         if i < line.h.shape[0]:
-            f, Df, GR = half_cell_water(line, i, 1.0, z, eta, w, U1, vi, b, af, after, cv, ca, report)
+            f, Df, GR = half_cell_water(line, i, 1.0, water, vi, after, rates, report)
             F, D = add(F, f), madd(D, Df)
         if bits & BODIES:
-            f, Df, (drag, added, pushed) = body_water(line, i, z, eta, w, U1, vi, b, af, cv, ca)
+            f, Df, (drag, added, pushed) = body_water(line, i, water, vi, rates)
             F, D = add(F, f), madd(D, Df)
             report[DRAG_POWER] -= drag
             report[ADDED_MASS_POWER] -= added
@@ -264,11 +281,11 @@ def inertia_and_water(line, sea, i, z, vi, vdi, before, after, cv, ca, report):
 
 
 @kernel  # called for every node, not inlined in each of the loops that do
-def node_loads(line, sea, i, r, u, state, before, after, cv, ca, report):
+def node_loads(line, sea, i, r, u, state, before, after, rates, report):
     """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
-    v = state.v
+    v, cv = state.v, rates.cv
     F, D, GL, GR = inertia_and_water(
-        line, sea, i, r[i, 2] + u[i, 2], get3(v, i), get3(state.vd, i), before, after, cv, ca, report
+        line, sea, i, r[i, 2] + u[i, 2], get3(v, i), get3(state.vd, i), before, after, rates, report
     )
     if line.bits & VORTICES:
         f, Df, L, R = lift_at(line, sea, i, r[i, 2] + u[i, 2], state, before, after, cv, report)

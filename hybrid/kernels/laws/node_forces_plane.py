@@ -19,7 +19,7 @@ from hybrid.kernels.algebra.plane import (
     to_space,
     vector_in_plane,
 )
-from hybrid.kernels.laws.node_forces import wet_parts
+from hybrid.kernels.laws.node_forces import Water, wet_parts
 from hybrid.kernels.laws.seabed import contact, pressure
 from hybrid.kernels.laws.soil import left_of, soil_force
 from hybrid.kernels.laws.water import current_at, wetted_stretch
@@ -44,9 +44,10 @@ Z4 = (0.0, 0.0, 0.0, 0.0)
 
 
 @inner
-def half_cell_water2(line, c, side, up, z, eta, u, U1, vi, b, af, chord, cv, ca, report):
+def half_cell_water2(line, c, side, up, water, vi, chord, rates, report):
     """Force of the water on the half cell c before (side -1) or after (+1) a node: f, D (dr_i), L (chord)."""
-    bits = line.bits
+    bits, (cv, ca) = line.bits, rates
+    z, eta, u, U1, b, af = water
     d, l, il = chord
     f, D, L = Z2, Z4, Z4
     if bits & DRAG:
@@ -84,9 +85,10 @@ def half_cell_water2(line, c, side, up, z, eta, u, U1, vi, b, af, chord, cv, ca,
 
 
 @inner
-def body_water2(line, i, up, z, eta, u, U1, vi, b, af, cv, ca, report):
+def body_water2(line, i, up, water, vi, rates, report):
     """Force of the water on a body at node i, and D."""
-    bits = line.bits
+    bits, (cv, ca) = line.bits, rates
+    z, eta, u, U1, b, af = water
     f, B = body_drag2(u, line.point_drag[i])
     D = mscale2(cv, B)
     if bits & FLOW:
@@ -181,9 +183,9 @@ def seabed2(line, sea, i, r, u, v, state, cv, report):
 
 
 @inner
-def node_loads2(line, sea, i, r, u, state, before, after, cv, ca, report):
+def node_loads2(line, sea, i, r, u, state, before, after, rates, report):
     """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
-    bits, plane = line.bits, line.plane
+    bits, plane, (cv, ca) = line.bits, line.plane, rates
     vi, vdi = row_in_plane(plane, state.v, i), row_in_plane(plane, state.vd, i)
     m = line.mass[i]
     F = row_in_plane(plane, line.force, i)
@@ -211,14 +213,15 @@ def node_loads2(line, sea, i, r, u, state, before, after, cv, ca, report):
             af = vector_in_plane(plane, (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5]))
             w, b = (w[0] - U[0], w[1] - U[1]), (b[0] - af[0], b[1] - af[1])
             eta += sea.flow[i, 6]
+        water = Water(z, eta, w, U1, b, af)
         if i > 0:
-            f, Df, GL = half_cell_water2(line, i - 1, -1.0, up, z, eta, w, U1, vi, b, af, before, cv, ca, report)
+            f, Df, GL = half_cell_water2(line, i - 1, -1.0, up, water, vi, before, rates, report)
             F, D = (F[0] + f[0], F[1] + f[1]), madd2(D, Df)
         if i < line.h.shape[0]:
-            f, Df, GR = half_cell_water2(line, i, 1.0, up, z, eta, w, U1, vi, b, af, after, cv, ca, report)
+            f, Df, GR = half_cell_water2(line, i, 1.0, up, water, vi, after, rates, report)
             F, D = (F[0] + f[0], F[1] + f[1]), madd2(D, Df)
         if bits & BODIES:
-            f, Df = body_water2(line, i, up, z, eta, w, U1, vi, b, af, cv, ca, report)
+            f, Df = body_water2(line, i, up, water, vi, rates, report)
             F, D = (F[0] + f[0], F[1] + f[1]), madd2(D, Df)
     if bits & SEABED:
         f, Df, L, R = seabed2(line, sea, i, r, u, state.v, state, cv, report)

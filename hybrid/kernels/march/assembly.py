@@ -8,7 +8,14 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, eliminate_narrow, eliminate_wide
+from hybrid.kernels.algebra.block_elimination import (
+    SIZE,
+    WIDTH,
+    Length,
+    NarrowBalance,
+    eliminate_narrow,
+    eliminate_wide,
+)
 from hybrid.kernels.algebra.rotations import (
     add,
     cross,
@@ -90,6 +97,13 @@ class Force(NamedTuple):
     row: Any
     hck: float
     gap: float
+
+
+class LoadedCell(NamedTuple):
+    """A cell and its force."""
+
+    cell: Cell
+    force: Force
 
 
 class Balance(NamedTuple):
@@ -198,11 +212,12 @@ def element_after(line, ends, state, i, cell, following, cv, couple, report):
 
 
 @inner
-def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, couple, report):
+def cell_force(line, state, i, cell, here, there, bent, rates, work):
     """Force of cell i between the elements `here` and `there`; of no cell beyond the last one, whose dT is 0."""
     if i >= line.h.shape[0]:
         return Force(Z3, Z9, Z3, Z9, Z3, Z9, Z3, Z3, 1.0, 0.0)
-    d, l, il = cell.chord
+    gaps, couple, report = work.gaps, work.couple, work.report
+    (d, l, il), (cv, ca) = cell.chord, rates
     bits, T, w = line.bits, state.T[i], state.w[i]
     Nm, nm, n0, Np, np = Z9, Z3, Z3, Z9, Z3
     f, N0 = pull(d, il, T)
@@ -245,10 +260,11 @@ def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, couple, re
 
 
 @inner
-def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report):
+def balance(line, sea, ends, r, state, i, before, after, rates, work):
     """The balance of node i between two cells and their forces."""
-    n = line.h.shape[0]
-    F, D, GL, GR = node_loads(line, sea, i, r, u, state, cell_before.chord, cell.chord, cv, ca, report)
+    n, u, report = line.h.shape[0], work.u, work.report
+    force_before, force = before.force, after.force
+    F, D, GL, GR = node_loads(line, sea, i, r, u, state, before.cell.chord, after.cell.chord, rates, report)
     F = add(F, sub(force.f, force_before.f))
     held = (i == 0 and ends.held[0] != 0) or (i == n and ends.held[1] == 1)
     if i == 0:
@@ -332,11 +348,12 @@ def size_of_spin(line, i, cell, here, there, ca):
 
 
 @inner
-def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, passed, couple):
-    """The whole block row of node i, with its balance also where it is held."""
+def fill(line, state, i, node, before, after, here, there, ca, work):
+    """The whole block row of node i into work.W, with its balance also where it is held."""
+    W, couple, (cell, force), force_before = work.W, work.couple, after, before.force
     for j in range(SIZE * WIDTH):
         W[j] = 0.0
-    row, d_before, d = force_before.row, cell_before.chord.d, cell.chord.d
+    row, d_before, d = force_before.row, before.cell.chord.d, cell.chord.d
     W[6], W[7], W[8] = -row[0], -row[1], -row[2]
     W[11], W[12], W[13] = row[0], row[1], row[2]
     W[10], W[23] = -force_before.hck, force_before.gap
@@ -354,7 +371,7 @@ def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, 
         W[o + 15] = d[j]
         W[o + 19] = force.np[j]
     W[WIDTH + 23], W[2 * WIDTH + 23], W[3 * WIDTH + 23] = node.rhs
-    fill_spin(W, line, state, i, cell, here, there, ca, passed)
+    fill_spin(W, line, state, i, cell, here, there, ca, work.torsion.passed)
     if couple.shape[0] > 0:
         couple_rows(W, couple, line, state.e, i)
 
@@ -384,9 +401,9 @@ def eliminate(W, X, i, kept, node, cell_before, cell, force_before, wide, couple
             W[j] *= size
         W[23] *= size
         return eliminate_wide(W, X, i, kept, size, couples)
-    sized = (size * row[0], size * row[1], size * row[2])
-    hck, gap = size * force_before.hck, size * force_before.gap
+    length = Length((size * row[0], size * row[1], size * row[2]), size * force_before.hck, size * force_before.gap)
     if node.held:
-        return eliminate_narrow(sized, hck, gap, Z3, Z9, UNIT, Z3, Z9, node.gap, X, i, kept, size)
+        return eliminate_narrow(length, NarrowBalance(Z3, Z9, UNIT, Z3, Z9, node.gap), X, i, kept, size)
     back, L = scale(-1.0, cell_before.chord.d), mscale(-1.0, node.G1)
-    return eliminate_narrow(sized, hck, gap, back, L, node.D, cell.chord.d, node.G2, node.rhs, X, i, kept, size)
+    narrow = NarrowBalance(back, L, node.D, cell.chord.d, node.G2, node.rhs)
+    return eliminate_narrow(length, narrow, X, i, kept, size)

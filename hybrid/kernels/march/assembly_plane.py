@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from hybrid.kernels.algebra.block_elimination import ROW
+from hybrid.kernels.algebra.block_elimination import ROW, Length
 from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE, WIDE, eliminate2, eliminate_chain
 from hybrid.kernels.algebra.plane import (
     angle_between,
@@ -29,7 +29,7 @@ from hybrid.kernels.algebra.plane import (
 from hybrid.kernels.laws.axial_law import LOSS, SHIFT
 from hybrid.kernels.laws.bending_law import has_bend_law, shares_of_stiffness
 from hybrid.kernels.laws.bending_slip import slip_about_normal
-from hybrid.kernels.laws.cell import Chord
+from hybrid.kernels.laws.cell import Chord, Rates
 from hybrid.kernels.laws.end_forces import note_end
 from hybrid.kernels.laws.node_forces_plane import node_loads2
 from hybrid.kernels.machine.compile import inner, kernel
@@ -76,6 +76,13 @@ class Force(NamedTuple):
     row: Any
     hck: float
     gap: float
+
+
+class LoadedCell(NamedTuple):
+    """A cell and its force."""
+
+    cell: Cell
+    force: Force
 
 
 class Balance(NamedTuple):
@@ -175,11 +182,12 @@ def element_after(line, ends, state, i, cell, following, report):
 
 
 @inner
-def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, report):
+def cell_force(line, state, i, cell, here, there, bent, rates, work):
     """Force of cell i between the elements `here` and `there`; of no cell beyond the last one, whose dT is 0."""
     if i >= line.h.shape[0]:
         return Force(Z2, Z4, Z4, Z4, Z2, 1.0, 0.0)
-    d, l, il = cell.chord
+    gaps, report = work.gaps, work.report
+    (d, l, il), (cv, ca) = cell.chord, rates
     T, h, m = state.T[i], line.h[i], (-d[1], d[0])
     Nm, Np = Z4, Z4
     f, N0 = (T * d[0], T * d[1]), outer2(T * il, m, m)
@@ -214,11 +222,11 @@ def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, report):
 
 
 @inner
-def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report):
+def balance(line, sea, ends, r, state, i, before, after, rates, work):
     """The balance of node i between two cells and their forces."""
-    n, plane = line.h.shape[0], line.plane
-    before, after = cell_before.chord, cell.chord
-    F, D, GL, GR = node_loads2(line, sea, i, r, u, state, before, after, cv, ca, report)
+    n, plane, u, report = line.h.shape[0], line.plane, work.u, work.report
+    force_before, force = before.force, after.force
+    F, D, GL, GR = node_loads2(line, sea, i, r, u, state, before.cell.chord, after.cell.chord, rates, report)
     F = (F[0] + force.f[0] - force_before.f[0], F[1] + force.f[1] - force_before.f[1])
     if i == 0:
         f = row_in_plane(plane, ends.force, 0)
@@ -243,20 +251,19 @@ def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, fo
     if not size > 0.0:
         size = 1.0
     K, V = force_before.Nm, force.Np
-    back = (-before.d[0], -before.d[1])
-    return Balance(K, mscale2(-1.0, madd2(K, G1)), back, D, after.d, msub2(G2, V), V, (-F[0], -F[1]), size)
+    d, ahead = before.cell.chord.d, after.cell.chord.d
+    back = (-d[0], -d[1])
+    return Balance(K, mscale2(-1.0, madd2(K, G1)), back, D, ahead, msub2(G2, V), V, (-F[0], -F[1]), size)
 
 
 @inner
 def eliminate(node, force_before, X, i, kept, wide):
     """Eliminate the block row of node i, with its law of length in the unit of the balance; False if singular."""
     size, row = node.size, force_before.row
-    sized = (size * row[0], size * row[1])
-    hck, gap = size * force_before.hck, size * force_before.gap
-    K, L, back, D, ahead, U, V, b, _ = node
+    length = Length((size * row[0], size * row[1]), size * force_before.hck, size * force_before.gap)
     if wide:
-        return eliminate2(sized, hck, gap, K, L, back, D, ahead, U, V, b, X, i, kept, size)
-    return eliminate_chain(sized, hck, gap, L, back, D, ahead, U, b, X, i, kept, size)
+        return eliminate2(length, node, X, i, kept)
+    return eliminate_chain(length, node, X, i, kept)
 
 
 @kernel
@@ -267,7 +274,7 @@ def march_planar(line, sea, ends, r, state, cv, ca, work):
     the X_i where X has room for those of space (kernels.run.entry.workspace).
     """
     n, plane = line.h.shape[0], line.plane
-    u, X, report, rows = work.u, work.X, work.report, work.rows
+    X, report, rows, rates = work.X, work.report, work.rows, Rates(cv, ca)
     kept, next_kept = 0, 0
     if X.shape[0] > (n + 1) * ROW:
         kept, next_kept = (n + 1) * TRIPLE, KEPT
@@ -286,8 +293,9 @@ def march_planar(line, sea, ends, r, state, cv, ca, work):
         following = cell_at(line, state, i + 1, cv)
         there = element_after(line, ends, state, i, cell, following, report)
         bent = i < n and (line.element[i] != 0 or line.element[i + 1] != 0 or line.spin[i] != 0)
-        force = cell_force(line, state, i, cell, here, there, bent, work.gaps, cv, ca, report)
-        node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
+        force = cell_force(line, state, i, cell, here, there, bent, rates, work)
+        before, after = LoadedCell(cell_before, force_before), LoadedCell(cell, force)
+        node = balance(line, sea, ends, r, state, i, before, after, rates, work)
         if rows.shape[0] > 0:
             store_block_row(rows, i, node, force_before)
         if not eliminate(node, force_before, X, i, kept, bent or bent_before):

@@ -6,13 +6,14 @@ The same functions as in kernels.march.march: what only derivatives need is not 
 from __future__ import annotations
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, sub
-from hybrid.kernels.laws.cell import Chord
+from hybrid.kernels.laws.cell import Chord, Rates
 from hybrid.kernels.laws.node_forces import Z3, Z9, node_loads
 from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.march.assembly import (
     Cell,
     Element,
     Force,
+    LoadedCell,
     balance,
     cell_at,
     cell_force,
@@ -27,11 +28,11 @@ from hybrid.kernels.state.report import ASSEMBLED, MOMENT_A, MOMENT_B, RESIDUAL_
 @inner
 def catenaries_left_over(line, sea, r, state, i, cv, ca, work, b):
     """Fill b from node i on as long as the cells on both sides are catenaries; the next node, and the force before it."""
-    u, report, gaps, n = work.u, work.report, work.gaps, line.h.shape[0]
+    u, report, gaps, n, rates = work.u, work.report, work.gaps, line.h.shape[0], Rates(cv, ca)
     before, f, N, hck, gap = catenary_cell(line, state, i - 1, gaps)
     while i < n and not is_bent(line, i):
         after, fa, Na, hcka, gapa = catenary_cell(line, state, i, gaps)
-        F, _, _, _ = node_loads(line, sea, i, r, u, state, before, after, cv, ca, report)
+        F, _, _, _ = node_loads(line, sea, i, r, u, state, before, after, rates, report)
         F = add(F, sub(fa, f))
         b[i, 0], b[i, 1], b[i, 2], b[i, 3], b[i, 4] = gap, -F[0], -F[1], -F[2], 0.0
         before, f, N, hck, gap = after, fa, Na, hcka, gapa
@@ -46,7 +47,7 @@ def left_over_in_space(line, sea, ends, r, state, cv, ca, work, b):
     The rest as of `kernels.march.march.march`, and the report as from there.  No torque passes through catenary zones.
     """
     n = line.h.shape[0]
-    u, report, couple = work.u, work.report, work.couple
+    report, couple, rates = work.report, work.couple, Rates(cv, ca)
     for j in range(ASSEMBLED):
         report[j] = 0.0
     report[RESIDUAL_NODE] = -1.0
@@ -66,8 +67,9 @@ def left_over_in_space(line, sea, ends, r, state, cv, ca, work, b):
         following = cell_at(line, ends, state, i + 1, cv)
         there = element_after(line, ends, state, i, cell, following, cv, couple, report)
         bent = i < n and is_bent(line, i)
-        force = cell_force(line, state, i, cell, here, there, bent, work.gaps, cv, ca, couple, report)
-        node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
+        force = cell_force(line, state, i, cell, here, there, bent, rates, work)
+        before, after = LoadedCell(cell_before, force_before), LoadedCell(cell, force)
+        node = balance(line, sea, ends, r, state, i, before, after, rates, work)
         b[i, 0], b[i, 1], b[i, 2], b[i, 3], b[i, 4] = force_before.gap, 0.0, 0.0, 0.0, 0.0
         if not node.held:
             b[i, 1], b[i, 2], b[i, 3] = node.rhs

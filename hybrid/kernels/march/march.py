@@ -6,15 +6,16 @@ bending, some 150 numbers, would be most of what they cost.
 
 from __future__ import annotations
 
-from hybrid.kernels.algebra.block_elimination import KEPT, ROW, eliminate_narrow
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW, Length, NarrowBalance, eliminate_narrow
 from hybrid.kernels.algebra.rotations import add, get3, madd, mscale, msub, scale, sub
-from hybrid.kernels.laws.cell import Chord, chord, pull, stretch
+from hybrid.kernels.laws.cell import Chord, Rates, chord, pull, stretch
 from hybrid.kernels.laws.node_forces import Z3, Z9, node_loads
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import (
     Cell,
     Element,
     Force,
+    LoadedCell,
     balance,
     cell_at,
     cell_force,
@@ -55,13 +56,13 @@ def march_catenaries(line, sea, r, state, i, cv, ca, work, kept, next_kept):
     Returns the next node or, of a block that was singular, that node and False; and what `march` goes on with: force,
     derivative and law of length of the cell before.
     """
-    u, X, report, gaps = work.u, work.X, work.report, work.gaps
+    u, X, report, gaps, rates = work.u, work.X, work.report, work.gaps, Rates(cv, ca)
     worst, where = report[RESIDUAL], report[RESIDUAL_NODE]
     before, f, N, hck, gap = catenary_cell(line, state, i - 1, gaps)
     good, n = True, line.h.shape[0]
     while good and i < n and not is_bent(line, i):
         after, fa, Na, hcka, gapa = catenary_cell(line, state, i, gaps)
-        F, D, GL, GR = node_loads(line, sea, i, r, u, state, before, after, cv, ca, report)
+        F, D, GL, GR = node_loads(line, sea, i, r, u, state, before, after, rates, report)
         F = add(F, sub(fa, f))
         G1, G2 = msub(GL, N), madd(Na, GR)
         D = madd(msub(G1, G2), D)
@@ -72,10 +73,9 @@ def march_catenaries(line, sea, r, state, i, cv, ca, work, kept, next_kept):
         if not size > 0.0:
             size = 1.0
         at = (i - 1) * ROW  # a view from the block before on: numba need not ask whether indices are negative
-        good = eliminate_narrow(
-            scale(size, before.d), size * hck, size * gap, scale(-1.0, before.d), mscale(-1.0, G1), D, after.d, G2,
-            scale(-1.0, F), X[at:], 1, kept - at if kept > 0 else 0, size,
-        )  # fmt: skip
+        length = Length(scale(size, before.d), size * hck, size * gap)
+        node = NarrowBalance(scale(-1.0, before.d), mscale(-1.0, G1), D, after.d, G2, scale(-1.0, F))
+        good = eliminate_narrow(length, node, X[at:], 1, kept - at if kept > 0 else 0, size)
         if good:
             i += 1
             kept += next_kept
@@ -95,7 +95,7 @@ def march(line, sea, ends, r, state, cv, ca, work):
     factors of one block those of the last (kernels.algebra.block_elimination).
     """
     n = line.h.shape[0]
-    u, W, X, report, rows = work.u, work.W, work.X, work.report, work.rows
+    W, X, report, rows = work.W, work.X, work.report, work.rows
     keeps_start, keeps_rows = rows.shape[0] == 1, rows.shape[0] > 1
     kept, next_kept, last_kept, room = 0, 0, 0, X.shape[0] - (n + 1) * ROW
     known = work.torsion.known
@@ -111,7 +111,7 @@ def march(line, sea, ends, r, state, cv, ca, work):
     force_before = Force(Z3, Z9, Z3, Z9, Z3, Z9, Z3, Z3, -1.0, 0.0)  # there is no cell before the start: dT = 0
     bent_before = False
     cell = cell_at(line, ends, state, 0, cv)
-    couple = work.couple
+    couple, rates = work.couple, Rates(cv, ca)
     here = element_at_start(line, ends, state, cell, cv, couple, report)
     report[MOMENT_A], report[MOMENT_A + 1], report[MOMENT_A + 2] = here.M
     report[MOMENT_B], report[MOMENT_B + 1], report[MOMENT_B + 2] = get3(ends.moment, 1)  # unless an element is there
@@ -129,12 +129,12 @@ def march(line, sea, ends, r, state, cv, ca, work):
         following = cell_at(line, ends, state, i + 1, cv)
         there = element_after(line, ends, state, i, cell, following, cv, couple, report)
         bent = i < n and is_bent(line, i)
-        force = cell_force(line, state, i, cell, here, there, bent, work.gaps, cv, ca, couple, report)
-        node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
+        force = cell_force(line, state, i, cell, here, there, bent, rates, work)
+        before, after = LoadedCell(cell_before, force_before), LoadedCell(cell, force)
+        node = balance(line, sea, ends, r, state, i, before, after, rates, work)
         wide = bent or bent_before
         if wide or keeps_rows or (keeps_start and i == 0):
-            passed = work.torsion.passed
-            fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, passed, couple)
+            fill(line, state, i, node, before, after, here, there, ca, work)
             if keeps_start and i == 0:
                 keep_row(rows, 0, W)
             if node.held:

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
-from hybrid.kernels.laws.cell import Chord, chord
+from hybrid.kernels.laws.cell import Chord, Rates, chord
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.march.assembly import JOINED
@@ -156,8 +156,9 @@ def of_material(line, sea, ends, state, reel, i):
     for c in range(i, n):
         z -= numbers[SIDE] * state.e[cell(line, reel, c), 2]
     vi, ai = get3(state.v, k), get3(state.vd, k)
-    with_material, _, _, _ = inertia_and_water(line, sea, k, z, v, sub(ai, K), before, after, 0.0, 0.0, reel.report)
-    with_node, _, _, _ = inertia_and_water(line, sea, k, z, vi, ai, before, after, 0.0, 0.0, reel.report)
+    rates = Rates(0.0, 0.0)
+    with_material, _, _, _ = inertia_and_water(line, sea, k, z, v, sub(ai, K), before, after, rates, reel.report)
+    with_node, _, _, _ = inertia_and_water(line, sea, k, z, vi, ai, before, after, rates, reel.report)
     return sub(with_material, with_node), slope
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from hybrid.kernels.algebra.rotations import add, dot, frame, get3, get9, scale, sub
 from hybrid.kernels.laws.bending_law import bending_at
-from hybrid.kernels.laws.cell import Chord, chord, moment_force, rotary_force, turning
+from hybrid.kernels.laws.cell import Chord, Rates, chord, moment_force, rotary_force, turning
 from hybrid.kernels.laws.node_forces import Z9, node_loads
 from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.reel.paid_length import growing, node
@@ -69,7 +69,7 @@ def find_balance(line, sea, ends, state, reel):
         da, la, ia = chord(get3(state.e, i - 1))
         db, lb, ib = chord(get3(state.e, i))
         before, after = Chord(da, la, ia), Chord(db, lb, ib)
-        F, _, _, _ = node_loads(line, sea, i, state.r, reel.plain, state, before, after, 0.0, 0.0, reel.report)
+        F, _, _, _ = node_loads(line, sea, i, state.r, reel.plain, state, before, after, Rates(0.0, 0.0), reel.report)
         F = add(F, sub(force_in(line, ends, state, i), force_in(line, ends, state, i - 1)))
         both = add(da, db)
         F = sub(F, scale(dot(F, both) / max(dot(both, both), 1e-300), both))  # tensions balance the rest

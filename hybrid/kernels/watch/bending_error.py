@@ -24,7 +24,7 @@ from hybrid.kernels.algebra.block_elimination_plane import solve_again_planar
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
 from hybrid.kernels.laws.bed import bed_before, bed_beside, bed_under
-from hybrid.kernels.laws.cell import Chord
+from hybrid.kernels.laws.cell import Chord, Rates
 from hybrid.kernels.laws.end_motion import end_turn
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
 from hybrid.kernels.laws.seabed import contact, friction, pressure
@@ -154,12 +154,12 @@ def rates(line, sea, i, state, u, before, after, history):
     yi, zi = get3(history.y, i), get3(history.z, i)
     v, vd, F = get3(state.v, i), get3(state.vd, i), Z3
     for k in range(3):
-        cv, ca, x = 0.0, 0.0, scale(-1.0, add(yi, zi))
+        unit, x = Rates(0.0, 0.0), scale(-1.0, add(yi, zi))
         if k == 1:
-            cv, x = 1.0, yi
+            unit, x = Rates(1.0, 0.0), yi
         elif k == 2:
-            ca, x = 1.0, zi
-        _, D, _, _ = inertia_and_water(line, sea, i, state.r[i, 2], v, vd, before, after, cv, ca, history.powers)
+            unit, x = Rates(0.0, 1.0), zi
+        _, D, _, _ = inertia_and_water(line, sea, i, state.r[i, 2], v, vd, before, after, unit, history.powers)
         F = add(F, mat_vec(D, x))
     if line.bits & SEABED:
         F = add(F, seabed_rates(line, sea, i, state, u, history))
