@@ -17,7 +17,7 @@ import hybrid
 from hybrid.kernels.contact.self_contact import contact_task
 from hybrid.kernels.contact.self_contact_pairs import ENERGY, NODES, POINTS, TRIED
 from hybrid.kernels.contact.self_distance import LEAST_DISTANCE
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.step.newton import ASKED, FINISH, GAIN, LIMIT, PREPARE, TOUCH
 from hybrid.simulation.transient import Transient
 
@@ -62,7 +62,7 @@ def energy(run: Transient) -> float:
     """Kinetic, elastic and contact energy, with that of travels, J."""
     x, parts = run.state, np.zeros(5)
     room = np.zeros((x.T.size + 1, 3))
-    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, room, room.copy(), parts)
+    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
     numbers = run.run.contact.contact.numbers
     return float(parts.sum() + numbers[ENERGY] + numbers[TRIED])
 

@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -197,6 +198,50 @@ def test_only_the_command_line_prints() -> None:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
     ]
     assert not found
+
+
+# Arguments of a function, at most; those of a command of the command line are its options.
+MOST_ARGUMENTS = 10
+# Functions with more, and why.
+MORE_ARGUMENTS = {
+    "kernels/laws/tension_torque.py note_element": "called for every element, of which a record would be made each time",
+}
+
+
+def functions(node: ast.AST, in_class: bool = False) -> Iterator[tuple[str, int]]:
+    """Names of all functions within a node, of methods too, and how many arguments they have besides `self`."""
+    for inner in ast.iter_child_nodes(node):
+        if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            given = [x.arg for x in (*inner.args.posonlyargs, *inner.args.args, *inner.args.kwonlyargs)]
+            bound = in_class and given[:1] in (["self"], ["cls"])
+            yield getattr(inner, "name", "lambda"), len(given) - bound
+        yield from functions(inner, isinstance(inner, ast.ClassDef))
+
+
+def test_no_function_takes_many_arguments() -> None:
+    many = {
+        f"{file.relative_to(PACKAGE).as_posix()} {name}"
+        for file in FILES
+        if room(file) != "cli"
+        for name, count in functions(ast.parse(file.read_text(encoding="utf-8")))
+        if count > MOST_ARGUMENTS
+    }
+    assert many == MORE_ARGUMENTS.keys(), "more than ten arguments, or an exception that is none (any longer)"
+
+
+def test_arguments_are_counted() -> None:
+    text = """
+class A:
+    def many(self, a, b, /, c, *, d): ...
+    @staticmethod
+    def two(self_, x): ...
+    class B:
+        async def none(self): ...
+def outer(x):
+    def inner(a, *rest, b=1, **named): return lambda y, z: y
+"""
+    counted = [("many", 4), ("two", 2), ("none", 0), ("outer", 1), ("inner", 2), ("lambda", 2)]
+    assert list(functions(ast.parse(text))) == counted
 
 
 def loaded(code: str) -> set[str]:

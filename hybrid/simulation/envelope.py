@@ -19,7 +19,7 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.watch.carried_extremes import pass_on
+from hybrid.kernels.watch.carried_extremes import Watched, pass_on
 from hybrid.kernels.watch.extremes import fold_extremes
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
@@ -163,10 +163,9 @@ class Envelope:
         if self._grows:
             self.fold(model.nodes, books.extremes)
         elif books.extremes.shape[1]:
-            pass_on(
-                model.line.s, _rods(model), books.extremes, books.right, to_model.line.s, _rods(to_model),
-                to_books.right, to_books.extremes, np.zeros(model.cells + 1, np.int64), self.s, self.bounds,
-            )  # fmt: skip
+            old = Watched(model.line.s, _rods(model), books.right, books.extremes)
+            new = Watched(to_model.line.s, _rods(to_model), to_books.right, to_books.extremes)
+            pass_on(old, new, np.zeros(model.cells + 1, np.int64), self.s, self.bounds)
 
     def _with(self, nodes: Floats, extremes: Floats) -> Floats:
         """All extremes (4, EXTREMES, n), with those (4, EXTREMES, N+1+K) of the mesh of now."""

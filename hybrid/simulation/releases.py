@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.zone_torque import TURN, torsion_energy
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import NO_TURN, State
@@ -49,8 +49,8 @@ def due(model: Model, t: float, step: float) -> list[int]:
 def elastic(model: Model, t: float, state: State) -> float:
     """Energy of bending and torsion, J, at t (s), with that of zones that a torque passes through."""
     cells, energy = model.cells, np.zeros(4)
-    vectors = np.zeros((2, cells + 1, 3))
-    observe(model.line, model.ends.at(t), state.e, state.v, state.a1, state.w, state.T, state.turn, *vectors, energy)
+    observed = Observed(np.zeros((cells + 1, 3)), np.zeros((cells + 1, 3)), energy)
+    observe(model.line, model.ends.at(t), state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
     line = model.line
     twist = float(torsion_energy(line, state.turn[:, TURN], state.T)) if line.torsion.size else 0.0
     return float(energy[1] + energy[2]) + twist

@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.seabed import contact
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import workspace
 from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE
@@ -208,7 +208,7 @@ class Corrector:
             found, strain = np.zeros((2, n + 1, 3))
             for k in range(len(e)):
                 of = ends_in(batch, k), e[k], batch.v[k], a[k], batch.w[k], batch.T[k], NO_TURN
-                observe(line, *of, found, strain, np.zeros(4))
+                observe(line, *of, Observed(found, strain, np.zeros(4)))
                 M[k] += found[[0, 1, n - 1, n]]
         out = np.zeros((len(batch.t), 2, 3))
         for k, c, sign in ((0, 0, 1.0), (1, n - 1, -1.0)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybrid.kernels.watch.carried_extremes import pass_on
+from hybrid.kernels.watch.carried_extremes import Watched, pass_on
 from hybrid.kernels.watch.extremes import fold_extremes
 
 FINEST = np.arange(65.0)
@@ -40,10 +40,8 @@ class Mesh:
 
     def pass_on(self, other: Mesh, bounds: np.ndarray) -> None:
         stays = np.zeros(self.s.size, np.int64)
-        pass_on(
-            self.s, self.rods, self.extremes, self.right, other.s, other.rods, other.right, other.extremes, stays,
-            PLACES, bounds,
-        )  # fmt: skip
+        old, new = (Watched(x.s, x.rods, x.right, x.extremes) for x in (self, other))
+        pass_on(old, new, stays, PLACES, bounds)
 
 
 def unknown(columns: int) -> np.ndarray:

@@ -12,7 +12,7 @@ import pytest
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.march.configuration import update
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
 from hybrid.kernels.state.forces import (
     ADDED_MASS,
@@ -299,7 +299,8 @@ def test_a_swivel_passes_no_torque_however_its_sides_are_turned():
     M = np.zeros((2, N + 1, 3))
     for turned in range(2):
         d = st.e / np.linalg.norm(st.e, axis=1)[:, None]
-        observe(line, ends, st.e, st.v, st.a1, st.w, st.T, st.turn, M[turned], np.zeros((N + 1, 3)), np.zeros(5))
+        observed = Observed(M[turned], np.zeros((N + 1, 3)), np.zeros(5))
+        observe(line, ends, st.e, st.v, st.a1, st.w, st.T, st.turn, observed)
         assert abs(M[turned, 3] @ d[2]) < 1e-15 and abs(M[turned, 3] @ d[3]) < 1e-15
         angle = np.arccos(d[2] @ d[3])
         np.testing.assert_allclose(np.linalg.norm(M[turned, 3]), 0.7 * angle, rtol=1e-12)

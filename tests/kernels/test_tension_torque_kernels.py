@@ -10,7 +10,7 @@ from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.laws.axial_law_with_torque import follow_law_with_torque
 from hybrid.kernels.march.configuration import update
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace_of
 from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import STRETCH_ENERGY
@@ -128,7 +128,7 @@ def test_kept_factors_solve_for_another_right_hand_side():
 
 def energy_of(line, sea, ends, st):
     found, room, work = np.zeros(5), np.zeros((2, N + 1, 3)), workspace_of(line)
-    observe(line, ends, st.e, st.v, st.a1, st.w, st.T, st.turn, *room, found)
+    observe(line, ends, st.e, st.v, st.a1, st.w, st.T, st.turn, Observed(*room, found))
     assembly(line, sea, ends, st, 0.0, 0.0, work)
     return found[1:4].sum() + work.report[STRETCH_ENERGY]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.kernels.laws.hinge_layer import FADED
 from hybrid.kernels.laws.seabed import stored
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.report import CONTACT_FORCE, FORCE_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.mesh import Zone
@@ -169,7 +169,7 @@ class Plain:
             return self._plain._observed
         n, st = self.line.h.size, self.computed
         M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
-        observe(self.line, self.ends, st.e, st.v, st.a1, st.w, st.T, st.turn, M, strain, energy)
+        observe(self.line, self.ends, st.e, st.v, st.a1, st.w, st.T, st.turn, Observed(M, strain, energy))
         return M, strain, energy
 
     @property

@@ -13,7 +13,7 @@ from random_scenes import random_scene
 import hybrid
 from hybrid.kernels.contact.self_contact_pairs import ENERGY, POINTS, SPEED
 from hybrid.kernels.contact.self_distance import LEAST_DISTANCE
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.books import FRICTION
 from hybrid.kernels.step.newton import NEAR
 from hybrid.simulation.step_events import count_energy_gains
@@ -58,7 +58,7 @@ def energy(run: Transient) -> float:
     """Kinetic, elastic and contact energy, J."""
     x, parts = run.state, np.zeros(4)
     room = np.zeros((x.T.size + 1, 3))
-    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, room, room.copy(), parts)
+    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
     contact = run.run.contact
     return float(parts.sum()) + (float(contact.contact.numbers[ENERGY]) if contact else 0.0)
 

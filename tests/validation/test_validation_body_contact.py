@@ -13,7 +13,7 @@ import hybrid
 from hybrid.errors import Outcome, SceneError
 from hybrid.kernels.junctions.bodies import FRAME, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import stored_energy
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.books import SHORTEST, blank_books
 from hybrid.kernels.state.obstacle_rows import EACH, FORCE, STIFFNESS
 from hybrid.model.bodies import body_model
@@ -436,7 +436,9 @@ def thrown(friction: float, step: float) -> tuple[Any, list[float], Any, float]:
     def energy(states: SystemState) -> float:
         line, b, parts = states.lines[0], states.bodies[0], np.zeros(5)
         room = np.zeros((61, 3))
-        observe(model.line, x.ends, line.e, line.v, line.a1, line.w, line.T, line.turn, room, room.copy(), parts)
+        observe(
+            model.line, x.ends, line.e, line.v, line.a1, line.w, line.T, line.turn, Observed(room, room.copy(), parts)
+        )
         nu = np.concatenate([b[FRAME:V].reshape(3, 3).T @ b[V : V + 3], b[W : W + 3]])
         stored = float(stored_energy(model.line, x.sea, line.r))
         return float(parts[:4].sum() + 0.5 * nu @ one.numbers[:36].reshape(6, 6) @ nu) + stored

@@ -13,7 +13,7 @@ from hybrid.kernels.contact.self_contact_law import DISTANCE
 from hybrid.kernels.contact.self_contact_pairs import ENERGY, POINTS
 from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import depths_in_obstacles, stored_energy
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.books import SHORTEST, blank_books
 from hybrid.kernels.state.forces import OBSTACLES
 from hybrid.kernels.state.obstacle_rows import INERTIA, SPIN
@@ -143,7 +143,7 @@ def energy(
     total = float(shared.contact.numbers[ENERGY])
     for model, x, joined in zip(models, states.lines, lines, strict=True):
         parts, room = np.zeros(5), np.zeros((x.T.size + 1, 3))
-        observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, room, room.copy(), parts)
+        observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
         total += float(parts[:4].sum())
         if model.line.bits & OBSTACLES:
             total += float(stored_energy(model.line, joined.sea, x.r))

@@ -29,7 +29,7 @@ from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import couples
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import caller_of_six
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.powers import find_powers, loses
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.state.books import NOW, RATES, STORED, TRY_END
@@ -92,9 +92,8 @@ def observe_coupled(line, ends, state, contact, _1, _2):
 
     Called by its address (Contact.observer), so that contact of other lines compiles none of it.
     """
-    observe(
-        line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, contact.at, contact.move, contact.energy
-    )
+    observed = Observed(contact.at, contact.move, contact.energy)
+    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
     contact.counts[STALE] = 1
     return 0
 

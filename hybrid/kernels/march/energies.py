@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get9, scale, sub
 from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at, energy_share
@@ -14,6 +15,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import get3
 from hybrid.kernels.march.zone_torque import FIRST, LAST, TORQUE
 from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.state.state import Floats
 
 
 @inner
@@ -23,15 +25,27 @@ def stretch_of(line, e, i, low, high):
     return stretch_energy(line, i, l - line.h[i], low, high)
 
 
-@kernel
-def observe(line, ends, e, v, a1, w, T, turn, M, strain, energy):
-    """Moments M (N+1, 3) N m inertial and log strains (N+1, 3) rad in the frame of the cell before; energies (5,) J.
+class Observed(NamedTuple):
+    """What a state means, to be filled by `observe`.
 
-    energy: kinetic (structure, with rotary inertia), bending, torsion, stretch (not of a line with an axial law, which
-    reports it); gravity is left to the caller.
-    A moment is that of the part after the node on the part before.  T: (N,) N and turn: (K, 3) as of a State are read
-    where tension makes a torque; the torsion of catenary zones is left to the caller.
+    M: (N+1, 3) N m inertial, moments of the part after a node on the part before; strain: (N+1, 3) rad, log strains in
+    the frame of the cell before; energy: (5,) J, kinetic (structure, with rotary inertia), bending, torsion, stretch
+    (not of a line with an axial law, which reports it); gravity is left to the caller.
     """
+
+    M: Floats
+    strain: Floats
+    energy: Floats
+
+
+@kernel
+def observe(line, ends, e, v, a1, w, T, turn, observed):
+    """Fill `Observed` with the moments, strains and energies of a state.
+
+    T: (N,) N and turn: (K, 3) as of a State are read where tension makes a torque; the torsion of catenary zones is left
+    to the caller.
+    """
+    M, strain, energy = observed
     n = e.shape[0]
     coupled, torque, zone = couples(line), 0.0, 0
     stretches = coupled and not line.bits & AXIAL_LAW

@@ -21,7 +21,7 @@ from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_errors import (
     CURVATURE,
     MOMENT,
@@ -359,7 +359,8 @@ def evaluate(line, sea, ends, state, zones, near, dt):
 def find_strain(line, ends, state, zones, k):
     """Strains of the elements of a state into zones.strain[k], from what has no stress."""
     strain = zones.strain[k]
-    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, zones.moment, strain, zones.energy)
+    observed = Observed(zones.moment, strain, zones.energy)
+    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
     for i in range(strain.shape[0]):
         for j in range(3):
             strain[i, j] = (strain[i, j] - line.k0[i, j]) * line.element[i]

@@ -14,7 +14,7 @@ from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.mesh.cell_lengths import arc_less_chord
 from hybrid.kernels.mesh.stiffness_ramp import shares, soften
@@ -53,19 +53,8 @@ read = reader(blank_switch_job())
 @inner
 def energy(line, sea, ends, state, zones):
     """All energy of a state, J; its strains into those of zones."""
-    observe(
-        line,
-        ends,
-        state.e,
-        state.v,
-        state.a1,
-        state.w,
-        state.T,
-        state.turn,
-        zones.moment,
-        zones.strain[1],
-        zones.energy,
-    )
+    observed = Observed(zones.moment, zones.strain[1], zones.energy)
+    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
     total = zones.energy[0] + zones.energy[1] + zones.energy[2] + zones.energy[3] + twist_energy(line, state)
     if line.bits & AXIAL_LAW:
         total += stretch_energy(line, state)

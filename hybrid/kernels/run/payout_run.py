@@ -16,7 +16,7 @@ from hybrid.kernels.contact.self_distance import boxes_of
 from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_changes import clear, copy_state, wave_step
 from hybrid.kernels.mesh.fill_line import copy_cell, copy_node, move_line
 from hybrid.kernels.mesh.zone_transfer import carry_push
@@ -178,7 +178,7 @@ def renew_books(job, n, m, forward, cut):
 @kernel
 def energy_of(line, ends, state, moment, strain, parts):
     """Kinetic, elastic and potential energy, J; the last three are work arrays (N+1, 3), (N+1, 3), (5,)."""
-    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, moment, strain, parts)
+    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, Observed(moment, strain, parts))
     found = parts[0] + parts[1] + parts[2] + parts[3]
     for i in range(line.h.shape[0] + 1):
         for j in range(3):

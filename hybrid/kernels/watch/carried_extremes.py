@@ -8,8 +8,13 @@ ones are infinite, and change nothing.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch.extremes import fold_cell
 
 
@@ -93,9 +98,20 @@ def carry_extremes(stays, cells, old, columns, right, to_cells, out):
                 carry_column(old, columns, cells + right[k] - to_cells, right[k], out)
 
 
+class Watched(NamedTuple):
+    """Nodes with their extremes: s, rods and extremes as above; right: columns of what is after the nodes."""
+
+    s: Floats
+    rods: NDArray[np.bool_]
+    right: NDArray[np.int64]
+    extremes: Floats
+
+
 @kernel
-def pass_on(s, rods, now, right, to_s, to_rods, to_right, out, stays, places, bounds):
-    """All of it, for arrays that do not share memory; stays: (N+1,) room."""
+def pass_on(old, new, stays, places, bounds):
+    """All of it, of `Watched` nodes whose arrays do not share memory; stays: (N+1,) room."""
+    s, rods, right, now = old
+    to_s, to_rods, to_right, out = new
     match_nodes(s, rods, to_s, to_rods, stays)
     fold_gone(s, now, right, stays, places, bounds)
     carry_extremes(stays, rods.shape[0], now.reshape(now.size), now.shape[2], to_right, to_rods.shape[0], out)

@@ -16,7 +16,7 @@ from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.binding import Series
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.state import (
     ALONG_LINE,
     NO_TURN,
@@ -77,7 +77,7 @@ def observe_outputs(tables):
     """Find moment, strain, energy and bend of all outputs, (nb, size) tables of `Output`."""
     for k in range(tables.shape[0]):
         x = _read(tables[k])
-        observe(x.line, x.ends, x.e, x.v, x.a1, x.w, x.T, x.turn, x.moment, x.strain, x.energy)
+        observe(x.line, x.ends, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(x.moment, x.strain, x.energy))
         high = 0.0
         for i in range(x.r.shape[0]):
             for j in range(3):
