@@ -20,6 +20,8 @@ nothing.  That slows Newton's method by the difference of both changes, and touc
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from hybrid.kernels.algebra.block_elimination import WIDTH
 from hybrid.kernels.algebra.rotations import (
     add,
@@ -91,21 +93,28 @@ def axis_of_twist(Ra, Rb):
     return mat_vec(Ra, (P[6], P[7], P[8])), k
 
 
+class Side(NamedTuple):
+    """A side of an element: frame, direction and 1/length of the cell there; 1/length 0 of an end."""
+
+    R: Any
+    d: Any
+    il: float
+
+
 @kernel
-def note_element(couple, line, T, i, Ra, Rb, before, after, rates_before, rates_after, tau):
+def note_element(couple, line, T, i, before, after, rates_before, rates_after, tau):
     """What the rows of an element at node i need.
 
-    before, after: direction and 1/length of its cells; 1/length 0 of an end.  rates: angular velocity (1/s) of each and
-    its derivatives by chord and spin.
+    before, after: its `Side`s; rates: angular velocity (1/s) of each and its derivatives by chord and spin.
     """
     for j in range(COUPLES):
         couple[i, j] = 0.0
     kb = line.kb[i, 2]
     if turns_freely(get3(line.kb, i), get3(line.k0, i)) or kb == 0.0:
         return
+    (Ra, da, ila), (Rb, db, ilb) = before, after
     p, k = axis_of_twist(Ra, Rb)
     q = scale(kb, p)
-    (da, ila), (db, ilb) = before, after
     (wa, Wa, pa), (wb, Wb, pb) = rates_before, rates_after
     A, a = scale(ilb, cross(q, db)), dot(q, db)
     B, b = scale(ila, cross(q, da)), dot(q, da)

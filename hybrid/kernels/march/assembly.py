@@ -39,6 +39,7 @@ from hybrid.kernels.laws.element import after, angular_velocity, before
 from hybrid.kernels.laws.end_forces import note_end
 from hybrid.kernels.laws.node_forces import Z3, Z9, node_loads
 from hybrid.kernels.laws.tension_torque import (
+    Side,
     couple_length,
     couple_rows,
     damping_loss,
@@ -163,7 +164,7 @@ def element_at_start(line, ends, state, cell, cv, couple, report):
             A, a = after(C, d, il)
         if couple.shape[0] > 0:
             fixed = (get3(ends.spin, 0), Z9, Z3)
-            note_element(couple, line, state.T, 0, R, cell.R, (Z3, 0.0), (d, il), fixed, rates, tau)
+            note_element(couple, line, state.T, 0, Side(R, Z3, 0.0), Side(cell.R, d, il), fixed, rates, tau)
     elif couple.shape[0] > 0:
         note_end_torque(couple, line, 0, M, cell.chord.d, cell.chord.il)
     return Element(M, A, a, Z9, Z3)
@@ -200,10 +201,9 @@ def element_after(line, ends, state, i, cell, following, cv, couple, report):
             A, a = after(C, dn, iln)
             B, b = before(C, M, d, il)
         if couple.shape[0] > 0:
-            next_cell = (dn, iln) if i + 1 < n else (Z3, 0.0)
-            note_element(
-                couple, line, state.T, i + 1, cell.R, following.R, (d, il), next_cell, rates, rates_after, tau
-            )  # fmt: skip
+            mine = Side(cell.R, d, il)
+            other = Side(following.R, dn, iln) if i + 1 < n else Side(following.R, Z3, 0.0)
+            note_element(couple, line, state.T, i + 1, mine, other, rates, rates_after, tau)
         if i + 1 == n:
             A, a = Z9, Z3  # the frame of the end is given
     elif couple.shape[0] > 0 and i < n:
