@@ -16,7 +16,7 @@ import pytest
 from ruamel.yaml import YAML
 
 import hybrid
-from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE, LAST_DT, PARITY, RHO
+from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.watch.bending_error import advance_error
 from hybrid.model.build import build
 from hybrid.simulation.bending_correction import corrector_for
@@ -183,10 +183,10 @@ def test_model_error_cost():
             sea, ends, clock, counts = (
                 m.sea.at(0.0),
                 m.ends.at(0.0),
-                np.zeros(CLOCK_SIZE),
-                np.zeros(COUNT_SIZE, np.int64),
+                Clock(),
+                Counts(),
             )
-            clock[[LAST_DT, RHO]] = dt, 0.5
+            clock.last_dt, clock.rho = dt, 0.5
             corrector.rest(sea, ends, old)
             table = corrector.bind(m.line, sea, ends, (old, new), clock, counts, stepper.work)
             stepper.consistent_accelerations(m.sea.at(0.0), m.ends.at(0.0), m.ends.acceleration(0.0, 1e-3 * dt), old)
@@ -198,7 +198,7 @@ def test_model_error_cost():
                 middle = time.perf_counter()
                 old, new = new, old
                 if keep:
-                    counts[PARITY] = 1 - counts[PARITY]
+                    counts.parity = 1 - counts.parity
                     advance_error(table)
                 took.append((middle - begin, time.perf_counter() - middle))
             medians.append(np.median(took, axis=0) * 1e6)

@@ -105,17 +105,17 @@ class Line:
             run.carry((push, np.zeros_like(push)))
         run.place(self.start.r.copy())
         clock, count = run.clock, run.count
-        clock[books.STOP], clock[books.LEG_STEP], count[books.LEG_PARTS] = np.inf, STEP, 10**9
-        clock[books.FLOOR] = clock[books.SLACK_LIMIT] = -np.inf
-        clock[[books.BEND_LIMIT, books.TWIST_LIMIT, books.SCALED_JUMP, books.MOST_TURN]] = np.inf
-        count[books.PHASE] = books.BEGIN_STEP
+        clock.stop, clock.leg_step, count.leg_parts = np.inf, STEP, 10**9
+        clock.floor = clock.slack_limit = -np.inf
+        clock.bend_limit = clock.twist_limit = clock.scaled_jump = clock.most_turn = np.inf
+        count.phase = books.BEGIN_STEP
         begin, total = time.process_time(), 0
-        while run.count[books.STEPS] < STEPS:
+        while run.count.steps < STEPS:
             code = run.go()
             assert code in (books.PAUSED, books.STEPPED), code
             total += int(run.log()[:, 2].sum())
-        self.each.append((time.process_time() - begin) / int(run.count[books.STEPS]))
-        self.iterations = total / int(run.count[books.STEPS])
+        self.each.append((time.process_time() - begin) / int(run.count.steps))
+        self.iterations = total / int(run.count.steps)
 
     @property
     def per_cell(self):

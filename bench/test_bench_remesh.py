@@ -19,7 +19,6 @@ from test_bench_cells import CASES, TOUCHDOWN, from_file, scene_of
 import hybrid
 from hybrid.adapt.state_transfer import transfer_to
 from hybrid.kernels.mesh.zone_step import SHARE, Zones
-from hybrid.kernels.state import books as b
 from hybrid.simulation import zone_switching
 from hybrid.simulation.cell_changes import CellChanges
 
@@ -139,7 +138,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
         found.append((float(off), float(np.linalg.norm(state.v, axis=1).max())))
 
     def compiled(self: CellChanges, *given: Any) -> float:
-        k, n, parity, on = self.side, self.cells, int(self._run.count[b.PARITY]), self._on
+        k, n, parity, on = self.side, self.cells, int(self._run.count.parity), self._on
         booked = change(self, *given)
         to, m = self.side, self.cells
         note(on.line(k, n), on.state(k, parity, n), on.line(to, m), on.state(to, 0, m))

@@ -19,7 +19,6 @@ from hybrid.accuracy.budget import CELL, COMPARISONS, FINER, LEAST, MOST_TIMES, 
 from hybrid.accuracy.model_choice import chosen_and_surveyed
 from hybrid.errors import ComputationError
 from hybrid.kernels.machine.cache import is_warm
-from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import State
 from hybrid.model import plan as tables
 from hybrid.model.build import Model, build
@@ -222,7 +221,7 @@ def _steps(
         return float(count_steps(scene))
     rate = _steps_a_second(seen)
     if run.steps < SETTLED:  # they still grow: not shorter than the next is to be
-        rate = min(rate, 1.0 / float(run.run.clock[b.NEXT_DT]))
+        rate = min(rate, 1.0 / float(run.run.clock.next_dt))
     linear = run.steps + rate * (duration - run.t)
     if coarse is None or coarse is loop or not coarse.run.steps:
         return linear
@@ -279,7 +278,7 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     if run.loop.controlled:
         rate = run.steps / max(run.t, 1e-9 * time.duration)
         if run.steps < SETTLED:
-            rate = min(rate, 1.0 / float(run.loop.clock[b.NEXT_DT]))
+            rate = min(rate, 1.0 / float(run.loop.clock.next_dt))
         steps = run.steps + rate * max(time.duration - run.t, 0.0)
     motion = steps * spent / max(run.steps, 1)
     scenes = {name: system.scene_of(name) for name in system.lines}

@@ -15,7 +15,6 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.criteria import CRITERIA, GIVEN, TORSION
-from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats
 
 
@@ -313,11 +312,11 @@ def quiet_review(table):
             ratios[GIVEN, j] = job.forced
         job.flags[0, j], job.calm[j] = zones.leaving[j], job.calm_since[j]
         job.wait[j] = job.dwell * job.patience[j]
-    state = run.new if run.counts[b.PARITY] else run.old
+    state = run.new if run.counts.parity else run.old
     reach(state.T, kinds.base_of_cell, kinds.EI, kinds.w, kinds.floor, job.parts, job.light, job.buffer)
     if z.asks_layers(zones):
         widen(job.buffer, zones.H)
-    now = run.clock[b.NOW]
+    now = run.clock.now
     _plan(ratios, job.off, zones.rod, job.calm, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
     for j in range(n):
         if not stays(job, zones, j):

@@ -48,7 +48,7 @@ from hybrid.kernels.run.system_tangents import (
     follow_system,
 )
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, sample_size
+from hybrid.kernels.state.books import Books, Clock, Counts, sample_size
 from hybrid.kernels.state.forces import WAVES
 from hybrid.kernels.state.report import ASSEMBLED
 from hybrid.kernels.state.state import Batch, Floats, Line, State, batch_of_one, state_for
@@ -228,12 +228,12 @@ class SystemOthers:
 
     def _bind(
         self, solver: SystemSolver, states: tuple[SystemState, SystemState], rests: bool = False,
-        clock: Floats | None = None, counts: NDArray[np.int64] | None = None,
+        clock: Clock | None = None, counts: Counts | None = None,
         books: Callable[[int, int], Books] | None = None,
     ) -> _Tables:  # fmt: skip
         """Tables for lines of a solver between states that take turns."""
-        number, clock = len(self._others), np.zeros(b.CLOCK_SIZE) if clock is None else clock
-        counts = np.zeros(b.COUNT_SIZE, np.int64) if counts is None else counts
+        number, clock = len(self._others), b.Clock() if clock is None else clock
+        counts = b.Counts() if counts is None else counts
         jobs, kept, own = [], [], []
         reports: list[list[Floats]] = [[] for _ in self._others]
         size = Table(blank_other).numbers.size
@@ -280,7 +280,7 @@ class SystemOthers:
         run = self._run
         loop, solver = run.loop, run.solver
         solver.keep_factors()
-        done = int(loop.counts[b.OUTPUT])
+        done = int(loop.counts.output)
 
         def books(p: int, l: int) -> Books:
             x, report = self._others[p].joined[l], reports[p][l]
@@ -327,7 +327,7 @@ class SystemOthers:
         more = {}
         for l in base:
             books, cells = self._books[p][l], self._model.models[l].line.h.size
-            rest, _ = batch_of_rows(books.samples[: int(books.counts[b.SAMPLES])], cells, HELD, False, 0, 0)
+            rest, _ = batch_of_rows(books.samples[: int(books.counts.samples)], cells, HELD, False, 0, 0)
             more[l] = joined([self._first[p][l], rest])
         scene, other = self._scenes[p]
         seen = self._looked_at(scene, self._others[p].model, more, names)

@@ -24,8 +24,7 @@ from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import block_rows, out_of_balance, workspace, workspace_of
-from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, blank_books, sample_size
+from hybrid.kernels.state.books import Books, Clock, Counts, blank_books, sample_size
 from hybrid.kernels.state.forces import FRICTION, PLANAR, SELF_CONTACT, SOIL, STIFFNESS_DAMPING, VORTICES, WAVES
 from hybrid.kernels.state.report import ASSEMBLED
 from hybrid.kernels.state.state import (
@@ -258,7 +257,7 @@ class Others:
         same = [bool(model.line.bits & WAVES) and same_waves(around, x.sea.values) for x in self.models]
         for k, (x, report) in enumerate(zip(self.models, reports, strict=True)):
             ends, sea, there = x.ends.at(0.0), x.sea.at(0.0), beside(run.state, rates[k], spins[k], self._steps[k])
-            books = books_beside(compiled.clock, outputs, int(compiled.count[b.OUTPUT]), cells, ends, report)
+            books = books_beside(compiled.clock, outputs, int(compiled.count.output), cells, ends, report)
             self._books.append(books)
             self._first.append(batch_of_one(0.0, ends, there, report, np.zeros(len(POWERS)), sea))
             of = Tangent(rates[k], spins[k], self.sizes[k], float(self._steps[k]))
@@ -292,7 +291,7 @@ class Others:
 
     def _seen(self, p: int, base: Batch, names: Sequence[str]) -> tuple[Mapping[str, Seen], ...]:
         books, held, cells = self._books[p], self._model.ends.values.held, self._model.line.h.size
-        rest, _ = batch_of_rows(books.samples[: int(books.counts[b.SAMPLES])], cells, held, False, 0, 0)
+        rest, _ = batch_of_rows(books.samples[: int(books.counts.samples)], cells, held, False, 0, 0)
         more, (scene, other) = joined([self._first[p], rest]), self._scenes[p]
         seen = {"": self._looked_at(scene, self.models[p], self._lines[p], more, names)}
         if other is None:
@@ -415,8 +414,8 @@ def bind_other(
 
 
 def bind_line(
-    line: Line, ends: Ends, sea: Sea, states: tuple[State, State], work: Work, clock: Floats,
-    counts: NDArray[np.int64], tables: NDArray[np.int64], found: NDArray[np.int64], same: bool,
+    line: Line, ends: Ends, sea: Sea, states: tuple[State, State], work: Work, clock: Clock,
+    counts: Counts, tables: NDArray[np.int64], found: NDArray[np.int64], same: bool,
 ) -> tuple[Table, Floats]:  # fmt: skip
     """A TangentJob of a line of a run, whose states take turns, and the report that it works with.
 
@@ -434,10 +433,10 @@ def bind_line(
     return table, own.report
 
 
-def books_beside(clock: Floats, outputs: Floats, done: int, cells: int, ends: Ends, report: Floats) -> Books:
+def books_beside(clock: Clock, outputs: Floats, done: int, cells: int, ends: Ends, report: Floats) -> Books:
     """Books of another line, whose outputs are those of the run, of which so many are done."""
     books = blank_books(cells)
-    books.counts[b.OUTPUT], books.report[0] = done, report
+    books.counts.output, books.report[0] = done, report
     for k in (0, 1):
         parts = (ends.position[k], ends.frame[k], ends.spin[k], ends.force[k], ends.moment[k])
         books.imposed[0, k] = np.concatenate(parts)

@@ -16,7 +16,6 @@ import numpy as np
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
 from hybrid.kernels.mesh.criteria import CRITERIA
-from hybrid.kernels.state.books import OUTPUT
 from hybrid.kernels.state.forces import SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bending_reference import NO_DOUBT
@@ -236,7 +235,7 @@ class Case:
                 near = SAME_STOP * resolution.step  # an output may be due where a load turns, but for round-off
                 if not point.t - near <= loop.run.t <= self.scene.require_time().duration:
                     raise ValueError(f"t = {loop.run.t:g} s after an output at {point.t:g} s")
-                due, at = loop.run.run.books.outputs, int(loop.run.run.count[OUTPUT])
+                due, at = loop.run.run.books.outputs, int(loop.run.run.count.output)
                 if at < due.size and not due[at] > point.t:
                     raise ValueError(f"an output at {due[at]:g} s is due, after one at {point.t:g} s")
             assert loop.run.envelope is not None

@@ -283,7 +283,7 @@ class CellChanges:
                 self._bind_all()
             self._bound = True
         self._at[f.SIDE], self._at[f.CELLS] = k, n
-        parity, at = int(run.count[b.PARITY]), self._on.layout(k, n)
+        parity, at = int(run.count.parity), self._on.layout(k, n)
         for which in (0, 1):
             _copy(run.states[which], self._on.state(k, which, n))
             if run.push.size:
@@ -303,7 +303,7 @@ class CellChanges:
         self._calls[f.SOLVER] = run.solver_address()
         f.put_cells(self._following.numbers)
         self.adopted, self._synced = True, -1
-        run.count[b.PARITY] = parity
+        run.count.parity = parity
         self.sync()
 
     def go(self, reviewed: bool = False) -> int:
@@ -324,20 +324,20 @@ class CellChanges:
     def unwatched(self) -> bool:
         """After a step that Python is to look at: whether nothing is to be done but a review and a change of cells."""
         count = self._run.count
-        if count[b.FLAGS] or count[b.ASKS]:
+        if count.notices or count.asks:
             return False
         return not self.due or bool(f.cells_may_change(self._following.numbers))
 
     def review_due(self) -> bool:
         """Whether the criteria are to be reviewed."""
-        return self._switching.manager.review_due(float(self._run.clock[b.NOW]))
+        return self._switching.manager.review_due(float(self._run.clock.now))
 
     def review(self) -> Change | None:
         """The change of zones that follows from the criteria now; None: they stay."""
         manager, k, n = self._switching.manager, self.side, self.cells
         if self._stale:
             manager.take(manager.layout, self._on.zones(k, n))
-        return manager.review(float(self._run.clock[b.NOW]), self._on.state(k, int(self._run.count[b.PARITY]), n))
+        return manager.review(float(self._run.clock.now), self._on.state(k, int(self._run.count.parity), n))
 
     def change_zones(self, change: Change) -> float:
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""

@@ -9,7 +9,6 @@ import numpy as np
 
 from hybrid.errors import IN_SPACE, Complaint, Outcome, SceneError
 from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles
-from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import MAY_TOUCH, OBSTACLES
 from hybrid.kernels.state.state import State
 from hybrid.model.self_reach import touching, touching_no_more
@@ -65,7 +64,7 @@ def begin_contact(moving: Transient) -> None:
         end_contact(moving)
         watch.waits()
         if moving.envelope is not None and moving.steps:
-            watch.tell_again(moving.t, float(moving.run.clock[b.LAST_DT]), moving.events.event)
+            watch.tell_again(moving.t, float(moving.run.clock.last_dt), moving.events.event)
 
 
 def end_contact(moving: Transient) -> None:
@@ -85,7 +84,7 @@ def gives_up_contact(moving: Transient) -> bool:
     if not may or outcome in (Outcome.SLACK, Outcome.WINCH_AT_END):
         return False
     assert contact is not None and moving.itself is not None
-    dt = float(moving.run.clock[b.TRY_END]) - moving.t
+    dt = float(moving.run.clock.try_end) - moving.t
     s, other, text = given_up(contact, moving.model, dt)
     moving.events.event(moving.t, s, other, GIVEN_UP, text)
     end_contact(moving)

@@ -26,7 +26,7 @@ from hybrid.kernels.laws.obstacles import (
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books
+from hybrid.kernels.state.books import Books, Clock
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION, SOIL
 from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RIDES
 from hybrid.kernels.state.report import BEND, TWIST_NODE
@@ -193,9 +193,9 @@ class Diagnostics:
         """What has been noted so far, and what `finish` will judge by."""
         clock, count = books.clock, books.counts
         return {name: getattr(self, name) for name in REMEMBERED} | {
-            "pulls": clock[[b.LEAST_PEAK, b.LARGEST_PEAK]].tolist(), "_rho": float(clock[b.RHO]),
-            "_moved": float(clock[b.MOVED]), "_steps": int(count[b.MEASURED]),
-            "worst": books.worst[: min(int(count[b.MEASURED]), b.WORST)].copy(), "placed": books.placed,
+            "pulls": [float(clock.least_peak), float(clock.largest_peak)], "_rho": float(clock.rho),
+            "_moved": float(clock.moved), "_steps": int(count.measured),
+            "worst": books.worst[: min(int(count.measured), b.WORST)].copy(), "placed": books.placed,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any], books: Books, r: Floats) -> Floats:
@@ -208,8 +208,9 @@ class Diagnostics:
         if placed.shape not in (NOWHERE.shape, (books.base.size, 3)) or worst.shape != (min(steps, b.WORST), 4):
             raise ValueError("places of another line")
         books.worst[: len(worst)] = worst
-        books.clock[[b.LEAST_PEAK, b.LARGEST_PEAK]], books.clock[b.MOVED] = saved["pulls"], saved["_moved"]
-        books.counts[b.MEASURED] = steps
+        books.clock.least_peak, books.clock.largest_peak = saved["pulls"]
+        books.clock.moved = saved["_moved"]
+        books.counts.measured = steps
         self.watch(books.clock)
         return placed if placed.size else r[books.base].copy()
 
@@ -384,12 +385,12 @@ class Diagnostics:
             text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
             self.events.event(0.0, 0.0, self._model.length, "undamped", text)
 
-    def watch(self, clock: Floats) -> None:
+    def watch(self, clock: Clock) -> None:
         """Tell a run, by its clock, beyond which values there is something to look at."""
         model = self._model
         warns = model.slack == "warn" or bool(model.line.bits & FRICTION)  # friction may hold a compressed line
-        clock[b.BEND_LIMIT], clock[b.TWIST_LIMIT], clock[b.SCALED_JUMP] = self._bend, self._twist, self._jump
-        clock[b.SLACK_LIMIT] = self._slack if warns else -np.inf
+        clock.bend_limit, clock.twist_limit, clock.scaled_jump = self._bend, self._twist, self._jump
+        clock.slack_limit = self._slack if warns else -np.inf
 
     def look(self, run: Watched, flags: int) -> Stop:
         """Look at what a run has flagged in its last step (kernels.state.books)."""
@@ -418,8 +419,9 @@ class Diagnostics:
         beta = 1/(1 + rho)^2 of generalized-alpha.
         """
         self.created_energy()
-        low, high, moved = books.clock[[b.LEAST_PEAK, b.LARGEST_PEAK, b.MOVED]].tolist()
-        steps, rho, worst = int(books.counts[b.MEASURED]), float(books.clock[b.RHO]), books.worst.tolist()
+        clock = books.clock
+        low, high, moved = float(clock.least_peak), float(clock.largest_peak), float(clock.moved)
+        steps, rho, worst = int(books.counts.measured), float(books.clock.rho), books.worst.tolist()
         hardly = moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
         if hardly or not steps or not moved > 0.0:
             return

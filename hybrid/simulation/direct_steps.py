@@ -21,7 +21,7 @@ class DirectSteps:
         others = moving.switching, moving.correction, moving.payout
         self._asks_others = any(x is not None for x in others) or moving.controlled or not loop.patient
         self._asks_others |= bool(ends.breaks) or min(ends.release_times) < math.inf
-        self._count = moving.run.count.data  # of which one number costs a third of what numpy takes
+        self._count = moving.run.count
 
     def still_of(self, loop: TimeLoop) -> bool:
         """Whether these are steps of the loop as it is now."""
@@ -29,7 +29,7 @@ class DirectSteps:
 
     def take(self, until: float) -> None:
         """To `until` (s), where a step ends; StepFailed and ComputationError as of `TimeLoop.until`."""
-        if self._asks_others or self._count[b.ASKS]:
+        if self._asks_others or self._count.asks:
             self._loop.until(until, exact=False)
             return
         self._moving.set_stop(until)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.state import books as b
 from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd, contradictions
 from hybrid.scene.read import scene_text
@@ -64,7 +63,7 @@ def explanation(run: Transient, tried: Tried, dt: float) -> str:
             f"shorter cells there may help, and contact: {{self: false}} leaves it out"
         )
     if _used_up(run):
-        detail += f"; the {int(run.run.count[b.MOST_ITERATIONS])} iterations that a step may take are used up"
+        detail += f"; the {int(run.run.count.most_iterations)} iterations that a step may take are used up"
     ends = model.ends.at(run.t + dt)
     apart = float(np.linalg.norm(ends.position[1] - ends.position[0]))
     if ends.held.all() and model.inextensible and apart >= model.length:
@@ -76,12 +75,12 @@ def explanation(run: Transient, tried: Tried, dt: float) -> str:
 def _used_up(run: Transient) -> bool:
     """Whether the step that fails has used up the Newton iterations that it may take."""
     count = run.run.count
-    return bool(0 < count[b.MOST_ITERATIONS] <= count[b.TAKEN])
+    return bool(0 < count.most_iterations <= count.taken)
 
 
 def _slack_detail(run: Transient, tried: Tried, dt: float) -> str:
     """Over which steps a catenary was slack, and whether they are short enough for the line to be to blame."""
-    tension, waves = run.before.T[failed_node(run, tried)], float(run.run.clock[b.WAVE_STEP])
+    tension, waves = run.before.T[failed_node(run, tried)], float(run.run.clock.wave_step)
     over = f", tried after longer ones from {_planned(run):.3g} s on," if dt < 0.99 * _planned(run) else ""
     detail = (
         f"the step of {dt:.3g} s{over} that starts at this time ends with a tension of {tension:.3g} N; a wave "
@@ -92,12 +91,12 @@ def _slack_detail(run: Transient, tried: Tried, dt: float) -> str:
 
 def _steps_too_long(run: Transient) -> bool:
     """Whether waves of tension pass many cells in the step that fails, as it was to be: so they did in those before."""
-    return run.steps > 0 and _planned(run) > MOST_PASSED * float(run.run.clock[b.WAVE_STEP])
+    return run.steps > 0 and _planned(run) > MOST_PASSED * float(run.run.clock.wave_step)
 
 
 def _planned(run: Transient) -> float:
     """Length, s, that the step that fails was to have."""
-    return float(run.run.clock[b.UNTIL] - run.run.clock[b.BEGIN])
+    return float(run.run.clock.until - run.run.clock.begin)
 
 
 def first_remedy(run: Transient, tried: Tried) -> str:
@@ -108,7 +107,7 @@ def first_remedy(run: Transient, tried: Tried) -> str:
         return contradictions(driven_of(run.model), soon=True)
     if tried.outcome != Outcome.SLACK or not _steps_too_long(run):
         return slack_remedy(run.model, tried.outcome, float(run.model.line.s[failed_node(run, tried)]))
-    step = max(_planned(run) / SHORTER, float(run.run.clock[b.WAVE_STEP]))
+    step = max(_planned(run) / SHORTER, float(run.run.clock.wave_step))
     return f"time.step: {step:.2g} from the start, because the steps before may be to blame, not the line"
 
 

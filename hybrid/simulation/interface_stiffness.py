@@ -14,7 +14,6 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.run import entry
-from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.generalized_alpha import weights
@@ -29,8 +28,8 @@ def interface_stiffness(run: Transient, k: int, step: float) -> Floats:
     with itself is left out.  ComputationError: the end moves without resistance.
     """
     model, clock = run.model, run.run.clock
-    dt, before = float(clock[b.LAST_DT]), float(clock[b.STEP_BEFORE])
-    rho, rho_before = float(clock[b.LAST_RHO]), float(clock[b.RHO_BEFORE])
+    dt, before = float(clock.last_dt), float(clock.step_before)
+    rho, rho_before = float(clock.last_rho), float(clock.rho_before)
     if not dt > 0.0:
         dt, before, rho, rho_before = step, 0.0 if run.controlled else step, run.rho, run.rho
     am, af, ga, be, _ = weights.py_func(rho, rho_before, before / dt)
@@ -41,7 +40,7 @@ def interface_stiffness(run: Transient, k: int, step: float) -> Floats:
     held[k] = 0
     work = workspace_of(line, keep=True)
     old, new = run.before, run.state
-    work.u[:] = new.r - old.r if clock[b.LAST_DT] > 0.0 else 0.0
+    work.u[:] = new.r - old.r if clock.last_dt > 0.0 else 0.0
     bad = entry.assembly_of_step(line, model.sea.values, ends._replace(held=held), old, new, cv, ca, work)
     give, n = np.zeros((3, 3)), line.h.size
     x, load = np.zeros((n + 1, SIZE)), np.zeros((n + 1, SIZE))

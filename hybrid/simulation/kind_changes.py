@@ -186,9 +186,9 @@ class KindChanges:
     def change(self, change: Change) -> float:
         """Other kinds of cells from now on: nothing moves; the energy, J, that is booked."""
         run, (first, second) = self._owner.run, self._owner.run.states
-        before, after = (second, first) if run.count[b.PARITY] else (first, second)
+        before, after = (second, first) if run.count.parity else (first, second)
         copy_into(before, after)
-        if run.count[b.PARITY] and run.push.size:
+        if run.count.parity and run.push.size:
             run.pushes[0][:] = run.pushes[1]
         self._owner.model.ends.at(run.t)
         self._kinds.model = self._owner.model

@@ -24,7 +24,7 @@ from hybrid.kernels.junctions.lines_distance import (
     watch_lines,
 )
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.books import Clock
 from hybrid.model.lines_contact import joined_ends_of
 from hybrid.model.system import SystemModel
 from hybrid.scene.system import System
@@ -61,7 +61,7 @@ class LinesWatch:
     """What looks after every step whether two of such lines have met, or are near."""
 
     def __init__(
-        self, system: System, model: SystemModel, met: set[tuple[int, int]], clock: Floats,
+        self, system: System, model: SystemModel, met: set[tuple[int, int]], clock: Clock,
         alone: Collection[tuple[int, int]] = (),
     ) -> None:  # fmt: skip
         """met: lines of which it is known; clock: of the run; alone: lines that may meet, but are let pass."""

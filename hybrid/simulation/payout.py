@@ -30,8 +30,7 @@ from hybrid.kernels.reel.payout_layers import carry_layers
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
 from hybrid.kernels.reel.reel import MovingZones, Reel, blank_reel, blank_reel_job
 from hybrid.kernels.run.payout_run import energy_of
-from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import CLOCK_SIZE
+from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.forces import FRICTION, STIFFNESS_DAMPING, TOUCHES
 from hybrid.kernels.state.report import LENGTH_OUT, PAYOUT_RATE
 from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, slip_size, state_for
@@ -64,7 +63,7 @@ class Before(NamedTuple):
 
     state: State
     t: float  # s
-    clock: Floats
+    clock: Clock
     tension: Floats  # (2, N) N, as of Books
 
 
@@ -84,7 +83,7 @@ class PayingOut:
         self.foreseen = fastest(self.law)
         self.layout: Layout | None = None  # of a line whose zones move
         self.ended = False  # whether the end at the winch has been let go
-        self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), np.zeros(CLOCK_SIZE)
+        self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), Clock()
         self._carrying = Table(blank_carry_job())
 
     def _blank(self, material: int) -> Reel:
@@ -367,7 +366,7 @@ class PayingOut:
 
     def _fit(self, line: Line, reel: Reel, length: float, t: float) -> None:
         """Let a line have a length, m, at t (s): cells that grow hold the sections that come off the reel."""
-        reel.numbers[p.LENGTH], self._clock[b.NOW] = length, t
+        reel.numbers[p.LENGTH], self._clock.now = length, t
         self._fitting.bind(line=line, reel=reel, clock=self._clock)
         fit_line(self._fitting.numbers)
 
@@ -410,7 +409,7 @@ class PayingOut:
             batch.report[known, LENGTH_OUT], batch.report[known, PAYOUT_RATE] = there
         lengths = batch.report[:, LENGTH_OUT].tolist()
         for t, length in zip(batch.t.tolist(), lengths, strict=True):
-            reel.numbers[p.LENGTH], self._clock[b.NOW] = length, t
+            reel.numbers[p.LENGTH], self._clock.now = length, t
             fit_line(self._fitting.numbers)
             yield line, self.plan.zones_of(length, moving)
 

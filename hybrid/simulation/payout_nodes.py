@@ -295,7 +295,7 @@ class NodeChanges:
             self._bind_all()
             self._bound = True
         self._at[f.ON], self._at[f.CELLS] = 0, n
-        parity = int(run.count[b.PARITY])
+        parity = int(run.count.parity)
         for which in (0, 1):
             _copy(run.states[which], self._state(0, which, n), ("turn",))
             if run.push.size:
@@ -312,7 +312,7 @@ class NodeChanges:
         self._calls[f.SOLVER] = run.solver_address()
         f.put_paid(self._following.numbers)
         self.adopted, self._synced = True, -1
-        run.count[b.PARITY] = parity
+        run.count.parity = parity
         self.sync()
 
     def go(self) -> int:

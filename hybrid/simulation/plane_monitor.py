@@ -16,7 +16,6 @@ import numpy as np
 
 from hybrid.errors import IN_SPACE
 from hybrid.kernels.run.entry import NO_PUSH
-from hybrid.kernels.state.books import NEAR_PLANE, PUSH_GROWN, PUSH_START
 from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.kernels.step.accept import GROWN
 from hybrid.model.build import Model
@@ -72,7 +71,7 @@ class PlaneMonitor:
     def attach(self, run: CompiledRun, line: Line) -> None:
         """Carry the push along with a (new) line of a run, in proportion to s."""
         away = self.comes_back and self.home is not None and not self.speed
-        run.clock[NEAR_PLANE] = BACK * line.s[-1] if away else 0.0
+        run.clock.near_plane = BACK * line.s[-1] if away else 0.0
         if not self.speed:
             run.carry((NO_PUSH, NO_PUSH))
         elif not np.array_equal(line.s, self._s):
@@ -85,18 +84,18 @@ class PlaneMonitor:
             self._s = line.s
 
     def _give(self, run: CompiledRun, push: Floats, s: Floats) -> None:
-        started = float(run.clock[PUSH_START]) if self._s.size else 0.0
+        started = float(run.clock.push_start) if self._s.size else 0.0
         run.carry((push, np.zeros_like(push)))
-        self._s, run.clock[PUSH_START] = s, started
+        self._s, run.clock.push_start = s, started
 
     def renew(self, run: CompiledRun) -> None:
         """Give the push anew: it has died."""
         run.push[:] = seed(self._s, self.speed)
-        run.clock[PUSH_START], self.real = 0.0, False
+        run.clock.push_start, self.real = 0.0, False
 
     def must_leave(self, run: CompiledRun, note: Note) -> bool:
         """Whether the motion has to go on in space, after a step in which the push had grown too large."""
-        grown = float(run.clock[PUSH_GROWN])
+        grown = float(run.clock.push_grown)
         fast = "faster than the step can follow" if np.isinf(grown) else f"by a factor of {grown:.0f}"
         text = f"a small push out of the plane has grown {fast}: the cable would leave the plane"
         where = int(np.argmax(np.abs(scaled(run.push, 1.0, self._s)[:, 0])))
@@ -163,13 +162,13 @@ class PlaneMonitor:
         least = BACK * model.length / model.time_scale
         speeds = np.maximum(np.abs(self._across[:, 1]), least)
         begun = BACK * GROWN / HANDED_ON  # by how much a push that was given at the start would have grown by now
-        run.clock[PUSH_START] = 0.5 * float(model.line.mass @ speeds**2) / begun**2
+        run.clock.push_start = 0.5 * float(model.line.mass @ speeds**2) / begun**2
 
     def checkpoint(self, run: CompiledRun) -> dict[str, Any] | None:
         """The push, its energy when it was given, and whether it is of a line that has come back."""
         if not self.speed:
             return None
-        pair, energy = np.array([run.push, run.push]), float(run.clock[PUSH_START])
+        pair, energy = np.array([run.push, run.push]), float(run.clock.push_start)
         return {"pair": pair, "unit": self.speed, "energy": energy, "led": True, "real": self.real}
 
     def restore(self, saved: Mapping[str, Any], run: CompiledRun) -> None:
@@ -178,7 +177,7 @@ class PlaneMonitor:
             raise ValueError("a push of no size")
         self.speed, self.real = saved["unit"], saved["real"]
         run.push[:] = saved["pair"][int(saved["led"])]
-        run.clock[PUSH_START] = saved["energy"]
+        run.clock.push_start = saved["energy"]
 
 
 def same_plane(a: Floats | None, b: Floats | None) -> bool:

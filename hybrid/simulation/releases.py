@@ -23,15 +23,14 @@ SAME_TIME = 1e-6  # of a step: a time so near is now
 def watch_forces(run: CompiledRun, model: Model) -> None:
     """Let the compiled run notice the forces at which held ends are let go."""
     held, forces = model.ends.values.held, model.ends.release_forces
-    for k, name in enumerate((b.RELEASE_START, b.RELEASE_END)):
-        run.clock[name] = forces[k] if held[k] else np.inf
+    run.clock.release_start, run.clock.release_end = np.where(held, forces, np.inf)
 
 
 def overloaded(run: CompiledRun) -> dict[int, str]:
     """The ends that are held by more than the force at which they are let go, after a step, and the reason in words."""
-    row, found = run.books.log[run.count[b.ROWS] - 1], {}
-    for k, name in enumerate((b.RELEASE_START, b.RELEASE_END)):
-        force, limit = float(row[b.LOG.index("end_force_start") + k]), float(run.clock[name])
+    row, found = run.books.log[run.count.rows - 1], {}
+    for k, limit in enumerate((float(run.clock.release_start), float(run.clock.release_end))):
+        force = float(row[b.LOG.index("end_force_start") + k])
         if force > limit:
             text = f"after the first step in which its force, {force:.6g} N, is above release_at.tension, {limit:g} N,"
             found[k] = text

@@ -46,7 +46,7 @@ from hybrid.kernels.contact.self_distance import (
     watch_itself,
 )
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE, NOW
+from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State, Work, state_for
 from hybrid.model.build import Model
@@ -302,14 +302,14 @@ class LineWatch:
         """Get ready for the kernel, when the line is so bent for the first time that it could come near itself."""
         model, job = self._model, Table(blank_itself_job)
         self._now, self._before = state_for(model.line), state_for(model.line)
-        self._clock = np.zeros(CLOCK_SIZE)
+        self._clock = Clock()
         job.bind(
             line=model.line, ends=model.ends.values, old=self._now, new=self._before, clock=self._clock,
-            counts=np.zeros(COUNT_SIZE, np.int64), itself=self._watch.itself,
+            counts=Counts(), itself=self._watch.itself,
         )  # fmt: skip
         return job
 
-    def attach(self, states: tuple[State, State], clock: Floats, counts: np.ndarray) -> dict[str, Any]:
+    def attach(self, states: tuple[State, State], clock: Clock, counts: Counts) -> dict[str, Any]:
         """What the job of a line is to have so that its steps, between two states in turn, look by themselves.
 
         clock, counts: of the run (kernels.state.books).
@@ -378,7 +378,7 @@ class LineWatch:
         if self._job is None:
             self._job = self._bind()
         self._now.r[:], self._now.e[:], self._now.v[:], self._before.r[:] = state.r, state.e, state.v, before
-        self._clock[NOW] = t
+        self._clock.now = t
         return int(watch_itself(self._job.numbers))
 
 

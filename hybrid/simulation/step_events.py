@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hybrid.simulation.transient import Transient
 
 # What cuts steps, and where the tries are counted.
-CUTS = {GAIN: b.CUT_BY_GAIN, TURN: b.CUT_BY_TURN, NEWTON: b.CUT_BY_NEWTON, ERROR: b.CUT_BY_ERROR}
+CUTS = {GAIN: "cut_by_gain", TURN: "cut_by_turn", NEWTON: "cut_by_newton", ERROR: "cut_by_error"}  # of Counts
 # What a look at the line finds (kernels.contact.self_distance), as flags of a step.
 ITSELF = {MEETS: b.MEETS_ITSELF, NEARS: b.NEARS_ITSELF, PARTS: b.PARTS_ITSELF, HIDES: b.HIDES_ITSELF}
 
@@ -25,26 +25,26 @@ def note_cut(moving: Transient) -> None:
     """An end turns too far in a fixed step, which was cut: an event for the first."""
     clock, most = moving.run.clock, moving.resolution.turn
     if not moving.turned and not moving.controlled:
-        text = steps_cut_text(float(clock[b.CUT_ANGLE]), float(clock[b.CUT_STEP]), most)
-        moving.events.event(float(clock[b.PREVIOUS]), 0.0, moving.model.length, "steps cut", text)
-    moving.turned, clock[b.MUTE_CUTS] = True, 1.0
+        text = steps_cut_text(float(clock.cut_angle), float(clock.cut_step), most)
+        moving.events.event(float(clock.previous), 0.0, moving.model.length, "steps cut", text)
+    moving.turned, clock.mute_cuts = True, 1.0
 
 
 def note_slack(moving: Transient) -> None:
     """A catenary was slack in a step too long for its waves, and is not in shorter ones: an event for the first."""
-    clock, cell = moving.run.clock, int(moving.run.count[b.SLACK_CELL])
-    text = slack_steps_text(float(clock[b.SLACK_STEP]), float(clock[b.LAST_DT]), float(clock[b.WAVE_STEP]))
+    clock, cell = moving.run.clock, int(moving.run.count.slack_cell)
+    text = slack_steps_text(float(clock.slack_step), float(clock.last_dt), float(clock.wave_step))
     s = float(moving.model.line.s[cell])
     moving.events.event(moving.t, s, s, "steps cut", text)
-    moving.slackened, clock[b.MUTE_SLACK] = True, 1.0
+    moving.slackened, clock.mute_slack = True, 1.0
 
 
 def note_iterations(moving: Transient) -> None:
     """A step was taken in all the Newton iterations that it may take though these had not converged: the first."""
-    clock, most = moving.run.clock, int(moving.run.count[b.MOST_ITERATIONS])
+    clock, most = moving.run.clock, int(moving.run.count.most_iterations)
     left = "though the next would still have" if most > 1 else "which"  # from one alone the next is not known
     text = (
-        f"a step was taken after {most} Newton iterations, {left} changed it by {float(clock[b.CORRECTION]):.2g} "
+        f"a step was taken after {most} Newton iterations, {left} changed it by {float(clock.correction):.2g} "
         f"(relative), and so are others like it: most_iterations bounds their cost; "
         f"steps/correction has what each left out; a shorter time.step or more iterations leave less"
     )
@@ -53,7 +53,7 @@ def note_iterations(moving: Transient) -> None:
 
 def count_iterations(moving: Transient) -> None:
     """How many steps were taken so: an event with their number, at the end of the run."""
-    short, most = int(moving.run.count[b.CUT_SHORT]), int(moving.run.count[b.MOST_ITERATIONS])
+    short, most = int(moving.run.count.cut_short), int(moving.run.count.most_iterations)
     if short:
         text = f"{short} of {moving.steps} steps were taken after {most} Newton iterations that had not converged"
         moving.events.event(
@@ -96,17 +96,17 @@ def look_at_itself(moving: Transient, flags: int) -> None:
         if found & MEETS:
             watch.itself.found[TOLD] = 0.0
     elif found & MEETS and moving.envelope is not None:
-        watch.tell(moving.t, float(moving.run.clock[b.LAST_DT]), moving.events.event)
+        watch.tell(moving.t, float(moving.run.clock.last_dt), moving.events.event)
 
 
 def note_collapse(moving: Transient) -> bool:
     """Steps have become so short that the run may not end: an event; whether a run to compare with has to stop."""
     clock, count = moving.run.clock, moving.run.count
-    steps, dt, node = int(count[b.TINY_STEPS]), float(clock[b.LAST_DT]), int(count[b.CUT_AT])
+    steps, dt, node = int(count.tiny_steps), float(clock.last_dt), int(count.cut_at)
     s = float(moving.model.line.s[min(max(node, 0), moving.model.line.s.size - 1)])
-    cuts = {cause: int(count[k]) for cause, k in CUTS.items()}
+    cuts = {cause: int(getattr(count, name)) for cause, name in CUTS.items()}
     contact = TOUCHES_ITSELF if moving.run.contact is not None and moving.run.contact.touches else ""
-    text = collapse_text(steps, dt, float(clock[b.LONGEST]), cuts, s, contact)
+    text = collapse_text(steps, dt, float(clock.longest), cuts, s, contact)
     if steps == MANY:
         moving.events.event(moving.t, s, s, COLLAPSE, text, value=dt)
     moving.collapse = text

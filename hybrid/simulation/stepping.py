@@ -17,7 +17,6 @@ import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
-from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd, contradictions
@@ -128,7 +127,7 @@ class Simulation(SteppedEnds):
         self._next: dict[int, tuple[Triple, Triple | None, Triple]] = {}  # what ends are set to, for the next step
         self._courses, self._moved = {}, {}
         self._loop.patient = self._plain
-        self._loop.run.run.count[b.MOST_ITERATIONS] = self._most
+        self._loop.run.run.count.most_iterations = self._most
         self._loop.run.run.wait_longer()
         self._written = monotonic()
         try:
@@ -147,7 +146,7 @@ class Simulation(SteppedEnds):
     @property
     def cut_short(self) -> int:
         """Steps so far that were taken after `most_iterations` though these had not converged."""
-        return int(self._loop.run.run.count[b.CUT_SHORT])
+        return int(self._loop.run.run.count.cut_short)
 
     def step(self) -> float:
         """One step of the scene's length, and the time after it (s).
@@ -175,7 +174,7 @@ class Simulation(SteppedEnds):
         if moving.payout is not None:
             moving.payout.go_on(now, until, self._wound)
             self._wound = None
-        one_step = until - now <= ONE_STEP * (self._fixed_step or float(moving.run.clock[b.LAST_DT]))
+        one_step = until - now <= ONE_STEP * (self._fixed_step or float(moving.run.clock.last_dt))
         for k, end in self._driven.items():
             if (course := self._next.pop(k, None)) is None:
                 end.stay(now, until, one_step)
@@ -264,7 +263,7 @@ class Simulation(SteppedEnds):
                 unpack(saved.state), self._loop, self._target, lambda model: self._drive_again(model, saved)
             )
             self._loop.recorder = self._recorder
-            self._loop.run.run.count[b.MOST_ITERATIONS] = self._most
+            self._loop.run.run.count.most_iterations = self._most
         else:
             run = self._loop.run
             if run.model is not saved.model:  # an end has been released since
@@ -281,7 +280,7 @@ class Simulation(SteppedEnds):
             run.run.move(run.model.ends.moves())
         self._bring_back_courses(saved.obstacles)
         self._loop.remember(saved.watch)
-        self._loop.run.run.count[b.CUT_SHORT] = saved.cut_short
+        self._loop.run.run.count.cut_short = saved.cut_short
         self._next.clear()
         self._wound = None
         self._failed = ""

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hybrid.adapt.manager import Change
 from hybrid.kernels.mesh import zone_step as z
-from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE
+from hybrid.kernels.state.books import Clock, Counts
 from hybrid.model.build import Model
 from hybrid.simulation.kind_changes import LineKinds, carries_all, copy_into
 from hybrid.simulation.zone_switching import ZoneSwitching
@@ -65,7 +63,7 @@ class SystemKinds:
         """A line of the solver that changes from now on."""
         run, (first, second) = self._run, self._turns
         line, model, ends = run.lines[number], run.model.models[number], self._solver.lines[number].ends
-        around = line.around(self._solver.work[number], np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64))
+        around = line.around(self._solver.work[number], Clock(), Counts())
         kinds = LineKinds(model, switching, (first.lines[number], second.lines[number]), around, ends)
         self._solver.take_line(number, kinds.model.line)
         switching.model = kinds.model

@@ -19,23 +19,17 @@ from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.mesh.zone_criteria import twist_of_rods
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state.books import (
-    FLAGS,
     HIDES_ITSELF,
     IS_BENT,
     JUMPED,
-    LEAST_PEAK,
     MEETS_ITSELF,
     NEARS_ITSELF,
     PARTS_ITSELF,
-    RELEASE_END,
-    RELEASE_START,
-    RHO,
-    STIFF,
-    STORED,
     STRAINS,
     STRETCHED,
-    VARIES,
     Books,
+    Clock,
+    Counts,
     blank_books,
     sample_size,
 )
@@ -183,9 +177,9 @@ class LineResult:
         right[marked] = nodes + np.arange(marked.size)
         books, base = blank_books(line.h.size), self.model.always.astype(np.int64)
         books.loaded[:] = self.model.loaded_ends
-        books.clock[[LEAST_PEAK, RELEASE_START, RELEASE_END]] = np.inf
-        books.counts[STIFF], books.counts[VARIES] = self.model.inextensible, self.model.layout is not None
-        books.clock[RHO] = self.scene.time.rho_inf if self.scene.time is not None else 0.0
+        books.clock.least_peak = books.clock.release_start = books.clock.release_end = np.inf
+        books.counts.stiff, books.counts.varies = self.model.inextensible, self.model.layout is not None
+        books.clock.rho = self.scene.time.rho_inf if self.scene.time is not None else 0.0
         return books._replace(
             strains=np.zeros((nodes, STRAINS)), marks=marks, right=right, start=begin.copy(), base=base,
             hinges=self.model.hinges, placed=begin[base], borne=1.0 + borne_strain(self.model),
@@ -306,7 +300,7 @@ class LineResult:
         self.books.work[:], self.books.power[:] = before.work, before.power
         self.books.velocity[:] = before.velocity
 
-    def around(self, work: Work, clock: Floats, counts: np.ndarray) -> Around:
+    def around(self, work: Work, clock: Clock, counts: Counts) -> Around:
         """What changes of kinds have to know of the line; clock, counts: room for those of a run alone."""
         books = self.books._replace(clock=clock, counts=counts)
         return Around(work, books, self.envelope, self._marked, self.envelope.itself.itself.cells)
@@ -319,7 +313,7 @@ class LineResult:
 
     # --- steps and outputs --------------------------------------------------------------------------
 
-    def attach(self, solver: SystemSolver, states: tuple[State, State], clock: Floats, counts: np.ndarray) -> None:
+    def attach(self, solver: SystemSolver, states: tuple[State, State], clock: Clock, counts: Counts) -> None:
         """Steps of a solver go on with the line, between two states in turn; clock, counts: of the run."""
         solver.bind_line(self.number, **self._itself.attach(states, clock, counts))
 
@@ -342,7 +336,7 @@ class LineResult:
 
         LineFailed where going on would make no sense.
         """
-        flags, step.books.counts[FLAGS] = int(step.books.counts[FLAGS]), 0
+        flags, step.books.counts.notices = int(step.books.counts.notices), 0
         if isinstance(self.recorder, ComparisonRecorder):
             flags &= ~(STRETCHED | JUMPED)
         self._stop_if(self.diagnostics.look(step, flags), step.t, step.state)
@@ -464,7 +458,7 @@ class LineResult:
         """What the rest of the run depends on beside the state at t (s), between two steps, with no output waiting."""
         books, answers = self.books, answers_of(work.torsion)
         return {
-            "work": books.work[0].copy(), "power": books.power[0].copy(), "stored": float(books.clock[STORED]),
+            "work": books.work[0].copy(), "power": books.power[0].copy(), "stored": float(books.clock.stored),
             "report": work.report.copy(), "envelope": self.envelope.checkpoint(books.extremes),
             "before": {
                 "imposed": books.imposed[0].copy(), "report": books.report[1].copy(),
@@ -479,7 +473,7 @@ class LineResult:
     def restore(self, saved: Mapping[str, Any], work: Work, t: float, joints: Sequence[int]) -> None:
         """Go on at t (s) as `checkpoint` has written; joints: as of `JoinedLine`.  ValueError: that cannot be."""
         books, model = self.books, self.model
-        books.work[0], books.power[0], books.clock[STORED] = saved["work"], saved["power"], saved["stored"]
+        books.work[0], books.power[0], books.clock.stored = saved["work"], saved["power"], saved["stored"]
         work.report[:] = books.report[0] = saved["report"]
         before = saved["before"]  # what outputs within the next step are made of
         books.imposed[0], books.report[1], books.tension[0] = (before[x] for x in ("imposed", "report", "tension"))

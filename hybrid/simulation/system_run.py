@@ -215,32 +215,32 @@ class SystemRun:
     @property
     def t(self) -> float:
         """Time of the state, s."""
-        return float(self.loop.clock[b.NOW])
+        return float(self.loop.clock.now)
 
     @property
     def steps(self) -> int:
         """Steps so far."""
-        return int(self.loop.counts[b.STEPS])
+        return int(self.loop.counts.steps)
 
     @property
     def last_step(self) -> float:
         """Length, s, of the step that led to the state; 0: it is a start."""
-        return float(self.loop.clock[b.LAST_DT])
+        return float(self.loop.clock.last_dt)
 
     @property
     def last_rho(self) -> float:
         """Its spectral radius."""
-        return float(self.loop.clock[b.LAST_RHO])
+        return float(self.loop.clock.last_rho)
 
     @property
     def interval(self) -> float:
         """What the step took (s) that led to the state, of which outputs within the next are made, too; 0: unknown."""
-        return float(self.loop.clock[b.NOW] - self.loop.clock[b.PREVIOUS])
+        return float(self.loop.clock.now - self.loop.clock.previous)
 
     def stand_at(self, t: float, steps: int, last_step: float, last_rho: float, interval: float) -> None:
         """Be between two steps, at t (s)."""
         clock = self.loop.clock
-        clock[b.NOW], clock[b.LAST_DT], clock[b.LAST_RHO], self.loop.counts[b.STEPS] = t, last_step, last_rho, steps
+        clock.now, clock.last_dt, clock.last_rho, self.loop.counts.steps = t, last_step, last_rho, steps
         self.loop.stand_between(interval, self.resolution.one.step)
         self._logged = clock_now() - self._begin
 
@@ -362,10 +362,10 @@ class SystemRun:
 
     def _record_samples(self) -> None:
         """Record what has been sampled of points, bodies and lines."""
-        count = int(self.loop.counts[b.SAMPLES])
+        count = int(self.loop.counts.samples)
         if not count:
             return
-        self.loop.counts[b.SAMPLES] = 0
+        self.loop.counts.samples = 0
         states = [line.sampled(count) for line in self.lines]
         seen = Sampled(states, self.loop.body_samples[:count])
         if self.target is not None:
@@ -604,7 +604,7 @@ class SystemRun:
             if code in (b.TRYING, b.TRIED, b.STEPPED, b.FAILED) or loop.is_half_full:
                 self._record_samples()  # of lines as they were until now
             if code == b.TRYING:
-                self._prepare(float(loop.clock[b.TRY_END]))
+                self._prepare(float(loop.clock.try_end))
             elif code == b.TRIED:
                 self._judge_zones()
             elif code == b.FAILED:
@@ -615,24 +615,24 @@ class SystemRun:
                 if code == b.STEPPED:
                     self.ends_of_now()
                     self._after_step(step)
-                if loop.controlled or self.t >= loop.clock[b.UNTIL]:
-                    self.leg = (self.leg[0], int(loop.counts[b.LEG_PART]))
-                arrived = self.t >= stop and loop.counts[b.PHASE] != b.SAMPLE
+                if loop.controlled or self.t >= loop.clock.until:
+                    self.leg = (self.leg[0], int(loop.counts.leg_part))
+                arrived = self.t >= stop and loop.counts.phase != b.SAMPLE
                 if arrived:
                     self._record_samples()
                     self._arrive(stop, step)
-                self._between = arrived or loop.counts[b.PHASE] == b.BEGIN_STEP
+                self._between = arrived or loop.counts.phase == b.BEGIN_STEP
                 if code == b.PAUSED:
-                    loop.set_quota(LOOK if loop.counts[b.ASKS] else ROWS)
+                    loop.set_quota(LOOK if loop.counts.asks else ROWS)
                 if code == b.PAUSED or arrived:
                     look()
 
     def _attach(self) -> None:
         """Steps lead from the state of now, with ends that move as they do now."""
         loop, solver = self.loop, self.solver
-        loop.counts[b.ASKS] = 0
+        loop.counts.asks = 0
         if self.failures.all:
-            loop.counts[b.ASKS] |= b.ASK_STEPS
+            loop.counts.asks |= b.ASK_STEPS
         if loop.attach(solver, self.state, self.other):
             for line, old, new in zip(self.lines, self.state.lines, self.other.lines, strict=True):
                 line.attach(solver, (old, new), loop.clock, loop.counts)
@@ -640,7 +640,7 @@ class SystemRun:
             self.zones.attach(loop)
         if self.payout is not None:
             self.payout.attach(loop)
-        if loop.counts[b.ASKS] & b.ASK_BEFORE:
+        if loop.counts.asks & b.ASK_BEFORE:
             return
         moves = [model.ends.moves() for model in self.model.models]
         if len(moves) != len(self._moved) or any(x is not y for x, y in zip(moves, self._moved, strict=True)):
@@ -665,20 +665,20 @@ class SystemRun:
         """After a try: lines may get more rod, with which it is made again."""
         assert self.zones is not None
         clock = self.loop.clock
-        last = bool(0.5 * clock[b.TRIED_DT] < clock[b.SHORTEST])
-        if self.zones.wants_more_rod(self.loop.tried, float(clock[b.TRY_END]), last):
+        last = bool(0.5 * clock.tried_dt < clock.shortest)
+        if self.zones.wants_more_rod(self.loop.tried, float(clock.try_end), last):
             self.loop.try_again()
 
     def _failed_step(self) -> None:
         """No shorter step is left to try: contact is given up, or the run ends.  LineFailed."""
-        dt = float(self.loop.clock[b.TRIED_DT])
+        dt = float(self.loop.clock.tried_dt)
         if not gives_up_contact(self, dt):
             raise self._stopped(self.solver, self.loop.tried, dt)
         self.loop.try_whole()
 
     def ends_of_now(self) -> None:
         """Let ends and sea be as they are now: compiled steps have moved them without Python."""
-        if not self.loop.counts[b.ASKS] & b.ASK_BEFORE:
+        if not self.loop.counts.asks & b.ASK_BEFORE:
             for model in self.model.models:
                 model.ends.at(self.t)
                 model.sea.at(self.t)
@@ -700,17 +700,17 @@ class SystemRun:
         for line, new, old, work in zip(self.lines, self.state.lines, self.other.lines, solver.work, strict=True):
             if seen := int(loop.seen[line.number]):
                 line.look_at_itself(solver, seen, t, self.last_step, new)
-            if line.books.counts[b.FLAGS]:
+            if line.books.counts.notices:
                 line.watch(LineStep(t, new, old, work.report, line.books))
         if self.zones is not None:
             self.zones.accepted(self.last_step)
         if any(line.nears_itself for line in self.lines):
             begin_contact(self)
-        if loop.counts[b.FLAGS] & b.LINES_NEAR:
+        if loop.counts.notices & b.LINES_NEAR:
             begin_between(self)
         if parted := [line.number for line in self.lines if line.parts_itself and not line.shares]:
             end_contact(self, parted)
-        if loop.counts[b.FLAGS] & b.COLLAPSES:
+        if loop.counts.notices & b.COLLAPSES:
             self._tell_collapse()
         if self.zones is not None:
             self.zones.adapt()
@@ -811,8 +811,8 @@ class SystemRun:
         number, where = self.loop.last_cut
         line = self.lines[max(number, 0)]
         s = float(line.model.line.s[min(max(where, 0), line.model.line.s.size - 1)]) if number >= 0 else 0.0
-        cuts, tiny = {cause: int(count[k]) for cause, k in CUTS.items()}, int(count[b.TINY_STEPS])
-        text = collapse_text(tiny, self.last_step, float(clock[b.LONGEST]), cuts, s, self._touching)
+        cuts, tiny = {cause: int(getattr(count, name)) for cause, name in CUTS.items()}, int(count.tiny_steps)
+        text = collapse_text(tiny, self.last_step, float(clock.longest), cuts, s, self._touching)
         if tiny == MANY:
             line.events.event(self.t, s, s, COLLAPSE, text, value=self.last_step)
         if self.target is None and tiny >= GIVE_UP:

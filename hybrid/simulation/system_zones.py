@@ -20,7 +20,7 @@ from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, follow_zones
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import COUNT_SIZE
+from hybrid.kernels.state.books import Counts
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Ends, Line, State, state_for
 from hybrid.model.build import Model
@@ -197,7 +197,7 @@ class _LineZones:
 
     def __init__(self, number: int, model: Model, manager: DomainManager, every: int) -> None:
         self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager, followed=True)
-        self.clock, self.counts = np.zeros(b.CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+        self.clock, self.counts = b.Clock(), Counts()
         longest, clock = LONGEST_IN_PACE * manager.pace * every, manager.zones.clock
         clock[z.RAMP_STEP], clock[z.CALM_STEP] = longest, longest * READY
         clock[z.LETTING_GO] = LETTING_GO * manager.pace
@@ -206,7 +206,7 @@ class _LineZones:
 
     def follow(self, run: SystemRun, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
-        self.counts[b.PHASE], self.clock[b.NOW], self.clock[b.TRY_END] = phase, t, end
+        self.counts.phase, self.clock.now, self.clock.try_end = phase, t, end
         model = self.switching.model
         self.switching.table.bind(
             line=model.line, sea=model.sea.values, ends=model.ends.values, old=old, new=new, clock=self.clock,
@@ -261,17 +261,17 @@ class SystemZones:
     def attach(self, loop: SystemSteps) -> None:
         """Let the steps of a loop follow the zones from now on, or ask for what they do."""
         run = self._run
-        loop.clock[b.ALLOWED] = self.longest
+        loop.clock.allowed = self.longest
         if not self._compiled:
             loop.follow([])
-            loop.counts[b.ASKS] |= b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
+            loop.counts.asks |= b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
             return
         loop.follow([x.bind(run, loop) for x in self.lines])
         mine = [run.lines[x.number] for x in self.lines]
         if run.shared is not None or any(x.contact is not None for x in mine):
-            loop.counts[b.ASKS] |= b.ASK_STEPS
+            loop.counts.asks |= b.ASK_STEPS
         if any(x.observer.writes_criteria for x in mine):
-            loop.counts[b.ASKS] |= b.ASK_BEFORE | b.ASK_STEPS
+            loop.counts.asks |= b.ASK_BEFORE | b.ASK_STEPS
 
     def look_ahead(self) -> None:
         """Criteria know how near lines come to themselves and each other, by the contact that the solver has now."""
@@ -364,7 +364,7 @@ class SystemZones:
 
         last: no shorter step is left to try.
         """
-        run, changes, step = self._run, list[tuple[_LineZones, Change]](), int(self._run.loop.counts[b.STEPS])
+        run, changes, step = self._run, list[tuple[_LineZones, Change]](), int(self._run.loop.counts.steps)
         if step != self._rescued:
             self._rescues, self._rescued = 0, step
         for x in self.lines:
@@ -392,7 +392,7 @@ class SystemZones:
             k = x.number
             state, before = run.state.lines[k], run.other.lines[k]
             if not self._compiled:
-                x.clock[b.LAST_DT], x.clock[b.LAST_RHO] = dt, run.last_rho
+                x.clock.last_dt, x.clock.last_rho = dt, run.last_rho
                 x.follow(run, b.END_STEP, run.t, run.t, state, before)
             x.pending = x.switching.book_step(run.t, state)
 

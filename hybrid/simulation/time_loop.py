@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hybrid.errors import ComputationError
-from hybrid.kernels.state.books import AT_STOP, FAILED, FLAGS, JUMPED, LOG, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
+from hybrid.kernels.state.books import AT_STOP, FAILED, JUMPED, LOG, PAUSED, STEPPED, STRETCHED
 from hybrid.kernels.state.state import Batch, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
@@ -217,14 +217,14 @@ class TimeLoop:
         """
         run = self.run
         for code in run.advance(stop, begun):
-            self._keep_ratios(int(run.run.count[SAMPLES]))
+            self._keep_ratios(int(run.run.count.samples))
             if code in (PAUSED, FAILED) or (code == AT_STOP and (self._aside or not self.patient)):
                 self.write_down()
             elif not self._may_wait:
                 self.write_down(aside=(run.cells_follow or run.pays_out) and self._may_be_joined)
             if code == STEPPED:
                 self.diagnostics.follow(run.model)
-                self._look(int(run.run.count[FLAGS]))
+                self._look(int(run.run.count.notices))
             elif code in (PAUSED, AT_STOP):
                 self._pause()
 
@@ -280,7 +280,7 @@ class TimeLoop:
             if batch is not None:
                 self._put_aside(run.outputs_of_now(batch))
             return
-        if everything or batch is not None or self._aside or run.run.count[ROWS] > LOGGED:
+        if everything or batch is not None or self._aside or run.run.count.rows > LOGGED:
             self._log()
         self._record_aside()
         if batch is not None:

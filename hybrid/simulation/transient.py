@@ -137,8 +137,8 @@ class Transient:
         self._rescues = 0, 0  # the step before, and repetitions with more rod since
         self.run.books.loaded[:] = model.loaded_ends
         self.run.books = self.run.books._replace(hinges=model.hinges)
-        self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
-        self.run.count[b.STIFF] = model.inextensible
+        self.run.clock.floor = model.slack_floor if model.slack == "stop" else -np.inf
+        self.run.count.stiff = model.inextensible
         if not self._begins_at_once:
             self.set_model(model, state_for(model.line))  # until `begin` or `restore`
 
@@ -150,24 +150,24 @@ class Transient:
     def _set_control(self, resolution: Resolution) -> None:
         """How long steps may be."""
         clock, count = self.run.clock, self.run.count
-        count[b.CONTROLLED], clock[b.MOST_TURN] = resolution.local is not None, resolution.turn
+        count.controlled, clock.most_turn = resolution.local is not None, resolution.turn
         if resolution.local is not None:
-            clock[b.TOLERANCE], clock[b.LARGEST] = resolution.local, resolution.step
-            clock[b.SHORTEST] = resolution.shortest
-            clock[b.NEXT_DT] = max(resolution.step / FIRST, resolution.shortest)
-            clock[b.ERROR_RATIO] = 1.0
+            clock.tolerance, clock.largest = resolution.local, resolution.step
+            clock.shortest = resolution.shortest
+            clock.next_dt = max(resolution.step / FIRST, resolution.shortest)
+            clock.error_ratio = 1.0
 
     # --- what it knows --------------------------------------------------------------------------
 
     @property
     def rho(self) -> float:
         """Spectral radius of the time scheme."""
-        return float(self.run.clock[b.RHO])
+        return float(self.run.clock.rho)
 
     @property
     def t(self) -> float:
         """Time of the state, s."""
-        return float(self.run.clock[b.NOW])
+        return float(self.run.clock.now)
 
     @property
     def state(self) -> State:
@@ -181,22 +181,22 @@ class Transient:
     @property
     def steps(self) -> int:
         """Accepted steps so far."""
-        return int(self.run.count[b.STEPS])
+        return int(self.run.count.steps)
 
     @property
     def iterations(self) -> int:
         """Newton iterations of the last step."""
-        return int(self.run.count[b.ITERATIONS])
+        return int(self.run.count.iterations)
 
     @property
     def controlled(self) -> bool:
         """Whether the length of steps follows their error."""
-        return bool(self.run.count[b.CONTROLLED])
+        return bool(self.run.count.controlled)
 
     @property
     def between_steps(self) -> bool:
         """Whether the last step is done with, and the next not begun."""
-        return bool(self.run.count[b.PHASE] == b.BEGIN_STEP)
+        return bool(self.run.count.phase == b.BEGIN_STEP)
 
     @property
     def unchanging(self) -> bool:
@@ -299,7 +299,7 @@ class Transient:
         if taken.outcome != Outcome.OK:
             raise StepFailed(Tried(taken.outcome, taken.iterations, taken.correction, taken.where), 0.0)
         run.move(ends.moves())
-        run.clock[b.LAST_DT] = 0.0
+        run.clock.last_dt = 0.0
         self.stepper.work.report[SELF_CONTACT_ENERGY] = pressed
         self._restart_books()
         if new_leg:
@@ -312,9 +312,9 @@ class Transient:
         if self.payout is not None:
             self.payout.stand_still()
         run.books.report[0] = self.stepper.work.report
-        run.clock[b.STORED] = self.stepper.told[SEABED_ENERGY]
-        run.clock[b.PREVIOUS] = run.clock[b.NOW]
-        run.count[b.PHASE], run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.START, b.SAMPLE, 1
+        run.clock.stored = self.stepper.told[SEABED_ENERGY]
+        run.clock.previous = run.clock.now
+        run.count.phase, run.count.after_start, run.count.new_state = b.START, b.SAMPLE, 1
 
     def release(self, k: int, why: str, new_leg: bool = True) -> None:
         """End k (0 or 1) is let go now; new_leg: whether equal steps are counted from here."""
@@ -332,21 +332,21 @@ class Transient:
         self._find_accelerations(new_leg)
         clock = self.run.clock
         if self.controlled:
-            clock[b.NEXT_DT] = max(clock[b.NEXT_DT] / FIRST, clock[b.SHORTEST])
-            clock[b.ERROR_RATIO] = 1.0
+            clock.next_dt = max(clock.next_dt / FIRST, clock.shortest)
+            clock.error_ratio = 1.0
 
     # --- steps ----------------------------------------------------------------------------------
 
     def set_stop(self, stop: float) -> None:
         """The next steps end at `stop` (s)."""
         clock, count = self.run.clock, self.run.count
-        clock[b.STOP] = stop
-        if count[b.CONTROLLED] and self.payout is not None:
+        clock.stop = stop
+        if count.controlled and self.payout is not None:
             self.payout.limit_step()
-        if not count[b.CONTROLLED] and stop > clock[b.NOW]:
-            step, whole = self.resolution.step, stop - float(clock[b.LEG_BEGIN])
-            count[b.LEG_PARTS] = n = parts(whole, step)
-            clock[b.LEG_STEP] = step if abs(n * step - whole) <= WHOLE_STEPS * step else whole / n
+        if not count.controlled and stop > clock.now:
+            step, whole = self.resolution.step, stop - float(clock.leg_begin)
+            count.leg_parts = n = parts(whole, step)
+            clock.leg_step = step if abs(n * step - whole) <= WHOLE_STEPS * step else whole / n
 
     def advance(self, stop: float, begun: int | None = None) -> Iterator[int]:
         """To `stop` (s), where a step ends; yields codes of state.books: STEPPED where there is something to look at.
@@ -374,7 +374,7 @@ class Transient:
                     self._pending = None
             elif code == b.STEPPED:
                 self._after_step()
-                if count[b.FLAGS]:
+                if count.notices:
                     yield code
             elif code == b.SAMPLED:
                 yield code
@@ -382,10 +382,10 @@ class Transient:
             elif code == b.FAILED:
                 yield code
                 if not gives_up_contact(self):
-                    raise StepFailed(run.tried, float(clock[b.TRY_END] - clock[b.NOW]))
+                    raise StepFailed(run.tried, float(clock.try_end - clock.now))
                 self.evaluate_forces()
-                clock[b.TRIED_DT] = clock[b.UNTIL] - clock[b.NOW]
-                count[b.AFTER_START], count[b.NEW_STATE] = b.TRY, 0
+                clock.tried_dt = clock.until - clock.now
+                count.after_start, count.new_state = b.TRY, 0
             else:
                 yield code
                 if code == b.AT_STOP:
@@ -420,7 +420,7 @@ class Transient:
             return None
         if self._cells is None or not self._cells.still_fits():
             waits = self._cells is not None and self._cells.waits
-            if self.run.count[b.SAMPLES] or waits:  # in the arrays of before: Python changes cells until they go
+            if self.run.count.samples or waits:  # in the arrays of before: Python changes cells until they go
                 return None
             self._cells = CellChanges(self)
         if not self._cells.adopted:
@@ -444,7 +444,7 @@ class Transient:
         if not NodeChanges.applies(self):
             return None
         if self._nodes is None or not self._nodes.still_fits() or not self._nodes.adopted:
-            if self.run.count[b.SAMPLES] or (self._nodes is not None and self._nodes.waits):
+            if self.run.count.samples or (self._nodes is not None and self._nodes.waits):
                 return None  # in the arrays of before: Python changes nodes until they go
             if self._nodes is None or not self._nodes.still_fits():
                 self._nodes = NodeChanges(self)
@@ -453,7 +453,7 @@ class Transient:
 
     def begin_leg(self) -> None:
         """Count fixed steps from here."""
-        self.run.clock[b.LEG_BEGIN], self.run.count[b.LEG_PART] = self.t, 0
+        self.run.clock.leg_begin, self.run.count.leg_part = self.t, 0
 
     def _choose_asks(self) -> None:
         """When the compiled run has to ask: for zones, for a plane that is left."""
@@ -470,33 +470,33 @@ class Transient:
             self.correction.set_torque()
             if switching is not None and switching.manager.twisted:
                 asks |= b.ASK_STEPS  # the torque is another one after every step
-        count[b.ASKS] = asks
+        count.asks = asks
 
     def _review_try(self) -> Change | None:
         """A try has ended: more rod, and the step again, where zones ask for it or the step failed; None: as it is."""
         run, switching = self.run, self.switching
         assert switching is not None
         clock, count, tried = run.clock, run.count, run.tried
-        end, dt = float(clock[b.TRY_END]), float(clock[b.TRY_END] - clock[b.NOW])
+        end, dt = float(clock.try_end), float(clock.try_end - clock.now)
         rescues = self._rescues[1] if self._rescues[0] == self.steps else 0
         change = switching.rescue(tried, end, dt, run.before, rescues)
         if change is not None:
             self._rescues = self.steps, rescues + 1
-        elif tried.outcome != Outcome.OK and 0.5 * clock[b.TRIED_DT] < clock[b.SHORTEST]:
+        elif tried.outcome != Outcome.OK and 0.5 * clock.tried_dt < clock.shortest:
             change = switching.all_rod(tried)
-            clock[b.TRIED_DT] = clock[b.UNTIL] - clock[b.NOW] if change is not None else clock[b.TRIED_DT]
+            clock.tried_dt = clock.until - clock.now if change is not None else clock.tried_dt
         if change is not None:
-            count[b.WASTED] += tried.iterations
+            count.wasted += tried.iterations
         return change
 
     def _after_step(self) -> None:
         """A step is accepted: what zones put in is booked, and what is to change decided."""
         run = self.run
-        flags, end, dt = int(run.count[b.FLAGS]), self.t, float(run.clock[b.LAST_DT])
+        flags, end, dt = int(run.count.notices), self.t, float(run.clock.last_dt)
         if self.payout is not None and self.payout.at_its_end:
             raise StepFailed(Tried(Outcome.WINCH_AT_END, 0, 0.0, self.model.cells), dt)
         if flags & b.COLLAPSES and note_collapse(self):
-            raise StepFailed(Tried(Outcome.COLLAPSED, 0, 0.0, int(run.count[b.CUT_AT])), dt)
+            raise StepFailed(Tried(Outcome.COLLAPSED, 0, 0.0, int(run.count.cut_at)), dt)
         if flags & b.UNKNOWN_ERROR:
             note_unknown_error(self)
         if flags & b.STEPS_CUT:
@@ -521,16 +521,16 @@ class Transient:
         changes = self._pending is not None or self._leaves or self._returns or self.nears_itself
         changes |= bool(self._overloaded) or self.parts_itself
         changes |= self.payout is not None and self.payout.due
-        run.count[b.INSIDE] = changes
-        changes |= bool(run.count[b.SAMPLES]) and not self.unchanging
-        outputs, at = run.books.outputs, int(run.count[b.OUTPUT])
+        run.count.inside = changes
+        changes |= bool(run.count.samples) and not self.unchanging
+        outputs, at = run.books.outputs, int(run.count.output)
         if not changes and (at == outputs.size or outputs[at] > end + dt):
-            run.count[b.PHASE] = b.END_STEP  # nothing to sample, nothing to change
+            run.count.phase = b.END_STEP  # nothing to sample, nothing to change
 
     def _adapt(self) -> None:
         """After the outputs of a step: zones change where criteria ask for it, and the plane is left where it must."""
         change, self._pending = self._pending, None
-        self.run.count[b.INSIDE] = 0
+        self.run.count.inside = 0
         if change is not None:
             self._switch(change)
         if self.payout is not None and self.payout.due:
@@ -605,7 +605,7 @@ class Transient:
     def _switch(self, change: Change, here: np.ndarray | None = None) -> None:
         """Zones change: nothing moves, and what changes energy is booked; here: as of `ZoneSwitching.switch`."""
         assert self.switching is not None
-        run, trying, cells = self.run, self.run.count[b.PHASE] == b.JUDGE, self._changes_of_cells()
+        run, trying, cells = self.run, self.run.count.phase == b.JUDGE, self._changes_of_cells()
         if cells is not None and change.same:
             cells.change()
             if self._leaves or self._overloaded:
@@ -629,7 +629,7 @@ class Transient:
             self.set_model(model, state)
             self.evaluate_forces()
         if trying:  # the step before is done with: its state was looked at as it was then
-            run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.TRY, 0
+            run.count.after_start, run.count.new_state = b.TRY, 0
 
     def set_model(self, model: Model, state: State) -> None:
         """Go on with another line: other zones, or out of the plane."""
@@ -648,7 +648,7 @@ class Transient:
         keep = touches or self.correction is not None or (self.payout is not None and self.payout.solves_twice)
         self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=keep)
         books.hinges[:] = model.hinges
-        self.run.clock[b.WAVE_STEP] = wave_step(model.line, model.tension_scale)
+        self.run.clock.wave_step = wave_step(model.line, model.tension_scale)
         self.run.attach(
             self.stepper, model.sea.values, model.ends.values, model.ends.moves(), state, 1.0 + borne_strain(model),
             model.always, marks_on(model.line.s, self.marked),

@@ -24,31 +24,31 @@ SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were hav
 
 
 # Of steps that have become short: kernels.state.books.
-LENGTHS = (b.TINY_STEPS, b.CUT_BY_GAIN, b.CUT_BY_TURN, b.CUT_BY_NEWTON, b.CUT_BY_ERROR, b.CUT_AT)
+LENGTHS = "tiny_steps", "cut_by_gain", "cut_by_turn", "cut_by_newton", "cut_by_error", "cut_at"  # of Counts
 
 
 def checkpoint(run: Transient) -> dict[str, Any]:
     """What the next steps depend on, between two steps: named arrays and plain values (simulation.restore)."""
     model, clock, count, books = run.model, run.run.clock, run.run.count, run.run.books
     control = {
-        "next": float(clock[b.NEXT_DT]), "before": float(clock[b.ERROR_RATIO]), "wary": int(count[b.WARY])
+        "next": float(clock.next_dt), "before": float(clock.error_ratio), "wary": int(count.wary)
     }  # fmt: skip
     parts_: dict[str, Any] = {
         "ends": model.ends, "zoning": run.switching, "correction": run.correction, "payout": run.payout,
     }  # fmt: skip
     return {name: x.checkpoint() if x is not None else None for name, x in parts_.items()} | {
-        "t": run.t, "dt": float(clock[b.LAST_DT]), "rho": float(clock[b.LAST_RHO]), "steps": run.steps,
-        "iterations": int(count[b.ITERATIONS]),
+        "t": run.t, "dt": float(clock.last_dt), "rho": float(clock.last_rho), "steps": run.steps,
+        "iterations": int(count.iterations),
         "changes": run.changes, "_turned": run.turned, "_slackened": run.slackened, "_beyond": run.beyond,
-        "leg": [float(clock[b.LEG_BEGIN]), int(count[b.LEG_PART])],
-        "_stored": float(clock[b.STORED]),
-        "floor": float(clock[b.FLOOR]), "work": books.work[0].copy(), "power": books.power[0].copy(),
+        "leg": [float(clock.leg_begin), int(count.leg_part)],
+        "_stored": float(clock.stored),
+        "floor": float(clock.floor), "work": books.work[0].copy(), "power": books.power[0].copy(),
         "report": books.report[:2].copy(), "tension": books.tension[0].copy(),
         "twist": books.twist[0].copy(),
-        "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if run.controlled else None,
+        "last": float(clock.now - clock.previous), "control": control if run.controlled else None,
         "state": run.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
         "push": run.plane_monitor.checkpoint(run.run), "home": run.plane_monitor.home,
-        "lengths": [float(clock[b.LONGEST]), *(int(count[k]) for k in LENGTHS)],
+        "lengths": [float(clock.longest), *(int(getattr(count, name)) for name in LENGTHS)],
         "self_contact": run.run.contact and run.run.contact.checkpoint(run.t),
         "torsion": {name: x.copy() for name, x in run.run.answers.items()},
         "envelope": run.envelope and run.envelope.checkpoint(books.extremes),
@@ -104,15 +104,17 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         saved = {name: x for name, x in saved.items() if name != "zoning"}
     saved = matched(older | dict(saved), template, "state")
     clock, count, books = compiled.clock, compiled.count, compiled.books
-    clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
-    clock[b.LAST_RHO] = saved["rho"]
-    clock[b.LONGEST], count[list(LENGTHS)] = saved["lengths"][0], saved["lengths"][1:]
-    clock[b.LAST_DT], clock[b.STORED], clock[b.FLOOR] = saved["dt"], saved["_stored"], saved["floor"]
-    count[b.STEPS], count[b.ITERATIONS] = saved["steps"], saved["iterations"]
+    clock.now, clock.previous = saved["t"], saved["t"] - saved["last"]
+    clock.last_rho = saved["rho"]
+    clock.longest = saved["lengths"][0]
+    for name, number in zip(LENGTHS, saved["lengths"][1:], strict=True):
+        setattr(count, name, number)
+    clock.last_dt, clock.stored, clock.floor = saved["dt"], saved["_stored"], saved["floor"]
+    count.steps, count.iterations = saved["steps"], saved["iterations"]
     run.changes, run.beyond = saved["changes"], saved["_beyond"]
     run.turned, run.slackened = saved["_turned"], saved["_slackened"]
-    clock[b.MUTE_CUTS], clock[b.MUTE_SLACK] = float(run.turned), float(run.slackened)
-    clock[b.LEG_BEGIN], count[b.LEG_PART] = saved["leg"] if complete else (saved["t"], 0)
+    clock.mute_cuts, clock.mute_slack = float(run.turned), float(run.slackened)
+    clock.leg_begin, count.leg_part = saved["leg"] if complete else (saved["t"], 0)
     books.work[0], books.power[0], books.report[:2] = saved["work"], saved["power"], saved["report"]
     books.tension[0], books.twist[0] = saved["tension"], saved["twist"]
     for mine, its in ((state, saved["state"]), (compiled.before, saved["state"])):
@@ -143,11 +145,11 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         run.switching.restore(saved["zoning"])
     if run.correction is not None:
         run.correction.restore(saved["correction"])
-    count[b.OUTPUT] = np.searchsorted(books.outputs, run.t + SAME_TIME * saved["dt"], side="right")
+    count.output = np.searchsorted(books.outputs, run.t + SAME_TIME * saved["dt"], side="right")
     _restore_envelope(run, saved["envelope"])
     if not complete:
         run.evaluate_forces()
-    count[b.PHASE] = b.BEGIN_STEP
+    count.phase = b.BEGIN_STEP
 
 
 def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
@@ -185,8 +187,8 @@ def _restore_envelope(run: Transient, saved: Mapping[str, Any] | None) -> None:
 
 def _restore_control(run: Transient, saved: Mapping[str, Any]) -> None:
     clock, largest = run.run.clock, max(run.resolution.step, run.resolution.later)
-    clock[b.NEXT_DT], clock[b.ERROR_RATIO] = saved["next"], saved["before"]
-    run.run.count[b.WARY] = saved["wary"]
-    good = clock[b.SHORTEST] <= saved["next"] <= largest and saved["before"] > 0.0
+    clock.next_dt, clock.error_ratio = saved["next"], saved["before"]
+    run.run.count.wary = saved["wary"]
+    good = clock.shortest <= saved["next"] <= largest and saved["before"] > 0.0
     if not (good and 0 <= saved["wary"] <= WARY):
         raise ValueError("steps that no controller chooses")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import Resolution
 from hybrid.model.start_vibration import start_vibrations
@@ -39,9 +39,9 @@ class VibrationSteps:
         self._rows = np.zeros((0, 3))  # of steps since the last look: s; N, at start and end
         self._counts_from = 0.0  # s, from when on little has been seen
 
-    def begin(self, clock: Floats) -> None:
+    def begin(self, clock: Clock) -> None:
         """Steps are short from here on if a vibration begins here; clock: of kernels.state.books."""
-        now = float(clock[b.NOW])
+        now = float(clock.now)
         if any(abs(now - t) <= 1e-9 * self._period for t in self.begins):
             self.look, self._rows = now + SEEN * self._period, self._rows[:0]
             self._counts_from = max(now, self._recurs[0])
@@ -53,7 +53,7 @@ class VibrationSteps:
         if self.look < np.inf:
             self._rows = np.vstack([self._rows, rows])
 
-    def judge(self, clock: Floats) -> None:
+    def judge(self, clock: Clock) -> None:
         """At `look`: longer steps, if a whole period of the motion has shown little of the vibration."""
         if not self.amplitude() <= GONE * self._still:
             self._counts_from = max(self.look, self._recurs[0])
@@ -72,23 +72,23 @@ class VibrationSteps:
         found = np.linalg.lstsq(fit, self._rows[:, 1:], rcond=None)[0]
         return float(np.hypot(found[-2], found[-1]).max())
 
-    def _bound(self, clock: Floats) -> None:
-        clock[b.LARGEST] = self._short if self.look < np.inf else self._long
-        clock[b.NEXT_DT] = min(clock[b.NEXT_DT], clock[b.LARGEST])
+    def _bound(self, clock: Clock) -> None:
+        clock.largest = self._short if self.look < np.inf else self._long
+        clock.next_dt = min(clock.next_dt, clock.largest)
 
     def checkpoint(self) -> dict[str, Any]:
         """What later steps depend on; look: -1 for none."""
         look = self.look if self.look < np.inf else -1.0
         return {"look": float(look), "from": float(self._counts_from), "rows": self._rows}
 
-    def restore(self, saved: Mapping[str, Any] | None, clock: Floats) -> None:
+    def restore(self, saved: Mapping[str, Any] | None, clock: Clock) -> None:
         """Continue as `checkpoint` has said; None: of a file from before, a vibration may last from here on.
 
         ValueError: that cannot be.
         """
         if not self.begins:
             return
-        now, span = float(clock[b.NOW]), SEEN * self._period
+        now, span = float(clock.now), SEEN * self._period
         if saved is None:
             self._counts_from = max(now, self._recurs[0])
             self.look = now + span if now > self.begins[0] else np.inf

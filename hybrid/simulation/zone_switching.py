@@ -35,7 +35,6 @@ from hybrid.kernels.mesh.zone_switch import (
     end_switch,
 )
 from hybrid.kernels.mesh.zone_transfer import Transfer
-from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.build import Model
@@ -156,7 +155,7 @@ class ZoneSwitching:
 
     def limit_steps(self, run: CompiledRun) -> None:
         """Steps are as long as what is ramped allows."""
-        run.clock[b.ALLOWED] = self.zones.clock[z.RAMP_STEP if self.manager.ramping else z.CALM_STEP]
+        run.clock.allowed = self.zones.clock[z.RAMP_STEP if self.manager.ramping else z.CALM_STEP]
 
     def torque(self) -> float:
         """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""

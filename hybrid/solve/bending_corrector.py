@@ -15,7 +15,7 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import workspace
-from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE
+from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.forces import FRICTION, SEABED, WAVES
 from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line, Sea, State, Work, ends_in, no_sea
 from hybrid.kernels.step.step import friction_axes
@@ -251,13 +251,13 @@ class Corrector:
         still, no_spin = np.zeros_like(state.r), np.zeros_like(state.w)
         entry.assembly(line, sea, ends, state._replace(v=still, vd=still, w=no_spin, wd=no_spin), 0.0, ca, work)
         self.arrays.slid[:] = 0.0
-        clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+        clock, counts = Clock(), Counts()
         table = Table(blank_error_job())
         self._fill(table, line, sea, ends, (state, state), clock, counts, work._replace(u=still))
         advance_error(table.numbers)
 
     def bind(
-        self, line: Line, sea: Sea, ends: Ends, states: tuple[State, State], clock: Floats, counts: np.ndarray,
+        self, line: Line, sea: Sea, ends: Ends, states: tuple[State, State], clock: Clock, counts: Counts,
         work: Work,
     ) -> np.ndarray:  # fmt: skip
         """The table by which `advance_error` follows the steps of a run.
@@ -273,8 +273,8 @@ class Corrector:
         return int(advance_error.address(self._table.numbers))
 
     def _fill(
-        self, table: Table, line: Line, sea: Sea, ends: Ends, states: tuple[State, State], clock: Floats,
-        counts: np.ndarray, work: Work,
+        self, table: Table, line: Line, sea: Sea, ends: Ends, states: tuple[State, State], clock: Clock,
+        counts: Counts, work: Work,
     ) -> None:  # fmt: skip
         table.bind(
             line=line, sea=sea, ends=ends, bending=self.bending, even=states[0], odd=states[1], u=work.u, clock=clock,

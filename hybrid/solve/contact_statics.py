@@ -20,7 +20,7 @@ from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
 from hybrid.kernels.run.run import in_space
-from hybrid.kernels.state.books import CONTROLLED, NOW, PARITY, STEP_BEFORE, TRY_END, blank_books
+from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.forces import FRICTION, SELF_FRICTION, WAVES
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, TWIST
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work
@@ -65,7 +65,7 @@ class _Job:
         self.work = workspace_of(self.line, keep=True)
         self.books = blank_books(self.line.h.size)._replace(touch=np.zeros((3, self.line.s.size)))
         self.clock, self.count = self.books.clock, self.books.counts
-        self.count[CONTROLLED] = 1  # contact takes the step before as it is told
+        self.count.controlled = 1  # contact takes the step before as it is told
         self.table = Table(blank_job())
         self.attach()
 
@@ -80,20 +80,20 @@ class _Job:
     @property
     def state(self) -> State:
         """The state now."""
-        return self.states[self.count[PARITY]]
+        return self.states[self.count.parity]
 
     def step(self, dt: float, before: float) -> tuple[int, int, float]:
         """As of `Moving`."""
         clock, count = self.clock, self.count
-        old, new = self.states[count[PARITY]], self.states[1 - count[PARITY]]
-        clock[TRY_END], clock[STEP_BEFORE] = clock[NOW] + dt, before
+        old, new = self.states[count.parity], self.states[1 - count.parity]
+        clock.try_end, clock.step_before = clock.now + dt, before
         self.table.bind(task=Task(STEP, dt, before, 0.0, limits=self.limits), old=old, new=new)
         outcome, iterations, _, _ = in_space(self.table.numbers)
         if outcome == Outcome.OK and (self.twisted or dt * float(np.abs(new.w).max()) > MOST_SPIN):
             outcome = Outcome.TWISTED_TOO_FAR
         if outcome != Outcome.OK:
             return outcome, iterations, 0.0
-        clock[NOW], count[PARITY] = clock[TRY_END], 1 - count[PARITY]
+        clock.now, count.parity = clock.try_end, 1 - count.parity
         return outcome, iterations, float(np.abs(new.r - old.r).max())
 
     def rest(self) -> None:

@@ -81,9 +81,9 @@ class CompiledRun:
         self.books = blank_books()._replace(outputs=outputs, log=np.zeros((ROWS, len(b.LOG))))
         self.clock, self.count = self.books.clock, self.books.counts
         self.keeps_extremes, self._room = extremes, np.zeros(0)
-        self.clock[b.RHO], self.clock[b.ALLOWED] = rho, np.inf
-        self.clock[b.LEAST_PEAK] = self.clock[b.RELEASE_START] = self.clock[b.RELEASE_END] = np.inf
-        self.count[b.VARIES] = varies
+        self.clock.rho, self.clock.allowed = rho, np.inf
+        self.clock.least_peak = self.clock.release_start = self.clock.release_end = np.inf
+        self.count.varies = varies
         self.states: tuple[State, State]
         self.quota, self._waves = 0, 0  # steps of a call; waves of the sea
         self._zones_address = 0  # of what follows zones; 0: not known yet
@@ -111,7 +111,7 @@ class CompiledRun:
         followed = corrector.sampled if corrector is not None else np.zeros((2, 0))
         touches = bool(line.bits & SELF_CONTACT)
         more = len(line.torsion), touches, line.moved.size, sampled_size(line)
-        size = sample_size(cells, bool(self.count[b.VARIES]), *more)
+        size = sample_size(cells, bool(self.count.varies), *more)
         size += followed.shape[1]
         if not self._room.size:
             self._room = np.empty(max(1, min(self._rows, MOST_SAMPLED // size)) * size)  # some MB, touched as needed
@@ -135,15 +135,15 @@ class CompiledRun:
         self.books = books
         self.states = (state, state.copy())
         self._torsion = work.torsion
-        if self.count[b.PARITY]:
-            self.pushes, self.count[b.PARITY] = self.pushes[::-1], 0
-        self.clock[b.PREVIOUS] = self.clock[b.NOW]
+        if self.count.parity:
+            self.pushes, self.count.parity = self.pushes[::-1], 0
+        self.clock.previous = self.clock.now
         solver = in_plane if line.bits & PLANAR else in_space
         self._solver, self._address = solver, self._address if solver is self._solver else 0
         fresh, self._waves = not self.quota, len(sea.waves)
         self.set_quota(cells)
         if fresh:  # zones that change every few steps would otherwise never let it be used up
-            self.count[b.QUOTA] = self.quota
+            self.count.quota = self.quota
         old, new = self.states
         was, now = self.pushes
         self.table.bind(
@@ -165,9 +165,9 @@ class CompiledRun:
 
     def carry(self, pushes: tuple[Floats, Floats]) -> None:
         """Carry a push out of the plane along, (N+1, 4) now, and room for the next; empty: none."""
-        self.pushes = pushes[::-1] if self.count[b.PARITY] else pushes
+        self.pushes = pushes[::-1] if self.count.parity else pushes
         self.table.bind(was=self.pushes[0], now=self.pushes[1])
-        self.clock[b.PUSH_START] = 0.0
+        self.clock.push_start = 0.0
 
     def follow(self, zones: Table, compiled: bool) -> None:
         """Zones move from now on (kernels.mesh.zone_step); compiled: every step asks them, not Python."""
@@ -204,8 +204,8 @@ class CompiledRun:
 
         No step is taken: the kernel that solves them, whose compilation takes longest, is not asked for.
         """
-        self.clock[b.STOP] = self.clock[b.NOW]
-        self.count[b.PHASE], self.count[b.AFTER_START], self.count[b.NEW_STATE] = b.START, b.BEGIN_STEP, 1
+        self.clock.stop = self.clock.now
+        self.count.phase, self.count.after_start, self.count.new_state = b.START, b.BEGIN_STEP, 1
         run(self.table.numbers)
 
     def solver_address(self) -> int:
@@ -220,7 +220,7 @@ class CompiledRun:
         self.solver_address()
         code: int = run(self.table.numbers) if by is None else by()
         if code in (b.PAUSED, b.AT_STOP):
-            self.count[b.QUOTA] = self.quota
+            self.count.quota = self.quota
         return code
 
     def keep_ranges(self, books: b.Books) -> None:
@@ -236,11 +236,11 @@ class CompiledRun:
     @property
     def waits_much(self) -> bool:
         """Whether so much waits to be written down that copies of it would cost more than a step."""
-        return bool(self.count[b.ROWS] > ROWS_KEPT or self.count[b.SAMPLES] * self.books.samples.shape[1] > MOST_KEPT)
+        return bool(self.count.rows > ROWS_KEPT or self.count.samples * self.books.samples.shape[1] > MOST_KEPT)
 
     def keep(self) -> tuple[Floats, ...]:
         """Copies of all that steps change, for `bring_back`."""
-        rows = self.books.log[: self.count[b.ROWS]], self.books.samples[: self.count[b.SAMPLES]]
+        rows = self.books.log[: self.count.rows], self.books.samples[: self.count.samples]
         return tuple(x.copy() for x in (*rows, *self._changing()))
 
     def bring_back(self, kept: tuple[Floats, ...]) -> None:
@@ -266,16 +266,16 @@ class CompiledRun:
     @property
     def t(self) -> float:
         """Time of the state, s."""
-        return float(self.clock[b.NOW])
+        return float(self.clock.now)
 
     @property
     def state(self) -> State:
-        return self.states[self.count[b.PARITY]]
+        return self.states[self.count.parity]
 
     @property
     def before(self) -> State:
         """The state before the last step; while a try is judged, the one that it led to."""
-        return self.states[1 - self.count[b.PARITY]]
+        return self.states[1 - self.count.parity]
 
     @property
     def answers(self) -> dict[str, Floats]:
@@ -290,7 +290,7 @@ class CompiledRun:
     @property
     def push(self) -> Floats:
         """The push out of the plane (N+1, 4) now."""
-        return self.pushes[self.count[b.PARITY]]
+        return self.pushes[self.count.parity]
 
     @property
     def report(self) -> Floats:
@@ -300,13 +300,13 @@ class CompiledRun:
     @property
     def tried(self) -> Tried:
         """How the last try ended."""
-        outcome, iterations, where = (int(self.count[k]) for k in (b.OUTCOME, b.TRIES, b.WHERE))
-        return Tried(Outcome(outcome), iterations, float(self.clock[b.CORRECTION]), where)
+        outcome, iterations, where = int(self.count.outcome), int(self.count.tries), int(self.count.where)
+        return Tried(Outcome(outcome), iterations, float(self.clock.correction), where)
 
     def log(self) -> Floats:
         """Rows (n, len(LOG)) of steps since the last call of this; they are overwritten by the next steps."""
-        rows = int(self.count[b.ROWS])
-        self.count[b.ROWS] = 0
+        rows = int(self.count.rows)
+        self.count.rows = 0
         return self.books.log[:rows]
 
     def samples(self, ends: Ends) -> Batch | None:
@@ -315,15 +315,15 @@ class CompiledRun:
         What they take of the model error is then in `sampled_errors` (nb, K).
         ends: of the line, of which `held` is taken.
         """
-        count, cells = int(self.count[b.SAMPLES]), self.state.T.size
-        self.count[b.SAMPLES] = 0
+        count, cells = int(self.count.samples), self.state.T.size
+        self.count.samples = 0
         if not count:
             return None
         return self.batch_of(self.books.samples[:count], cells, ends)
 
     def batch_of(self, rows: Floats, cells: int, ends: Ends) -> Batch:
         """Rows (n, size) of samples of a line of so many cells, as views; ends: as of `samples`."""
-        touching, varies = self.books.touch.shape[1], bool(self.count[b.VARIES])
+        touching, varies = self.books.touch.shape[1], bool(self.count.varies)
         batch, self.sampled_errors = batch_of_rows(
             rows, cells, ends.held, varies, len(self.state.turn), touching, self.state.grip.shape[1] // EACH,
             self.state.layers.shape[1], bool(self.state.soil.size),

@@ -35,7 +35,7 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.run.run import in_space
 from hybrid.kernels.run.system import JUNCTIONS, book_system_step, solve_system
-from hybrid.kernels.state.books import NOW, PARITY, Books, blank_books
+from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.forces import FRICTION, WAVES
 from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
@@ -357,7 +357,7 @@ class SystemSolver:
         self._bind_states(0, old, new)
         for k, contact in self._contacts.items():
             contact.follow(old.lines[k], new.lines[k])
-            self.books[k].counts[PARITY] = 0
+            self.books[k].counts.parity = 0
         limits = task.limits
         self._asked[:] = (
             task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most,
@@ -534,7 +534,7 @@ class SystemSolver:
             self.bind_line(k, work=work._replace(gaps=gaps), ends=ends)
         self._at_rest[0] = 1
         for k in self._touching_lines:
-            self.books[k].clock[NOW] = t
+            self.books[k].clock.now = t
         taken = self._solve(Task(CORRECTION, ca=HEAVY, limits=Limits(1.0, 1.0, 1)), states, states)
         self._at_rest[0] = 0
         for k, (x, work) in enumerate(zip(self.lines, self.work, strict=True)):
@@ -572,7 +572,7 @@ class SystemSolver:
         """
         if self.shared is not None and self.books[self.shared.last].extremes.size:
             self._bind_states(0, states, states)  # extremes are noted of line by line, with what presses on each
-            self.books[self.shared.last].clock[NOW] = t
+            self.books[self.shared.last].clock.now = t
             self.shared.rest_energy(self.work)
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             work.u[:] = 0.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import MASS, V
-from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.forces import FRICTION, SELF_FRICTION, WAVES
 from hybrid.kernels.state.report import TWIST
 from hybrid.kernels.state.state import Floats
@@ -75,7 +75,7 @@ def touching_solver(lines: Sequence[JoinedLine], points: int, bodies: Floats, co
     solver = SystemSolver(lines, points, bodies, *contacts())
     books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
     for each in books:
-        each.clock[SHORTEST] = np.inf
+        each.clock.shortest = np.inf
     solver.keep_books(books)
     return solver
 

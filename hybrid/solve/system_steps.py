@@ -38,7 +38,7 @@ class SystemSteps:
         """
         self.outputs = np.array(outputs, float)
         self.body_samples, self.worked = np.zeros((0, 0, BODY_SAMPLE)), np.zeros((3, 0, WORK))
-        self.clock, self.counts = np.zeros(b.CLOCK_SIZE), np.zeros(b.COUNT_SIZE, np.int64)
+        self.clock, self.counts = b.Clock(), b.Counts()
         self.lines = np.zeros(2, np.int64)
         self._job, self._states, self._cells = Table(blank_steps_job), (SystemState([]), SystemState([])), 0
         self._log, self.seen = np.zeros((0, 0, len(b.LOG))), np.zeros(0, np.int64)
@@ -46,11 +46,11 @@ class SystemSteps:
         self._first: np.ndarray | None = None  # a job of the solver, until the kernels of its steps are known
         self._waves = 0
         clock = self.clock
-        clock[b.RHO], clock[b.ALLOWED], clock[b.TOLERANCE], clock[b.ERROR_RATIO] = rho, np.inf, 1.0, 1.0
+        clock.rho, clock.allowed, clock.tolerance, clock.error_ratio = rho, np.inf, 1.0, 1.0
         self.controlled = largest > 0.0
-        self.counts[b.CONTROLLED], self.counts[b.PHASE] = self.controlled, b.BEGIN_STEP
-        clock[b.LARGEST], clock[b.SHORTEST] = largest, shortest
-        clock[b.NEXT_DT] = max(largest / FIRST, shortest)
+        self.counts.controlled, self.counts.phase = self.controlled, b.BEGIN_STEP
+        clock.largest, clock.shortest = largest, shortest
+        clock.next_dt = max(largest / FIRST, shortest)
 
     # --- what steps lead from and to ----------------------------------------------------------------
 
@@ -60,12 +60,12 @@ class SystemSteps:
         now, then = self.states
         if self._solver is solver and solver.turns is self._states and now is state and then is other:
             return False
-        counts[b.PARITY], self._states, self._solver = 0, (state, other), solver
+        counts.parity, self._states, self._solver = 0, (state, other), solver
         lines = len(solver.lines)
         if len(self.seen) != lines:
             rows = max(16, min(one_line.ROWS, MOST_LOGGED // (lines * len(b.LOG))))
             self._log, self.seen = np.zeros((rows, lines, len(b.LOG))), np.zeros(lines, np.int64)
-            counts[b.ROWS] = 0
+            counts.rows = 0
         jobs = solver.take_turns(self._states)
         self._cells = sum(x.line.h.size for x in solver.lines)
         self._waves = max((len(x.sea.waves) for x in solver.lines), default=0)
@@ -85,12 +85,12 @@ class SystemSteps:
             self.body_samples = np.zeros((rows, bodies, BODY_SAMPLE))
             self.worked = np.zeros((3, bodies, WORK))
             self._job.bind(bodies=self.body_samples, worked=self.worked)
-        self.clock[b.PREVIOUS] = self.clock[b.NOW]
+        self.clock.previous = self.clock.now
 
     def stand_after_change(self) -> None:
         """The state of now is the first of the two, of lines that have changed: of the step before nothing is known."""
         assert self._solver is not None
-        self.clock[b.PREVIOUS], self.counts[b.PARITY] = self.clock[b.NOW], 0
+        self.clock.previous, self.counts.parity = self.clock.now, 0
         self.worked[0] = self._solver.body_work
 
     def move(self, solver: SystemSolver, moves: Sequence[Moves]) -> None:
@@ -141,7 +141,7 @@ class SystemSteps:
     @property
     def states(self) -> tuple[SystemState, SystemState]:
         """The state now, and the other one, before the last step."""
-        parity = self.counts[b.PARITY]
+        parity = self.counts.parity
         return self._states[parity], self._states[1 - parity]
 
     # --- steps ---------------------------------------------------------------------------------------
@@ -149,13 +149,13 @@ class SystemSteps:
     def begin_leg(self, stop: float, first: float, done: int, parts: int, length: float) -> None:
         """Steps are to end at `stop` (s): in so many parts of a length (s) since `first` (s), some of them done."""
         clock, counts = self.clock, self.counts
-        clock[b.STOP], clock[b.LEG_BEGIN], clock[b.LEG_STEP] = stop, first, length
-        counts[b.LEG_PART], counts[b.LEG_PARTS] = done, parts
+        clock.stop, clock.leg_begin, clock.leg_step = stop, first, length
+        counts.leg_part, counts.leg_parts = done, parts
 
     def set_quota(self, most: int) -> None:
         """As many steps as interrupts and progress can wait for; most: as far as Python knows what they cost."""
         cost = max(self._cells, 1) * (1.0 + self._waves / one_line.WAVES_OF_A_CELL)
-        self.counts[b.QUOTA] = max(1, min(one_line.ROWS, most, int(one_line.CELL_STEPS / cost)))
+        self.counts.quota = max(1, min(one_line.ROWS, most, int(one_line.CELL_STEPS / cost)))
 
     def go(self) -> int:
         """Go on until a code of kernels.state.books."""
@@ -167,13 +167,13 @@ class SystemSteps:
     @property
     def due(self) -> bool:
         """Whether an output is due at the state as it is."""
-        at, near = self.counts[b.OUTPUT], SAME_TIME * self.clock[b.LEG_STEP]
-        return bool(at < self.outputs.size and self.outputs[at] <= self.clock[b.NOW] + near)
+        at, near = self.counts.output, SAME_TIME * self.clock.leg_step
+        return bool(at < self.outputs.size and self.outputs[at] <= self.clock.now + near)
 
     @property
     def is_half_full(self) -> bool:
         """Whether half of the samples that there is room for wait, or more."""
-        return bool(2 * self.counts[b.SAMPLES] >= len(self.body_samples) - 1)
+        return bool(2 * self.counts.samples >= len(self.body_samples) - 1)
 
     def sample(self) -> bool:
         """Sample the outputs that are due at the state as it is; False: there is no room for all of them."""
@@ -181,20 +181,20 @@ class SystemSteps:
 
     def try_again(self) -> None:
         """The try is made once more: what it was made with has changed."""
-        self.counts[b.REPEATS] += 1
-        self.counts[b.PHASE] = b.TRY
+        self.counts.repeats += 1
+        self.counts.phase = b.TRY
 
     def try_whole(self) -> None:
         """The same with the whole of the step."""
-        self.clock[b.TRIED_DT] = self.clock[b.UNTIL] - self.clock[b.NOW]
+        self.clock.tried_dt = self.clock.until - self.clock.now
         self.try_again()
 
     def restart(self) -> None:
         """Accelerations jump now: of what comes nothing is known."""
-        self.clock[b.LAST_DT] = 0.0
+        self.clock.last_dt = 0.0
         if self.controlled:
-            self.clock[b.NEXT_DT] = max(self.clock[b.NEXT_DT] / FIRST, self.clock[b.SHORTEST])
-            self.clock[b.ERROR_RATIO] = 1.0
+            self.clock.next_dt = max(self.clock.next_dt / FIRST, self.clock.shortest)
+            self.clock.error_ratio = 1.0
 
     def stand_between(self, interval: float, step: float) -> None:
         """No step is under way, and none is to be written down, no output is due.
@@ -202,14 +202,14 @@ class SystemSteps:
         interval: s, that the last step took, 0: of that nothing is known; step: s, the usual one.
         """
         clock, counts = self.clock, self.counts
-        clock[b.PREVIOUS] = clock[b.NOW] - interval
-        counts[b.PHASE], counts[b.ROWS], counts[b.SAMPLES] = b.BEGIN_STEP, 0, 0
-        counts[b.OUTPUT] = np.searchsorted(self.outputs, clock[b.NOW] + SAME_TIME * step, side="right")
+        clock.previous = clock.now - interval
+        counts.phase, counts.rows, counts.samples = b.BEGIN_STEP, 0, 0
+        counts.output = int(np.searchsorted(self.outputs, clock.now + SAME_TIME * step, side="right"))
 
     def rows(self) -> Floats:
         """Rows (n, L, len(LOG)) of steps since the last call; the next steps overwrite them."""
-        count = int(self.counts[b.ROWS])
-        self.counts[b.ROWS] = 0
+        count = int(self.counts.rows)
+        self.counts.rows = 0
         return self._log[:count]
 
     # --- what is known --------------------------------------------------------------------------------
@@ -217,14 +217,14 @@ class SystemSteps:
     @property
     def tried(self) -> SystemTaken:
         """How the last try ended."""
-        outcome, it, where = (int(self.counts[k]) for k in (b.OUTCOME, b.TRIES, b.WHERE))
-        correction = float(self.clock[b.CORRECTION])
+        outcome, it, where = int(self.counts.outcome), int(self.counts.tries), int(self.counts.where)
+        correction = float(self.clock.correction)
         return SystemTaken(Outcome(outcome), it, correction, int(self.lines[LINE]), where, np.nan)
 
     @property
     def last_cut(self) -> tuple[int, int]:
         """Line (-1: a body) and cell or node of the last try that was given up."""
-        return int(self.lines[CUT_LINE]), int(self.counts[b.CUT_AT])
+        return int(self.lines[CUT_LINE]), int(self.counts.cut_at)
 
     # --- checkpoints ----------------------------------------------------------------------------------
 
@@ -232,15 +232,15 @@ class SystemSteps:
         """What the lengths of the next steps depend on."""
         if not self.controlled:
             return []
-        return [float(self.clock[b.NEXT_DT]), float(self.clock[b.ERROR_RATIO]), float(self.counts[b.WARY])]
+        return [float(self.clock.next_dt), float(self.clock.error_ratio), float(self.counts.wary)]
 
     def take_control(self, saved: Any) -> None:
         """Go on as `control` has told.  ValueError: that cannot be."""
         if not self.controlled:
             return
-        shortest, largest = (float(self.clock[k]) for k in (b.SHORTEST, b.LARGEST))
+        shortest, largest = float(self.clock.shortest), float(self.clock.largest)
         numbers = isinstance(saved, list) and len(saved) == 3 and all(isinstance(x, int | float) for x in saved)
         if not numbers or not (shortest <= saved[0] <= largest and saved[1] > 0.0 and 0 <= saved[2] <= WARY):
             raise ValueError("control: length and error of the steps were expected")
-        self.clock[b.NEXT_DT], self.clock[b.ERROR_RATIO] = float(saved[0]), float(saved[1])
-        self.counts[b.WARY] = int(saved[2])
+        self.clock.next_dt, self.clock.error_ratio = float(saved[0]), float(saved[1])
+        self.counts.wary = int(saved[2])

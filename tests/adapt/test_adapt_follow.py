@@ -19,7 +19,6 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, take_arcs
-from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import no_sea
 from hybrid.outputs.probes import Observer
 from hybrid.simulation import initial_zones
@@ -365,7 +364,7 @@ def test_outputs_that_wait_are_not_lost_with_the_arrays_they_wait_in(
     refused = []
 
     def still_fits(self: CellChanges) -> bool:
-        waits = (bool(self._run.count[b.SAMPLES]) or self.waits) and self._run.t > 1.0
+        waits = (bool(self._run.count.samples) or self.waits) and self._run.t > 1.0
         refused.extend([self] * waits)
         return fits(self) and not waits
 
@@ -408,7 +407,7 @@ def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.Mo
     left, change = [], CellChanges.change
 
     def measured(self: CellChanges, *given) -> float:
-        k, n, parity = self.side, self.cells, int(self._run.count[b.PARITY])
+        k, n, parity = self.side, self.cells, int(self._run.count.parity)
         line, state = self._on.line(k, n), self._on.state(k, parity, n)
         size, before = line.mass.sum() * np.linalg.norm(state.v, axis=1).max(), line.mass @ state.v
         booked = change(self, *given)

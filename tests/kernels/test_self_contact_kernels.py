@@ -10,7 +10,7 @@ from hybrid.kernels.contact.self_contact_law import INNER, OUTER, add_gradient, 
 from hybrid.kernels.contact.self_contact_pairs import POINTS, SPEED
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.run.entry import workspace
-from hybrid.kernels.state.books import TRY_END, blank_books
+from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.state import blank_line, blank_state, no_ends
 from hybrid.kernels.step.newton import ASKED, LIMIT, PREPARE, REST
 from hybrid.solve.self_contact import SelfContact
@@ -83,7 +83,7 @@ class Tangle:
     def speed(self, x: np.ndarray) -> float:
         """What is found in the limit of a correction x (m) of pieces that may come into contact, m."""
         self.states[0].v[:] = x
-        self.clock[TRY_END], self.work.u[:] = 1.0, 0.0
+        self.clock.try_end, self.work.u[:] = 1.0, 0.0
         self.contact.call[ASKED] = PREPARE
         k.contact_task(self.table)
         return float(self.contact.contact.numbers[SPEED])

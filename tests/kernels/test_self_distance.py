@@ -7,7 +7,7 @@ import pytest
 
 from hybrid.kernels.contact import self_distance as k
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE
+from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.state import State, blank_line, blank_state, no_ends
 
 WIDTH = 0.05
@@ -30,9 +30,9 @@ def look(before: np.ndarray, after: np.ndarray, held: bool = False, width: float
     ends.held[:] = held
     itself = k.blank_itself(np.full(n, width))
     table = Table(k.blank_itself_job())
-    counts = np.zeros(COUNT_SIZE, np.int64)
+    counts = Counts()
     table.bind(
-        line=line, ends=ends, old=state_at(after), new=state_at(before), clock=np.zeros(CLOCK_SIZE), counts=counts,
+        line=line, ends=ends, old=state_at(after), new=state_at(before), clock=Clock(), counts=counts,
         itself=itself,
     )  # fmt: skip
     return bool(k.watch_itself(table.numbers)), itself.found
@@ -133,7 +133,7 @@ class Asked:
         self.itself, self._table = k.blank_itself(np.full(n, WIDTH)), Table(k.blank_itself_job())
         self.itself.ahead[k.ASKED] = what
         self._bound = {
-            "line": line, "ends": no_ends(), "clock": np.zeros(CLOCK_SIZE), "counts": np.zeros(COUNT_SIZE, np.int64),
+            "line": line, "ends": no_ends(), "clock": Clock(), "counts": Counts(),
             "itself": self.itself,
         }  # fmt: skip
 

@@ -12,7 +12,6 @@ from test_system_contact import RUBS, system
 import hybrid
 import hybrid.simulation.transient
 import hybrid.solve.self_contact
-from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.step.accept import MANY, collapses
 from hybrid.simulation import contact_start
@@ -94,8 +93,8 @@ def test_many_steps_below_a_thousandth_of_the_longest_have_collapsed() -> None:
     assert not collapses.py_func(clock, count, 1.0)
     told = [collapses.py_func(clock, count, 5e-4) for _ in range(2 * MANY)]
     assert [k + 1 for k, x in enumerate(told) if x] == [MANY, 2 * MANY]
-    count[b.CUT_BY_ERROR] = 3
-    assert not collapses.py_func(clock, count, 2e-3) and count[b.TINY_STEPS] == count[b.CUT_BY_ERROR] == 0
+    count.cut_by_error = 3
+    assert not collapses.py_func(clock, count, 2e-3) and count.tiny_steps == count.cut_by_error == 0
 
 
 def hanging(**output: Any) -> dict[str, Any]:
@@ -119,7 +118,7 @@ def longest(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def after_a_long_step(self: Transient, *args: Any) -> None:
         begin(self, *args)
-        self.run.clock[b.LONGEST] = 1e3
+        self.run.clock.longest = 1e3
 
     monkeypatch.setattr(Transient, "begin", after_a_long_step)
 

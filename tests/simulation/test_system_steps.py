@@ -162,7 +162,7 @@ def test_bodies_are_moved_and_loaded_in_compiled_steps(
 
     def ask(run: Any) -> None:
         attach(run)
-        run.loop.counts[books.ASKS] |= books.ASK_BEFORE
+        run.loop.counts.asks |= books.ASK_BEFORE
 
     monkeypatch.setattr(system_run.SystemRun, "_prepare", note)
     compiled = hybrid.run(scene)

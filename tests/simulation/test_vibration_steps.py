@@ -35,8 +35,8 @@ def sag(ramp=1.0, accuracy="3%", duration=10.0, period=2.0):
 def watched(scene=None):
     """Of a scene, at t = 0: the clock of its run and what chooses its longest step."""
     scene = scene or sag()
-    resolution, clock = first_resolution(scene), np.zeros(b.CLOCK_SIZE)
-    clock[b.LARGEST] = clock[b.NEXT_DT] = resolution.step
+    resolution, clock = first_resolution(scene), b.Clock()
+    clock.largest = clock.next_dt = resolution.step
     steps = VibrationSteps(scene, resolution)
     steps.begin(clock)
     return resolution, clock, steps
@@ -48,7 +48,7 @@ def look(steps, clock, amplitude):
     force = 100.0 + 30.0 * np.sin(np.pi * t + 0.3) + amplitude * np.cos(2.0 * np.pi * t / PERIOD + 1.0)
     steps.log(np.column_stack([t, np.full_like(t, 50.0), force]))
     found = steps.amplitude()
-    clock[b.NOW] = steps.look
+    clock.now = steps.look
     steps.judge(clock)
     return found
 
@@ -64,23 +64,23 @@ def test_resolutions_have_both_steps():
 def test_steps_are_short_until_a_period_of_the_motion_has_shown_little():
     """Which begins where the ramp ends, and again where something has been seen."""
     resolution, clock, steps = watched()
-    assert clock[b.LARGEST] == resolution.step and steps.begins == [0.0, 1.0]
+    assert clock.largest == resolution.step and steps.begins == [0.0, 1.0]
     assert look(steps, clock, 20.0) == pytest.approx(20.0, rel=0.05)
-    clock[b.NOW] = 1.0
+    clock.now = 1.0
     steps.begin(clock)  # the ramp ends
     seen = 0.0
     while steps.look < np.inf:
-        assert clock[b.LARGEST] == resolution.step
+        assert clock.largest == resolution.step
         seen = steps.look if abs(steps.look - 2.3) < PERIOD else seen
         look(steps, clock, 3.0 * resolution.still if abs(steps.look - 2.3) < PERIOD else 0.0)
-    assert clock[b.LARGEST] == resolution.later and 0.0 <= clock[b.NOW] - seen - 2.0 <= 2.0 * PERIOD
+    assert clock.largest == resolution.later and 0.0 <= clock.now - seen - 2.0 <= 2.0 * PERIOD
 
 
 def test_a_vibration_that_stays_or_is_not_seen_keeps_steps_short():
     resolution, clock, steps = watched()
     for _ in range(40):
         look(steps, clock, 0.7 * resolution.still)
-    assert clock[b.LARGEST] == resolution.step and steps.look < np.inf
+    assert clock.largest == resolution.step and steps.look < np.inf
     _, clock, steps = watched()
     for _ in range(40):
         assert steps.amplitude() == np.inf  # no steps
@@ -91,7 +91,7 @@ def test_a_vibration_that_stays_or_is_not_seen_keeps_steps_short():
 def test_a_checkpoint_goes_on_and_a_forged_one_does_not():
     _, clock, steps = watched()
     look(steps, clock, 20.0)
-    steps.log(np.array([[clock[b.NOW] + 0.01, 1.0, 2.0]]))
+    steps.log(np.array([[clock.now + 0.01, 1.0, 2.0]]))
     again = watched()[2]
     again.restore(steps.checkpoint(), clock)
     assert {k: np.array(x).tolist() for k, x in again.checkpoint().items()} == {
@@ -101,7 +101,7 @@ def test_a_checkpoint_goes_on_and_a_forged_one_does_not():
         with pytest.raises(ValueError, match="vibration"):
             again.restore(steps.checkpoint() | wrong, clock)
     again.restore(None, clock)  # a file from before
-    assert again.look > clock[b.NOW]
+    assert again.look > clock.now
 
 
 @pytest.mark.long

@@ -187,14 +187,14 @@ class Controller:
     """The controller of the compiled run, one decision at a time."""
 
     def __init__(self, tolerance, largest, smallest):
-        self.clock, self.count = np.zeros(b.CLOCK_SIZE), np.zeros(b.COUNT_SIZE, np.int64)
-        self.clock[b.TOLERANCE], self.clock[b.LARGEST], self.clock[b.SHORTEST] = tolerance, largest, smallest
-        self.clock[b.NEXT_DT], self.clock[b.ERROR_RATIO] = largest / FIRST, 1.0
-        self.count[b.CONTROLLED] = 1
+        self.clock, self.count = b.Clock(), b.Counts()
+        self.clock.tolerance, self.clock.largest, self.clock.shortest = tolerance, largest, smallest
+        self.clock.next_dt, self.clock.error_ratio = largest / FIRST, 1.0
+        self.count.controlled = 1
 
     @property
     def next(self):
-        return self.clock[b.NEXT_DT]
+        return self.clock.next_dt
 
     def until(self, t, stop):
         return step_end(t, stop, self.next)
@@ -267,10 +267,10 @@ def _end_of_try(clock, moves):
 def test_fixed_steps_know_the_step_before_where_it_had_another_length():
     """Equal but for round-off, after a start or far shorter parts: the weights of equal steps; halved, or after half
     a step: others."""
-    clock, count = np.zeros(b.CLOCK_SIZE), np.zeros(b.COUNT_SIZE, np.int64)
-    clock[b.NOW], clock[b.TRY_END] = 9345.0, 9345.05
-    dt = clock[b.TRY_END] - clock[b.NOW]
-    clock[b.RHO], clock[b.LAST_RHO] = 0.5, 0.25
+    clock, count = b.Clock(), b.Counts()
+    clock.now, clock.try_end = 9345.0, 9345.05
+    dt = clock.try_end - clock.now
+    clock.rho, clock.last_rho = 0.5, 0.25
     for before, told, radius in (
         (0.05, dt, 0.25),
         (0.0, dt, 0.5),
@@ -278,23 +278,23 @@ def test_fixed_steps_know_the_step_before_where_it_had_another_length():
         (0.0125, dt, 0.5),
         (0.1, 0.1, 0.25),
     ):
-        clock[b.LAST_DT] = before
+        clock.last_dt = before
         _take_past(clock, count)
-        assert (clock[b.STEP_BEFORE], clock[b.RHO_BEFORE]) == (told, radius)
-    count[b.CONTROLLED], clock[b.LAST_DT] = 1, 0.0
+        assert (clock.step_before, clock.rho_before) == (told, radius)
+    count.controlled, clock.last_dt = 1, 0.0
     _take_past(clock, count)
-    assert clock[b.STEP_BEFORE] == 0.0
+    assert clock.step_before == 0.0
 
 
 @pytest.mark.parametrize("begin", [0.0, 9345.2, 1e7])
 def test_parts_of_a_halved_step_end_with_it_however_late(begin):
     """A rest of 9e-12 s was a step once, 2.6 h into a run, and none that followed it was short enough."""
-    clock = np.zeros(b.CLOCK_SIZE)
-    clock[b.MOST_TURN], clock[b.NOW], clock[b.UNTIL] = 1.0, begin, begin + 0.05
-    clock[b.TRIED_DT], parts = 0.05 / 32, 0
-    while clock[b.NOW] < clock[b.UNTIL]:
-        clock[b.NOW], parts = _end_of_try(clock, no_moves()), parts + 1
-    assert parts == 32 and clock[b.NOW] == begin + 0.05
+    clock = b.Clock()
+    clock.most_turn, clock.now, clock.until = 1.0, begin, begin + 0.05
+    clock.tried_dt, parts = 0.05 / 32, 0
+    while clock.now < clock.until:
+        clock.now, parts = _end_of_try(clock, no_moves()), parts + 1
+    assert parts == 32 and clock.now == begin + 0.05
 
 
 def test_a_line_without_drag_that_is_thrown_about_for_minutes_does_not_gain_energy_by_halved_steps():

@@ -14,7 +14,7 @@ from hybrid.errors import Outcome, SceneError
 from hybrid.kernels.junctions.bodies import FRAME, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.march.energies import Observed, observe
-from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.obstacle_rows import EACH, FORCE, STIFFNESS
 from hybrid.model.bodies import body_model
 from hybrid.model.build import build
@@ -417,7 +417,7 @@ def thrown(friction: float, step: float) -> tuple[Any, list[float], Any, float]:
     )  # fmt: skip
     solver = SystemSolver([x], 0, one.numbers[None])
     books = [blank_books(60)]
-    books[0].clock[SHORTEST] = 1e-9
+    books[0].clock.shortest = 1e-9
     solver.keep_books(books)
     row = np.zeros((1, STATE))
     row[0] = one.start

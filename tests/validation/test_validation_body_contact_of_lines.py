@@ -16,7 +16,7 @@ import pytest
 import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import PLACE, V, W
-from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.model.system import build_system
 from hybrid.scene.bodies import FreeBody
@@ -248,7 +248,7 @@ def test_newtons_method_converges_quadratically(mass: float) -> None:
         solver = SystemSolver(lines, 0, model.body_numbers(0.0), shared=shared_of(model))
         books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
         for each in books:
-            each.clock[SHORTEST] = np.inf
+            each.clock.shortest = np.inf
         solver.keep_books(books)
         start = SystemState([x.start for x in model.models], model.body_places).copy()
         start.lines[0].r[:, 2] -= 0.0035  # to the edge of contact with the lower line, and 6 mm into the ball

@@ -14,7 +14,7 @@ from hybrid.kernels.contact.self_contact_pairs import ENERGY, POINTS
 from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import depths_in_obstacles, stored_energy
 from hybrid.kernels.march.energies import Observed, observe
-from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.forces import OBSTACLES
 from hybrid.kernels.state.obstacle_rows import INERTIA, SPIN
 from hybrid.model.bodies import body_model
@@ -104,7 +104,7 @@ def throw(
     solver = SystemSolver(lines, 0, numbers, shared=shared)
     books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
     for each in books:
-        each.clock[SHORTEST] = 1e-9
+        each.clock.shortest = 1e-9
     solver.keep_books(books)
     old = SystemState(states, rows)
     solver.consistent_accelerations(old, [np.zeros((2, 3))] * count)

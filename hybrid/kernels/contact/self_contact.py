@@ -63,17 +63,9 @@ from hybrid.kernels.contact.self_contact_solve import solve_contact
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.books import (
-    CLOCK_SIZE,
-    CONTROLLED,
-    COUNT_SIZE,
-    NOW,
-    PARITY,
-    QUOTA,
     RATES,
-    RHO,
-    RHO_BEFORE,
-    STEP_BEFORE,
-    TRY_END,
+    Clock,
+    Counts,
 )
 from hybrid.kernels.state.report import FORCE_A, NET_A, REPORT_SIZE, SELF_FRICTION_WORK
 from hybrid.kernels.state.state import (
@@ -101,8 +93,8 @@ class ContactJob(NamedTuple):
     old: State
     new: State
     work: Work
-    clock: Floats
-    counts: NDArray[np.int64]
+    clock: Clock
+    counts: Counts
     call: NDArray[np.int64]
     contact: Contact
     touch: Floats  # (3, N+1) as kernels.state.books.Books has it, and so have
@@ -116,7 +108,7 @@ class ContactJob(NamedTuple):
 def blank_contact_job() -> ContactJob:
     """A job with the types that every one has."""
     state = blank_state(1)
-    clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+    clock, counts = Clock(), Counts()
     call = np.zeros(3, np.int64)
     return ContactJob(
         blank_line(1), no_ends(), state, state, no_work(), clock, counts, call, blank_contact(1),
@@ -149,15 +141,15 @@ def radius(contact, clock, near):
     if near:
         return 0.0
     part = (contact.numbers[QUIET] - CALMS) / RETURNS
-    return clock[RHO] * min(max(part, 0.0), 1.0)
+    return clock.rho * min(max(part, 0.0), 1.0)
 
 
 @inner
 def find_spins(line, contact, clock, near, old, new, u):
     """contact.x = shifts of nodes and spins of cells in the step that is tried."""
-    x, dt = contact.x, clock[TRY_END] - clock[NOW]
-    rho = radius_of_step(radius(contact, clock, near), clock[STEP_BEFORE], clock[RHO_BEFORE], dt)
-    cv = scheme(rho, clock[STEP_BEFORE], clock[RHO_BEFORE], dt).cv
+    x, dt = contact.x, clock.try_end - clock.now
+    rho = radius_of_step(radius(contact, clock, near), clock.step_before, clock.rho_before, dt)
+    cv = scheme(rho, clock.step_before, clock.rho_before, dt).cv
     for i in range(u.shape[0]):
         for k in range(3):
             x[i, k] = u[i, k]
@@ -243,7 +235,7 @@ def charge(line, contact, counts):
     """
     cells = line.h.shape[0]
     cost = contact.counts[LOOKS] + contact.counts[PRODUCTS] * max(cells // 4, 1)
-    counts[QUOTA] -= cost // cells
+    counts.quota -= cost // cells
     contact.counts[LOOKS], contact.counts[PRODUCTS] = cost % cells, 0
 
 
@@ -296,12 +288,12 @@ def contact_task(table):
     """
     job = read(table)
     line, ends, contact, work, phase = job.line, job.ends, job.contact, job.work, job.call[ASKED]
-    old, new = (job.new, job.old) if job.counts[PARITY] else (job.old, job.new)
+    old, new = (job.new, job.old) if job.counts.parity else (job.old, job.new)
     rubs, numbers = contact.numbers[FRICTION] > 0.0, contact.numbers
     if rubs and phase in (PREPARE, REST):
-        keep_last(contact, job.clock[NOW])
+        keep_last(contact, job.clock.now)
     if phase == PREPARE:
-        near = prepare(line, ends, contact, old, work.u, job.clock[NOW], job.clock[TRY_END] - job.clock[NOW])
+        near = prepare(line, ends, contact, old, work.u, job.clock.now, job.clock.try_end - job.clock.now)
         job.call[NEAR] = 1 if near else 0
         numbers[TRIES] += 1.0
         if near:
@@ -309,9 +301,9 @@ def contact_task(table):
         return contact.numbers[PART]
     if phase == RADIUS:
         clock, rho = job.clock, radius(contact, job.clock, job.call[NEAR] != 0)
-        if not job.counts[CONTROLLED]:
-            clock[STEP_BEFORE], clock[RHO_BEFORE] = before_fixed(
-                clock[TRY_END] - clock[NOW], clock[STEP_BEFORE], clock[RHO_BEFORE], rho
+        if not job.counts.controlled:
+            clock.step_before, clock.rho_before = before_fixed(
+                clock.try_end - clock.now, clock.step_before, clock.rho_before, rho
             )
         return rho
     if phase == GAIN:
@@ -338,7 +330,7 @@ def contact_task(table):
         hold_points(line, contact)
     if phase == FINISH and rubs:
         keep_grips(line, contact, contact.counts[POINTS])
-        contact.counts[FRESH], numbers[SINCE] = contact.counts[POINTS], job.clock[TRY_END]
+        contact.counts[FRESH], numbers[SINCE] = contact.counts[POINTS], job.clock.try_end
         work.report[SELF_FRICTION_WORK] = numbers[SLIP_WORK] + numbers[TRIED] - numbers[STORED]
     if numbers[HORIZON] > 0.0 and phase in (FINISH, REST):
         look_ahead(line, ends, contact, new.v if phase == FINISH else old.v)

@@ -32,7 +32,7 @@ from hybrid.kernels.machine.references import caller_of_six
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.powers import find_powers, loses
 from hybrid.kernels.march.zone_torque import twist_energy
-from hybrid.kernels.state.books import NOW, RATES, STORED, TRY_END
+from hybrid.kernels.state.books import RATES
 from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, TOUCHES
 from hybrid.kernels.state.report import (
     CONTACT_WORK,
@@ -120,13 +120,13 @@ def work_of_try(line, ends, contact, velocity, before, state, work, clock):
     of its change, and is missed by as much in long steps: of weight, in a heavy line, by far more than contact puts in.
     """
     report, done, missed = work.report, work.report[SELF_FRICTION_WORK], 0.0
-    half = 0.5 * (clock[TRY_END] - clock[NOW])
+    half = 0.5 * (clock.try_end - clock.now)
     find_powers(line, ends, velocity, state, report, contact.power)
     for k in range(RATES):
         done += half * (before[k] + contact.power[k])
         missed += half * abs(contact.power[k] - before[k])
     if line.bits & TOUCHES:
-        done += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED] + report[FRICTION_WORK]
+        done += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock.stored + report[FRICTION_WORK]
     if line.moved.shape[0] > 0:
         done += report[OBSTACLE_WORK]
     if loses(line):
@@ -170,14 +170,14 @@ def puts_energy_in(line, ends, contact, books, clock, old, new, work):
     numbers = contact.numbers
     if not is_judged(numbers):
         return False
-    if numbers[BEGUN] != clock[NOW]:
-        if numbers[LED] == clock[NOW]:
+    if numbers[BEGUN] != clock.now:
+        if numbers[LED] == clock.now:
             numbers[HAD], numbers[BALANCE] = numbers[HAS], numbers[TRIED_BALANCE]
         else:
             numbers[HAD] = energy_without_weight(line, ends, contact, old, books.report[0])
-        numbers[BEGUN] = clock[NOW]
+        numbers[BEGUN] = clock.now
         numbers[LARGEST] = max(numbers[LARGEST], numbers[HAD])
     numbers[HAS] = energy_without_weight(line, ends, contact, new, work.report)
-    numbers[LED] = clock[TRY_END]
+    numbers[LED] = clock.try_end
     done, missed = work_of_try(line, ends, contact, books.velocity, books.power[0], new, work, clock)
     return is_gain(contact, work.u, done, missed)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY
+from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.state import Ends, Floats, Line, State, blank_line, blank_state, no_ends
 
 # Distance of two points over the length of line between them below which they are no neighbours: half a circle has
@@ -99,15 +99,15 @@ class ItselfJob(NamedTuple):
     ends: Ends
     old: State
     new: State
-    clock: Floats
-    counts: NDArray[np.int64]
+    clock: Clock
+    counts: Counts
     itself: Itself
 
 
 def blank_itself_job() -> ItselfJob:
     """A job with the types that every one has."""
     state, itself = blank_state(1), blank_itself(np.ones(1))
-    clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+    clock, counts = Clock(), Counts()
     return ItselfJob(blank_line(1), no_ends(), state, state, clock, counts, itself)
 
 
@@ -444,9 +444,9 @@ def watch_itself(table):
     """
     job = read(table)
     state, before = job.old, job.new
-    if job.counts[PARITY]:
+    if job.counts.parity:
         state, before = before, state
     search(job.line, job.ends, before.r, state, job.itself)
     found, ahead = job.itself.found, job.itself.ahead
     asked = note_asked(found, ahead) if ahead[ASKED] > 0.0 else 0
-    return (MEETS if note_found(found, job.clock[NOW]) else 0) | asked
+    return (MEETS if note_found(found, job.clock.now) else 0) | asked

@@ -24,7 +24,7 @@ from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.contact.self_distance import NEIGHBOURS, least_on_the_way, nearest_feet
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.state.books import NOW
+from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.job import read
 
@@ -53,7 +53,7 @@ class LinesJob(NamedTuple):
     joined: NDArray[np.int64]  # (L, 2) what the ends are joined to
     begins: NDArray[np.int64]  # (L,) where their cells begin in `width`
     width: Floats  # (N,) m, diameters of the cells of all lines
-    clock: Floats  # of all lines, as kernels.run.system_run.StepsJob has it
+    clock: Clock  # of all lines, as kernels.run.system_run.StepsJob has it
     pairs: NDArray[np.int64]  # (K, WATCHED)
     room: Floats  # (K, ROOM)
     moved: Floats  # (L, MOVED)
@@ -63,7 +63,7 @@ def blank_lines_job() -> LinesJob:
     """A job with the types that every one has."""
     z, whole = np.zeros, np.int64
     return LinesJob(
-        z((1, 1), whole), z((1, 2), whole), z(1, whole), z(1), z(1), z((1, WATCHED), whole), z((1, ROOM)),
+        z((1, 1), whole), z((1, 2), whole), z(1, whole), z(1), Clock(), z((1, WATCHED), whole), z((1, ROOM)),
         z((1, MOVED)),
     )  # fmt: skip
 
@@ -280,9 +280,9 @@ def look_at_pair(job, pair, row):
         row[WAY + j] = moved[a, MEAN + j] - moved[b, MEAN + j]
     row[SPREAD] = spread
     if row[APART] < 0.0:
-        pair[HAVE_MET], row[TIME] = MET, job.clock[NOW]
+        pair[HAVE_MET], row[TIME] = MET, job.clock.now
     elif near:
-        pair[HAVE_MET], row[TIME] = NEAR, job.clock[NOW]
+        pair[HAVE_MET], row[TIME] = NEAR, job.clock.now
 
 
 @kernel

@@ -45,7 +45,6 @@ from hybrid.kernels.contact.self_contact_pairs import (
 from hybrid.kernels.junctions.junctions import move_joints
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.state.books import CONTROLLED, NOW, PARITY, TRY_END
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, SELF_FRICTION_WORK
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.job import read
@@ -121,12 +120,12 @@ def share_clock(job, one):
     clock = one.clock
     for k in range(job.lines.shape[0]):
         own = read(job.tables[job.lines[k]]).books.clock
-        own[NOW], own[TRY_END] = clock[NOW], clock[TRY_END]
-    if job.times[LATEST] == clock[NOW]:
+        own.now, own.try_end = clock.now, clock.try_end
+    if job.times[LATEST] == clock.now:
         keep_latest(job)
     for k in range(job.lines.shape[0]):  # of a try that was not taken
         for m in range(job.lines.shape[0]):
-            if job.meetings[k, m, MET] > clock[NOW]:
+            if job.meetings[k, m, MET] > clock.now:
                 job.meetings[k, m, MET] = math.nan
 
 
@@ -189,7 +188,7 @@ def spread(job, one, phase):
     """Give the lines what contact has: energy, work, force per length, and what it puts on ends that are held."""
     row, last, y = 2 if phase == FINISH else 0, 0.0, one.contact.y
     find_pushes(one, job.pushes[LATEST])
-    job.times[LATEST] = one.clock[TRY_END] if phase == FINISH else one.clock[NOW]
+    job.times[LATEST] = one.clock.try_end if phase == FINISH else one.clock.now
     for k in range(job.lines.shape[0]):
         for j in range(SHARES):
             job.shares[LATEST, k, j] = one.contact.shares[k, j]
@@ -240,14 +239,14 @@ def puts_energy_in(job, one):
     for k in range(job.lines.shape[0]):
         if read(job.tables[job.lines[k]]).reel != 0:  # what a winch does is not known here
             return False
-    if numbers[BEGUN] != clock[NOW]:
-        if numbers[LED] == clock[NOW]:
+    if numbers[BEGUN] != clock.now:
+        if numbers[LED] == clock.now:
             numbers[HAD], numbers[BALANCE] = numbers[HAS], numbers[TRIED_BALANCE]
         else:
             numbers[HAD] = energy_of(job, one, False)
-        numbers[BEGUN] = clock[NOW]
+        numbers[BEGUN] = clock.now
         numbers[LARGEST] = max(numbers[LARGEST], numbers[HAD])
-    numbers[HAS], numbers[LED] = energy_of(job, one, True), clock[TRY_END]
+    numbers[HAS], numbers[LED] = energy_of(job, one, True), clock.try_end
     done, missed = 0.0, 0.0
     if numbers[FRICTION] > 0.0:
         done = numbers[SLIP_WORK] + numbers[TRIED] - numbers[STORED]
@@ -270,7 +269,7 @@ def shared_task(table):
     job = read_shared(table)
     one, last = read_contact(job.inner), read(job.tables[job.lines[job.lines.shape[0] - 1]])
     phase = one.call[ASKED]
-    one.counts[CONTROLLED], one.counts[PARITY] = last.books.counts[CONTROLLED], 0
+    one.counts.controlled, one.counts.parity = last.books.counts.controlled, 0
     if phase == GAIN:
         return 1.0 if puts_energy_in(job, one) else 0.0
     if phase == PREPARE:

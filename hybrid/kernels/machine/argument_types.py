@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.machine.references import examples
 
 _IN_ROWS, _IN_COLUMNS, _ALIGNED, _WRITEABLE = 0x1, 0x2, 0x100, 0x400  # flags of arrays, as numpy numbers them
@@ -22,6 +23,10 @@ def key_of(value: Any) -> Any:
     """Of an array the type of its numbers, its dimensions and flags; of other tuples than those that are kept by
     reference their class and their parts; else the class.  TypeError: it is nothing that a kernel takes."""
     kind: Any = type(value)
+    if isinstance(value, NamedNumbers):
+        if value.shape != (len(kind._fields),) or not value.flags.c_contiguous:
+            raise TypeError(f"{kind.__name__}: shape {value.shape}, expected ({len(kind._fields)},), contiguous")
+        return kind
     if isinstance(value, np.ndarray):
         flags = value.flags.num & _TOLD
         return value.dtype, value.ndim, flags & ~_IN_COLUMNS if flags & _IN_ROWS else flags
@@ -66,4 +71,6 @@ def text_of(key: Any) -> str:
         return f"{text_of(key[0])}({', '.join(map(text_of, key[1:]))})"
     if issubclass(key, _NUMBERS):
         return np.dtype(key).name
+    if issubclass(key, NamedNumbers):
+        return f"{key.__module__}.{key.__qualname__}({', '.join(key._fields)})"
     return f"{key.__module__}.{key.__qualname__}"

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.machine.named_numbers import NamedNumbers
+
 
 class Table:
     """The arguments of one kernel, by the names of its NamedTuple; `numbers` is what the kernel gets."""
@@ -175,6 +177,8 @@ def _numbers(value: Any, pattern: Any, name: str) -> list[int]:
         if not (value.dtype == pattern.dtype and value.ndim == pattern.ndim and value.flags.c_contiguous):
             given = f"{value.dtype} of shape {value.shape}"
             raise TypeError(f"{name}: {given}, expected {pattern.dtype} of {pattern.ndim} dimensions, contiguous")
+        if not isinstance(value, pattern.kind):
+            raise TypeError(f"{name}: {type(value).__name__}, expected {pattern.kind.__name__}")
         return [value.__array_interface__["data"][0], *value.shape]
     return [_bits(value) if pattern is float else int(value)]
 
@@ -202,6 +206,7 @@ class Packed:
             slopes = tuple(b - a for a, b in zip(x.shape, y.shape, strict=True))
             fixed = tuple(a - 2 * k for a, k in zip(x.shape, slopes, strict=True))
             self._fields.append((name, x.dtype, tuple(zip(fixed, slopes, strict=True)), 1 + x.ndim))
+        self._kinds = {name: type(x) for name, x in two._asdict().items() if isinstance(x, NamedNumbers)}
         self._plans: dict[int, Any] = {}
 
     def __call__(self, cells: int, **given: Any) -> Any:
@@ -217,7 +222,8 @@ class Packed:
         values = []
         for name, dtype, shape, offset in places:
             if dtype is not None:
-                values.append(np.ndarray(shape, dtype, block, offset))
+                array = np.ndarray(shape, dtype, block, offset)
+                values.append(array.view(self._kinds[name]) if name in self._kinds else array)
                 continue
             values.append(given[name])
             found = _numbers(given[name], shape, name)
@@ -253,7 +259,7 @@ class Room:
 
     def __init__(self, packed: Packed, most: int) -> None:
         size, places, *_ = packed._plan(most)
-        self._make, self._block = packed._make, np.zeros(size)
+        self._make, self._kinds, self._block = packed._make, packed._kinds, np.zeros(size)
         at: int = self._block.__array_interface__["data"][0]
         fixed: list[int] = []
         slopes: list[int] = []
@@ -279,7 +285,8 @@ class Room:
                 if dtype is None:
                     values.append(given[name])
                 else:
-                    values.append(np.ndarray([a + k * cells for a, k in dims], dtype, block, offset))
+                    array = np.ndarray([a + k * cells for a, k in dims], dtype, block, offset)
+                    values.append(array.view(self._kinds[name]) if name in self._kinds else array)
             for name, pattern, at in self._given:
                 found = _numbers(given[name], pattern, name)
                 numbers[at : at + len(found)] = found
@@ -306,10 +313,10 @@ def _bits(value: float) -> int:
 
 
 class _ArrayPattern:
-    """Type of an array and number of its dimensions."""
+    """Type of an array and number of its dimensions; the class whose names its numbers have."""
 
     def __init__(self, array: NDArray[Any]) -> None:
-        self.dtype, self.ndim = array.dtype, array.ndim
+        self.dtype, self.ndim, self.kind = array.dtype, array.ndim, type(array)
 
 
 def _pattern(value: Any) -> Any:

@@ -13,11 +13,12 @@ import numpy as np
 from llvmlite import ir
 from numba import from_dtype, typeof, types
 from numba.core import cgutils
-from numba.core.imputils import lower_getattr_generic
+from numba.core.imputils import lower_getattr_generic, lower_setattr_generic
 from numba.core.typing.templates import AttributeTemplate, make_intrinsic_template
 from numba.extending import NativeValue, infer_getattr, models, register_model, unbox
 
 from hybrid.kernels.machine.argument_types import is_array, key_of, layout_of
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.machine.references import examples
 
 _WORD = ir.IntType(64)
@@ -29,6 +30,14 @@ class Reference(types.Type):
     def __init__(self, of: type) -> None:
         self.of = of
         super().__init__(name=f"Reference({of.__module__}.{of.__qualname__})")
+
+
+class Names(types.Type):
+    """Type of the named numbers of a class: the address of the first."""
+
+    def __init__(self, of: type[NamedNumbers]) -> None:
+        self.of, self.dtype = of, from_dtype(np.dtype(of._number))
+        super().__init__(name=f"Names({of.__module__}.{of.__qualname__})")
 
 
 def type_of(value: Any) -> Any:
@@ -47,6 +56,8 @@ def type_for(key: Any) -> Any:
         return types.BaseTuple.from_types(tuple(map(type_for, key[1:])), key[0])
     if key in examples:
         return Reference(key)
+    if issubclass(key, NamedNumbers):
+        return Names(key)
     return types.none if key is NoneType else from_dtype(np.dtype(key))
 
 
@@ -67,7 +78,7 @@ def size(kind: Any) -> int:
         return sum(size(x) for _, x in _fields_of(kind.of).values())
     if isinstance(kind, types.NamedTuple):
         return sum(size(x) for x in kind.types)
-    return 1 + kind.ndim if isinstance(kind, types.Array) else 1
+    return 1 + kind.ndim if isinstance(kind, types.Array) else 1 + isinstance(kind, Names)
 
 
 def read_function(example: Any) -> Any:
@@ -148,6 +159,56 @@ def _attribute(context: Any, builder: Any, kind: Any, table: Any, name: str) -> 
     return _built(context, builder, field, table, at)[0]
 
 
+@register_model(Names)
+class _NamesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, manager.lookup(kind.dtype).get_data_type().as_pointer())
+
+
+@infer_getattr
+class _Named(AttributeTemplate):
+    key = Names
+
+    def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]
+        if name == "plain":
+            return types.Array(kind.dtype, 1, "C")
+        return kind.dtype if name in kind.of._fields else None
+
+
+def _place(builder: Any, kind: Any, first: Any, name: str) -> Any:
+    return cgutils.gep_inbounds(builder, first, kind.of._fields.index(name))
+
+
+@lower_getattr_generic(Names)
+def _named(context: Any, builder: Any, kind: Any, first: Any, name: str) -> Any:
+    if name == "plain":
+        return _plain(context, builder, kind, first)
+    return builder.load(_place(builder, kind, first, name))
+
+
+def _plain(context: Any, builder: Any, kind: Any, first: Any) -> Any:
+    """All of them as an array."""
+    of = types.Array(kind.dtype, 1, "C")
+    array, size = context.make_array(of)(context, builder), context.get_constant
+    item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    shape, strides = [size(types.intp, len(kind.of._fields))], [size(types.intp, item)]
+    context.populate_array(array, data=first, shape=shape, strides=strides, itemsize=item, meminfo=None)
+    return array._getvalue()
+
+
+@lower_setattr_generic(Names)
+def _name(context: Any, builder: Any, sig: Any, args: Any, name: str) -> None:
+    builder.store(args[1], _place(builder, sig.args[0], args[0], name))
+
+
+@unbox(Names)
+def _unboxed_numbers(kind: Any, value: Any, c: Any) -> NativeValue:
+    """From Python; of which class they are has been looked at before (kernels.machine.argument_types)."""
+    of = types.Array(kind.dtype, 1, "C")
+    native = c.unbox(of, value)
+    return NativeValue(c.context.make_array(of)(c.context, c.builder, native.value).data, is_error=native.is_error)
+
+
 def _built(context: Any, builder: Any, kind: Any, table: Any, at: int) -> tuple[Any, int]:
     """The value of a type from the table's numbers at `at` on, and where the next begins."""
 
@@ -161,6 +222,9 @@ def _built(context: Any, builder: Any, kind: Any, table: Any, at: int) -> tuple[
         return context.make_tuple(builder, kind, values), at
     if isinstance(kind, types.Array):
         return _array(context, builder, kind, table, at), at + 1 + kind.ndim
+    if isinstance(kind, Names):
+        first = context.get_value_type(kind)
+        return builder.inttoptr(_number(builder, table, at), first), at + 2
     value = _number(builder, table, at)
     if isinstance(kind, types.Float):
         value = builder.bitcast(value, context.get_data_type(types.float64))
@@ -216,6 +280,8 @@ def _numbers(context: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
     if isinstance(kind, types.Array):
         array = context.make_array(kind)(context, builder, value)
         return [builder.ptrtoint(array.data, _WORD), *cgutils.unpack_tuple(builder, array.shape)]
+    if isinstance(kind, Names):
+        return [builder.ptrtoint(value, _WORD), _WORD(len(kind.of._fields))]
     if isinstance(kind, types.Float):
         return [builder.bitcast(value, _WORD)]
     if isinstance(kind, types.Boolean):

@@ -8,7 +8,7 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import FIRST, LAST
-from hybrid.kernels.state.books import CONTACT, FRICTION, HYSTERESIS, OBSTACLE, RATES, STORED, WORKS
+from hybrid.kernels.state.books import CONTACT, FRICTION, HYSTERESIS, OBSTACLE, RATES, WORKS
 from hybrid.kernels.state.forces import BENDING_SLIP, SELF_CONTACT, TOUCHES
 from hybrid.kernels.state.report import (
     ADDED_MASS_POWER,
@@ -83,9 +83,9 @@ def book_work(line, dt, report, books):
     for k in range(RATES):
         work[0, k] += half * (power[1, k] + power[0, k])
     if line.bits & TOUCHES:
-        work[0, CONTACT] += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED]
+        work[0, CONTACT] += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock.stored
         work[0, FRICTION] += report[FRICTION_WORK]
-        clock[STORED] = report[SEABED_ENERGY]
+        clock.stored = report[SEABED_ENERGY]
     if line.moved.shape[0] > 0:
         work[0, OBSTACLE] += report[OBSTACLE_WORK]
     if loses(line):

@@ -236,7 +236,7 @@ def renew(table):
     job.nearest[0], job.nearest[1] = -1, -1
     zones.clock[AGE], zones.clock[RECENT_AGE] = 0.0, 0.0
     zones.counts[KNOWN], zones.counts[STRAINED], zones.counts[RELAXING] = 0, 0, 1
-    clock[b.WAVE_STEP], clock[b.PREVIOUS], books.counts[b.PARITY] = wave_step(job.line, job.scale), clock[b.NOW], 0
+    clock.wave_step, clock.previous, books.counts.parity = wave_step(job.line, job.scale), clock.now, 0
 
 
 # --- forces ---------------------------------------------------------------------------------------
@@ -247,8 +247,8 @@ def before_forces(table):
     """What the assembly of a state as it is has to know; table: of a kernels.run.run.Job of parity 0."""
     job = read(table)
     clock = job.books.clock
-    ends_at(clock[b.NOW], job.moves, job.sea, job.ends, job.books.velocity)
-    sea_at(clock[b.NOW], job.sea)
+    ends_at(clock.now, job.moves, job.sea, job.ends, job.books.velocity)
+    sea_at(clock.now, job.sea)
     clear(job.work.u)
     if job.line.bits & WAVES:
         wave_kinematics(job.sea, job.old.r, job.work.u)
@@ -269,5 +269,5 @@ def after_forces(table):
                 job.old.bed[i, j] = job.sea.bed[i, j]
     for j in range(report.shape[0]):
         job.books.report[0, j] = report[j]
-    clock[b.STORED] = report[SEABED_ENERGY]
-    count[b.PHASE], count[b.AFTER_START], count[b.NEW_STATE] = b.START, b.SAMPLE, 1
+    clock.stored = report[SEABED_ENERGY]
+    count.phase, count.after_start, count.new_state = b.START, b.SAMPLE, 1

@@ -49,7 +49,7 @@ from hybrid.kernels.mesh.zone_criteria import (
     twist_of_rods,
 )
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import COUNT_SIZE, WORKS
+from hybrid.kernels.state.books import WORKS, Clock, Counts
 from hybrid.kernels.state.forces import OBSTACLES
 from hybrid.kernels.state.obstacle_rows import STRAND
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
@@ -164,8 +164,8 @@ class ZoneJob(NamedTuple):
     ends: Ends
     old: State
     new: State
-    clock: Floats
-    counts: NDArray[np.int64]
+    clock: Clock
+    counts: Counts
     work: Floats
     zones: Zones
     near: (
@@ -178,7 +178,7 @@ class ZoneJob(NamedTuple):
 def blank_zone_job() -> ZoneJob:
     """A job with the types that every one has."""
     state = blank_state(1)
-    clock, counts, work = np.zeros(b.CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), np.zeros((2, WORKS))
+    clock, counts, work = b.Clock(), Counts(), np.zeros((2, WORKS))
     return ZoneJob(
         blank_line(1),
         no_sea(1),
@@ -459,7 +459,7 @@ def plan_nodes(table):
 def plan_next(table):
     """`plan_nodes` between two steps of a run, for the state that it has come to."""
     job = read(table)
-    clock, state = job.zones.clock, job.new if job.counts[b.PARITY] else job.old
+    clock, state = job.zones.clock, job.new if job.counts.parity else job.old
     plan_cells(job.line, job.sea, state, job.zones, clock[DT], clock[FINENESS])
 
 
@@ -468,28 +468,28 @@ def follow_zones(table):
     """What zones do in the present phase of a run, before a try, after it, after a step; 1: Python must look at it."""
     job = read(table)
     line, ends, zones, clock, count = job.line, job.ends, job.zones, job.clock, job.counts
-    phase, dt = count[b.PHASE], clock[b.TRY_END] - clock[b.NOW]
+    phase, dt = count.phase, clock.try_end - clock.now
     if phase == b.SOLVE:
-        prepare(line, zones, clock[b.TRY_END], dt)
+        prepare(line, zones, clock.try_end, dt)
         return 0
     if phase == b.JUDGE:
-        evaluate(line, job.sea, ends, job.old if count[b.PARITY] else job.new, zones, job.near, dt)
+        evaluate(line, job.sea, ends, job.old if count.parity else job.new, zones, job.near, dt)
         return 1 if zones.clock[LOUDEST] > REJECT_RATIO else 0
     # a step is accepted, and the states have changed places
     state, before = job.old, job.new
-    if count[b.PARITY]:
+    if count.parity:
         state, before = before, state
     for k in range(QUANTITIES):
-        zones.largest[k] *= math.exp(-clock[b.LAST_DT] / zones.clock[MEMORY])
-    job.work[0, b.ZONES] += book(line, ends, before, state, clock[b.LAST_DT], zones)
+        zones.largest[k] *= math.exp(-clock.last_dt / zones.clock[MEMORY])
+    job.work[0, b.ZONES] += book(line, ends, before, state, clock.last_dt, zones)
     if zones.clock[SHARE] > 0.0:
         follow_arcs(line, state, zones)
-        watch_waves(line, state, zones, clock[b.LAST_DT])
-        zones.counts[CELLS_DUE] = other_cells(line, job.sea, state, zones, clock[b.LAST_DT])
+        watch_waves(line, state, zones, clock.last_dt)
+        zones.counts[CELLS_DUE] = other_cells(line, job.sea, state, zones, clock.last_dt)
     ramping = zones.counts[GOING] or zones.counts[COMING]
-    clock[b.ALLOWED] = zones.clock[RAMP_STEP] if ramping else zones.clock[CALM_STEP]
+    clock.allowed = zones.clock[RAMP_STEP] if ramping else zones.clock[CALM_STEP]
     if zones.clock[LOUDEST] > 1.0:
         return 1
-    if clock[b.NOW] >= zones.clock[NEXT_REVIEW] and (job.review == 0 or call_review(job.review, job.review_table) == 0):
+    if clock.now >= zones.clock[NEXT_REVIEW] and (job.review == 0 or call_review(job.review, job.review_table) == 0):
         return 1
     return 1 if zones.counts[CELLS_DUE] != 0 else 0

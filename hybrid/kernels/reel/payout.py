@@ -269,14 +269,14 @@ def limit_step(reel, clock):
 
     Of a winch that holds a tension the rate and its growth now tell what comes in a step, else the law of the length.
     """
-    dt, numbers, fastest = clock[b.NEXT_DT], reel.numbers, 1e-12
+    dt, numbers, fastest = clock.next_dt, reel.numbers, 1e-12
     if reel.winch[TENSION] > 0.0:
-        fastest = max(fastest, abs(numbers[RATE]) + abs(numbers[ACCELERATION]) * clock[b.LAST_DT])
+        fastest = max(fastest, abs(numbers[RATE]) + abs(numbers[ACCELERATION]) * clock.last_dt)
     else:
-        length, rate, _ = length_at(reel.law, clock[b.NOW])
-        later, then, _ = length_at(reel.law, clock[b.NOW] + dt)
+        length, rate, _ = length_at(reel.law, clock.now)
+        later, then, _ = length_at(reel.law, clock.now + dt)
         fastest = max(fastest, abs(rate), abs(then), abs(later - length) / dt)
-    clock[b.NEXT_DT] = max(min(dt, reel.rest_length[0] / (FEWEST_STEPS * fastest)), clock[b.SHORTEST])
+    clock.next_dt = max(min(dt, reel.rest_length[0] / (FEWEST_STEPS * fastest)), clock.shortest)
 
 
 @inner
@@ -291,44 +291,44 @@ def pay_out(table):
     """What a run whose line changes its length does before a try, after it, after a step; 1: Python must look at it."""
     job = read(table)
     line, reel, clock, count = job.line, job.reel, job.clock, job.counts
-    phase, numbers, winch = count[b.PHASE], reel.numbers, reel.winch
+    phase, numbers, winch = count.phase, reel.numbers, reel.winch
     if phase == b.SOLVE:
-        find_length(reel, clock[b.TRY_END])
+        find_length(reel, clock.try_end)
         if winch[TENSION] > 0.0:
-            dt = clock[b.TRY_END] - clock[b.NOW]
+            dt = clock.try_end - clock.now
             numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = predict(
-                winch, clock[b.RHO], clock[b.STEP_BEFORE], clock[b.RHO_BEFORE], dt
+                winch, clock.rho, clock.step_before, clock.rho_before, dt
             )
-        prepare(line, reel, clock[b.TRY_END])
-        put_balance_on(line, reel, clock[b.TRY_END])
+        prepare(line, reel, clock.try_end)
+        put_balance_on(line, reel, clock.try_end)
         if flows(line):
-            let_layers_flow(line, job.new if count[b.PARITY] else job.old, reel)
+            let_layers_flow(line, job.new if count.parity else job.old, reel)
         return 0
     if phase == b.JUDGE:
-        tried = job.old if count[b.PARITY] else job.new
+        tried = job.old if count.parity else job.new
         take_riding_off(line, reel)
         take_balance_off(line, reel)
-        pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report, clock[b.TRY_END])
+        pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report, clock.try_end)
         if reel.flow.shape[0] > 0:
             numbers[FLUX] += power_of_flow(line, job.ends, tried, reel)
-        note_pull(reel, clock[b.TRY_END], pull)
+        note_pull(reel, clock.try_end, pull)
         leave_to_reel(line, job.zones, reel)
         return 0
     # a step is accepted, and the states have changed places
     reel.stage[FLOW_KNOWN] = 0.0
     state, before = job.old, job.new
-    if count[b.PARITY]:
+    if count.parity:
         state, before = before, state
     if winch[TENSION] > 0.0:
         accept(winch, numbers[LENGTH], numbers[RATE], numbers[ACCELERATION])
-    job.work[0, end_of(reel)] += book(line, job.ends, before, state, reel, clock[b.LAST_DT])
-    job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock[b.NOW], clock[b.LAST_DT])
+    job.work[0, end_of(reel)] += book(line, job.ends, before, state, reel, clock.last_dt)
+    job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock.now, clock.last_dt)
     if line.bits & TOUCHES:
         book_contact(line, job.sea, before, state, reel, job.work)
     if flows(line):
         book_layers(job, before, state)
     remember_all(job, state)
-    if count[b.CONTROLLED]:
+    if count.controlled:
         limit_step(reel, clock)
     last = reel.true[growing(line, reel)]
     numbers[DUE] = 1.0 if last > numbers[LONGEST] or last < numbers[SHORTEST] else 0.0
@@ -338,14 +338,14 @@ def pay_out(table):
 @inner
 def correct_length(job, change):
     """The length of a winch that holds a tension changes, m, in the iteration of a step."""
-    numbers, winch, t = job.reel.numbers, job.reel.winch, job.clock[b.TRY_END]
+    numbers, winch, t = job.reel.numbers, job.reel.winch, job.clock.try_end
     numbers[LENGTH] += change
     numbers[RATE] += winch[CV] * change
     numbers[ACCELERATION] += winch[CA] * change
     prepare(job.line, job.reel, t)
     put_balance_on(job.line, job.reel, t)
     if flows(job.line):
-        let_layers_flow(job.line, job.new if job.counts[b.PARITY] else job.old, job.reel)
+        let_layers_flow(job.line, job.new if job.counts.parity else job.old, job.reel)
 
 
 @inner
@@ -364,8 +364,8 @@ def iterate(table):
     """
     job = read(table)
     line, reel, clock = job.line, job.reel, job.clock
-    numbers, winch, stage, t = reel.numbers, reel.winch, reel.stage, clock[b.TRY_END]
-    state = job.old if job.counts[b.PARITY] else job.new
+    numbers, winch, stage, t = reel.numbers, reel.winch, reel.stage, clock.try_end
+    state = job.old if job.counts.parity else job.new
     if stage[LENGTHENS] == MOVES:
         stage[LENGTHENS] = 0.0
         correct_length(job, stage[CHANGE])
@@ -374,7 +374,7 @@ def iterate(table):
     if stage[RIDING_ON] == 0.0:
         put_riding_on(line, job.sea, job.ends, state, reel, t)
         if rubs(line):
-            let_material_rub(line, job.sea, job.new if job.counts[b.PARITY] else job.old, reel)
+            let_material_rub(line, job.sea, job.new if job.counts.parity else job.old, reel)
         return 0
     if reel.flow.shape[0] > 0:
         correct_damping_power(line, job.ends, state, reel, job.report, True)
@@ -416,7 +416,7 @@ def end_payout(table):
     """Let the nodes that ride, and the fairlead, go on with the material that is there now; none comes any more."""
     job = read(table)
     line, reel = job.line, job.reel
-    state, n, g = job.new if job.counts[b.PARITY] else job.old, line.h.shape[0], growing(line, reel)
+    state, n, g = job.new if job.counts.parity else job.old, line.h.shape[0], growing(line, reel)
     for i in range(g + 1, n + 1):
         v = velocity_at(line, state, reel, i, reel.numbers[RATE], g)
         for j in range(3):
@@ -427,16 +427,16 @@ def end_payout(table):
 def fit_line(table):
     """The line with the length that its reel has, at clock[NOW]."""
     job = read(table)
-    prepare(job.line, job.reel, job.clock[b.NOW])
+    prepare(job.line, job.reel, job.clock.now)
 
 
 @kernel
 def lengthen(table):
     """The line as it is at clock[NOW]."""
     job = read(table)
-    find_length(job.reel, job.clock[b.NOW])
-    prepare(job.line, job.reel, job.clock[b.NOW])
-    remember_all(job, job.new if job.counts[b.PARITY] else job.old)
+    find_length(job.reel, job.clock.now)
+    prepare(job.line, job.reel, job.clock.now)
+    remember_all(job, job.new if job.counts.parity else job.old)
     leave_to_reel(job.line, job.zones, job.reel)
 
 
@@ -451,9 +451,9 @@ def limit_next_step(table):
 def put_forces_on(table):
     """On the line of now: forces of nodes that ride, and those that balance the neighbours of the last new node."""
     job = read(table)
-    put_balance_on(job.line, job.reel, job.clock[b.NOW])
-    state = job.new if job.counts[b.PARITY] else job.old
-    put_riding_on(job.line, job.sea, job.ends, state, job.reel, job.clock[b.NOW])
+    put_balance_on(job.line, job.reel, job.clock.now)
+    state = job.new if job.counts.parity else job.old
+    put_riding_on(job.line, job.sea, job.ends, state, job.reel, job.clock.now)
 
 
 @kernel
@@ -467,8 +467,8 @@ def take_forces_off(table):
 @inner
 def stand(job):
     """The line at clock[NOW], and the force of its fairlead, for a state that no step has led to."""
-    was_on, damped, t = job.reel.stage[FLOW_KNOWN] > 0.0, job.reel.flow.shape[0] > 0, job.clock[b.NOW]
-    state = job.new if job.counts[b.PARITY] else job.old
+    was_on, damped, t = job.reel.stage[FLOW_KNOWN] > 0.0, job.reel.flow.shape[0] > 0, job.clock.now
+    state = job.new if job.counts.parity else job.old
     find_length(job.reel, t)
     prepare(job.line, job.reel, t)
     if damped or job.reel.stage[UNBALANCED] > 0.0:

@@ -41,6 +41,7 @@ from hybrid.kernels.reel.reel import (
 )
 from hybrid.kernels.reel.winch import ALGORITHMIC_NOW, RATE_NOW, TENSION, TRUE_NOW
 from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.forces import PLANAR, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
 from hybrid.kernels.step.generalized_alpha import lead
@@ -58,7 +59,7 @@ class CarryJob(NamedTuple):
     out: State  # written
     reel: Reel
     new: Reel  # what its cells lack is written
-    clock: Floats  # of the run
+    clock: Clock  # of the run
     tension: Floats  # (2, N) N, before the last step
     nodes: Floats  # (M,) m, places of all material nodes that there may be
 
@@ -66,7 +67,7 @@ class CarryJob(NamedTuple):
 def blank_carry_job() -> CarryJob:
     """A job with the types that every one has."""
     line, state, reel, z = blank_line(1), blank_state(1), blank_reel(1), np.zeros
-    return CarryJob(line, line, state, state, reel, reel, z(b.CLOCK_SIZE), z((2, 1)), z(2))
+    return CarryJob(line, line, state, state, reel, reel, b.Clock(), z((2, 1)), z(2))
 
 
 read = reader(blank_carry_job())
@@ -188,8 +189,8 @@ def put_chord(line, state, reel, c, e):
 @inner
 def flow_at(reel, clock):
     """How material flows through the fairlead after an accepted step."""
-    t, winch = clock[b.NOW], reel.winch
-    ahead = lead(clock[b.LAST_RHO]) * clock[b.LAST_DT]
+    t, winch = clock.now, reel.winch
+    ahead = lead(clock.last_rho) * clock.last_dt
     if winch[TENSION] > 0.0:
         rate, acceleration = winch[RATE_NOW], winch[TRUE_NOW]
         return Flow(rate, acceleration, rate + ahead * acceleration, winch[ALGORITHMIC_NOW])
@@ -243,7 +244,7 @@ def tension_rate(line, state, clock, tension, c):
     """Rate, N/s, of the tension of cell c (of the line) over the last step, or of its material now if it is damped."""
     if is_damped(line, c):
         return late_strain(line, state, c) / (line.tau[c] * line.ck[c])
-    dt = clock[b.LAST_DT]
+    dt = clock.last_dt
     return (state.T[c] - tension[0, c]) / dt if dt > 0.0 else 0.0
 
 
@@ -268,7 +269,7 @@ def mismatch(job, flow, g, c):
         return 0.0
     ends = sub(get3(state.v, node(line, reel, c + 1)), get3(state.v, node(line, reel, c)))
     along = dot(e, ends) / math.sqrt(dot(e, e))
-    grows = (flow.rate if c == g else 0.0) - lack_rate(reel, clock[b.NOW], c)
+    grows = (flow.rate if c == g else 0.0) - lack_rate(reel, clock.now, c)
     rises = tension_rate(line, state, clock, job.tension, k)
     found = along - grows * (1.0 + strain_of(line, state, k)) - line.h[k] * line.ck[k] * rises
     return found - flow_stretch(line, state, reel, flow.rate, c) if c == g else found
@@ -324,7 +325,7 @@ def let_lack(job, flow, c, true, grows, rises, kept, late, span):
         kept += flow_stretch(target, out, new, grows, c)
     new.lack[c] = true - l / (1.0 + strain)
     new.rate[c] = grows - (dot(e, ends) / l - kept - true * target.ck[k] * rises) / (1.0 + strain)
-    new.since[c], new.span[c] = job.clock[b.NOW], span
+    new.since[c], new.span[c] = job.clock.now, span
 
 
 @inner
@@ -345,7 +346,7 @@ def span_of(job, flow, g):
 
     It does not go by the steps unless they are long: the shorter, the more a new node would kick.
     """
-    dt, h = job.clock[b.LAST_DT], job.nodes[g + 1] - job.nodes[g]
+    dt, h = job.clock.last_dt, job.nodes[g + 1] - job.nodes[g]
     slowly = min(crossing_time(job, g), 0.5 * h / max(abs(flow.rate), 1e-12))
     return max(slowly, FEWEST_STEPS * dt, 1e-9)
 
@@ -460,7 +461,7 @@ def carry(job):
         line.torsion.shape[0] == 0 and line.tension_twist.shape[0] == 0
     )  # no force that payout_balance does not know
     new.stage[UNBALANCED] = 1.0 if plain else 0.0
-    new.numbers[CHANGED], new.numbers[EASING] = job.clock[b.NOW] if plain else -np.inf, span_of(job, flow, g)
+    new.numbers[CHANGED], new.numbers[EASING] = job.clock.now if plain else -np.inf, span_of(job, flow, g)
 
 
 @kernel

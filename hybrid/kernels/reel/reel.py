@@ -13,12 +13,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.mesh.fill_line import COLUMNS
 from hybrid.kernels.reel.winch import WINCH
-from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE, WORKS
+from hybrid.kernels.state.books import WORKS, Clock, Counts
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 
@@ -140,8 +139,8 @@ class ReelJob(NamedTuple):
     ends: Ends
     old: State
     new: State
-    clock: Floats
-    counts: NDArray[np.int64]
+    clock: Clock
+    counts: Counts
     work: Floats  # (2, WORKS)
     velocity: Floats  # (2, 3) m/s, of the ends
     report: Floats  # (REPORT_SIZE,) of the step
@@ -155,7 +154,7 @@ def blank_reel_job() -> ReelJob:
     """A job with the types that every one has."""
     state, z = blank_state(1), np.zeros
     return ReelJob(
-        blank_line(1), no_sea(1), no_ends(), state, state, z(CLOCK_SIZE), z(COUNT_SIZE, np.int64), z((2, WORKS)),
+        blank_line(1), no_sea(1), no_ends(), state, state, Clock(), Counts(), z((2, WORKS)),
         z((2, 3)), z(REPORT_SIZE), blank_reel(1), z(0), z(0), zones_that_stay(),
     )  # fmt: skip
 

@@ -18,7 +18,7 @@ from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.mesh.zone_step import CELLS_DUE, CLOCK_SIZE, FLAG_COUNT, LOUDEST, NEXT_REVIEW, RELAXING
 from hybrid.kernels.mesh.zone_switch import AFTER, BEFORE, NUMBERS, RELAXES, TIME
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import sample_size
+from hybrid.kernels.state.books import Clock, sample_size
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.newton import ASSEMBLY, RUN
 from hybrid.kernels.step.sampling import SAME_TIME
@@ -51,7 +51,7 @@ class FollowingJob(NamedTuple):
 
     calls: Numbers  # (CALLS,)
     at: Numbers  # (AT_SIZE,)
-    clock: Floats  # of the run
+    clock: Clock  # of the run
     counts: Numbers
     outputs: Floats
     work: Floats
@@ -85,7 +85,7 @@ def blank_following_job() -> FollowingJob:
     """A job with the types that every one has."""
     z, few, pairs, sides = np.zeros, np.zeros(1, np.int64), np.zeros((1, 3), np.int64), np.zeros((2, 3, 1), np.int64)
     return FollowingJob(
-        z(CALLS, np.int64), z(AT_SIZE, np.int64), z(b.CLOCK_SIZE), z(b.COUNT_SIZE, np.int64), z(0), z((2, b.WORKS)),
+        z(CALLS, np.int64), z(AT_SIZE, np.int64), b.Clock(), b.Counts(), z(0), z((2, b.WORKS)),
         z(CLOCK_SIZE), z(FLAG_COUNT, np.int64), z(NUMBERS), few, few, sides, few, few, sides, few, few, sides,
         z((2, 1), np.int64), few, sides, few, sides, few, sides, few, sides, z(1, bool), pairs, few,
     )  # fmt: skip
@@ -117,10 +117,10 @@ def begin_change(job):
     k, n = at[SIDE], at[CELLS]
     m = call_count(calls[LAY_OUT], job.layouts[1 - k])
     at[NEXT_CELLS] = m
-    put(job.renews[2 * k + counts[b.PARITY]], n, m, job.renewed)
-    put(job.switches[2 * k + counts[b.PARITY]], n, m, job.switch)
+    put(job.renews[2 * k + counts.parity], n, m, job.renewed)
+    put(job.switches[2 * k + counts.parity], n, m, job.switch)
     put(job.lines[1 - k], n, m, job.line)
-    job.numbers[TIME], job.numbers[RELAXES] = job.clock[b.NOW], job.zone_counts[RELAXING]
+    job.numbers[TIME], job.numbers[RELAXES] = job.clock.now, job.zone_counts[RELAXING]
     call(calls[CLEAR], job.renewed)
     call(calls[LINE], job.line)
     call(calls[BEGIN], job.switch)
@@ -168,8 +168,8 @@ def end_change(job):
 @inner
 def due_within(job):
     """How many outputs lie within the last step, before its end, and have not been sampled."""
-    clock, outputs, at, count = job.clock, job.outputs, job.counts[b.OUTPUT], 0
-    last = clock[b.NOW] - SAME_TIME * clock[b.LAST_DT]
+    clock, outputs, at, count = job.clock, job.outputs, job.counts.output, 0
+    last = clock.now - SAME_TIME * clock.last_dt
     while at + count < outputs.shape[0] and outputs[at + count] < last:
         count += 1
     return count
@@ -178,7 +178,7 @@ def due_within(job):
 @inner
 def may_change(job):
     """Whether cells may change now: no outputs of those of now are to come or wait, or there is room for them."""
-    at, some = job.at, due_within(job) + job.counts[b.SAMPLES]
+    at, some = job.at, due_within(job) + job.counts.samples
     if some == 0 or at[ALONE] == 0:
         return at[ALONE] != 0
     room = at[WAITING] < job.waiting.shape[0] and at[PLACED] + at[CELLS] + 1 <= job.places.shape[0]
@@ -222,14 +222,14 @@ def cells_may_change(table):
 def set_aside(job):
     """The outputs that have been sampled wait, with the places of the nodes that they are of."""
     at, row = job.at, job.waiting[job.at[WAITING]]
-    row[OFFSET], row[COUNT], row[OF_CELLS] = at[USED], job.counts[b.SAMPLES], at[CELLS]
+    row[OFFSET], row[COUNT], row[OF_CELLS] = at[USED], job.counts.samples, at[CELLS]
     for i in range(job.here.shape[0]):
         if job.here[i]:
             job.places[at[PLACED]] = i
             at[PLACED] += 1
     at[USED] += row[COUNT] * numbers_of_sample(row[OF_CELLS], True)
     at[WAITING] += 1
-    job.counts[b.SAMPLES] = 0
+    job.counts.samples = 0
 
 
 @inner
@@ -237,10 +237,10 @@ def leave(job):
     """Outputs of the cells of now, which are to change: those within the last step are sampled, and all wait."""
     counts = job.counts
     if due_within(job) > 0:
-        counts[b.INSIDE], counts[b.ASKS] = 1, b.ASK_SAMPLES
+        counts.inside, counts.asks = 1, b.ASK_SAMPLES
         call_count(job.calls[STEPS], job.run)
-        counts[b.INSIDE], counts[b.ASKS] = 0, 0
-    if counts[b.SAMPLES] > 0:
+        counts.inside, counts.asks = 0, 0
+    if counts.samples > 0:
         set_aside(job)
 
 
@@ -261,13 +261,13 @@ def go_on(table, reviewed):
     if not reviewed:
         code = call_count(job.calls[STEPS], job.run)
     while True:
-        if code != b.STEPPED or job.counts[b.FLAGS] != 0 or job.counts[b.ASKS] != 0:
+        if code != b.STEPPED or job.counts.notices != 0 or job.counts.asks != 0:
             return code
         due = job.zone_counts[CELLS_DUE] != 0
         if due and not may_change(job):
             return code
         if not reviewed:
-            asked = job.zone_clock[LOUDEST] > 1.0 or job.clock[b.NOW] >= job.zone_clock[NEXT_REVIEW]
+            asked = job.zone_clock[LOUDEST] > 1.0 or job.clock.now >= job.zone_clock[NEXT_REVIEW]
             if asked or not due:
                 return code
         if due:

@@ -26,7 +26,7 @@ from hybrid.kernels.reel.reel import BALANCE_ON, DUE, FAR, FLOW_KNOWN, LONGEST, 
 from hybrid.kernels.reel.winch import at_its_end
 from hybrid.kernels.run.following_run import call, call_count, call_solver, put, put_at
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, blank_books, sample_size
+from hybrid.kernels.state.books import Books, Clock, blank_books, sample_size
 from hybrid.kernels.state.forces import TOUCHES
 from hybrid.kernels.state.state import (
     Ends,
@@ -199,14 +199,14 @@ def change_line(table):
     new.stage[RIDING_ON], new.stage[BALANCE_ON], new.stage[FLOW_KNOWN], new.numbers[DUE] = 0.0, 0.0, 0.0, 0.0
     place_reel(new, job.nodes, job.target.h.shape[0] - reel.layer.shape[0] + 1)
     line_as(job.line, read_node(table).whole, job.target, new)
-    prepare(job.target, new, job.clock[b.NOW])  # what new cells lack goes by what they are made of
+    prepare(job.target, new, job.clock.now)  # what new cells lack goes by what they are made of
 
 
 @kernel
 def fit_changed(table):
     """The new line has the length of now."""
     job = read_node(table).carry
-    prepare(job.target, job.new, job.clock[b.NOW])
+    prepare(job.target, job.new, job.clock.now)
 
 
 @kernel
@@ -241,8 +241,8 @@ def renew_run(table):
     clear(job.sea.flow)
     for j in range(job.work.report.shape[0]):
         job.work.report[j] = 0.0
-    clock[b.WAVE_STEP], clock[b.PREVIOUS] = wave_step(target, job.scale), clock[b.NOW]
-    job.books.counts[b.PARITY] = 0
+    clock.wave_step, clock.previous = wave_step(target, job.scale), clock.now
+    job.books.counts.parity = 0
 
 
 class LineJob(NamedTuple):
@@ -298,7 +298,7 @@ class PaidRunJob(NamedTuple):
 
     calls: Numbers  # (CALLS,)
     at: Numbers  # (AT_SIZE,)
-    clock: Floats  # of the run
+    clock: Clock  # of the run
     counts: Numbers
     outputs: Floats
     winch: Floats
@@ -323,7 +323,7 @@ def blank_paid_run_job() -> PaidRunJob:
     """A job with the types that every one has."""
     z, few, sides, reel = np.zeros, np.zeros(1, np.int64), np.zeros((2, 3, 1), np.int64), blank_reel(1)
     return PaidRunJob(
-        z(CALLS, np.int64), z(AT_SIZE, np.int64), z(b.CLOCK_SIZE), z(b.COUNT_SIZE, np.int64), z(0), z(1), reel, reel,
+        z(CALLS, np.int64), z(AT_SIZE, np.int64), b.Clock(), b.Counts(), z(0), z(1), reel, reel,
         few, few, sides, few, few, sides, few, few, sides, few, sides, z((1, 3), np.int64), z(1),
     )  # fmt: skip
 
@@ -357,7 +357,7 @@ def change(job):
     at, calls, counts, reel = job.at, job.calls, job.counts, reel_of(job)
     k, n = at[ON], at[CELLS]
     m = n + 1 if reel.true[n - reel.layer.shape[0]] > reel.numbers[LONGEST] else n - 1
-    put(job.nodes[2 * k + counts[b.PARITY]], n, m, job.node)
+    put(job.nodes[2 * k + counts.parity], n, m, job.node)
     call(calls[CHANGE], job.node)
     call(calls[CARRY], job.node)
     call(calls[FIT], job.node)
@@ -376,8 +376,8 @@ def change(job):
 @inner
 def due_within(job):
     """How many outputs lie within the last step, before its end, and have not been sampled."""
-    clock, outputs, at, count = job.clock, job.outputs, job.counts[b.OUTPUT], 0
-    last = clock[b.NOW] - SAME_TIME * clock[b.LAST_DT]
+    clock, outputs, at, count = job.clock, job.outputs, job.counts.output, 0
+    last = clock.now - SAME_TIME * clock.last_dt
     while at + count < outputs.shape[0] and outputs[at + count] < last:
         count += 1
     return count
@@ -386,7 +386,7 @@ def due_within(job):
 @inner
 def may_change(job):
     """Whether a node may enter or leave now: no outputs of the line of now are to come or wait, or there is room."""
-    at, some = job.at, due_within(job) + job.counts[b.SAMPLES]
+    at, some = job.at, due_within(job) + job.counts.samples
     if some == 0:
         return True
     size = numbers_of_sample(at[CELLS])
@@ -399,14 +399,14 @@ def may_change(job):
 def set_aside(job):
     """The outputs that have been sampled wait, with what cells of the line lacked."""
     at, row, reel, n = job.at, job.waiting[job.at[WAITING]], reel_of(job), job.at[CELLS]
-    row[OFFSET], row[COUNT], row[OF_CELLS] = at[USED], job.counts[b.SAMPLES], n
+    row[OFFSET], row[COUNT], row[OF_CELLS] = at[USED], job.counts.samples, n
     at[USED] += row[COUNT] * numbers_of_sample(n)
     for c in range(n):
         job.room[at[USED] + c], job.room[at[USED] + n + c] = reel.lack[c], reel.rate[c]
         job.room[at[USED] + 2 * n + c], job.room[at[USED] + 3 * n + c] = reel.since[c], reel.span[c]
     at[USED] += OF_REEL * n
     at[WAITING] += 1
-    job.counts[b.SAMPLES] = 0
+    job.counts.samples = 0
 
 
 @kernel
@@ -427,14 +427,14 @@ def go_on(table):
     job = read(table)
     counts = job.counts
     code = call_count(job.calls[STEPS], job.run)
-    while code == b.STEPPED and counts[b.FLAGS] == 0 and counts[b.ASKS] == 0:
+    while code == b.STEPPED and counts.notices == 0 and counts.asks == 0:
         if reel_of(job).numbers[DUE] == 0.0 or at_its_end(job.winch) or not may_change(job):
             return code
         if due_within(job) > 0:
-            counts[b.INSIDE], counts[b.ASKS] = 1, b.ASK_SAMPLES
+            counts.inside, counts.asks = 1, b.ASK_SAMPLES
             call_count(job.calls[STEPS], job.run)
-            counts[b.INSIDE], counts[b.ASKS] = 0, 0
-        if counts[b.SAMPLES] > 0:
+            counts.inside, counts.asks = 0, 0
+        if counts.samples > 0:
             set_aside(job)
         change(job)
         code = call_count(job.calls[STEPS], job.run)

@@ -15,56 +15,32 @@ from hybrid.kernels.laws.end_motion import ends_at, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.powers import find_powers
 from hybrid.kernels.state.books import (
-    AFTER_START,
     ASK_BEFORE,
     ASK_SAMPLES,
     ASK_STEPS,
     ASK_TRIES,
-    ASKS,
     AT_STOP,
     BEGIN_STEP,
     COLLAPSES,
-    CONTROLLED,
-    CUT_ANGLE,
-    CUT_SHORT,
     END_STEP,
     FAILED,
-    FLAGS,
     HIDES_ITSELF,
     IS_BENT,
-    IS_CUT,
     ITERATIONS_CUT,
     JUDGE,
     MEETS_ITSELF,
-    MOST_ITERATIONS,
-    MUTE_CUTS,
-    MUTE_SLACK,
     NEARS_ITSELF,
-    NEW_STATE,
-    NOW,
-    OUTCOME,
-    PARITY,
     PARTS_ITSELF,
     PAUSED,
-    PHASE,
-    QUOTA,
-    RHO,
-    RHO_BEFORE,
-    ROWS,
     SAMPLE,
     SAMPLED,
-    SLACK_STEP,
     SOLVE,
     START,
-    STEP_BEFORE,
     STEPPED,
     STEPS_CUT,
     STEPS_SLACK,
-    STOP,
-    TAKEN,
     TRIED,
     TRY,
-    TRY_END,
     TRYING,
 )
 from hybrid.kernels.step.accept import accept, collapses, end_step, judge, keep_imposed, note_try, watch, watch_push
@@ -100,40 +76,40 @@ def watch_itself(job, state):
 def conclude(table, job, old, new):
     """After a try: -1, or what to return.  Where the step is accepted its books are kept, and it is looked at."""
     line, sea, ends, books, work = job.line, job.sea, job.ends, job.books, job.work
-    clock, count, asks = books.clock, books.counts, job.books.counts[ASKS] & ASK_STEPS
-    dt = clock[TRY_END] - clock[NOW]
-    gains = job.contact[ADDRESS] != 0 and count[OUTCOME] == OK and job.reel == 0
+    clock, count, asks = books.clock, books.counts, job.books.counts.asks & ASK_STEPS
+    dt = clock.try_end - clock.now
+    gains = job.contact[ADDRESS] != 0 and count.outcome == OK and job.reel == 0
     gains = gains and ask_contact(job.contact, job.contact_table, GAIN) > 0.0
     verdict = judge(clock, count, work.report, dt, gains)
     if verdict < 0:
         return FAILED
     if verdict > 0:
-        accept(line, ends, old, new, books, work, clock[TRY_END], dt)
-        count[FLAGS] = watch(line, ends, old, new, books, work.report, clock[NOW], dt)
-        if count[IS_CUT]:
-            count[CUT_SHORT] += 1
-            if count[CUT_SHORT] == 1:
-                count[FLAGS] |= ITERATIONS_CUT
+        accept(line, ends, old, new, books, work, clock.try_end, dt)
+        count.notices = watch(line, ends, old, new, books, work.report, clock.now, dt)
+        if count.is_cut:
+            count.cut_short += 1
+            if count.cut_short == 1:
+                count.notices |= ITERATIONS_CUT
         if collapses(clock, count, dt):
-            count[FLAGS] |= COLLAPSES
+            count.notices |= COLLAPSES
         if job.was.shape[0] > 0:
-            count[FLAGS] |= watch_push(clock, work.report)
-        if clock[CUT_ANGLE] > 0.0 and clock[MUTE_CUTS] == 0.0:
-            count[FLAGS] |= STEPS_CUT
-        if clock[SLACK_STEP] > 0.0 and clock[MUTE_SLACK] == 0.0:
-            count[FLAGS] |= STEPS_SLACK
+            count.notices |= watch_push(clock, work.report)
+        if clock.cut_angle > 0.0 and clock.mute_cuts == 0.0:
+            count.notices |= STEPS_CUT
+        if clock.slack_step > 0.0 and clock.mute_slack == 0.0:
+            count.notices |= STEPS_SLACK
         if job.follower != 0:
-            count[FLAGS] |= call_follower(job.follower, job.following)
-        count[FLAGS] |= watch_itself(job, new)
+            count.notices |= call_follower(job.follower, job.following)
+        count.notices |= watch_itself(job, new)
         if books.extremes.shape[1] > 0:
-            note_extremes(line, sea, ends, new, books, clock[NOW])
+            note_extremes(line, sea, ends, new, books, clock.now)
         if job.quantities != 0:
             call_quantities(job.quantities, table)
         if job.zones != 0:
             asks |= call_zones(job.zones, job.zone_table)
         if job.reel != 0:
             asks |= call_reel(job.reel, job.reel_table)
-        if count[FLAGS] != 0 or asks:
+        if count.notices != 0 or asks:
             return STEPPED
     return -1
 
@@ -142,37 +118,37 @@ def conclude(table, job, old, new):
 def between_steps(table, job, old, new):
     """The phases before a try; `new` is the state now.  -1 when one is to be made, else what to return."""
     clock, count = job.books.clock, job.books.counts
-    if count[PHASE] == START:
+    if count.phase == START:
         find_powers(job.line, job.ends, job.books.velocity, new, job.books.report[0], job.books.power[0])
         keep_imposed(job.ends, job.books.imposed)
-        if count[NEW_STATE] and job.books.extremes.shape[1] > 0:
+        if count.new_state and job.books.extremes.shape[1] > 0:
             first_strains(job.line, job.ends, new, job.books)
-            note_extremes(job.line, job.sea, job.ends, new, job.books, clock[NOW])
-        if count[NEW_STATE] and job.quantities != 0:
+            note_extremes(job.line, job.sea, job.ends, new, job.books, clock.now)
+        if count.new_state and job.quantities != 0:
             call_quantities(job.quantities, table)
-        count[PHASE] = count[AFTER_START]
-    if count[PHASE] == SAMPLE:
+        count.phase = count.after_start
+    if count.phase == SAMPLE:
         if not sample_step(job.line, job.sea, old, new, job.books):
             return PAUSED
-        count[PHASE] = END_STEP
-        if count[ASKS] & ASK_SAMPLES:
+        count.phase = END_STEP
+        if count.asks & ASK_SAMPLES:
             return SAMPLED
-    if count[PHASE] == END_STEP:
+    if count.phase == END_STEP:
         end_step(job.line, new, clock, count)
-    if count[PHASE] == BEGIN_STEP:
-        if not clock[NOW] < clock[STOP]:
+    if count.phase == BEGIN_STEP:
+        if not clock.now < clock.stop:
             return AT_STOP
-        if count[QUOTA] <= 0 or count[ROWS] == job.books.log.shape[0]:
+        if count.quota <= 0 or count.rows == job.books.log.shape[0]:
             return PAUSED
-        count[QUOTA] -= 1
+        count.quota -= 1
         begin_step(clock, count)
-        count[PHASE] = TRY
-    if count[PHASE] == TRY:
-        if count[ROWS] == job.books.log.shape[0] or count[QUOTA] < 0:  # one step may be cut into many, or cost as many
+        count.phase = TRY
+    if count.phase == TRY:
+        if count.rows == job.books.log.shape[0] or count.quota < 0:  # one step may be cut into many, or cost as many
             return PAUSED
-        clock[TRY_END] = end_of_try(clock, job.moves)
-        count[PHASE] = SOLVE
-        if count[ASKS] & ASK_BEFORE:
+        clock.try_end = end_of_try(clock, job.moves)
+        count.phase = SOLVE
+        if count.asks & ASK_BEFORE:
             return TRYING
     return -1
 
@@ -187,15 +163,15 @@ def solve_job(plane, space, job):
     iterated = 0
     if task.what == RUN:
         iterated = job.iterated
-        if job.books.counts[PARITY]:
+        if job.books.counts.parity:
             old, new, was, now = job.new, job.old, job.now, job.was
-        dt = clock[TRY_END] - clock[NOW]
-        limits, cut = task.limits, job.books.counts[MOST_ITERATIONS] > 0
+        dt = clock.try_end - clock.now
+        limits, cut = task.limits, job.books.counts.most_iterations > 0
         if cut:
-            left = job.books.counts[MOST_ITERATIONS] - job.books.counts[TAKEN]
+            left = job.books.counts.most_iterations - job.books.counts.taken
             limits = Limits(limits.reach, limits.scale, min(left, limits.most))
-        fixed = job.books.counts[CONTROLLED] == 0
-        task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, limits, cut, clock[RHO_BEFORE], fixed)
+        fixed = job.books.counts.controlled == 0
+        task = Task(STEP, dt, clock.step_before, clock.rho, 0.0, 0.0, False, limits, cut, clock.rho_before, fixed)
     states, calls = States(old, new, was, now), Calls(job.contact, job.contact_table, iterated, job.reel_table)
     return solve(plane, space, task, job.line, job.sea, job.ends, states, job.work, job.books.strains, calls)
 
@@ -222,14 +198,14 @@ def run(table):
     clock, count = books.clock, books.counts
     while True:
         old, new = job.old, job.new
-        if count[PARITY]:
+        if count.parity:
             old, new = job.new, job.old
         code = between_steps(table, job, new, old)
         if code >= 0:
             return code
-        if count[PHASE] == SOLVE:
-            ends_at(clock[TRY_END], moves, sea, job.ends, books.velocity)
-            sea_at(clock[TRY_END], sea)
+        if count.phase == SOLVE:
+            ends_at(clock.try_end, moves, sea, job.ends, books.velocity)
+            sea_at(clock.try_end, sea)
             if job.zones != 0:
                 call_zones(job.zones, job.zone_table)
             take_past(clock, count)
@@ -237,12 +213,12 @@ def run(table):
                 call_reel(job.reel, job.reel_table)
             outcome, it, left, where = call_solver(job.solver, table)
             note_try(clock, count, report, outcome, it, left, where)
-            count[PHASE] = JUDGE
+            count.phase = JUDGE
             if job.reel != 0:
                 call_reel(job.reel, job.reel_table)
-            if job.zones != 0 and (count[OUTCOME] != OK or call_zones(job.zones, job.zone_table) != 0):
+            if job.zones != 0 and (count.outcome != OK or call_zones(job.zones, job.zone_table) != 0):
                 return TRIED
-            if count[ASKS] & ASK_TRIES:
+            if count.asks & ASK_TRIES:
                 return TRIED
         code = conclude(table, job, old, new)
         if code >= 0:

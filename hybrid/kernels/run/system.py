@@ -46,7 +46,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller
 from hybrid.kernels.march.configuration import first_bad, measure, update
 from hybrid.kernels.march.powers import book_work, find_powers
-from hybrid.kernels.state.books import FLAGS, NOW, RATES, RHO, RHO_BEFORE, SHORTEST, STEP_BEFORE, STORED, TRY_END
+from hybrid.kernels.state.books import RATES
 from hybrid.kernels.state.forces import FRICTION, TOUCHES
 from hybrid.kernels.state.report import (
     LOCAL_ERROR,
@@ -222,8 +222,8 @@ def prepare_contact(tables, task, t):
         job = read(tables[l])
         if job.contact[ADDRESS] > 0:
             clock = job.books.clock
-            clock[NOW], clock[TRY_END], clock[STEP_BEFORE], clock[RHO] = t - task.dt, t, task.before, task.rho
-            clock[RHO_BEFORE] = task.rho_before
+            clock.now, clock.try_end, clock.step_before, clock.rho = t - task.dt, t, task.before, task.rho
+            clock.rho_before = task.rho_before
             safe = min(safe, ask_contact(job.contact, job.contact_table, PREPARE))
             rho = min(rho, ask_contact(job.contact, job.contact_table, RADIUS))
     common = with_radius(task, rho)
@@ -233,8 +233,8 @@ def prepare_contact(tables, task, t):
             own = ask_contact(job.contact, job.contact_table, RADIUS)
             clock = job.books.clock
             if own > rho:
-                clock[RHO] *= rho / own
-            clock[STEP_BEFORE], clock[RHO_BEFORE] = common.before, common.rho_before
+                clock.rho *= rho / own
+            clock.step_before, clock.rho_before = common.before, common.rho_before
     return safe, rho
 
 
@@ -282,7 +282,7 @@ def end_lines(tables, joints, floors, s, task, good):
             if not turn < most_turn(job.contact):
                 return l, turn, cell
             report = job.work.report
-            if touches and job.reel == 0 and 0.5 * task.dt >= job.books.clock[SHORTEST]:
+            if touches and job.reel == 0 and 0.5 * task.dt >= job.books.clock.shortest:
                 move_joints(job, joints[l, START], joints[l, END])
                 if ask_contact(job.contact, job.contact_table, GAIN) > 0.0:
                     return l, turn, cell  # it creates energy: in halves
@@ -302,7 +302,7 @@ def keep_report(books, report):
 def note_quantities(table, job, t):
     """Ranges of the quantities that are asked of a line, to its state at t (s)."""
     if job.quantities != 0:
-        job.books.clock[NOW] = t
+        job.books.clock.now = t
         call_quantities(job.quantities, table)
 
 
@@ -314,13 +314,13 @@ def begin_books(tables, joints, t):
         line, sea, new, books, report = job.line, job.sea, job.new, job.books, job.work.report
         if line.bits & TOUCHES:
             report[SEABED_ENERGY] = stored_in_contact(line, sea, new.r)
-            books.clock[STORED] = report[SEABED_ENERGY]
+            books.clock.stored = report[SEABED_ENERGY]
             if line.moved.shape[0] > 0:
                 grip_obstacles(line, sea, job.work.u, new, new.grip, new.grip)
             for i in range(new.r.shape[0]):
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
         if job.contact[ADDRESS] > 0:
-            books.clock[NOW] = t
+            books.clock.now = t
             report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, REST)
         move_joints(job, joints[l, START], joints[l, END])
         if job.reel != 0:
@@ -346,7 +346,7 @@ def keep_books(tables, joints, dt, t):
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
         book_work(line, dt, report, books)
         if books.base.shape[0] > 0:
-            books.counts[FLAGS] |= watch(line, job.ends, job.old, new, books, report, t, dt)
+            books.counts.notices |= watch(line, job.ends, job.old, new, books, report, t, dt)
         keep_past(line, job.ends, job.old, books, report)
         if books.extremes.shape[1] > 0:
             note_extremes(line, job.sea, job.ends, new, books, t)

@@ -38,61 +38,28 @@ from hybrid.kernels.run.run import watch_itself
 from hybrid.kernels.run.system import error_ratio
 from hybrid.kernels.run.system_sampling import BODY_SAMPLE, is_due, keep_bodies, sample_now, sample_within
 from hybrid.kernels.state.books import (
-    ALLOWED,
     ASK_BEFORE,
     ASK_STEPS,
     ASK_TRIES,
-    ASKS,
     AT_STOP,
     BEGIN_STEP,
-    CLOCK_SIZE,
     COLLAPSES,
-    CONTROLLED,
-    CORRECTION,
-    COUNT_SIZE,
-    CUT_AT,
-    CUT_BY_ERROR,
-    CUT_BY_NEWTON,
-    CUT_BY_TURN,
-    EARLIER_DT,
     END_STEP,
     FAILED,
-    FLAGS,
-    ITERATIONS,
     JUDGE,
-    LAST_DT,
-    LAST_RHO,
     LINES_NEAR,
     LOG,
     NODES_DUE,
-    NOW,
-    OUTCOME,
-    PARITY,
     PAUSED,
-    PHASE,
-    PREVIOUS,
-    QUOTA,
-    REPEATS,
-    RHO,
-    RHO_BEFORE,
-    ROWS,
     SAMPLE,
-    SHORTEST,
     SOLVE,
-    STEP_BEFORE,
     STEPPED,
-    STEPS,
-    STOP,
     TRIED,
-    TRIED_DT,
-    TRIES,
     TRY,
-    TRY_END,
     TRYING,
-    UNTIL,
-    WASTED,
-    WHERE,
     ZONES_DUE,
+    Clock,
+    Counts,
 )
 from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.state.state import Floats
@@ -119,8 +86,8 @@ class StepsJob(NamedTuple):
     joined: NDArray[np.int64]  # (J,) their numbers
     lone: NDArray[np.int64]  # (L - J, ..) jobs of the others, their task RUN
     lone_lines: NDArray[np.int64]  # (L - J,) and their numbers
-    clock: Floats  # (CLOCK_SIZE,) of kernels.state.books, of all lines
-    counts: NDArray[np.int64]  # (COUNT_SIZE,)
+    clock: Clock  # of all lines
+    counts: Counts
     limits: Floats  # (3,) above
     lines: NDArray[np.int64]  # (2,) above
     seen: NDArray[np.int64]  # (L,) bits of kernels.state.books: how near a line came to itself in the last step
@@ -156,7 +123,7 @@ def no_loads() -> tuple[Floats, Floats]:
 def blank_steps_job() -> StepsJob:
     """A job with the types that every one has."""
     none, log = np.zeros(1, np.int64), np.zeros((1, 1, len(LOG)))
-    clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+    clock, counts = Clock(), Counts()
     lone = np.zeros((1, 1), np.int64)
     return StepsJob(
         none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
@@ -173,8 +140,8 @@ call_sample, call_stir, call_watch = caller(0), caller(0), caller(0)
 @inner
 def end_of_try(clock):
     """Time at which the present try ends."""
-    end = clock[NOW] + clock[TRIED_DT]
-    return clock[UNTIL] if clock[UNTIL] - end <= SAME * clock[TRIED_DT] else end
+    end = clock.now + clock.tried_dt
+    return clock.until if clock.until - end <= SAME * clock.tried_dt else end
 
 
 @inner
@@ -211,8 +178,8 @@ def stir_water(steps, system):
         job, row = read_members(steps.members[m]), system.old[steps.with_members[m]]
         for k in range(STATE):
             job.state[k] = row[k]
-        job.dt[0], job.waves[0] = clock[TRY_END] - clock[NOW], 1.0
-        sea_at(clock[TRY_END], job.sea)
+        job.dt[0], job.waves[0] = clock.try_end - clock.now, 1.0
+        sea_at(clock.try_end, job.sea)
         call_stir(steps.stirrer, steps.members[m])
 
 
@@ -226,8 +193,8 @@ def try_lone(steps, system):
     for j in range(steps.lone.shape[0]):
         job, l = read(steps.lone[j]), steps.lone_lines[j]
         own = job.books.clock
-        own[NOW], own[TRY_END], own[RHO] = clock[NOW], clock[TRY_END], clock[RHO]
-        own[STEP_BEFORE], own[RHO_BEFORE] = clock[LAST_DT], clock[LAST_RHO]
+        own.now, own.try_end, own.rho = clock.now, clock.try_end, clock.rho
+        own.step_before, own.rho_before = clock.last_dt, clock.last_rho
         outcome, it, left, where = call_solver(steps.marcher, steps.lone[j])
         if outcome == OK and not job.work.report[SLACKEST] > system.floors[l]:
             outcome, where = SLACK, int(job.work.report[SLACKEST_CELL])
@@ -241,23 +208,23 @@ def try_lone(steps, system):
 def try_step(steps, system):
     """Solve the step that is tried, and note how that ended."""
     clock, counts, asked, table = steps.clock, steps.counts, system.asked, steps.joined_even
-    if counts[PARITY]:
+    if counts.parity:
         table = steps.joined_odd
-    asked[WHAT], asked[DT], asked[TIME] = STEP, clock[TRY_END] - clock[NOW], clock[TRY_END]
-    asked[BEFORE], asked[RHO_OF_STEP], asked[RHO_OF_LAST] = clock[LAST_DT], clock[RHO], clock[LAST_RHO]
-    asked[CV], asked[CA], asked[SCALE], asked[FIXED] = 0.0, 0.0, 1.0, 1.0 - counts[CONTROLLED]
+    asked[WHAT], asked[DT], asked[TIME] = STEP, clock.try_end - clock.now, clock.try_end
+    asked[BEFORE], asked[RHO_OF_STEP], asked[RHO_OF_LAST] = clock.last_dt, clock.rho, clock.last_rho
+    asked[CV], asked[CA], asked[SCALE], asked[FIXED] = 0.0, 0.0, 1.0, 1.0 - counts.controlled
     asked[REACH], asked[MOST] = steps.limits[OF_REACH], steps.limits[OF_ITERATIONS]
     for l in range(system.tables.shape[0]):
         books = read(system.tables[l]).books
-        books.counts[PARITY], books.clock[SHORTEST] = counts[PARITY], clock[SHORTEST]
-        books.counts[CONTROLLED] = counts[CONTROLLED]
+        books.counts.parity, books.clock.shortest = counts.parity, clock.shortest
+        books.counts.controlled = counts.controlled
     outcome, line, it, left, where = try_lone(steps, system)
     if outcome == OK and (steps.joined.shape[0] > 0 or system.work.shape[0] > 0):
         result, more, worse, row, place = call_step(steps.solver, table)
         outcome, it, left, where = result, max(it, more), max(left, worse), place
         if row >= 0:
             line = steps.joined[row]
-    counts[OUTCOME], counts[TRIES], counts[WHERE], clock[CORRECTION] = outcome, it, where, left
+    counts.outcome, counts.tries, counts.where, clock.correction = outcome, it, where, left
     steps.lines[LINE] = line
 
 
@@ -269,8 +236,8 @@ def follow_lines(steps):
         return 0
     for k in range(steps.followed.shape[0]):
         due |= call_follower(steps.follower, steps.followed[k])
-        allowed = min(allowed, clock[ALLOWED])
-    clock[ALLOWED] = allowed  # which each writes after a step
+        allowed = min(allowed, clock.allowed)
+    clock.allowed = allowed  # which each writes after a step
     return due
 
 
@@ -280,7 +247,7 @@ def pay_lines(steps):
     due = 0
     if steps.payer == 0:
         return 0
-    if steps.counts[PHASE] == SOLVE:
+    if steps.counts.phase == SOLVE:
         take_past(steps.clock, steps.counts)
     for k in range(steps.paid.shape[0]):
         due |= call_follower(steps.payer, steps.paid[k])
@@ -288,30 +255,34 @@ def pay_lines(steps):
 
 
 @inner
-def give_up(steps, cause):
+def give_up(steps):
     """A try is given up, and repeated in another length."""
     counts = steps.counts
-    counts[cause] += 1
-    counts[CUT_AT], steps.lines[CUT_LINE] = counts[WHERE], steps.lines[LINE]
-    counts[WASTED] += counts[TRIES]
-    counts[REPEATS] += 1
-    counts[PHASE] = TRY
+    counts.cut_at, steps.lines[CUT_LINE] = counts.where, steps.lines[LINE]
+    counts.wasted += counts.tries
+    counts.repeats += 1
+    counts.phase = TRY
 
 
 @inner
 def judge(steps, system):
     """Whether the try is the step (1), is to be repeated in another length (0), or has failed for good (-1)."""
     clock, counts = steps.clock, steps.counts
-    dt, outcome = clock[TRY_END] - clock[NOW], counts[OUTCOME]
+    dt, outcome = clock.try_end - clock.now, counts.outcome
     if outcome == OK:
-        if counts[CONTROLLED] and not passes(clock, counts, dt, error_ratio(system.tables, system.allowed)):
-            give_up(steps, CUT_BY_ERROR)
+        if counts.controlled and not passes(clock, counts, dt, error_ratio(system.tables, system.allowed)):
+            counts.cut_by_error += 1
+            give_up(steps)
             return 0
         return 1
-    if 0.5 * clock[TRIED_DT] < clock[SHORTEST]:
+    if 0.5 * clock.tried_dt < clock.shortest:
         return -1
     halve(clock, counts, dt)
-    give_up(steps, CUT_BY_TURN if outcome == TURNED_TOO_FAR else CUT_BY_NEWTON)
+    if outcome == TURNED_TOO_FAR:
+        counts.cut_by_turn += 1
+    else:
+        counts.cut_by_newton += 1
+    give_up(steps)
     return 0
 
 
@@ -335,39 +306,39 @@ def largest_residual(system, arm):
 def accept(steps, system):
     """The step that was tried is taken: clock, log, and what there is to look at."""
     clock, counts = steps.clock, steps.counts
-    dt, residual = clock[TRY_END] - clock[NOW], largest_residual(system, steps.limits[OF_ARM])
-    clock[EARLIER_DT] = clock[LAST_DT] if clock[NOW] > clock[PREVIOUS] else 0.0
-    clock[PREVIOUS], clock[NOW], clock[LAST_DT] = clock[NOW], clock[TRY_END], dt
+    dt, residual = clock.try_end - clock.now, largest_residual(system, steps.limits[OF_ARM])
+    clock.earlier_dt = clock.last_dt if clock.now > clock.previous else 0.0
+    clock.previous, clock.now, clock.last_dt = clock.now, clock.try_end, dt
     keep_bodies(steps.worked, system.work)
-    counts[PARITY] = 1 - counts[PARITY]
-    counts[STEPS] += 1
-    counts[ITERATIONS] = counts[TRIES]
+    counts.parity = 1 - counts.parity
+    counts.steps += 1
+    counts.iterations = counts.tries
     flags = COLLAPSES if collapses(clock, counts, dt) else 0
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
-        report, row = job.work.report, steps.log[counts[ROWS], l]
+        report, row = job.work.report, steps.log[counts.rows, l]
         if l == 0:
-            clock[LAST_RHO] = report[USED_RHO]
-        row[0], row[1], row[2], row[3] = clock[NOW], dt, counts[TRIES] + counts[WASTED], clock[CORRECTION]
-        row[4], row[5], row[6] = residual, counts[REPEATS], report[LOCAL_ERROR]
+            clock.last_rho = report[USED_RHO]
+        row[0], row[1], row[2], row[3] = clock.now, dt, counts.tries + counts.wasted, clock.correction
+        row[4], row[5], row[6] = residual, counts.repeats, report[LOCAL_ERROR]
         row[7], row[8] = pull(report, 0), pull(report, 1)
         steps.seen[l] = watch_itself(job, job.new)
-        flags |= job.books.counts[FLAGS] | steps.seen[l]
+        flags |= job.books.counts.notices | steps.seen[l]
     if steps.watcher != 0:  # the parity is that of the next step
         watched = steps.watched_odd
-        if counts[PARITY]:
+        if counts.parity:
             watched = steps.watched_even
         if call_watch(steps.watcher, watched) > 0:
             flags |= LINES_NEAR
     if steps.tangents != 0:
         call_watch(steps.tangents, steps.beside)
-    counts[ROWS] += 1
-    counts[WASTED], counts[PHASE] = 0, SAMPLE
+    counts.rows += 1
+    counts.wasted, counts.phase = 0, SAMPLE
     if follow_lines(steps) != 0:
         flags |= ZONES_DUE
     if pay_lines(steps) != 0:
         flags |= NODES_DUE
-    counts[FLAGS] = flags
+    counts.notices = flags
 
 
 @inner
@@ -377,32 +348,32 @@ def between_steps(steps, table):
     Outputs within the step are sampled before Python looks at it, those on its end after that, and at a stop by Python.
     """
     clock, counts = steps.clock, steps.counts
-    if counts[PHASE] == SAMPLE:
+    if counts.phase == SAMPLE:
         if is_due(steps, -1) and call_sample(steps.sampler, table) == 0:
             return PAUSED
-        counts[PHASE] = END_STEP
-        if counts[FLAGS] != 0 or counts[ASKS] & ASK_STEPS:
+        counts.phase = END_STEP
+        if counts.notices != 0 or counts.asks & ASK_STEPS:
             return STEPPED
-    if counts[PHASE] == END_STEP:
-        if not clock[NOW] < clock[STOP]:
+    if counts.phase == END_STEP:
+        if not clock.now < clock.stop:
             return AT_STOP
         if is_due(steps, 1) and call_sample(steps.sampler, table) == 0:
             return PAUSED
-        counts[PHASE] = BEGIN_STEP if counts[CONTROLLED] or clock[NOW] >= clock[UNTIL] else TRY
-    if counts[PHASE] == BEGIN_STEP:
-        if not clock[NOW] < clock[STOP]:
+        counts.phase = BEGIN_STEP if counts.controlled or clock.now >= clock.until else TRY
+    if counts.phase == BEGIN_STEP:
+        if not clock.now < clock.stop:
             return AT_STOP
-        if counts[QUOTA] <= 0 or counts[ROWS] == steps.log.shape[0]:
+        if counts.quota <= 0 or counts.rows == steps.log.shape[0]:
             return PAUSED
-        counts[QUOTA] -= 1
+        counts.quota -= 1
         begin_step(clock, counts)
-        counts[PHASE] = TRY
-    if counts[PHASE] == TRY:
-        if counts[ROWS] == steps.log.shape[0]:  # one step may be cut into many
+        counts.phase = TRY
+    if counts.phase == TRY:
+        if counts.rows == steps.log.shape[0]:  # one step may be cut into many
             return PAUSED
-        clock[TRY_END] = end_of_try(clock)
-        counts[PHASE] = SOLVE
-        if counts[ASKS] & ASK_BEFORE:
+        clock.try_end = end_of_try(clock)
+        counts.phase = SOLVE
+        if counts.asks & ASK_BEFORE:
             return TRYING
     return -1
 
@@ -415,9 +386,9 @@ def sample_system(table):
     """
     steps = read_steps(table)
     own = steps.even
-    if steps.counts[PARITY]:
+    if steps.counts.parity:
         own = steps.odd
-    if steps.counts[PHASE] == SAMPLE:
+    if steps.counts.phase == SAMPLE:
         return sample_within(steps, read_system(own))
     return sample_now(steps, read_system(own))
 
@@ -432,22 +403,22 @@ def run_system(table):
         if code >= 0:
             return code
         own = steps.even
-        if counts[PARITY]:
+        if counts.parity:
             own = steps.odd
         system = read_system(own)
-        if counts[PHASE] == SOLVE:
+        if counts.phase == SOLVE:
             follow_lines(steps)
-            if not counts[ASKS] & ASK_BEFORE:
-                move_lines(system, steps.clock[TRY_END])
-                load_bodies(system.bodies, steps.loads, steps.history, steps.clock[TRY_END])
+            if not counts.asks & ASK_BEFORE:
+                move_lines(system, steps.clock.try_end)
+                load_bodies(system.bodies, steps.loads, steps.history, steps.clock.try_end)
                 stir_water(steps, system)
             pay_lines(steps)
             try_step(steps, system)
-            counts[PHASE] = JUDGE
+            counts.phase = JUDGE
             pay_lines(steps)
-            if counts[ASKS] & ASK_TRIES:
+            if counts.asks & ASK_TRIES:
                 return TRIED
-            if steps.follower != 0 and (counts[OUTCOME] != OK or follow_lines(steps) != 0):
+            if steps.follower != 0 and (counts.outcome != OK or follow_lines(steps) != 0):
                 return TRIED
         verdict = judge(steps, system)
         if verdict < 0:

@@ -27,15 +27,8 @@ from hybrid.kernels.laws.obstacle_motion import put_matrix as put_matrix_of
 from hybrid.kernels.laws.obstacle_motion import put_vector
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.state.books import (
-    EARLIER_DT,
     HEAD,
-    LAST_DT,
-    LEG_STEP,
-    NOW,
-    OUTPUT,
-    PREVIOUS,
     SAMPLE_POSITION,
-    SAMPLES,
 )
 from hybrid.kernels.state.obstacle_rows import ENDED, TURNED
 from hybrid.kernels.step.job import read
@@ -96,7 +89,7 @@ def carry_sampled(system, sea, rows):
 def take_sample(steps, system, where):
     """Lines and bodies at a time, as the next rows of the buffers; `system` leads on from the state of now."""
     t, x, dt, k = where
-    count = steps.counts[SAMPLES]
+    count = steps.counts.samples
     for b in range(system.work.shape[0]):
         sample_body(system.new, system.old, steps.worked, b, where, steps.bodies[count, b])
     for l in range(system.tables.shape[0]):
@@ -112,9 +105,9 @@ def take_sample(steps, system, where):
             row[SAMPLE_POSITION + j] = row[HEAD + j]
             row[SAMPLE_POSITION + 3 + j] = row[HEAD + 3 * n + j]
         if x < 1.0:
-            sea_at(steps.clock[NOW], job.sea)
-    steps.counts[SAMPLES] += 1
-    steps.counts[OUTPUT] += 1
+            sea_at(steps.clock.now, job.sea)
+    steps.counts.samples += 1
+    steps.counts.output += 1
 
 
 @inner
@@ -129,8 +122,8 @@ def rows_of_samples(steps, system):
 @inner
 def is_due(steps, sign):
     """Whether an output is due: until the state of now (sign 1), or before it (-1)."""
-    clock, at = steps.clock, steps.counts[OUTPUT]
-    return at < steps.outputs.shape[0] and steps.outputs[at] <= clock[NOW] + sign * SAME_TIME * clock[LEG_STEP]
+    clock, at = steps.clock, steps.counts.output
+    return at < steps.outputs.shape[0] and steps.outputs[at] <= clock.now + sign * SAME_TIME * clock.leg_step
 
 
 @inner
@@ -138,10 +131,10 @@ def sample_within(steps, system):
     """Sample the outputs that fall into the last step, but not on its end; 0: the buffers are full before the last."""
     clock, rows = steps.clock, rows_of_samples(steps, system)
     while is_due(steps, -1):
-        if steps.counts[SAMPLES] == rows:
+        if steps.counts.samples == rows:
             return 0
-        t, dt = steps.outputs[steps.counts[OUTPUT]], clock[LAST_DT]
-        take_sample(steps, system, (t, (t - clock[PREVIOUS]) / dt, dt, clock[EARLIER_DT] / dt))
+        t, dt = steps.outputs[steps.counts.output], clock.last_dt
+        take_sample(steps, system, (t, (t - clock.previous) / dt, dt, clock.earlier_dt / dt))
     return 1
 
 
@@ -150,7 +143,7 @@ def sample_now(steps, system):
     """Sample the outputs that are due at the state of now, as it is; 0: the buffers are full before the last."""
     rows = rows_of_samples(steps, system)
     while is_due(steps, 1):
-        if steps.counts[SAMPLES] == rows:
+        if steps.counts.samples == rows:
             return 0
-        take_sample(steps, system, (steps.outputs[steps.counts[OUTPUT]], 1.0, 0.0, 0.0))
+        take_sample(steps, system, (steps.outputs[steps.counts.output], 1.0, 0.0, 0.0))
     return 1

@@ -62,13 +62,10 @@ from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.left_over import left_over_in_space
 from hybrid.kernels.run.system_run import load_bodies
 from hybrid.kernels.state.books import (
-    CLOCK_SIZE,
-    COUNT_SIZE,
     HEAD,
-    NOW,
-    PARITY,
     SAMPLE_POSITION,
-    SAMPLES,
+    Clock,
+    Counts,
 )
 from hybrid.kernels.state.forces import WAVES
 from hybrid.kernels.state.report import NET_A
@@ -122,8 +119,8 @@ class SystemTangents(NamedTuple):
     lone: NDArray[np.int64]  # and those of the others
     lines: NDArray[np.int64]  # (L, ..) tables of a TangentJob each
     bodies: NDArray[np.int64]  # (P, ..) tables of an OtherBodies each
-    clock: Floats
-    counts: NDArray[np.int64]
+    clock: Clock
+    counts: Counts
     asked: NDArray[np.int64]  # (1,) of `correct_beside`: the number, -1: the lines of the run
     by: Floats  # (2,) cv, ca of `correct_beside`
 
@@ -140,9 +137,7 @@ def blank_bodies() -> OtherBodies:
 def blank_system_tangents() -> SystemTangents:
     """With the types that every one has."""
     one, two = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    return SystemTangents(
-        one, one, one, one, two, two, np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), one, np.zeros(2)
-    )
+    return SystemTangents(one, one, one, one, two, two, Clock(), Counts(), one, np.zeros(2))
 
 
 read_bodies, read_tangents = reader(blank_bodies()), reader(blank_system_tangents())
@@ -370,7 +365,7 @@ def settle(system):
 @inner
 def old_of(job, x):
     """Of the states of a line the one before the last step; x: the line of the run, or another one."""
-    if job.counts[PARITY] == 0:
+    if job.counts.parity == 0:
         return x.odd
     return x.even
 
@@ -378,7 +373,7 @@ def old_of(job, x):
 @inner
 def new_of(job, x):
     """And the one behind it."""
-    if job.counts[PARITY] == 0:
+    if job.counts.parity == 0:
         return x.even
     return x.odd
 
@@ -420,9 +415,9 @@ def end_lines(net, p, s):
         job = read_job(net.lines[l])
         other = read_other(job.tables[p])
         books, n = other.books, other.line.h.shape[0]
-        begin = books.counts[SAMPLES]
+        begin = books.counts.samples
         end_other(None, 1, job, other, s, new_of(job, job), old_of(job, other), new_of(job, other), job.work.report)
-        for i in range(begin, books.counts[SAMPLES]):
+        for i in range(begin, books.counts.samples):
             row = books.samples[i]
             for j in range(3):
                 row[SAMPLE_POSITION + j] = row[HEAD + j]
@@ -433,7 +428,7 @@ def end_lines(net, p, s):
 def advance(system, net, p, s):
     """The other lines and bodies of a number from the beginning of the last step of the run to its end."""
     bodies = read_bodies(net.bodies[p])
-    load_bodies(bodies.numbers, bodies.loads, bodies.history, net.clock[NOW])
+    load_bodies(bodies.numbers, bodies.loads, bodies.history, net.clock.now)
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         other = read_other(job.tables[p])
@@ -463,7 +458,7 @@ def follow_system(table):
     """Tangents of all lines and bodies through the last step of their run; table: of SystemTangents.  Returns 0."""
     net = read_tangents(table)
     own = net.even
-    if net.counts[PARITY] == 0:
+    if net.counts.parity == 0:
         own = net.odd
     system = read_system(own)
     task = task_of(system.asked)

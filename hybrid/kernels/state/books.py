@@ -1,6 +1,6 @@
 """What a run knows beside its state, as arrays that compiled steps read and write: clock, counts, books, samples.
 
-Numbers of `clock` (float64) and `count` (int64) have their names here; `FLAGS` are what Python has to look at.
+`Counts.notices` are what Python has to look at.
 """
 
 from __future__ import annotations
@@ -10,83 +10,105 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.state.obstacle_rows import SEEN
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import Floats
 
-# --- clock: times in s ----------------------------------------------------------------------------
 
-(
-    NOW, PREVIOUS,  # time of the state, and of the one before it
-    LAST_DT,  # length of the step that led there; 0 after a start
-    EARLIER_DT,  # length of the step before the last; 0: it is not known
-    STEP_BEFORE,  # length of the step before that, as the weights of the scheme took it
-    LAST_RHO, RHO_BEFORE,  # spectral radii at infinity of these two steps
-    STOP,  # where steps must end, and the call with them
-    LEG_BEGIN, LEG_STEP,  # where equal steps to `STOP` began, and their length
-    BEGIN, UNTIL,  # where the present step was begun, and where it should end
-    TRIED_DT,  # longest length of the present tries
-    TRY_END,  # where the present one ends
-    SHORTEST,  # below which a step is not tried
-    LARGEST,  # longest step that the controller may choose
-    ALLOWED,  # the same for the time being
-    TOLERANCE,  # m, error of position that a step may make
-    NEXT_DT,  # chosen by the controller
-    ERROR_RATIO,  # error over tolerance of the last accepted step
-    RHO,  # spectral radius at infinity of equal steps
-    FLOOR,  # N, a catenary cell not above it refuses the step
-    STORED,  # J, in the seabed
-    SCALED_JUMP,  # N, jump of tension in a step that is worth a look
-    MOVED,  # m, largest displacement of a base node since the start
-    LEAST_PEAK, LARGEST_PEAK,  # N, lowest and highest of the largest tensions
-    BEND_LIMIT, TWIST_LIMIT,  # rad, of an element, from which on they are worth a look
-    SLACK_LIMIT,  # N, tension of a catenary cell, likewise
-    PUSH_START,  # J, kinetic energy of the push out of the plane when it was given; 0: unknown
-    PUSH_GROWN,  # by how much its speed has grown since
-    MOST_TURN,  # rad, through which an end may turn in a step
-    CUT_ANGLE, CUT_STEP,  # rad, s: of the last step that was cut because an end turned further; 0: none was
-    MUTE_CUTS,  # 1 when an event has told of that
-    WAVE_STEP,  # in which tension waves pass a cell: a longer step that leaves a catenary slack is repeated shorter
-    SLACK_STEP,  # of the last step that was; 0: none was
-    MUTE_SLACK,  # 1 when an event has told of that
-    CORRECTION,  # of the last try: next correction of Newton's method, as predicted
-    RELEASE_START, RELEASE_END,  # N, force at which an end is let go; infinity: never
-    NEAR_PLANE,  # m, distance from its plane below which a line in space has come back to it; 0: it never does
-    LONGEST,  # of the accepted steps so far
-) = range(44)  # fmt: skip
-CLOCK_SIZE = 44
+class Clock(NamedNumbers):
+    """Times of a run, in s where nothing else is said, and what else a step compares."""
 
-# --- count -----------------------------------------------------------------------------------------
+    now: float  # time of the state, and of the one before it
+    previous: float
+    last_dt: float  # length of the step that led there; 0 after a start
+    earlier_dt: float  # length of the step before the last; 0: it is not known
+    step_before: float  # length of the step before that, as the weights of the scheme took it
+    last_rho: float  # spectral radii at infinity of these two steps
+    rho_before: float
+    stop: float  # where steps must end, and the call with them
+    leg_begin: float  # where equal steps to `stop` began, and their length
+    leg_step: float
+    begin: float  # where the present step was begun, and where it should end
+    until: float
+    tried_dt: float  # longest length of the present tries
+    try_end: float  # where the present one ends
+    shortest: float  # below which a step is not tried
+    largest: float  # longest step that the controller may choose
+    allowed: float  # the same for the time being
+    tolerance: float  # m, error of position that a step may make
+    next_dt: float  # chosen by the controller
+    error_ratio: float  # error over tolerance of the last accepted step
+    rho: float  # spectral radius at infinity of equal steps
+    floor: float  # N, a catenary cell not above it refuses the step
+    stored: float  # J, in the seabed
+    scaled_jump: float  # N, jump of tension in a step that is worth a look
+    moved: float  # m, largest displacement of a base node since the start
+    least_peak: float  # N, lowest and highest of the largest tensions
+    largest_peak: float
+    bend_limit: float  # rad, of an element, from which on they are worth a look
+    twist_limit: float
+    slack_limit: float  # N, tension of a catenary cell, likewise
+    push_start: float  # J, kinetic energy of the push out of the plane when it was given; 0: unknown
+    push_grown: float  # by how much its speed has grown since
+    most_turn: float  # rad, through which an end may turn in a step
+    cut_angle: float  # rad, s: of the last step that was cut because an end turned further; 0: none was
+    cut_step: float
+    mute_cuts: float  # 1 when an event has told of that
+    wave_step: (
+        float  # in which tension waves pass a cell: a longer step that leaves a catenary slack is repeated shorter
+    )
+    slack_step: float  # of the last step that was; 0: none was
+    mute_slack: float  # 1 when an event has told of that
+    correction: float  # of the last try: next correction of Newton's method, as predicted
+    release_start: float  # N, force at which an end is let go; infinity: never
+    release_end: float
+    near_plane: float  # m, distance from its plane below which a line in space has come back to it; 0: it never does
+    longest: float  # of the accepted steps so far
 
-(
-    CONTROLLED,  # 1 where the length of steps is controlled by their error
-    PARITY,  # which of the two states is now
-    PHASE, AFTER_START,  # what comes next (below), and what after START
-    STEPS, ITERATIONS,  # accepted steps; iterations of the last
-    OUTCOME, TRIES, WHERE,  # of the last try: its outcome, iterations, and the cell or node where it was worst
-    WASTED, REPEATS,  # iterations of tries given up since the last step, and tries repeated since `BEGIN`
-    LEG_PART, LEG_PARTS,  # equal steps taken, and all of them, from LEG_BEGIN to STOP
-    WARY,  # steps for which the length may not grow
-    ROWS,  # in the log
-    OUTPUT,  # next output that is due
-    SAMPLES,  # in the buffer
-    INSIDE,  # 1: outputs at the end of the step wait, because the line is about to change
-    ASKS,  # bits: Python is asked before every try, after it, after every step, after its outputs
-    FLAGS,  # what there is to look at after the last step
-    STIFF,  # 1 where no cell stretches
-    QUOTA,  # steps until the call returns
-    MEASURED,  # steps of which `worst` knows
-    NEW_STATE,  # 1 where the state of a START counts among the extremes
-    SLACK_CELL,  # of the step of SLACK_STEP
-    VARIES,  # 1 where samples have the lengths of cells and the stiffness of elements, which change in a run
-    MOST_ITERATIONS,  # Newton iterations that a step may take in all its tries; 0: as many as converge
-    TAKEN,  # iterations of all tries since `BEGIN`
-    IS_CUT, CUT_SHORT,  # whether the last try was taken though it had not converged, and steps so far that were
+
+class Counts(NamedNumbers, number=np.int64):
+    """What a run counts, and what comes next in it."""
+
+    controlled: int  # 1 where the length of steps is controlled by their error
+    parity: int  # which of the two states is now
+    phase: int  # what comes next (below), and what after START
+    after_start: int
+    steps: int  # accepted steps; iterations of the last
+    iterations: int
+    outcome: int  # of the last try: its outcome, iterations, and the cell or node where it was worst
+    tries: int
+    where: int
+    wasted: int  # iterations of tries given up since the last step, and tries repeated since the step was begun
+    repeats: int
+    leg_part: int  # equal steps taken, and all of them, from leg_begin to stop
+    leg_parts: int
+    wary: int  # steps for which the length may not grow
+    rows: int  # in the log
+    output: int  # next output that is due
+    samples: int  # in the buffer
+    inside: int  # 1: outputs at the end of the step wait, because the line is about to change
+    asks: int  # bits: Python is asked before every try, after it, after every step, after its outputs
+    notices: int  # what there is to look at after the last step
+    stiff: int  # 1 where no cell stretches
+    quota: int  # steps until the call returns
+    measured: int  # steps of which `worst` knows
+    new_state: int  # 1 where the state of a START counts among the extremes
+    slack_cell: int  # of the step of Clock.slack_step
+    varies: int  # 1 where samples have the lengths of cells and the stiffness of elements, which change in a run
+    most_iterations: int  # Newton iterations that a step may take in all its tries; 0: as many as converge
+    taken: int  # iterations of all tries since the step was begun
+    is_cut: int  # whether the last try was taken though it had not converged, and steps so far that were
+    cut_short: int
     # Since the last step that was no small part of the longest: steps; tries cut by energy that contact puts in, by what
     # turns too far, by Newton's method, by their error; the node where the last was.
-    TINY_STEPS, CUT_BY_GAIN, CUT_BY_TURN, CUT_BY_NEWTON, CUT_BY_ERROR, CUT_AT,
-) = range(36)  # fmt: skip
-COUNT_SIZE = 36
+    tiny_steps: int
+    cut_by_gain: int
+    cut_by_turn: int
+    cut_by_newton: int
+    cut_by_error: int
+    cut_at: int
+
 
 # Phases.
 START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
@@ -94,7 +116,7 @@ ASK_BEFORE, ASK_TRIES, ASK_STEPS, ASK_SAMPLES = 1, 2, 4, 8
 # What a call returns: at STOP; a buffer is full or the quota is used up; a try to come; one to be judged; a step to be
 # looked at; its outputs to be looked at; a step that fails however small.
 AT_STOP, PAUSED, TRYING, TRIED, STEPPED, SAMPLED, FAILED = range(7)
-# Bits of FLAGS.
+# Bits of Counts.notices.
 STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SLACK = 1, 2, 4, 8, 16, 32, 64, 128
 UNKNOWN_ERROR = 256
 IS_BENT, MEETS_ITSELF = 512, 1024
@@ -133,8 +155,8 @@ STRAINS = 8  # columns of `strains`
 class Books(NamedTuple):
     """What a run knows beside its state."""
 
-    clock: Floats  # (CLOCK_SIZE,)
-    counts: NDArray[np.int64]  # (COUNT_SIZE,)
+    clock: Clock
+    counts: Counts
     outputs: Floats  # s, times of all outputs
     power: Floats  # (2, RATES) W, now and before the last step
     work: Floats  # (2, WORKS) J, since the start of the run, likewise
@@ -214,7 +236,7 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
     """Books of a line of so many cells, with room for so many rows of log and samples, extremes unwanted."""
     z, nodes = np.zeros, cells + 1
     return Books(
-        clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
+        clock=Clock(), counts=Counts(), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
         report=z((3, REPORT_SIZE)), tension=z((2, cells)), twist=z((2, 2)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), hinges=z((3, 3)), base=z(0, np.int64), placed=z((0, 3)),
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
         samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, STRAINS)), start=z((nodes, 3)), marks=z(nodes, np.int8),

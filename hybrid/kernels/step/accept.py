@@ -9,65 +9,17 @@ from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.powers import book_work, find_powers, pull
 from hybrid.kernels.march.zone_torque import POWER
 from hybrid.kernels.state.books import (
-    BEGIN,
     BEGIN_STEP,
-    BEND_LIMIT,
     BENT,
-    CONTROLLED,
-    CORRECTION,
-    CUT_AT,
-    CUT_BY_ERROR,
-    CUT_BY_GAIN,
-    CUT_BY_NEWTON,
-    CUT_BY_TURN,
-    EARLIER_DT,
-    FLOOR,
-    IS_CUT,
-    ITERATIONS,
     JUMPED,
-    LARGEST_PEAK,
-    LAST_DT,
-    LAST_RHO,
-    LEAST_PEAK,
     LEAVES_PLANE,
     LETS_GO,
-    LONGEST,
-    MEASURED,
-    MOVED,
-    NEAR_PLANE,
     NEARS_PLANE,
-    NOW,
-    OUTCOME,
-    PARITY,
-    PHASE,
-    PREVIOUS,
     PUSH_DIED,
-    PUSH_GROWN,
-    PUSH_START,
-    RELEASE_END,
-    RELEASE_START,
-    REPEATS,
-    ROWS,
     SAMPLE,
-    SCALED_JUMP,
-    SHORTEST,
-    SLACK_CELL,
-    SLACK_LIMIT,
-    SLACK_STEP,
     SLACKENED,
-    STEPS,
-    STIFF,
     STRETCHED,
-    TAKEN,
-    TINY_STEPS,
-    TRIED_DT,
-    TRIES,
     TRY,
-    TWIST_LIMIT,
-    UNTIL,
-    WASTED,
-    WAVE_STEP,
-    WHERE,
     ZONES,
 )
 from hybrid.kernels.state.forces import PLANAR, SELF_FRICTION, TOUCHES
@@ -102,14 +54,14 @@ TINY, MANY = 1e-3, 200
 @inner
 def note_try(clock, count, report, outcome, iterations, left, where):
     """Keep how a try ended; one that leaves a catenary cell at the floor of tension or below has failed."""
-    count[TAKEN] += iterations
-    count[IS_CUT] = 0
+    count.taken += iterations
+    count.is_cut = 0
     if outcome == CUT_SHORT:
-        outcome, count[IS_CUT] = OK, 1
-    if outcome == OK and not report[SLACKEST] > clock[FLOOR]:
+        outcome, count.is_cut = OK, 1
+    if outcome == OK and not report[SLACKEST] > clock.floor:
         outcome, where = SLACK, int(report[SLACKEST_CELL])
-    count[OUTCOME], count[TRIES], count[WHERE] = outcome, iterations, where
-    clock[CORRECTION] = left
+    count.outcome, count.tries, count.where = outcome, iterations, where
+    clock.correction = left
 
 
 @inner
@@ -118,38 +70,41 @@ def judge(clock, count, report, dt, gains):
 
     gains: whether it is to be repeated in halves because contact has put energy in, as long as it may be halved.
     """
-    count[CUT_AT] = count[WHERE]
-    if gains and 0.5 * clock[TRIED_DT] >= clock[SHORTEST]:
+    count.cut_at = count.where
+    if gains and 0.5 * clock.tried_dt >= clock.shortest:
         halve(clock, count, dt)
-        count[CUT_BY_GAIN] += 1
-    elif count[OUTCOME] == OK:
-        if not count[CONTROLLED] or passes(clock, count, dt, report[LOCAL_ERROR]):
+        count.cut_by_gain += 1
+    elif count.outcome == OK:
+        if not count.controlled or passes(clock, count, dt, report[LOCAL_ERROR]):
             return 1
-        count[CUT_BY_ERROR] += 1
-        count[CUT_AT] = int(report[LOCAL_ERROR_NODE])
-    elif 0.5 * clock[TRIED_DT] < clock[SHORTEST] or (count[OUTCOME] == SLACK and dt <= clock[WAVE_STEP]):
+        count.cut_by_error += 1
+        count.cut_at = int(report[LOCAL_ERROR_NODE])
+    elif 0.5 * clock.tried_dt < clock.shortest or (count.outcome == SLACK and dt <= clock.wave_step):
         # A catenary that is slack in a step that follows its waves is no matter of the step.
         return -1
     else:
-        if count[OUTCOME] == SLACK:
-            clock[SLACK_STEP], count[SLACK_CELL] = dt, count[WHERE]
+        if count.outcome == SLACK:
+            clock.slack_step, count.slack_cell = dt, count.where
         halve(clock, count, dt)
-        count[CUT_BY_TURN if count[OUTCOME] == TURNED_TOO_FAR else CUT_BY_NEWTON] += 1
-    count[WASTED] += count[TRIES]
-    count[REPEATS] += 1
-    count[PHASE] = TRY
+        if count.outcome == TURNED_TOO_FAR:
+            count.cut_by_turn += 1
+        else:
+            count.cut_by_newton += 1
+    count.wasted += count.tries
+    count.repeats += 1
+    count.phase = TRY
     return 0
 
 
 @inner
 def collapses(clock, count, dt):
     """Whether steps have become so short, for so long, after a step of dt that is taken, that somebody has to know."""
-    clock[LONGEST] = max(clock[LONGEST], dt)
-    if not dt < TINY * clock[LONGEST]:
-        count[TINY_STEPS] = count[CUT_BY_GAIN] = count[CUT_BY_TURN] = count[CUT_BY_NEWTON] = count[CUT_BY_ERROR] = 0
+    clock.longest = max(clock.longest, dt)
+    if not dt < TINY * clock.longest:
+        count.tiny_steps = count.cut_by_gain = count.cut_by_turn = count.cut_by_newton = count.cut_by_error = 0
         return False
-    count[TINY_STEPS] += 1
-    return count[TINY_STEPS] % MANY == 0
+    count.tiny_steps += 1
+    return count.tiny_steps % MANY == 0
 
 
 @inner
@@ -201,11 +156,11 @@ def keep_past(line, ends, old, books, report):
 def accept(line, ends, old, new, books, work, end, dt):
     """The step that was tried is taken: clock, books and log."""
     clock, count, report = books.clock, books.counts, work.report
-    clock[EARLIER_DT] = clock[LAST_DT] if clock[NOW] > clock[PREVIOUS] else 0.0
-    count[PARITY] = 1 - count[PARITY]
-    clock[PREVIOUS], clock[NOW], clock[LAST_DT], clock[LAST_RHO] = clock[NOW], end, dt, report[USED_RHO]
-    count[STEPS] += 1
-    count[ITERATIONS] = count[TRIES]
+    clock.earlier_dt = clock.last_dt if clock.now > clock.previous else 0.0
+    count.parity = 1 - count.parity
+    clock.previous, clock.now, clock.last_dt, clock.last_rho = clock.now, end, dt, report[USED_RHO]
+    count.steps += 1
+    count.iterations = count.tries
     keep_past(line, ends, old, books, report)
     for j in range(books.power.shape[1]):
         books.power[1, j] = books.power[0, j]
@@ -213,12 +168,12 @@ def accept(line, ends, old, new, books, work, end, dt):
     book_work(line, dt, report, books)
     for z in range(new.turn.shape[0]):
         books.work[0, ZONES] += 0.5 * dt * (old.turn[z, POWER] + new.turn[z, POWER])
-    row = books.log[count[ROWS]]
-    row[0], row[1], row[2], row[3] = end, dt, count[TRIES] + count[WASTED], clock[CORRECTION]
-    row[4], row[5], row[6] = report[RESIDUAL], count[REPEATS], report[LOCAL_ERROR]
+    row = books.log[count.rows]
+    row[0], row[1], row[2], row[3] = end, dt, count.tries + count.wasted, clock.correction
+    row[4], row[5], row[6] = report[RESIDUAL], count.repeats, report[LOCAL_ERROR]
     row[7], row[8] = pull(report, 0), pull(report, 1)
-    count[ROWS] += 1
-    count[WASTED], count[PHASE] = 0, SAMPLE
+    count.rows += 1
+    count.wasted, count.phase = 0, SAMPLE
 
 
 @inner
@@ -231,8 +186,8 @@ def remember_worst(line, old, new, books, t, dt):
             if x > most:
                 most, node = x, i
     left = dt * dt * most
-    known = min(books.counts[MEASURED], worst.shape[0])
-    books.counts[MEASURED] += 1
+    known = min(books.counts.measured, worst.shape[0])
+    books.counts.measured += 1
     at = known
     while at > 0 and left > worst[at - 1, 0]:
         at -= 1
@@ -261,28 +216,28 @@ def watch(line, ends, old, new, books, report, t, dt):
     peak, before, stretched, slack = new.T[0], old.T[0], False, False
     for c in range(new.T.shape[0]):
         peak, before = max(peak, new.T[c]), max(before, old.T[c])
-        slack |= not (line.spin[c] or new.T[c] > clock[SLACK_LIMIT])
+        slack |= not (line.spin[c] or new.T[c] > clock.slack_limit)
         e, longest = new.e[c], books.borne[c] * line.h[c]
         e2, shortest = e[0] * e[0] + e[1] * e[1] + e[2] * e[2], max(2.0 * line.h[c] - longest, 0.0)
         stretched |= e2 > longest * longest or e2 < shortest * shortest
-    clock[LEAST_PEAK], clock[LARGEST_PEAK] = min(clock[LEAST_PEAK], peak), max(clock[LARGEST_PEAK], peak)
+    clock.least_peak, clock.largest_peak = min(clock.least_peak, peak), max(clock.largest_peak, peak)
     for j in range(books.base.shape[0]):
         for k in range(3):
-            clock[MOVED] = max(clock[MOVED], abs(new.r[books.base[j], k] - books.placed[j, k]))
+            clock.moved = max(clock.moved, abs(new.r[books.base[j], k] - books.placed[j, k]))
     remember_worst(line, old, new, books, t, dt)
-    if stretched and not books.counts[STIFF]:
+    if stretched and not books.counts.stiff:
         flags |= STRETCHED
-    if books.counts[STIFF] and peak - before > clock[SCALED_JUMP]:
+    if books.counts.stiff and peak - before > clock.scaled_jump:
         flags |= JUMPED
-    if report[BEND] > clock[BEND_LIMIT] or report[TWIST] > min(clock[TWIST_LIMIT], LARGEST_TWIST):
+    if report[BEND] > clock.bend_limit or report[TWIST] > min(clock.twist_limit, LARGEST_TWIST):
         flags |= BENT
     if slack:
         flags |= SLACKENED
-    if clock[NEAR_PLANE] > 0.0 and is_near_plane(line, new, clock[NEAR_PLANE]):
+    if clock.near_plane > 0.0 and is_near_plane(line, new, clock.near_plane):
         flags |= NEARS_PLANE
-    if pull(report, 0) > clock[RELEASE_START]:
+    if pull(report, 0) > clock.release_start:
         flags |= LETS_GO
-    if pull(report, 1) > clock[RELEASE_END]:
+    if pull(report, 1) > clock.release_end:
         flags |= LETS_GO
     return flags
 
@@ -292,27 +247,27 @@ def watch_push(clock, report):
     """By how much a push out of the plane has grown, as bits."""
     energy = report[PUSH_ENERGY]
     if report[WRONG_PIVOTS] > 0.0 or not energy < math.inf:
-        clock[PUSH_GROWN] = math.inf
+        clock.push_grown = math.inf
         return LEAVES_PLANE
-    if not clock[PUSH_START] > 0.0:
-        clock[PUSH_START] = energy
-    clock[PUSH_GROWN] = math.sqrt(energy / clock[PUSH_START]) if clock[PUSH_START] > 0.0 else 0.0
-    if clock[PUSH_GROWN] < DIED:
+    if not clock.push_start > 0.0:
+        clock.push_start = energy
+    clock.push_grown = math.sqrt(energy / clock.push_start) if clock.push_start > 0.0 else 0.0
+    if clock.push_grown < DIED:
         return PUSH_DIED
-    return LEAVES_PLANE if clock[PUSH_GROWN] >= GROWN else 0
+    return LEAVES_PLANE if clock.push_grown >= GROWN else 0
 
 
 @inner
 def end_step(line, state, clock, count):
     """Go on with the next part of the step, or with the next step."""
-    if not (count[CONTROLLED] or clock[NOW] >= clock[UNTIL]):
-        count[PHASE] = TRY
+    if not (count.controlled or clock.now >= clock.until):
+        count.phase = TRY
         return
-    if count[REPEATS] > 0 and line.bits & TOUCHES:
-        settle_impact(state, clock[UNTIL] - clock[BEGIN])
-    if count[REPEATS] > 0 and line.bits & SELF_FRICTION:
-        settle_spins(state, clock[UNTIL] - clock[BEGIN])
-    count[PHASE] = BEGIN_STEP
+    if count.repeats > 0 and line.bits & TOUCHES:
+        settle_impact(state, clock.until - clock.begin)
+    if count.repeats > 0 and line.bits & SELF_FRICTION:
+        settle_spins(state, clock.until - clock.begin)
+    count.phase = BEGIN_STEP
 
 
 @inner

@@ -32,13 +32,7 @@ from hybrid.kernels.laws.obstacle_grip import sample_obstacles
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.state.books import (
-    EARLIER_DT,
     HEAD,
-    INSIDE,
-    LAST_DT,
-    NOW,
-    OUTPUT,
-    PREVIOUS,
     RATES,
     SAMPLE_FORCE,
     SAMPLE_FRAME,
@@ -48,8 +42,6 @@ from hybrid.kernels.state.books import (
     SAMPLE_SEA,
     SAMPLE_SPIN,
     SAMPLE_WORK,
-    SAMPLES,
-    VARIES,
     WORKS,
 )
 from hybrid.kernels.state.forces import PLANAR
@@ -306,7 +298,7 @@ def sample_state(line, sea, old, new, books, where, row):
     if x < 1.0 and not line.bits & PLANAR:
         sample_end_twist(line, old, new, books.imposed, x, k, books.twist, row)
     at = HEAD + 9 * new.r.shape[0] + 8 * new.T.shape[0]
-    if books.counts[VARIES]:
+    if books.counts.varies:
         sample_line(line, row)
         at += line.h.shape[0] + line.kb.size
     for z in range(new.turn.shape[0]):
@@ -334,19 +326,19 @@ def sample_state(line, sea, old, new, books, where, row):
 def sample_step(line, sea, old, new, books):
     """Sample the outputs that fall into the last step; False: the buffer is full before the last of them."""
     clock, count, outputs = books.clock, books.counts, books.outputs
-    dt = clock[LAST_DT]
+    dt = clock.last_dt
     near = SAME_TIME * dt
-    last = clock[NOW] - near if count[INSIDE] else clock[NOW] + near
-    while count[OUTPUT] < outputs.shape[0] and outputs[count[OUTPUT]] <= last:
-        if count[SAMPLES] == books.samples.shape[0]:
+    last = clock.now - near if count.inside else clock.now + near
+    while count.output < outputs.shape[0] and outputs[count.output] <= last:
+        if count.samples == books.samples.shape[0]:
             return False
-        t, x = outputs[count[OUTPUT]], 1.0
-        if t < clock[NOW] - near:
-            x = (t - clock[PREVIOUS]) / dt
+        t, x = outputs[count.output], 1.0
+        if t < clock.now - near:
+            x = (t - clock.previous) / dt
         sea_at(t, sea)
-        row, k = books.samples[count[SAMPLES]], clock[EARLIER_DT] / dt if x < 1.0 else 0.0
+        row, k = books.samples[count.samples], clock.earlier_dt / dt if x < 1.0 else 0.0
         sample_head(sea, books, x, dt, k, t, row)
         sample_state(line, sea, old, new, books, (t, x, dt, k), row)
-        count[SAMPLES] += 1
-        count[OUTPUT] += 1
+        count.samples += 1
+        count.output += 1
     return True

@@ -33,14 +33,9 @@ from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.books import (
-    CLOCK_SIZE,
-    COUNT_SIZE,
-    LAST_DT,
-    LAST_RHO,
-    PARITY,
-    RHO_BEFORE,
-    STEP_BEFORE,
     UNKNOWN_ERROR,
+    Clock,
+    Counts,
 )
 from hybrid.kernels.state.forces import FRICTION, PLANAR, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import REPORT_SIZE
@@ -280,8 +275,8 @@ class ErrorJob(NamedTuple):
     even: State  # two states that take turns: the one after the step if counts[PARITY] is even
     odd: State  # else
     u: Floats  # (N+1, 3) m, displacement of the nodes in the step
-    clock: Floats  # of the run (kernels.state.books); the last step is 0 s long for an equilibrium
-    counts: NDArray[np.int64]
+    clock: Clock  # of the run (kernels.state.books); the last step is 0 s long for an equilibrium
+    counts: Counts
     X: Floats  # of the march whose matrix was factored last
     W: Floats
     errors: Floats  # (2, 4, N+1, 4) error of r, v, a, vd, which take turns
@@ -292,7 +287,7 @@ class ErrorJob(NamedTuple):
 def blank_error_job() -> ErrorJob:
     """A job with the types that every one has."""
     state, bending = blank_state(1), Bending(np.zeros(2), np.zeros(2, np.int8), np.zeros(2, np.int8), np.zeros(1))
-    clock, counts, none = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), np.zeros(1)
+    clock, counts, none = Clock(), Counts(), np.zeros(1)
     return ErrorJob(
         blank_line(1), no_sea(1), no_ends(), bending, state, state, np.zeros((2, 3)), clock, counts, none, none,
         np.zeros((2, 4, 2, 4)), 1.0, error_arrays(1),
@@ -399,14 +394,14 @@ def advance_error(table):
     job = read(table)
     arrays, found, counts, clock = job.arrays, job.arrays.found, job.counts, job.clock
     state = job.even
-    if counts[PARITY]:
+    if counts.parity:
         state = job.odd
     old, new = job.errors[found[CURRENT]], job.errors[1 - found[CURRENT]]
-    dt = clock[LAST_DT]
+    dt = clock.last_dt
     moving = dt > 0.0
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if moving:
-        s = scheme(clock[LAST_RHO], clock[STEP_BEFORE], clock[RHO_BEFORE], dt)
+        s = scheme(clock.last_rho, clock.step_before, clock.rho_before, dt)
     work = arrays.work
     history = History(work[0], work[1], work[2], old[0], arrays.slid, work[3], arrays.powers)
     found[FINITE], found[CLIPPED] = 1, 0

@@ -17,7 +17,6 @@ import math
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.books import NOW, PARITY, STEPS
 from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.step.job import read
 from hybrid.kernels.step.newton import RUN
@@ -249,9 +248,9 @@ def note_quantities(table):
     """
     job = read(table)
     books, state = job.books, job.new
-    if job.task.what == RUN and books.counts[PARITY] == 0:
+    if job.task.what == RUN and books.counts.parity == 0:
         state = job.old
-    t, begins = books.clock[NOW], books.counts[STEPS] == 0
+    t, begins = books.clock.now, books.counts.steps == 0
     if books.walls.shape[0] > 0:
         note_pipes(job.line, job.ends, state, books, t)
     for q in range(books.asked.shape[0]):

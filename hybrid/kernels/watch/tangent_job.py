@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE, Books, blank_books
+from hybrid.kernels.state.books import Books, Clock, Counts, blank_books
 from hybrid.kernels.state.state import (
     LANES,
     Ends,
@@ -66,8 +66,8 @@ class TangentJob(NamedTuple):
     odd: State
     work: Work  # of the run, whose last matrix is kept in X
     own: Work  # the same with a report of what the equations of the line leave over
-    clock: Floats
-    counts: NDArray[np.int64]
+    clock: Clock
+    counts: Counts
     left: Floats  # (N+1, 5) what the equations of the line leave over
     last: Floats  # (N+1, 3) m/s2, a of the state that the last step led to
     ahead: Floats  # (N+1, 3) m, where the prediction of a step leads nodes
@@ -90,7 +90,7 @@ def blank_tangent_job() -> TangentJob:
     """With the types that every one has."""
     state, z = blank_state(1), np.zeros
     return TangentJob(
-        blank_line(1), no_sea(1), no_ends(), state, state, no_work(), no_work(), z(CLOCK_SIZE), z(COUNT_SIZE, np.int64), z((2, 5)),
+        blank_line(1), no_sea(1), no_ends(), state, state, no_work(), no_work(), Clock(), Counts(), z((2, 5)),
         z((2, 3)), z((2, 3)), z((0, SLOPES)), z((PHASES, LANES)), z(2, np.int64), z((1, 1), np.int64),
     )  # fmt: skip
 

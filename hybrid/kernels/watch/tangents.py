@@ -24,7 +24,6 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.march.left_over import left_over_in_space
 from hybrid.kernels.march.left_over_plane import left_over_in_plane
-from hybrid.kernels.state.books import LAST_DT, LAST_RHO, NOW, OUTPUT, PARITY, RHO_BEFORE, STEP_BEFORE
 from hybrid.kernels.state.forces import ROTARY, STIFFNESS_DAMPING, WAVES
 from hybrid.kernels.state.report import ASSEMBLED
 from hybrid.kernels.step.accept import keep_past
@@ -250,10 +249,10 @@ def note_left(r, T, before_r, before_T, wanted, now, sizes):
 @inner
 def is_wanted(books):
     """Whether forces are wanted of the end of the last step."""
-    clock, outputs, k = books.clock, books.outputs, books.counts[OUTPUT]
+    clock, outputs, k = books.clock, books.outputs, books.counts.output
     if k >= outputs.shape[0]:
         return False
-    ahead = (outputs[k] - clock[NOW]) / clock[LAST_DT]  # in steps; within one, those before it count as well
+    ahead = (outputs[k] - clock.now) / clock.last_dt  # in steps; within one, those before it count as well
     return ahead < (2.0 if abs(ahead - round(ahead)) > ON_STEP else 0.5)
 
 
@@ -345,8 +344,8 @@ def turn_over(was, now, spin_was, spin_now):
 def begin_other(space, job, other, s, there_old):
     """Ends and sea of the other line at the end of a step, and its tangents there as they are predicted."""
     sea, now = other.sea, other.rates
-    ends_at(job.clock[NOW], other.moves, sea, other.ends, other.books.velocity)
-    sea_at(job.clock[NOW], sea)
+    ends_at(job.clock.now, other.moves, sea, other.ends, other.books.velocity)
+    sea_at(job.clock.now, sea)
     turn_over(other.before, now, other.spin_before, other.spin)
     predict_rates(space, other.line, s, other.before, other.spin_before, now, other.spin)
     predict_other(job, other, s, there_old, other.work.u)
@@ -384,7 +383,7 @@ def end_other(plane, space, job, other, s, new, there_old, there, report):
 def advance(plane, space, job, other, s, old, new, report):
     """The other line from the beginning of the last step of the run to its end; report: of the step."""
     there_old, there = other.even, other.odd
-    if job.counts[PARITY] == 0:  # the run is in its even state
+    if job.counts.parity == 0:  # the run is in its even state
         there_old, there = other.odd, other.even
     begin_other(space, job, other, s, there_old)
     carry_spins(plane, space, other, old, new, there_old, there)
@@ -417,10 +416,10 @@ def keep_own(plane, space, job, s, old, new):
 def follow(plane, space, job):
     """All other lines through the last step of the run."""
     old, new = job.even, job.odd
-    if job.counts[PARITY] == 0:
+    if job.counts.parity == 0:
         old, new = job.odd, job.even
     clock = job.clock
-    s = scheme(clock[LAST_RHO], clock[STEP_BEFORE], clock[RHO_BEFORE], clock[LAST_DT])
+    s = scheme(clock.last_rho, clock.step_before, clock.rho_before, clock.last_dt)
     keep_own(plane, space, job, s, old, new)
     for p in range(job.tables.shape[0]):
         advance(plane, space, job, read_other(job.tables[p]), s, old, new, job.work.report)
