@@ -18,7 +18,7 @@ from test_bench_cells import CASES, TOUCHDOWN, from_file, scene_of
 
 import hybrid
 from hybrid.adapt.state_transfer import transfer_to
-from hybrid.kernels.mesh.zone_step import SHARE, Zones
+from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.simulation import zone_switching
 from hybrid.simulation.cell_changes import CellChanges
 
@@ -66,7 +66,7 @@ def forced(scene: dict[str, Any], seed: int | None) -> tuple[hybrid.Result, list
         while simulation.t < scene["time"]["duration"] - 1e-9:
             zones = run.switching.zones
             zones.calm[:] = -1000  # no cells join by themselves
-            zones.clock[SHARE] = 1e9  # nor are any halved, for the layers of the pinned ends, which are 2 cm long
+            zones.clock.share = 1e9  # nor are any halved, for the layers of the pinned ends, which are 2 cm long
             simulation.step()
             steps += 1
             if steps == 1 or (rng is not None and steps % 2 == 0):

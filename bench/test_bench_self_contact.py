@@ -15,8 +15,6 @@ import pytest
 
 import hybrid
 from hybrid.kernels.contact.self_contact import contact_task
-from hybrid.kernels.contact.self_contact_pairs import ENERGY, NODES, POINTS, TRIED
-from hybrid.kernels.contact.self_distance import LEAST_DISTANCE
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.step.newton import ASKED, FINISH, GAIN, LIMIT, PREPARE, TOUCH
 from hybrid.simulation.transient import Transient
@@ -64,7 +62,7 @@ def energy(run: Transient) -> float:
     room = np.zeros((x.T.size + 1, 3))
     observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
     numbers = run.run.contact.contact.numbers
-    return float(parts.sum() + numbers[ENERGY] + numbers[TRIED])
+    return float(parts.sum() + numbers.energy + numbers.tried)
 
 
 def ring(chord: float, radius: float = 0.4) -> tuple[np.ndarray, np.ndarray]:
@@ -106,12 +104,12 @@ def throw(seed: int) -> dict[str, float]:
     while simulation.t < duration * (1.0 - 1e-9):
         simulation.advance(min(simulation.t + step, duration))
         most = max(most, energy(run))
-        touched |= contact.contact.counts[POINTS] > 0
-    touched |= float(run.envelope.itself.itself.found[LEAST_DISTANCE]) < 1.03 * width
+        touched |= contact.contact.counts.points > 0
+    touched |= float(run.envelope.itself.itself.found.least_distance) < 1.03 * width
     moved = np.abs((mass * run.state.v).sum(axis=0) - momentum).max() / (mass.sum() * speed)
     return {
         "touched": float(touched), "energy": most / first, "momentum": float(moved), "steps": run.steps / (duration / step),
-        "space": float(seed % 2), "distance": float(run.envelope.itself.itself.found[LEAST_DISTANCE]) / width,
+        "space": float(seed % 2), "distance": float(run.envelope.itself.itself.found.least_distance) / width,
     }  # fmt: skip
 
 
@@ -199,7 +197,7 @@ def test_search_for_contact_that_is_not_there(shape: str) -> None:
             before, begin = run.steps, time.process_time()
             simulation.advance(simulation.t + count * step)
             whole = (time.process_time() - begin) / (run.steps - before)
-            assert contact.contact.counts[POINTS] == 0
+            assert contact.contact.counts.points == 0
             found, balance = 0.0, 0.0
             for what, times in ((PREPARE, 1.0), (TOUCH, each), (LIMIT, each), (FINISH, 1.0), (GAIN, 0.0)):
                 contact.call[ASKED], begin = what, time.process_time()
@@ -238,7 +236,7 @@ def test_cost_of_contact() -> None:
         simulation = approaching(cells)
         run, step = simulation._loop.run, simulation.scene.time.step
         counts = run.run.contact.contact.counts
-        while counts[NODES] < 48:
+        while counts.nodes < 48:
             simulation.advance(simulation.t + step)
         spent = []
         for _ in range(5):
@@ -249,6 +247,6 @@ def test_cost_of_contact() -> None:
             spent.append((time.process_time() - begin) / solves * 6.0 / (run.steps - steps))
         each = 1e3 * float(np.median(spent))
         found.append(each)
-        print(f"{cells:6} {counts[NODES]:4} {counts[POINTS]:5} {solves / 6.0:6.2f} {each:8.3f}")
+        print(f"{cells:6} {counts.nodes:4} {counts.points:5} {solves / 6.0:6.2f} {each:8.3f}")
     assert found[0] < 1.5
     assert found[1] < 2.2 * found[0] and found[2] < 4.4 * found[0]

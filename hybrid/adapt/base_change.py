@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.adapt.manager import OF_BASE, DomainManager
-from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.zone_step import blank_zones
 from hybrid.model.layout import Layout, on_other_parts
 from hybrid.model.line_on_base import LineOnBase
@@ -33,7 +32,7 @@ def change_base(
     kept |= {name: getattr(old, name)[source] for name in CARRIED}
     assert set(kept) <= set(OF_BASE)
     cells = {name: getattr(old, name)[of_cell] for name in OF_CELLS}
-    known, relaxing = old.counts[z.KNOWN], old.counts[z.RELAXING]
+    known, relaxing = old.counts.known, old.counts.relaxing
     age, recent_age = manager.age, manager.recent_age
     manager.zones = blank._replace(**kept)
     for name in ("calm_since", "patience", "released", "buffer"):
@@ -44,5 +43,5 @@ def change_base(
     manager.set_layout(layout)
     for name, x in cells.items():
         getattr(manager.zones, name)[:] = x
-    manager.zones.counts[z.KNOWN], manager.zones.counts[z.RELAXING] = known, relaxing
+    manager.zones.counts.known, manager.zones.counts.relaxing = known, relaxing
     manager.age, manager.recent_age = age, recent_age

@@ -103,17 +103,21 @@ class Times(NamedTuple):
     period: float = 0.0
 
 
-def _number(k: int, text: str) -> Any:
+def _number(name: str, text: str) -> Any:
     """A number of the clock of zones."""
     return property(
-        lambda self: float(self.zones.clock[k]), lambda self, x: self.zones.clock.__setitem__(k, x), doc=text
+        lambda self: float(getattr(self.zones.clock, name)),
+        lambda self, x: setattr(self.zones.clock, name, x),
+        doc=text,
     )
 
 
-def _flag(k: int, text: str) -> Any:
+def _flag(name: str, text: str) -> Any:
     """A flag of zones."""
     return property(
-        lambda self: bool(self.zones.counts[k]), lambda self, x: self.zones.counts.__setitem__(k, x), doc=text
+        lambda self: bool(getattr(self.zones.counts, name)),
+        lambda self, x: setattr(self.zones.counts, name, x),
+        doc=text,
     )
 
 
@@ -152,13 +156,13 @@ class DomainManager:
             here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64),
             waves=np.zeros(places),
         )  # fmt: skip
-        self.zones.clock[z.SHARE], self.zones.clock[z.FINENESS] = allowed.curvature_error or 0.0, allowed.fineness
-        self.tolerance, self.zones.clock[z.LEFT] = allowed.tolerance, 1.0
+        self.zones.clock.share, self.zones.clock.fineness = allowed.curvature_error or 0.0, allowed.fineness
+        self.tolerance, self.zones.clock.left = allowed.tolerance, 1.0
         for quantity, part in allowed.asked.items():
             self.zones.asked[quantity] = part
-        self.zones.clock[z.PACE] = self.pace
-        self.zones.clock[z.EDGE_TIME] = self.pace if times.edge is None else times.edge
-        self.zones.clock[z.MEMORY] = FADE * max(self.pace, times.period)
+        self.zones.clock.pace = self.pace
+        self.zones.clock.edge_time = self.pace if times.edge is None else times.edge
+        self.zones.clock.memory = FADE * max(self.pace, times.period)
         self.zones.clamped[:] = cable.held_tangent
         self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
         self.foreseen = np.zeros(n)  # what catenaries will lack, by a pre-run, over what is allowed
@@ -174,21 +178,21 @@ class DomainManager:
         floor = tension_floor(cable.mean_bending, weight, scale)
         self.weightless = bool((floor < WEIGHTLESS * scale).any())
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
-        self.zones.counts[z.HOLDS_TWIST] = cable.passes_torque
+        self.zones.counts.holds_twist = cable.passes_torque
         self.set_layout(layout)
 
     # --- what the compiled run knows ----------------------------------------------------------------
 
-    tolerance = _number(z.TOLERANCE, "Error of position, m.")
-    next_review = _number(z.NEXT_REVIEW, "When the next review is due, s.")
-    loudest = _number(z.LOUDEST, "Largest ratio among catenaries at the last evaluation.")
-    torque = _number(z.TORQUE, "Torque, N m, that a rod from end to end would carry, where there is none.")
-    total_twist = _number(z.TOTAL_TWIST, "Turn of the ends against each other, rad.")
-    compliance = _number(z.COMPLIANCE, "Turn per torque of all the line, rad per N m.")
-    age, recent_age = _number(z.AGE, "Of `past`, s."), _number(z.RECENT_AGE, "Of `recent`, s.")
-    fastest = _number(z.FASTEST, "By how much velocities of nodes differed of late, m/s.")
-    going, coming = _flag(z.GOING, "Some stiffness is ramped down."), _flag(z.COMING, "Some is ramped up.")
-    twisted = _flag(z.HOLDS_TWIST, "Both ends hold the twist.")
+    tolerance = _number("tolerance", "Error of position, m.")
+    next_review = _number("next_review", "When the next review is due, s.")
+    loudest = _number("loudest", "Largest ratio among catenaries at the last evaluation.")
+    torque = _number("torque", "Torque, N m, that a rod from end to end would carry, where there is none.")
+    total_twist = _number("total_twist", "Turn of the ends against each other, rad.")
+    compliance = _number("compliance", "Turn per torque of all the line, rad per N m.")
+    age, recent_age = _number("age", "Of `past`, s."), _number("recent_age", "Of `recent`, s.")
+    fastest = _number("fastest", "By how much velocities of nodes differed of late, m/s.")
+    going, coming = _flag("going", "Some stiffness is ramped down."), _flag("coming", "Some is ramped up.")
+    twisted = _flag("holds_twist", "Both ends hold the twist.")
 
     @property
     def ratios(self) -> Floats:
@@ -208,12 +212,12 @@ class DomainManager:
     @property
     def past(self) -> Floats:
         """(N,) N, tensions some time ago; none: not known."""
-        return self.zones.past if self.zones.counts[z.KNOWN] else np.zeros(0)
+        return self.zones.past if self.zones.counts.known else np.zeros(0)
 
     def load(self, moments: Floats) -> None:
         """Moments (2, 3) N m are given at the ends."""
         self.zones.moments[:] = moments
-        self.zones.counts[z.LOADED] = moments.any()
+        self.zones.counts.loaded = bool(moments.any())
 
     def set_layout(self, layout: Layout) -> None:
         """Take over a layout: what the criteria need of its nodes."""
@@ -226,8 +230,9 @@ class DomainManager:
         self.zones.here[layout.places] = True
         self.zones.waves[~self.zones.here] = 0.0
         clock, flags = self.zones.clock, self.zones.counts
-        clock[z.AGE] = clock[z.RECENT_AGE] = 0.0
-        flags[[z.KNOWN, z.RELAXING, z.STRAINED]], flags[z.ALL_ROD] = 0, layout.rod.all()
+        clock.age = clock.recent_age = 0.0
+        flags.known = flags.relaxing = flags.strained = 0
+        flags.all_rod = bool(layout.rod.all())
 
     def take(self, layout: Layout, zones: Zones) -> None:
         """Go on with other cells of the same base, of which `zones` knows all."""
@@ -241,8 +246,8 @@ class DomainManager:
         H, zones, cable = np.diff(layout.base), self.zones, self.cable
         of = cable.piece(0.5 * (layout.base[:-1] + layout.base[1:]))
         zones.parts[:], zones.H[:] = layout.parts, H
-        zones.clock[z.COMPLIANCE] = np.sum(H / np.maximum(cable.B[of, 2], 1e-300))
-        zones.clock[z.FREE_TWIST] = H @ cable.kappa[of, 2]
+        zones.clock.compliance = np.sum(H / np.maximum(cable.B[of, 2], 1e-300))
+        zones.clock.free_twist = H @ cable.kappa[of, 2]
 
     def adopt_layout(self, new: Layout, change: Change, t: float) -> None:
         """Take over the layout of a change, at t."""
@@ -262,7 +267,7 @@ class DomainManager:
         self.grown[fresh], self.leaving[fresh], self.calm_since[fresh] = 0.0, False, np.inf
         self.zones.haste[fresh] = np.where(urgent[fresh], FAST_RAMP, 1.0)
         self.grown[~rod], self.leaving[~rod] = 1.0, False
-        self.zones.rod[:], self.zones.counts[z.ALL_ROD] = rod, rod.all()
+        self.zones.rod[:], self.zones.counts.all_rod = rod, bool(rod.all())
 
     def checkpoint(self) -> dict[str, Any]:
         """State besides the layout."""
@@ -290,7 +295,7 @@ class DomainManager:
                 there[:] = saved[name]  # in place: compiled reviews know where it is
             else:
                 setattr(self, name, saved[name])
-        zones.counts[z.KNOWN] = saved["past"].size > 0
+        zones.counts.known = saved["past"].size > 0
         self._update_ramping()
 
     # --- watching ------------------------------------------------------------------------------
@@ -300,7 +305,7 @@ class DomainManager:
 
         dt = 0: there was none, or it was on other nodes.
         """
-        self.zones.clock[z.DT] = dt
+        self.zones.clock.dt = dt
         near = self.near if self.near.size == line.s.size else np.zeros(0)
         self._table.bind(line=line, sea=sea, ends=ends, new=state, zones=self.zones, near=near)
         evaluate_criteria(self._table.numbers)
@@ -312,7 +317,7 @@ class DomainManager:
         """End k holds its tangent and its twist no longer; cable: as that leaves it."""
         self.cable = cable
         self.zones.clamped[k], self.zones.tangents[k] = 0, 0.0
-        self.zones.counts[z.HOLDS_TWIST] = 0
+        self.zones.counts.holds_twist = 0
 
     def ask_user(self, line: Line, state: State, t: float) -> None:
         """Raise the ratios to those of the user's criterion."""
@@ -450,7 +455,7 @@ class DomainManager:
     def _add_global_ratios(self) -> None:
         """Ratios that are not local: forced rods, and torque, which needs rods from end to end."""
         self.ratios[GIVEN, self.given > 0] = FORCED_RATIO
-        if self.twisted or self.zones.counts[z.LOADED]:
+        if self.twisted or self.zones.counts.loaded:
             self.ratios[TORSION] = self.ratios[TORSION].max()
 
     def _reset_ratios(self) -> None:

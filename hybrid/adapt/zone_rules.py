@@ -276,7 +276,7 @@ def stays(job, zones, j):
 @inner
 def let_go(job, zones):
     """Rods that are not planned are on their way out; the part of the pace until one of them may have gone."""
-    ratios, wait, going, any_before = zones.ratios, job.pause, 0, zones.counts[z.GOING]
+    ratios, wait, going, any_before = zones.ratios, job.pause, 0, zones.counts.going
     for j in range(zones.rod.shape[0]):
         planned = (job.flags[3, j] or job.held != 0) and job.given[j] >= 0
         goes = zones.rod[j] and not planned
@@ -286,9 +286,9 @@ def let_go(job, zones):
                 c = loudest(ratios, job.off, j)
                 job.calmed[0, j], job.calmed[1, j] = c, ratios[c, j]
         zones.leaving[j] = goes
-    zones.counts[z.GOING] = going
+    zones.counts.going = going
     if going or any_before:
-        zones.counts[z.COMING] = z.is_coming(zones)  # perhaps one that was on its way out
+        zones.counts.coming = z.is_coming(zones)  # perhaps one that was on its way out
     return wait
 
 
@@ -299,9 +299,9 @@ def quiet_review(table):
     run = read_zones(job.zone_table)
     zones, clock = run.zones, run.zones.clock
     kinds, ratios, n = zones.kinds, zones.ratios, zones.rod.shape[0]
-    if clock[z.LOUDEST] > 1.0:
+    if clock.loudest > 1.0:
         return 0
-    if zones.counts[z.HOLDS_TWIST] or zones.counts[z.LOADED]:  # torque needs rods from end to end
+    if zones.counts.holds_twist or zones.counts.loaded:  # torque needs rods from end to end
         most = 0.0
         for j in range(n):
             most = max(most, ratios[TORSION, j])
@@ -326,5 +326,5 @@ def quiet_review(table):
         job.calm_since[j] = job.calm[j]
         for c in range(ratios.shape[0]):
             job.seen[c, j], ratios[c, j] = max(job.seen[c, j], ratios[c, j]), 0.0
-    clock[z.NEXT_REVIEW] = now + (max(wait, 0.0) - ROUND_TIME) * job.pace
+    clock.next_review = now + (max(wait, 0.0) - ROUND_TIME) * job.pace
     return 1

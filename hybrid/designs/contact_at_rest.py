@@ -14,7 +14,6 @@ from scipy import sparse
 from hybrid.designs.line_at_rest import Beside
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
-from hybrid.kernels.contact.self_contact_pairs import OVERFLOW, POINTS
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.touching import stiffness_between
 from hybrid.model.scales import tension_scale
@@ -40,7 +39,7 @@ class ContactAtRest:
         self, solver: SystemSolver, states: SystemState, names: Sequence[str], lines: Sequence[Beside]
     ) -> None:
         """lines: those of the equilibrium.  SceneError: a line touches itself alone, or something at its very end."""
-        if any(x.counts[POINTS] for x, of in solver.contacts_at(states) if len(of) == 1) or solver.shared is None:
+        if any(x.counts.points for x, of in solver.contacts_at(states) if len(of) == 1) or solver.shared is None:
             raise _refused("contact of a line with itself", "no line touches itself")
         self._solver, self._states, self._shared = solver, states, solver.shared
         self._here = [lines[k] for k in self._shared.lines]
@@ -70,7 +69,7 @@ class ContactAtRest:
             return None
         for finer, off in FINER.items():
             self._solver.contacts_at(self._states, finer)
-            if not self._shared.contact.counts[OVERFLOW]:
+            if not self._shared.contact.counts.overflow:
                 return self._stiffness(), off
         return None
 

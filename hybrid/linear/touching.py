@@ -29,7 +29,7 @@ from hybrid.kernels.contact.self_contact_law import (
     P,
     Q,
 )
-from hybrid.kernels.contact.self_contact_pairs import POINTS, Contact
+from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.junctions.bodies import PLACE as ORIGIN
 from hybrid.kernels.junctions.body_forces import BY_BODY, BY_NODES, OF_LINE, OF_NODE, OF_SLOT, TOUCHED
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
@@ -155,7 +155,7 @@ def touching_parts(
     stiffness = K.matrix(size, size)
     if touching is not None:
         for contact, of_lines in touching.solver.contacts_at(states):
-            if not contact.counts[POINTS]:
+            if not contact.counts.points:
                 continue
             node_of = np.concatenate([begins[k] + np.arange(counts[k]) for k in of_lines])
             stiffness = stiffness + stiffness_between(contact, node_of, size)
@@ -299,7 +299,7 @@ def _of_lines(
 
     asked: whether friction sticks, how many unknowns there are.
     """
-    rows, (sticks, size) = contact.points[: contact.counts[POINTS]], asked
+    rows, (sticks, size) = contact.points[: contact.counts.points], asked
     pieces = rows[:, [P, Q]].astype(np.int64)
     nodes = (pieces[:, :, None] + np.arange(-1, 2)).reshape(-1, 6)
     weights = np.concatenate([rows[:, WX : WX + 3], -rows[:, WY : WY + 3]], axis=1)

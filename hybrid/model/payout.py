@@ -82,7 +82,7 @@ class PayoutPlan:
     cable: Material  # what is out and what is on the reel
     pieces: Floats  # (P, 1 + COLUMNS) as of kernels.reel.reel.Reel
     from_outside: bool  # whether the length is set from Python
-    winch: Floats  # (WINCH,) as of kernels.reel.winch, before its brake opens; of zeros where none holds a tension
+    winch: w.Winch  # before its brake opens; of zeros where none holds a tension
     layer: Floats  # (m+1,) m, how far before the fairlead the nodes are that ride with it; 0 is the last
     begun: Floats  # (N+1,) m, nodes at t = 0
 
@@ -106,12 +106,12 @@ class PayoutPlan:
     @property
     def holds_tension(self) -> bool:
         """Whether a winch holds a tension."""
-        return bool(self.winch[w.TENSION] > 0.0)
+        return bool(self.winch.tension > 0.0)
 
     def forecast(self, duration: float) -> PayoutForecast:
         """What will be out up to a time, s."""
         if self.from_outside or self.holds_tension:
-            by = f"a winch holds {self.winch[w.TENSION]:.6g} N" if self.holds_tension else "set from Python"
+            by = f"a winch holds {self.winch.tension:.6g} N" if self.holds_tension else "set from Python"
             cells = self.cells(self.longest)
             return PayoutForecast(by, self.first, math.nan, self.shortest, self.longest, math.nan, cells, math.nan)
         t = np.linspace(0.0, duration, 2001)
@@ -293,7 +293,7 @@ def payout_plan(
     while nodes[-3 - ride] < longest:
         nodes.append(nodes[-1] + h)
     winch = winch_of(payout, length)
-    winch[w.LEAST], winch[w.MOST] = shortest, longest
+    winch.least, winch.most = shortest, longest
     far, places = 0.0 if side else length, np.array(nodes)
     cable = _whole_material(scene, places if side else far - places[::-1])
     finest = np.ones(places.size - 1, int)
@@ -347,13 +347,13 @@ def shorter_behind_clamp(scene: Scene, cable: Material, base: Floats, share: flo
     return side if winch_side(scene) else scene.length - side[::-1]
 
 
-def winch_of(payout: Payout, length: float) -> Floats:
+def winch_of(payout: Payout, length: float) -> w.Winch:
     """Numbers of a winch that holds a tension (kernels.reel.winch), at rest with a length, m, that is out."""
-    out, winch = np.zeros(w.WINCH), payout.winch
+    out, winch = w.Winch(), payout.winch
     if winch is not None:
-        out[w.TENSION], out[w.BEGIN], out[w.RAMP] = winch.tension, winch.begin, winch.ramp
-        out[w.INERTIA], out[w.DAMPING], out[w.MAX_RATE] = winch.inertia, winch.damping, winch.max_rate or np.inf
-        out[w.LENGTH_NOW] = length
+        out.tension, out.begin, out.ramp = winch.tension, winch.begin, winch.ramp
+        out.inertia, out.damping, out.max_rate = winch.inertia, winch.damping, winch.max_rate or np.inf
+        out.length_now = length
     return out
 
 

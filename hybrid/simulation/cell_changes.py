@@ -80,7 +80,7 @@ class CellChanges:
         self._finest, self._piece = layout.finest.nodes, model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
         self._marked = marks_on(layout.base, owner.marked)
         extra = int((self._marked != 0).sum())
-        self._calls, self._at = np.zeros(f.CALLS, np.int64), np.zeros(f.AT_SIZE, np.int64)
+        self._calls, self._at = f.FollowingCalls(), f.FollowingPlaces()
         self._on = CellViews(owner, self.most, extra, self._at)
         self._numbers = np.zeros(NUMBERS)
         self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
@@ -99,21 +99,21 @@ class CellChanges:
     @property
     def side(self) -> int:
         """Which of the two sets of arrays is in use."""
-        return int(self._at[f.SIDE])
+        return int(self._at.side)
 
     @property
     def cells(self) -> int:
         """Cells of the line now."""
-        return int(self._at[f.CELLS])
+        return int(self._at.cells)
 
     @property
     def waits(self) -> bool:
         """Whether there are outputs of cells of before."""
-        return bool(self._at[f.WAITING])
+        return bool(self._at.waiting)
 
     @property
     def _stale(self) -> bool:
-        return bool(self._at[f.CHANGES] != self._synced)
+        return bool(self._at.changes != self._synced)
 
     @staticmethod
     def _key(owner: Transient) -> tuple[Any, ...]:
@@ -125,7 +125,7 @@ class CellChanges:
     def applies(owner: Transient) -> bool:
         """Whether the cells of a run follow the curvature, and nothing asks Python on the way."""
         switching = owner.switching
-        if switching is None or not switching.zones.clock[z.SHARE] > 0.0:
+        if switching is None or not switching.zones.clock.share > 0.0:
             return False
         remembers = owner.model.line.bits & REMEMBERS
         return plain(owner) and not remembers and switching.manager.layout.rod.size >= LEAST_CELLS
@@ -244,7 +244,7 @@ class CellChanges:
             itself, itself_places = self._watch.table.numbers, of_itself[0].places(IN_ITSELF)
             in_itself = stacked(of_itself, itself_places)
             tree = self._on.itself.tree.__array_interface__["data"][0]
-            self._at[f.BOXES_AT] = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
+            self._at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
         numbers: dict[str, Any] = {
             "calls": self._calls, "at": self._at, "clock": run.clock, "counts": run.count, "outputs": run.books.outputs,
             "work": run.books.work, "zone_clock": zones.clock, "zone_counts": zones.counts, "numbers": self._numbers,
@@ -258,18 +258,18 @@ class CellChanges:
         }  # fmt: skip
         self._following.bind(**numbers)
         at, samples = self._at, self._on.samples.__array_interface__["data"][0]
-        at[f.ROOM], at[f.ROOM_SIZE], at[f.MOST_ROWS] = samples, self._on.samples.size, self._on.rows
-        at[f.TASK] = run.table.part("task").start
-        (at[f.SAMPLES_AT],) = np.flatnonzero(of_run[0].numbers[0] == samples)
+        at.room, at.room_size, at.most_rows = samples, self._on.samples.size, self._on.rows
+        at.task = run.table.part("task").start
+        at.samples_at = int(np.flatnonzero(of_run[0].numbers[0] == samples).item())
         calls = {
-            f.LAY_OUT: (lay_out, layouts[0]), f.CLEAR: (clear_state, renews[0].table),
-            f.LINE: (fill_line, lines[0].table), f.BEGIN: (begin_switch, switches[0].table),
-            f.KINDS: (fill_kinds, kinds[0].table), f.END: (end_switch, switches[0].table),
-            f.RENEW: (renew, renews[0].table), f.BEFORE_FORCES: (before_forces, run.table),
-            f.AFTER_FORCES: (after_forces, run.table), f.STEPS: (steps, run.table),
+            "lay_out": (lay_out, layouts[0]), "clear": (clear_state, renews[0].table),
+            "line": (fill_line, lines[0].table), "begin": (begin_switch, switches[0].table),
+            "kinds": (fill_kinds, kinds[0].table), "end": (end_switch, switches[0].table),
+            "renew": (renew, renews[0].table), "before_forces": (before_forces, run.table),
+            "after_forces": (after_forces, run.table), "steps": (steps, run.table),
         }  # fmt: skip
-        for k, (kernel, table) in calls.items():
-            self._calls[k] = kernel.address(table.numbers)
+        for name, (kernel, table) in calls.items():
+            setattr(self._calls, name, kernel.address(table.numbers))
 
     # --- changes ------------------------------------------------------------------------------------
 
@@ -282,7 +282,7 @@ class CellChanges:
             with self._on.bound():
                 self._bind_all()
             self._bound = True
-        self._at[f.SIDE], self._at[f.CELLS] = k, n
+        self._at.side, self._at.cells = k, n
         parity, at = int(run.count.parity), self._on.layout(k, n)
         for which in (0, 1):
             _copy(run.states[which], self._on.state(k, which, n))
@@ -300,7 +300,7 @@ class CellChanges:
         at.place[:], at.s[:], at.of[:], at.rods[:] = layout.places, model.line.s, layout.base_of_cell, layout.rod_cells
         self._on.sides[k].first[:] = self._on.base[:] = layout.first
         run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
-        self._calls[f.SOLVER] = run.solver_address()
+        self._calls.solver = run.solver_address()
         f.put_cells(self._following.numbers)
         self.adopted, self._synced = True, -1
         run.count.parity = parity
@@ -311,7 +311,7 @@ class CellChanges:
 
         reviewed: the criteria have just been reviewed after a step, and zones stay as they are.
         """
-        self._at[f.ALONE], self._at[f.MAY_WAIT] = self.alone, self._owner.outputs_may_wait
+        self._at.alone, self._at.may_wait = self.alone, self._owner.outputs_may_wait
         code = self._run.go(lambda: int(f.go_on(self._following.numbers, reviewed)))
         self._run.set_quota(self.cells)
         return code
@@ -319,7 +319,7 @@ class CellChanges:
     @property
     def due(self) -> bool:
         """Whether cells are to change."""
-        return bool(self._switching.zones.counts[z.CELLS_DUE])
+        return bool(self._switching.zones.counts.cells_due)
 
     def unwatched(self) -> bool:
         """After a step that Python is to look at: whether nothing is to be done but a review and a change of cells."""
@@ -354,7 +354,7 @@ class CellChanges:
             return None
         f.leave_cells(self._following.numbers)
         if self.waits:
-            self._rods_then.append((int(self._at[f.WAITING]), self._switching.zones.rod.copy()))
+            self._rods_then.append((int(self._at.waiting), self._switching.zones.rod.copy()))
         return self._to_zones(change)
 
     def _to_zones(self, change: Change) -> float:
@@ -391,7 +391,7 @@ class CellChanges:
         layout, begin, zones = self._owner.model.layout, 0, None
         assert layout is not None
         then = [*self._rods_then, (MOST_WAITING, self._switching.zones.rod)]
-        for i, (offset, count, cells) in enumerate(self._waiting[: self._at[f.WAITING]].tolist()):
+        for i, (offset, count, cells) in enumerate(self._waiting[: self._at.waiting].tolist()):
             if zones is None or i == then[0][0]:
                 while i >= then[0][0]:
                     del then[0]
@@ -416,7 +416,7 @@ class CellChanges:
     def empty(self) -> None:
         """No output waits any longer."""
         waits, self._rods_then = self.waits, []
-        self._at[[f.WAITING, f.PLACED, f.USED]] = 0
+        self._at.waiting = self._at.placed = self._at.used = 0
         if waits and self.adopted:
             self._synced = -1
             f.put_cells(self._following.numbers)
@@ -426,7 +426,7 @@ class CellChanges:
         """What Python has of the line is that of now."""
         if not self._stale:
             return
-        self._synced = int(self._at[f.CHANGES])
+        self._synced = int(self._at.changes)
         owner, run, k, n = self._owner, self._run, self.side, self.cells
         model, switching, line = owner.model, self._switching, self._on.line(k, n)
         assert model.layout is not None

@@ -12,8 +12,8 @@ from hybrid.adapt.manager import OF_BASE
 from hybrid.kernels.contact.self_distance import Itself, blank_itself
 from hybrid.kernels.machine.binding import Packed, Room
 from hybrid.kernels.mesh.zone_step import Zones
-from hybrid.kernels.run import following_run as f
 from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.run.following_run import FollowingPlaces
 from hybrid.kernels.state.books import Books, sample_size
 from hybrid.kernels.state.state import (
     NO_GRIP,
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 class CellViews:
     """Two sets of arrays (sides k = 0, 1) with room for the most cells, and views of them for a number of cells."""
 
-    def __init__(self, owner: Transient, most: int, marked: int, at: np.ndarray) -> None:
+    def __init__(self, owner: Transient, most: int, marked: int, at: FollowingPlaces) -> None:
         """most: cells at most; marked: nodes of them beside which extremes are kept on both sides; at: numbers of the
         run (kernels.run.following_run)."""
         assert owner.switching is not None and owner.model.layout is not None
@@ -136,7 +136,7 @@ class CellViews:
         return found
 
     def books(self, cells: int) -> Books:
-        size, used = sample_size(cells, True), int(self._at[f.USED])
+        size, used = sample_size(cells, True), int(self._at.used)
         rows = min(self.rows, (self.samples.size - used) // size)
         samples = self.samples[used : used + rows * size].reshape(rows, size)
         kept = self._view(self._kept, cells)

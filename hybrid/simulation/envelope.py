@@ -209,7 +209,7 @@ class Envelope:
         """Go on as `checkpoint` has written, into `now`.  ValueError: it is that of another line."""
         mine = self.checkpoint(now)
         mine["itself"] = blank_itself(np.ones(1)).found  # infinite as long as the line was never near itself
-        older = {"itself": self.itself.itself.found}  # files of before have none
+        older: dict[str, Any] = {"itself": self.itself.itself.found}  # files of before have none
         saved = dict(saved)
         known = saved.get("itself")
         if isinstance(known, np.ndarray) and known.shape == (OF_0_6,):  # nor when contact may end

@@ -14,7 +14,6 @@ import numpy as np
 
 from hybrid.adapt.manager import Change
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_changes import after_forces, before_forces, blank_renew_job, clear_state, renew
 from hybrid.kernels.mesh.zone_line import blank_line_job, fill_line
 from hybrid.kernels.mesh.zone_switch import (
@@ -134,7 +133,7 @@ class LineKinds:
             self._held[k] = clamp is not None
             if clamp is not None:
                 self._clamps[k] = clamp
-        numbers[TIME], numbers[RELAXES] = t, switching.zones.counts[z.RELAXING]
+        numbers[TIME], numbers[RELAXES] = t, switching.zones.counts.relaxing
         fill_line(self._fill.numbers)
         clear_state(self._renew.numbers)
         begin_switch(self._switch.numbers)
@@ -153,7 +152,7 @@ class KindChanges:
     def applies(owner: Transient) -> bool:
         """Whether the cells of a run stay, and kinds can change so."""
         switching = owner.switching
-        return plain(owner) and switching is not None and not switching.zones.clock[z.SHARE] > 0.0
+        return plain(owner) and switching is not None and not switching.zones.clock.share > 0.0
 
     def __init__(self, owner: Transient) -> None:
         """From now on the run has a line of its own, which changes."""

@@ -13,8 +13,6 @@ from hybrid.kernels.laws.axial_law import SHIFT, stretch_energy
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.reel import reel as p
-from hybrid.kernels.reel import winch as w
 from hybrid.kernels.reel.payout import (
     end_payout,
     fit_line,
@@ -28,7 +26,7 @@ from hybrid.kernels.reel.payout import (
 )
 from hybrid.kernels.reel.payout_layers import carry_layers
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
-from hybrid.kernels.reel.reel import MovingZones, Reel, blank_reel, blank_reel_job
+from hybrid.kernels.reel.reel import MovingZones, Reel, ReelNumbers, blank_reel, blank_reel_job
 from hybrid.kernels.run.payout_run import energy_of
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.forces import FRICTION, STIFFNESS_DAMPING, TOUCHES
@@ -55,6 +53,7 @@ VARIES = ("s", "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar")
 VARIES_TOO = ("bend_law", "tension_twist", "wake_law")  # likewise, of lines that have them
 # What a checkpoint keeps of a reel.
 OF_CELLS = ("lack", "rate", "since", "span")
+OF_EARLIER_VERSIONS = 10, 12, 13, 15  # numbers of a reel in checkpoints of those
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
 
 
@@ -94,10 +93,10 @@ class PayingOut:
             self._slips,
         )  # fmt: skip
         numbers = reel.numbers
-        numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
-        numbers[p.SPRING] = plan.cable.springs[plan.side]
+        numbers.side, numbers.far = (1.0 if plan.side else -1.0), plan.far
+        numbers.spring = plan.cable.springs[plan.side]
         if plan.cable.vortices.size:
-            numbers[p.LIFT] = plan.cable.vortices[-plan.side, 0]
+            numbers.lift = plan.cable.vortices[-plan.side, 0]
         put_places(reel, self._nodes, material)
         return reel
 
@@ -126,7 +125,7 @@ class PayingOut:
         """
         old = energy(line, ends, before.state)
         end_payout(self.table.numbers)
-        self.winch[w.TENSION], self.ended = 0.0, True
+        self.winch.tension, self.ended = 0.0, True
         law = np.zeros((1, 8))
         law[0, 0], law[0, 7] = before.t, self.length
         self.law, self.reel = law, self.reel._replace(law=law)
@@ -155,7 +154,7 @@ class PayingOut:
     @property
     def length(self) -> float:
         """Length, m, that is out."""
-        return float(self.reel.numbers[p.LENGTH])
+        return float(self.reel.numbers.length)
 
     @property
     def material(self) -> int:
@@ -180,14 +179,14 @@ class PayingOut:
     @property
     def holds_tension(self) -> bool:
         """Whether a winch holds a tension."""
-        return bool(self.winch[w.TENSION])
+        return bool(self.winch.tension)
 
     @property
     def fastest(self) -> float:
         """Largest size of the rate, m/s, that is to be expected."""
         if self.holds_tension:
-            most = float(self.winch[w.MAX_RATE])
-            return most if np.isfinite(most) else abs(float(self.winch[w.RATE_NOW]))
+            most = float(self.winch.max_rate)
+            return most if np.isfinite(most) else abs(float(self.winch.rate_now))
         return fastest(self.law)
 
     def stand_still(self) -> None:
@@ -207,7 +206,7 @@ class PayingOut:
     def lengthening(self) -> Floats:
         """(N,) m/s2, second rates of the lengths of cells."""
         out = np.zeros(self.reel.true.size)
-        out[self.material - 1] = self.reel.numbers[p.ACCELERATION]
+        out[self.material - 1] = self.reel.numbers.acceleration
         return self._ordered(out)
 
     def _ordered(self, x: Floats) -> Floats:
@@ -216,18 +215,18 @@ class PayingOut:
 
     def leave_unbalanced(self) -> None:
         """Nothing balances the neighbours of a node that has just entered or left."""
-        self.reel.stage[p.UNBALANCED], self.reel.numbers[p.CHANGED] = 0.0, -np.inf
+        self.reel.stage.unbalanced, self.reel.numbers.changed = 0.0, -np.inf
 
     @property
     def due(self) -> bool:
         """Whether a node is to enter or to leave."""
-        return bool(self.reel.numbers[p.DUE])
+        return bool(self.reel.numbers.due)
 
     @property
     def at_its_end(self) -> bool:
         """Whether a winch that holds a tension has no more line to pay out, or none to take in."""
         winch = self.winch
-        return self.holds_tension and not winch[w.LEAST] <= winch[w.LENGTH_NOW] <= winch[w.MOST]
+        return self.holds_tension and not winch.least <= winch.length_now <= winch.most
 
     def change(
         self, run: Before, model: Model, carry: Callable[[Model, np.ndarray, np.ndarray], None] | None = None
@@ -292,7 +291,7 @@ class PayingOut:
     @property
     def enters(self) -> bool:
         """Whether the node that is due enters; else one leaves."""
-        return bool(self.reel.true[self.material - 1] > self.reel.numbers[p.LONGEST])
+        return bool(self.reel.true[self.material - 1] > self.reel.numbers.longest)
 
     def _came_from(self, enters: bool, cells: int) -> np.ndarray:
         """Which of so many old cells, or base cells, those come from of a line that a node enters, or leaves."""
@@ -352,7 +351,7 @@ class PayingOut:
         assert model.layout is not None
         if self.plan.follows:
             self._take_cells(model.layout)
-        self._fit(model.line, self.reel, float(self.reel.numbers[p.LENGTH]), t)
+        self._fit(model.line, self.reel, float(self.reel.numbers.length), t)
 
     def _take_cells(self, layout: Layout) -> None:
         """Go on with other cells far from the winch: what the reel knows of those near it stays."""
@@ -366,7 +365,7 @@ class PayingOut:
 
     def _fit(self, line: Line, reel: Reel, length: float, t: float) -> None:
         """Let a line have a length, m, at t (s): cells that grow hold the sections that come off the reel."""
-        reel.numbers[p.LENGTH], self._clock.now = length, t
+        reel.numbers.length, self._clock.now = length, t
         self._fitting.bind(line=line, reel=reel, clock=self._clock)
         fit_line(self._fitting.numbers)
 
@@ -409,7 +408,7 @@ class PayingOut:
             batch.report[known, LENGTH_OUT], batch.report[known, PAYOUT_RATE] = there
         lengths = batch.report[:, LENGTH_OUT].tolist()
         for t, length in zip(batch.t.tolist(), lengths, strict=True):
-            reel.numbers[p.LENGTH], self._clock.now = length, t
+            reel.numbers.length, self._clock.now = length, t
             fit_line(self._fitting.numbers)
             yield line, self.plan.zones_of(length, moving)
 
@@ -472,15 +471,17 @@ class PayingOut:
         else:
             self.reel = self._blank(count)
         numbers = np.asarray(given.get("numbers", np.zeros(0)))
-        if numbers.shape in ((p.SIDE,), (p.SPRING,), (p.CHANGED,), (p.LIFT,)):  # of a file of an earlier version
+        if numbers.size in OF_EARLIER_VERSIONS:
             given["numbers"] = np.concatenate([numbers, self.reel.numbers[numbers.size :]])
         absent = {"winch": self.winch, "balance": self.reel.balance}
         kept = matched(absent | given, {name: getattr(self.reel, name) for name in KEPT}, "payout")
-        if not (kept["span"].min() > 0.0 and kept["numbers"][p.LENGTH] > kept["numbers"][p.PLACE]):
+        if not (
+            kept["span"].min() > 0.0 and ReelNumbers.of(kept["numbers"]).length > ReelNumbers.of(kept["numbers"]).place
+        ):
             raise ValueError("a length that no line has")
         for name, x in kept.items():
             getattr(self.reel, name)[:] = x
-        return self.on(model, float(self.reel.numbers[p.LENGTH]))
+        return self.on(model, float(self.reel.numbers.length))
 
     def go_on(self, begin: float, end: float, asked: tuple[float | None, float] | None) -> None:
         """From `begin` to `end`, s, a length that is set from Python goes where it was asked to, or on at its rate.

@@ -107,7 +107,7 @@ class NodeChanges:
         self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
         self._itself = blank_itself(np.zeros(self.most))
         self._base = np.zeros(owner.run.books.base.size, np.int64)
-        self._calls, self._at = np.zeros(f.CALLS, np.int64), np.zeros(f.AT_SIZE, np.int64)
+        self._calls, self._at = f.PaidCalls(), f.PaidPlaces()
         self._waiting = np.zeros((MOST_WAITING, 3), np.int64)
         self._following, self._line_table = Table(blank_paid_run_job()), Table(blank_line_job())
         self._whole = plan.whole_line(model.line, plan.held_as(model.cable))
@@ -138,12 +138,12 @@ class NodeChanges:
     @property
     def cells(self) -> int:
         """Cells of the line now."""
-        return int(self._at[f.CELLS])
+        return int(self._at.cells)
 
     @property
     def waits(self) -> bool:
         """Whether there are outputs of lines of before."""
-        return bool(self._at[f.WAITING])
+        return bool(self._at.waiting)
 
     # --- arrays -------------------------------------------------------------------------------------
 
@@ -180,7 +180,7 @@ class NodeChanges:
         return found
 
     def _books(self, k: int, cells: int) -> Books:
-        size, used = sample_size(cells), int(self._at[f.USED])
+        size, used = sample_size(cells), int(self._at.used)
         rows = min(self._rows, (self._samples.size - used) // size)
         samples = self._samples[used : used + rows * size].reshape(rows, size)
         kept = self._sides[k].kept.view(cells)
@@ -270,21 +270,21 @@ class NodeChanges:
         }  # fmt: skip
         self._following.bind(**numbers)
         at, samples = self._at, self._samples.__array_interface__["data"][0]
-        at[f.ROOM], at[f.MOST_ROWS], at[f.MOST] = samples, self._rows, self.most
-        at[f.TASK] = run.table.part("task").start
-        (at[f.SAMPLES_AT],) = np.flatnonzero(of_run[0].numbers[0] == samples)
+        at.room, at.most_rows, at.most = samples, self._rows, self.most
+        at.task = run.table.part("task").start
+        at.samples_at = int(np.flatnonzero(of_run[0].numbers[0] == samples).item())
         if self._watch is not None:
             tree = self._itself.tree.__array_interface__["data"][0]
-            at[f.BOXES_AT] = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
+            at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
         node = nodes[0].table
         calls = {
-            f.STEPS: (steps, run.table), f.CHANGE: (f.change_line, node), f.CARRY: (carry_node, Table(blank_carry_job)),
-            f.FIT: (f.fit_changed, node), f.BOOK: (f.book_change, node), f.RENEW: (f.renew_run, node),
-            f.BEFORE_FORCES: (before_forces, run.table), f.STAND_STILL: (stand_still, paying.table),
-            f.AFTER_FORCES: (after_forces, run.table),
+            "steps": (steps, run.table), "change": (f.change_line, node), "carry": (carry_node, Table(blank_carry_job)),
+            "fit": (f.fit_changed, node), "book": (f.book_change, node), "renew": (f.renew_run, node),
+            "before_forces": (before_forces, run.table), "stand_still": (stand_still, paying.table),
+            "after_forces": (after_forces, run.table),
         }  # fmt: skip
-        for k, (kernel, table) in calls.items():
-            self._calls[k] = kernel.address(table.numbers)
+        for name, (kernel, table) in calls.items():
+            setattr(self._calls, name, kernel.address(table.numbers))
 
     # --- steps --------------------------------------------------------------------------------------
 
@@ -294,7 +294,7 @@ class NodeChanges:
         if not self._bound:
             self._bind_all()
             self._bound = True
-        self._at[f.ON], self._at[f.CELLS] = 0, n
+        self._at.on, self._at.cells = 0, n
         parity = int(run.count.parity)
         for which in (0, 1):
             _copy(run.states[which], self._state(0, which, n), ("turn",))
@@ -309,7 +309,7 @@ class NodeChanges:
             _copy(self._watch.itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
         _copy(run.books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
         run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
-        self._calls[f.SOLVER] = run.solver_address()
+        self._calls.solver = run.solver_address()
         f.put_paid(self._following.numbers)
         self.adopted, self._synced = True, -1
         run.count.parity = parity
@@ -317,7 +317,7 @@ class NodeChanges:
 
     def go(self) -> int:
         """Steps, and nodes that enter and leave; a code of kernels.state.books."""
-        self._at[f.MAY_WAIT] = self._owner.outputs_may_wait
+        self._at.may_wait = self._owner.outputs_may_wait
         code = self._run.go(lambda: int(f.go_on(self._following.numbers)))
         self.sync()
         return code
@@ -329,10 +329,10 @@ class NodeChanges:
 
     def sync(self) -> None:
         """What Python has of the line is that of now."""
-        if self._at[f.CHANGES] == self._synced:
+        if self._at.changes == self._synced:
             return
-        self._synced = int(self._at[f.CHANGES])
-        owner, run, paying, k, n = self._owner, self._run, self._paying, int(self._at[f.ON]), self.cells
+        self._synced = int(self._at.changes)
+        owner, run, paying, k, n = self._owner, self._run, self._paying, int(self._at.on), self.cells
         line, sea, work, books, reel = (
             self._line(k, n), self._sea_on(n), self._work_on(n), self._books(k, n), self._reel(k, n),
         )  # fmt: skip
@@ -361,8 +361,8 @@ class NodeChanges:
 
     def waiting(self) -> Iterator[list[Output]]:
         """Outputs of lines of before, copied."""
-        k, paying, model = int(self._at[f.ON]), self._paying, self._owner.model
-        for offset, count, cells in self._waiting[: self._at[f.WAITING]].tolist():
+        k, paying, model = int(self._at.on), self._paying, self._owner.model
+        for offset, count, cells in self._waiting[: self._at.waiting].tolist():
             size = sample_size(cells)
             end = offset + count * size
             rows = self._samples[offset:end].reshape(count, size).copy()
@@ -378,7 +378,7 @@ class NodeChanges:
     def empty(self) -> None:
         """No output waits any longer."""
         waits = self.waits
-        self._at[[f.WAITING, f.USED]] = 0
+        self._at.waiting = self._at.used = 0
         if waits and self.adopted:
             self._synced = -1
             f.put_paid(self._following.numbers)

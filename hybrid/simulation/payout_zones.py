@@ -8,7 +8,6 @@ import numpy as np
 
 from hybrid.adapt.base_change import change_base
 from hybrid.adapt.manager import Change, DomainManager, Reason
-from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.stiffness_ramp import soften
 from hybrid.kernels.reel.reel import MovingZones, zones_that_stay
 from hybrid.kernels.state.state import State
@@ -101,7 +100,7 @@ class PaidZones:
             less = switching.arcs_less_chords(state)[cells]
             true, lack = true - less, lack - less
         zones.true[cells], zones.lack[cells], zones.rate[cells], zones.since[cells] = true, lack, rate, t
-        zones.lengths[cells], zones.keeps[cells], zones.counts[z.RELAXING] = line.h[cells], False, 1
+        zones.lengths[cells], zones.keeps[cells], zones.counts.relaxing = line.h[cells], False, 1
         paying.release(own)
 
     def as_now(self, model: Model, t: float, state: State) -> Model:

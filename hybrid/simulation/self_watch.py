@@ -13,34 +13,15 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.contact.self_contact_law import INNER, OUTER
 from hybrid.kernels.contact.self_contact_pairs import WINDOW
 from hybrid.kernels.contact.self_distance import (
-    ASKED,
-    AWAY,
-    CLEARANCE,
-    DISTANCE,
     ENDS,
-    HIDDEN,
-    HIDDEN_I,
-    HIDDEN_J,
     HIDES,
-    LEAST,
-    LEAST_DISTANCE,
-    LEAST_OTHER,
-    LEAST_S,
-    LEAST_TIME,
-    MEETING,
     MEETS,
     NEARS,
     NEIGHBOURS,
-    OTHER_S,
     PARTS,
-    SECONDS,
-    SHARP,
-    TOLD,
     TURNED,
     UNBENT,
-    WAITS,
     WIDER,
-    S,
     blank_itself,
     blank_itself_job,
     watch_itself,
@@ -59,11 +40,11 @@ from hybrid.store.format import Field
 GROUP = "self_distance"
 # In the file: where in `found` it stands, unit, meaning.
 FIELDS = {
-    f"{GROUP}/clearance": (LEAST, "m", "least clearance between surfaces of the line that are no neighbours"),
-    f"{GROUP}/distance": (LEAST_DISTANCE, "m", "distance of the centrelines there"),
-    f"{GROUP}/s_a": (LEAST_S, "m", "arc length where it was"),
-    f"{GROUP}/s_b": (LEAST_OTHER, "m", "arc length of the other place"),
-    f"{GROUP}/time": (LEAST_TIME, "s", "when it was"),
+    f"{GROUP}/clearance": ("least", "m", "least clearance between surfaces of the line that are no neighbours"),
+    f"{GROUP}/distance": ("least_distance", "m", "distance of the centrelines there"),
+    f"{GROUP}/s_a": ("least_s", "m", "arc length where it was"),
+    f"{GROUP}/s_b": ("least_other", "m", "arc length of the other place"),
+    f"{GROUP}/time": ("least_time", "s", "when it was"),
 }
 
 
@@ -170,10 +151,10 @@ class SelfWatch:
         """Go on with the cells of a model; events tell of contact from now on where it is computed."""
         self.itself = blank_itself(diameters(model))._replace(found=self.itself.found)
         self._touches = bool(model.line.bits & SELF_CONTACT)
-        self.itself.found[MEETING] = OUTER - 1.0 if self._touches else 0.0
+        self.itself.found.meeting = OUTER - 1.0 if self._touches else 0.0
         self.asks = bool(model.line.bits & MAY_TOUCH) and not self._touches
         ends = self._touches and bool(model.line.bits & MAY_TOUCH)
-        self.itself.ahead[ASKED] = 1.0 if self.asks else WIDER if ends else -1.0
+        self.itself.ahead.asked = 1.0 if self.asks else WIDER if ends else -1.0
 
     @property
     def table(self) -> Table:
@@ -198,38 +179,39 @@ class SelfWatch:
 
     def foresees(self, state: State, step: float, look: Callable[[], int]) -> bool:
         """Whether a look at a state, from which steps (s) are to be made, finds that the line will be near itself."""
-        self.itself.ahead[SECONDS] = step
+        self.itself.ahead.seconds = step
         found = look()
-        self.itself.ahead[SECONDS], self.itself.found[TOLD], self.itself.found[HIDDEN] = 0.0, 0.0, ENDS
+        self.itself.ahead.seconds, self.itself.found.told, self.itself.found.hidden = 0.0, 0.0, ENDS
         return bool(found & NEARS)
 
     def begins(self, t: float, model: Model, event: Callable[..., None] | None) -> None:
         """Contact is computed from now on; event: as of `tell`, None where nobody is told."""
         found = self.itself.found
-        found[AWAY] = 0.0
+        found.away = 0.0
         if event is None:
             return
         s, other, where = float(model.line.s[0]), float(model.line.s[-1]), "parts of the line"
-        if math.isfinite(found[DISTANCE]):
-            s, other = sorted((float(found[S]), float(found[OTHER_S])))
-            where = f"s = {s:.6g} m and s = {other:.6g} m, whose surfaces are {found[CLEARANCE]:.3g} m apart,"
+        if math.isfinite(found.distance):
+            s, other = sorted((float(found.s), float(found.other_s)))
+            where = f"s = {s:.6g} m and s = {other:.6g} m, whose surfaces are {found.clearance:.3g} m apart,"
         event(t, s, other, "contact begins", f"{where} come near each other: {BEGINS}")
 
     def waits(self) -> None:
         """Contact is not computed again before parts have come apart; where they meet until then, that is told."""
-        self.itself.found[WAITS], self.itself.found[TOLD] = 1.0, 0.0
+        self.itself.found.waits, self.itself.found.told = 1.0, 0.0
 
     def tell_hidden(self, t: float, model: Model, state: State, event: Callable[..., None]) -> None:
         """An event for a bend that hides how near parts are."""
-        i, j, node = (int(self.itself.ahead[k]) for k in (HIDDEN_I, HIDDEN_J, SHARP))
+        ahead = self.itself.ahead
+        i, j, node = int(ahead.hidden_i), int(ahead.hidden_j), int(ahead.sharp)
         s = float(model.line.s[node])
         event(t, s, s, "unresolved bend", hidden_text(model, state, i, j, node))
 
     def tell_again(self, t: float, dt: float, event: Callable[..., None]) -> None:
         """The event of a line that meets itself, where contact could not begin, unless it has been told."""
         found = self.itself.found
-        if found[CLEARANCE] < 0.0 and found[TOLD] == 0.0:
-            found[TOLD] = 1.0
+        if found.clearance < 0.0 and found.told == 0.0:
+            found.told = 1.0
             self.tell(t, dt, event)
 
     def look_at_start(self, run: CompiledRun, event: Callable[..., None]) -> None:
@@ -240,16 +222,16 @@ class SelfWatch:
     def tell(self, t: float, dt: float, event: Callable[..., None]) -> None:
         """An event for what was found; dt: s, the step in which it was, 0: in none."""
         found = self.itself.found
-        distance, width = float(found[DISTANCE]), float(found[DISTANCE] - found[CLEARANCE])
-        s, other = sorted((float(found[S]), float(found[OTHER_S])))
+        distance, width = float(found.distance), float(found.distance - found.clearance)
+        s, other = sorted((float(found.s), float(found.other_s)))
         if self._touches:
             text = touching_text(s, other, distance, width)
             event(t, s, other, "line touches itself", text, value=distance, threshold=width)
         else:
             why, remedy = self.why, self.remedy
-            if self.asks and found[WAITS] > 0.0:
+            if self.asks and found.waits > 0.0:
                 why, remedy = GIVEN_UP, "shorter cells"
-            elif self.asks and found[HIDDEN] == 0.0:
+            elif self.asks and found.hidden == 0.0:
                 why, remedy = HIDDEN_BY_BEND, "shorter cells"
             text = meeting_text(s, other, distance, width, dt, why, remedy)
             event(t, s, other, "line meets itself", text, value=distance, threshold=width)
@@ -257,18 +239,18 @@ class SelfWatch:
     def tell_unkept(self, model: Model, event: Callable[..., None]) -> None:
         """At the end of a run: an event where a line whose contact is computed has come nearer than contact lets it."""
         found, s = self.itself.found, model.line.s
-        distance = float(found[LEAST_DISTANCE])
-        width = distance - float(found[LEAST])
+        distance = float(found.least_distance)
+        width = distance - float(found.least)
         if not (self.on and self._touches and distance < INNER * width):
             return
-        first, last = sorted((float(found[LEAST_S]), float(found[LEAST_OTHER])))
+        first, last = sorted((float(found.least_s), float(found.least_other)))
         why, remedy = "its cells are too long for contact there", "shorter cells"
         beside = BESIDE * width + BESIDE_CELLS * float(np.diff(s).max())
         if model.ends.values.held.all() and first + float(s[-1]) - last < beside:
             why = "beside ends that are held no contact is computed of one with the other"
             remedy = "ends that stay a diameter apart"
         text = meeting_text(first, last, distance, width, 0.0, why, remedy)
-        event(float(found[LEAST_TIME]), first, last, "line meets itself", text, value=distance, threshold=width)
+        event(float(found.least_time), first, last, "line meets itself", text, value=distance, threshold=width)
 
     def fields(self) -> list[Field]:
         """Fields of the file; NaN where the line never came near itself."""
@@ -282,8 +264,8 @@ class SelfWatch:
     def values(self) -> dict[str, np.ndarray]:
         """Values of those fields."""
         found = self.itself.found
-        near = self.on and math.isfinite(found[LEAST])
-        return {x.name: np.array(found[FIELDS[x.name][0]] if near else np.nan) for x in self.fields()}
+        near = self.on and math.isfinite(found.least)
+        return {x.name: np.array(getattr(found, FIELDS[x.name][0]) if near else np.nan) for x in self.fields()}
 
 
 class LineWatch:
@@ -346,8 +328,8 @@ class LineWatch:
         watch = self._watch
         if not watch.on:
             return 0
-        if not is_bent(state) and watch.itself.ahead[ASKED] != WIDER:
-            watch.itself.found[TOLD] = 0.0
+        if not is_bent(state) and watch.itself.ahead.asked != WIDER:
+            watch.itself.found.told = 0.0
             return 0
         return self.tell(self._look(t, state, state.r), t, 0.0, state, event)
 
@@ -361,7 +343,7 @@ class LineWatch:
         if found & HIDES:
             self._watch.tell_hidden(t, self._model, state, event)
         if found & NEARS:
-            told[TOLD] = 0.0 if found & MEETS else told[TOLD]
+            told.told = 0.0 if found & MEETS else told.told
         elif found & MEETS:
             self._watch.tell(t, dt, event)
         return found & (NEARS | PARTS)

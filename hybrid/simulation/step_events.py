@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, TOLD
+from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
 from hybrid.kernels.state import books as b
 from hybrid.kernels.step.accept import MANY
 from hybrid.simulation.collapse import COLLAPSE, ERROR, GAIN, GIVE_UP, NEWTON, TOUCHES_ITSELF, TURN, collapse_text
@@ -94,7 +94,7 @@ def look_at_itself(moving: Transient, flags: int) -> None:
     if found & NEARS:
         moving.nears_itself = comes_near(moving)  # contact begins after the outputs of this step
         if found & MEETS:
-            watch.itself.found[TOLD] = 0.0
+            watch.itself.found.told = 0.0
     elif found & MEETS and moving.envelope is not None:
         watch.tell(moving.t, float(moving.run.clock.last_dt), moving.events.event)
 

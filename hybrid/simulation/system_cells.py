@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.mesh.zone_step import SHARE
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
@@ -25,7 +24,7 @@ Rest = tuple[SystemModel, SystemEquilibrium]
 
 def following(model: SystemModel, managers: Mapping[int, DomainManager]) -> dict[int, DomainManager]:
     """Those of lines whose cells follow the curvature from the start on; at a winch they begin to with the motion."""
-    share = {k: x.zones.clock[SHARE] for k, x in managers.items()}
+    share = {k: x.zones.clock.share for k, x in managers.items()}
     return {k: x for k, x in managers.items() if share[k] > 0.0 and model.models[k].payout is None}
 
 

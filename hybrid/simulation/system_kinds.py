@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hybrid.adapt.manager import Change
-from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.state.books import Clock, Counts
 from hybrid.model.build import Model
 from hybrid.simulation.kind_changes import LineKinds, carries_all, copy_into
@@ -31,7 +30,7 @@ class SystemKinds:
         alone &= all(line.contact is None for line in run.lines)
         if not (attached and alone):
             return False
-        return all(carries_all(x.model, x) and not x.zones.clock[z.SHARE] > 0.0 for x in switched)
+        return all(carries_all(x.model, x) and not x.zones.clock.share > 0.0 for x in switched)
 
     @property
     def fits(self) -> bool:

@@ -17,7 +17,6 @@ from hybrid.adapt.manager import Change, DomainManager
 from hybrid.adapt.user_criterion import UserCriterion, of_line
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.junctions.carried_frames import TURNS
-from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, follow_zones
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Counts
@@ -199,8 +198,8 @@ class _LineZones:
         self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager, followed=True)
         self.clock, self.counts = b.Clock(), Counts()
         longest, clock = LONGEST_IN_PACE * manager.pace * every, manager.zones.clock
-        clock[z.RAMP_STEP], clock[z.CALM_STEP] = longest, longest * READY
-        clock[z.LETTING_GO] = LETTING_GO * manager.pace
+        clock.ramp_step, clock.calm_step = longest, longest * READY
+        clock.letting_go = LETTING_GO * manager.pace
         self.pending: Change | None = None
         self.paid: PaidZones | None = None  # of a line that is paid out
 
@@ -303,14 +302,14 @@ class SystemZones:
     @property
     def follow_curvature(self) -> bool:
         """Whether cells of a line follow the curvature: its nodes come and go."""
-        return any(x.switching.zones.clock[z.SHARE] > 0.0 for x in self.lines)
+        return any(x.switching.zones.clock.share > 0.0 for x in self.lines)
 
     @property
     def longest(self) -> float:
         """Longest step (s) that what is ramped allows."""
         return min(
-            float(x.switching.zones.clock[z.RAMP_STEP if x.switching.manager.ramping else z.CALM_STEP])
-            for x in self.lines
+            float(x.ramp_step if ramps else x.calm_step)
+            for x, ramps in ((x.switching.zones.clock, x.switching.manager.ramping) for x in self.lines)
         )  # fmt: skip
 
     # --- checkpoints ------------------------------------------------------------------------------

@@ -14,7 +14,6 @@ from hybrid.adapt.zone_rules import blank_review_job, quiet_review
 from hybrid.errors import KINK_COUNTS, Outcome
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.torque_transfer import carry_torque
-from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.zone_step import (
     LOOKAHEAD,
     REJECT_RATIO,
@@ -132,8 +131,8 @@ class ZoneSwitching:
         """Let a run follow the zones of its line from now on; every: outputs of the result to one of this run."""
         manager, longest = self.manager, LONGEST_IN_PACE * self.manager.pace * every
         clock = self.zones.clock
-        clock[z.RAMP_STEP], clock[z.CALM_STEP] = longest, longest * READY
-        clock[z.LETTING_GO] = LETTING_GO * manager.pace
+        clock.ramp_step, clock.calm_step = longest, longest * READY
+        clock.letting_go = LETTING_GO * manager.pace
         self.limit_steps(run)
         line, sea, ends = self.model.line, self.model.sea.values, self.model.ends.values
         contact = run.contact
@@ -155,7 +154,8 @@ class ZoneSwitching:
 
     def limit_steps(self, run: CompiledRun) -> None:
         """Steps are as long as what is ramped allows."""
-        run.clock.allowed = self.zones.clock[z.RAMP_STEP if self.manager.ramping else z.CALM_STEP]
+        clock = self.zones.clock
+        run.clock.allowed = clock.ramp_step if self.manager.ramping else clock.calm_step
 
     def torque(self) -> float:
         """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
@@ -164,14 +164,14 @@ class ZoneSwitching:
     def checkpoint(self) -> dict[str, Any]:
         """What is under way: bending, lengths, and what the manager remembers."""
         line, zones = self.model.line, self.zones
-        relaxing = {name: getattr(zones, name) for name in RELAXING} if zones.counts[z.RELAXING] else None
+        relaxing = {name: getattr(zones, name) for name in RELAXING} if zones.counts.relaxing else None
         following = None
-        if zones.clock[z.SHARE] > 0.0:
+        if zones.clock.share > 0.0:
             following = {"true": zones.true, "calm": zones.calm, "waves": zones.waves}
         return {
             "following": following,
             "manager": self.manager.checkpoint(), "h": line.h, "kb": line.kb, "force": line.force,
-            "strain": zones.strain[1] if zones.counts[z.STRAINED] else NO_STRAIN,
+            "strain": zones.strain[1] if zones.counts.strained else NO_STRAIN,
             "relaxing": relaxing,
         }  # fmt: skip
 
@@ -189,7 +189,7 @@ class ZoneSwitching:
             template = {"lack": cells, "rate": cells, "since": cells - np.inf, "keeps": cells > 0.0}
             for name, x in matched(relaxing, template, "relaxing").items():
                 getattr(zones, name)[:] = x
-            zones.counts[z.RELAXING] = 1
+            zones.counts.relaxing = 1
         if (following := saved["following"]) is not None:
             needs = {"true": zones.true, "calm": zones.calm, "waves": zones.waves}
             found = matched(following, needs, "following")
@@ -200,18 +200,18 @@ class ZoneSwitching:
         line.h[:], line.kb[:], line.force[:] = saved["h"], saved["kb"], saved["force"]
         zones.lengths[:] = line.h
         if strain.size:
-            zones.strain[1], zones.counts[z.STRAINED] = strain, 1
+            zones.strain[1], zones.counts.strained = strain, 1
 
     def begin(self, ends: Ends, state: State) -> None:
         """Weigh the criteria of the first state."""
         self.manager.reset()
         self.evaluate_criteria(0.0, 0.0, ends, state)
         zones = self.zones
-        if zones.clock[z.SHARE] > 0.0:  # chords become as long as arcs within a pace
+        if zones.clock.share > 0.0:  # chords become as long as arcs within a pace
             self._plan_table.bind(line=self.model.line, ends=ends, new=state, zones=zones)
             take_arcs(self._plan_table.numbers)
             zones.lack[:], zones.since[:] = zones.true - self.model.line.h, 0.0
-            zones.counts[z.RELAXING] = 1
+            zones.counts.relaxing = 1
 
     def prepare_step(self) -> None:
         """Before a step: lengths and bending as they will be after it; of zones not compiled."""
@@ -262,7 +262,7 @@ class ZoneSwitching:
         manager = self.manager
         self._follow()
         change = manager.review(t, state) if manager.review_due(t) else None
-        if change is None and self.zones.counts[z.CELLS_DUE]:
+        if change is None and self.zones.counts.cells_due:
             change = manager.same_zones()
         return change
 
@@ -283,7 +283,7 @@ class ZoneSwitching:
         changed.sea.at(t)  # obstacles stand where they are now
         target, numbers = changed.line, np.zeros(NUMBERS)
         transfer = self._transfer(old, new, line, target, ends, state)
-        numbers[TIME], numbers[RELAXES] = t, before.counts[z.RELAXING]
+        numbers[TIME], numbers[RELAXES] = t, before.counts.relaxing
         self._switch_table.bind(
             transfer=transfer, ends=ends, sea=sea, target_sea=changed.sea.values, zones=before, target_zones=before,
             numbers=numbers, guided=self.guided,
@@ -294,7 +294,7 @@ class ZoneSwitching:
         manager.adopt_layout(new, change, t)
         self._switch_table.bind(target_zones=self.zones)
         end_switch(self._switch_table.numbers)
-        self.zones.counts[z.RELAXING] = 1
+        self.zones.counts.relaxing = 1
         self.model = changed
         return changed, transfer.out, float(numbers[AFTER] - numbers[BEFORE])
 
@@ -316,7 +316,7 @@ class ZoneSwitching:
     def plan(self, rod: np.ndarray, sea: Sea, ends: Ends, state: State) -> np.ndarray | None:
         """Places of the finest mesh where nodes should be; None: cells do not follow the curvature."""
         zones = self.zones
-        if not zones.clock[z.SHARE] > 0.0:
+        if not zones.clock.share > 0.0:
             return None
         zones.next_rod[:] = rod
         self._plan_table.bind(line=self.model.line, sea=sea, ends=ends, new=state, zones=zones)
@@ -334,5 +334,5 @@ class ZoneSwitching:
     def _transfer(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Transfer:
         """What carries the state to the new nodes."""
         none = np.zeros(new.rod.size)
-        shifts = not self.zones.clock[z.SHARE] > 0.0
+        shifts = not self.zones.clock.share > 0.0
         return transfer_to(old, new, line, target, state, self.kinks, none, self.clamps(ends), shifts)

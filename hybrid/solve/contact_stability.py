@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_contact_law import ACROSS, ALONG, FOLLOWS, FORCE, NORMAL, RATES, SLOPE, WX, WY, P, Q
-from hybrid.kernels.contact.self_contact_pairs import OVERFLOW, POINTS, Contact
+from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.state.state import Floats
 from hybrid.solve.joined import SystemState
 from hybrid.solve.settling import gyration
@@ -31,7 +31,7 @@ def contact_stiffness(contact: Contact) -> tuple[NDArray[np.int64], Floats]:
 
     energies by the places of these nodes (n, 18, 18), N/m: kernels.contact.self_contact_law.
     """
-    rows = contact.points[: contact.counts[POINTS]]
+    rows = contact.points[: contact.counts.points]
     n, slope = rows[:, NORMAL : NORMAL + 3], rows[:, SLOPE : SLOPE + 3]
     weights = np.concatenate([rows[:, WX : WX + 3], -rows[:, WY : WY + 3]], axis=1)
     rates = np.concatenate([np.zeros((len(rows), 3)), rows[:, RATES : RATES + 3]], axis=1)
@@ -147,7 +147,7 @@ class ContactStability:
 
         rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
         for contact, lines in self._solver.contacts_at(states, finer):
-            if contact.counts[OVERFLOW]:
+            if contact.counts.overflow:
                 return None
             nodes, H = contact_stiffness(contact)
             nodes = np.concatenate([self._nodes[k] for k in lines])[nodes]

@@ -12,30 +12,6 @@ from hybrid.kernels.contact.self_contact_energy import observe_coupled
 from hybrid.kernels.contact.self_contact_friction import AT, GRIP, HELD, PIECE
 from hybrid.kernels.contact.self_contact_law import DISTANCE, FIRST, FORCE, LAST, NORMAL, WX, WY, P, Q
 from hybrid.kernels.contact.self_contact_pairs import (
-    BALANCE,
-    BEGUN,
-    FADED,
-    FRESH,
-    FRICTION,
-    GAINED,
-    GRIPS,
-    HAD,
-    HAS,
-    HORIZON,
-    KEEPS,
-    LARGEST,
-    LED,
-    NARROWEST,
-    POINTS,
-    QUIET,
-    REMESHED,
-    ROLLS,
-    SINCE,
-    SPEED,
-    STORED,
-    TRIED,
-    TRIED_BALANCE,
-    WIDEST,
     Contact,
     blank_contact,
 )
@@ -113,19 +89,20 @@ def contact_of_strands(strands: Sequence[Strand], friction: float) -> Contact:
     contact.kind[beside], contact.kind[beside + 1] = LAST, FIRST
     contact.tips[:, 0], contact.tips[:, 1] = np.append(0, beside + 1), np.append(beside, of.size - 1)
     numbers = contact.numbers
-    numbers[WIDEST], numbers[NARROWEST], numbers[FRICTION] = contact.width.max(), contact.width.min(), friction
-    numbers[ROLLS] = contact.rolls.max()
+    numbers.widest, numbers.narrowest, numbers.friction = contact.width.max(), contact.width.min(), friction
+    numbers.rolls = contact.rolls.max()
     if any(x.couples for x in strands):
         one = blank_line(1), no_ends(), blank_state(1), blank_contact(1)
         contact.observer[0] = observe_coupled.address(*one, 0, 0)
-    numbers[[SINCE, FADED, BEGUN, LED]], numbers[QUIET] = np.nan, np.inf
+    numbers.since = numbers.faded = numbers.begun = numbers.led = np.nan
+    numbers.quiet = np.inf
     return contact
 
 
 def forces_on_nodes(contact: Contact) -> Floats:
     """Forces (N+1, 3) N of contact, as it was looked at last, on the nodes."""
     out, rubs = np.zeros_like(contact.at), bool(contact.holds.size)
-    for k, row in enumerate(contact.points[: contact.counts[POINTS]]):
+    for k, row in enumerate(contact.points[: contact.counts.points]):
         f = -row[FORCE] * row[NORMAL : NORMAL + 3]
         f = f + contact.holds[k, HELD : HELD + 3] if rubs else f
         p, q = int(row[P]), int(row[Q])
@@ -144,22 +121,22 @@ class ContactBooks:
 
     def forget(self) -> None:
         """What is computed next is no step: no speed with which strands meet, and no pairs kept of a step."""
-        self.contact.numbers[SPEED], self.contact.numbers[KEEPS], self.call[NEAR] = 0.0, -1.0, 0
+        self.contact.numbers.speed, self.contact.numbers.keeps, self.call[NEAR] = 0.0, -1.0, 0
 
     @property
     def touches(self) -> bool:
         """Whether anything touches in the state that was looked at last."""
-        return bool(self.contact.counts[POINTS])
+        return bool(self.contact.counts.points)
 
     @property
     def narrowest(self) -> float:
         """The least diameter, m."""
-        return float(self.contact.numbers[NARROWEST])
+        return float(self.contact.numbers.narrowest)
 
     @property
     def least_distance(self) -> float:
         """The least distance, m, of the points of contact looked at last."""
-        points = self.contact.points[: self.contact.counts[POINTS]]
+        points = self.contact.points[: self.contact.counts.points]
         return float(points[:, DISTANCE].min())
 
     def changing(self) -> tuple[np.ndarray, ...]:
@@ -170,12 +147,12 @@ class ContactBooks:
     def checkpoint(self, t: float) -> dict[str, Any]:
         """What the steps after the time t, s, depend on."""
         contact, numbers, counts = self.contact, self.contact.numbers, self.contact.counts
-        latest = numbers[SINCE] == t
-        grips = contact.fresh[: counts[FRESH]] if latest else contact.grips[: counts[GRIPS]]
-        stored = float(numbers[TRIED] if latest else numbers[STORED])
+        latest = numbers.since == t
+        grips = contact.fresh[: counts.fresh] if latest else contact.grips[: counts.grips]
+        stored = float(numbers.tried if latest else numbers.stored)
         return {
-            "speed": float(numbers[SPEED]), "faded": float(numbers[FADED]), "quiet": float(numbers[QUIET]),
-            "stored": stored, "grips": grips.copy(), "remeshed": bool(counts[REMESHED]) and not latest,
+            "speed": float(numbers.speed), "faded": float(numbers.faded), "quiet": float(numbers.quiet),
+            "stored": stored, "grips": grips.copy(), "remeshed": bool(counts.remeshed) and not latest,
             "touch": self._touch[0].copy(), "samples": contact.samples.copy(), "mass": contact.mass.copy(),
             "energy": self._energy_at(t),
         }  # fmt: skip
@@ -183,32 +160,32 @@ class ContactBooks:
     def _energy_at(self, t: float) -> list[float]:
         """Of the energy at the time t, s: that of the line (nan: unknown), balance, the largest; and tries given up."""
         numbers = self.contact.numbers
-        led, begun = numbers[LED] == t, numbers[BEGUN] == t
-        has = numbers[HAS] if led else numbers[HAD] if begun else np.nan
-        balance = numbers[TRIED_BALANCE] if led else numbers[BALANCE]
-        return [float(has), float(balance), float(numbers[LARGEST]), float(numbers[GAINED])]
+        led, begun = numbers.led == t, numbers.begun == t
+        has = numbers.has if led else numbers.had if begun else np.nan
+        balance = numbers.tried_balance if led else numbers.balance
+        return [float(has), float(balance), float(numbers.largest), float(numbers.gained)]
 
     def _restore_energy(self, saved: list[float], t: float) -> None:
         """Go on from `_energy_at`; t: s, nan: the energy of the line is another one on other cells."""
         numbers = self.contact.numbers
-        numbers[HAS], numbers[BALANCE], numbers[LARGEST], numbers[GAINED] = saved
-        numbers[TRIED_BALANCE], numbers[BEGUN] = numbers[BALANCE], np.nan
-        numbers[LED] = t if np.isfinite(saved[0]) else np.nan
+        numbers.has, numbers.balance, numbers.largest, numbers.gained = saved
+        numbers.tried_balance, numbers.begun = numbers.balance, np.nan
+        numbers.led = t if np.isfinite(saved[0]) else np.nan
 
     @property
     def given_up(self) -> int:
         """Tries of steps that were given up because contact put energy in."""
-        return int(self.contact.numbers[GAINED])
+        return int(self.contact.numbers.gained)
 
     def restore(self, saved: Mapping[str, Any], t: float = np.nan, remeshed: bool = False) -> None:
         """Go on from `checkpoint` at t, s; remeshed: of a line that had other cells.  ValueError: no grips."""
         grips, numbers, counts = saved["grips"], self.contact.numbers, self.contact.counts
         if grips.ndim != 2 or grips.shape[1] != GRIP or not np.isfinite(grips).all():
             raise ValueError(f"self_contact/grips: expected rows of {GRIP} finite numbers")
-        numbers[SPEED], numbers[STORED], numbers[SINCE] = saved["speed"], saved["stored"], np.nan
-        numbers[FADED], numbers[QUIET] = saved.get("faded", np.nan), saved.get("quiet", np.inf)
+        numbers.speed, numbers.stored, numbers.since = saved["speed"], saved["stored"], np.nan
+        numbers.faded, numbers.quiet = saved.get("faded", np.nan), saved.get("quiet", np.inf)
         self._restore_energy(saved.get("energy", [np.nan, 0.0, 0.0, 0.0]), np.nan if remeshed else t)
-        counts[GRIPS], counts[REMESHED] = 0, remeshed or saved.get("remeshed", False)
+        counts.grips, counts.remeshed = 0, remeshed or saved.get("remeshed", False)
         touch = saved.get("touch", np.zeros(0))
         if not remeshed and touch.shape == self._touch[0].shape:
             self._touch[0] = touch
@@ -216,7 +193,7 @@ class ContactBooks:
         if self.contact.grips.size:
             grips = grips[: len(self.contact.grips)].copy()
             grips[:, PIECE] = np.clip(np.searchsorted(self._middles, grips[:, AT]), 1, self._middles.size - 1)
-            self.contact.grips[: len(grips)], counts[GRIPS] = grips, len(grips)
+            self.contact.grips[: len(grips)], counts.grips = grips, len(grips)
 
 
 class SelfContact(ContactBooks):
@@ -246,7 +223,7 @@ class SelfContact(ContactBooks):
         """
         self._work.u[:] = 0.0
         force, energy = self.force(state), self.energy()
-        self.contact.numbers[STORED] = self.contact.numbers[TRIED]
+        self.contact.numbers.stored = self.contact.numbers.tried
         report[SELF_CONTACT_ENERGY] = energy
         for k in np.flatnonzero(ends.held):  # 0 or 1: the first or the last node
             for at in (FORCE_A + 3 * k, NET_A + 3 * k):
@@ -256,7 +233,7 @@ class SelfContact(ContactBooks):
     @property
     def deepest(self) -> tuple[int, int]:
         """The nodes beside the nearest point of contact of those looked at last."""
-        points = self.contact.points[: self.contact.counts[POINTS]]
+        points = self.contact.points[: self.contact.counts.points]
         row = points[np.argmin(points[:, DISTANCE])]
         return int(row[P]), int(row[Q])
 
@@ -274,7 +251,7 @@ class SelfContact(ContactBooks):
 
         Returns where (N+1,): above 1, nearer than two diameters.
         """
-        self.contact.numbers[HORIZON] = horizon
+        self.contact.numbers.horizon = horizon
         return self.contact.near
 
     def follow(self, old: State, new: State) -> None:

@@ -12,15 +12,8 @@ from hybrid.kernels.contact.self_contact import blank_contact_job
 from hybrid.kernels.contact.self_contact_friction import AT, FOOT
 from hybrid.kernels.contact.self_contact_law import DISTANCE, P, Q
 from hybrid.kernels.contact.self_contact_pairs import (
-    ENERGY,
-    HORIZON,
-    NARROWEST,
-    POINTS,
     SHARES,
     SLIP_WITHIN,
-    STORED,
-    TRIED,
-    WIDEST,
     WINDOW,
 )
 from hybrid.kernels.junctions.shared_contact import MEETING, MET, MET_OTHER, MET_S, blank_shared_job, shared_task
@@ -90,7 +83,7 @@ class SharedContact(ContactBooks):
         for name in ("width", "stiff"):
             getattr(self.contact, name)[:] = np.concatenate([getattr(x, name) for x in of])
         width = self.contact.width
-        self.contact.numbers[WIDEST], self.contact.numbers[NARROWEST] = width.max(), width.min()
+        self.contact.numbers.widest, self.contact.numbers.narrowest = width.max(), width.min()
         self._own = [x.line.s.copy() for x in strands]
         self._line.s[:] = self._places(self.starts)
         self._line.h[:] = np.diff(self._line.s)
@@ -119,7 +112,7 @@ class SharedContact(ContactBooks):
 
         Returns where (N+1,), by number of a line: above 1, nearer than two diameters.
         """
-        self.contact.numbers[HORIZON] = horizon
+        self.contact.numbers.horizon = horizon
         return {k: self.contact.near[nodes] for k, nodes in self.slices().items()}
 
     # --- of states at rest ---------------------------------------------------------------------------
@@ -134,7 +127,7 @@ class SharedContact(ContactBooks):
         self.call[ASKED] = REST
         shared_task(self._jobs[0].numbers)
         numbers = self.contact.numbers
-        return float(numbers[ENERGY] + (numbers[TRIED] if self.contact.holds.size else 0.0))
+        return float(numbers.energy + (numbers.tried if self.contact.holds.size else 0.0))
 
     def forces(self) -> dict[int, Floats]:
         """By number of a line: forces (N+1, 3) N of contact, as it was looked at last, on its nodes."""
@@ -145,7 +138,7 @@ class SharedContact(ContactBooks):
         """As SelfContact.settle, of all lines that may touch: reports get what contact has and does to held ends."""
         self.rest_energy(works)
         numbers, shares = self.contact.numbers, self.contact.shares
-        numbers[STORED] = numbers[TRIED]
+        numbers.stored = numbers.tried
         for j, (k, force) in enumerate(self.forces().items()):
             report = works[k].report
             report[SELF_CONTACT_ENERGY] = float(shares[j, :SLIP_WITHIN].sum())
@@ -156,13 +149,13 @@ class SharedContact(ContactBooks):
     @property
     def deepest_pair(self) -> tuple[int, int, int, int, float]:
         """Numbers of the lines and nodes beside the nearest point of contact of those looked at last, distance (m)."""
-        points = self.contact.points[: self.contact.counts[POINTS]]
+        points = self.contact.points[: self.contact.counts.points]
         row = points[np.argmin(points[:, DISTANCE])]
         return *self.place(int(row[P])), *self.place(int(row[Q])), float(row[DISTANCE])
 
     def points_between(self) -> list[tuple[tuple[int, int], tuple[int, int]]]:
         """Of the points of contact looked at last: number of the line and node beside it, on both sides."""
-        points = self.contact.points[: self.contact.counts[POINTS]]
+        points = self.contact.points[: self.contact.counts.points]
         return [(self.place(int(row[P])), self.place(int(row[Q]))) for row in points]
 
     def met(self) -> list[tuple[int, int, float, float, float]]:

@@ -27,7 +27,7 @@ from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions.joined_sheaves import blank_spinning_job, spin_sheaves
 from hybrid.kernels.junctions.junctions import HANDED
 from hybrid.kernels.junctions.system_contact import blank_touching_job, room_for_products, touch_system
-from hybrid.kernels.junctions.system_job import ASKED, blank_system_job
+from hybrid.kernels.junctions.system_job import SystemTask, blank_system_job
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
@@ -150,7 +150,7 @@ class SystemSolver:
             self._joined_tables = {
                 k: tuple(blank.again(x[j]) for x in self._joined_numbers) for j, k in enumerate(self.joined)
             }
-        self._asked = np.zeros(ASKED)
+        self._asked = SystemTask()
         self._jobs = Table(blank_system_job), Table(blank_system_job)
         self._solver = in_space.address(self._numbers[0, 0])
         mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())

@@ -16,7 +16,6 @@ from hybrid.adapt.manager import Allowed, Change, DomainManager, Times
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.machine import binding
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, take_arcs
 from hybrid.kernels.state.state import no_sea
@@ -66,7 +65,7 @@ def test_where_tension_is_lost_is_read_on_the_cells_of_now() -> None:
     managers = [DomainManager(what, x, np.zeros(8, int), 1e12, Allowed(1e-2, 0.03), Times(1.0)) for x in (before, now)]
     manager, other = managers
     manager.take(before, other.zones)  # as a change of cells leaves it
-    manager.zones.counts[z.KNOWN], manager.zones.past[:], manager.age = 1, 100.0, 1.0
+    manager.zones.counts.known, manager.zones.past[:], manager.age = 1, 100.0, 1.0
     state = state_on(on(what, now), hanging(0.5, 3.0)[0], lambda s: np.where(abs(s - 4.4) < 0.6, 1.0, 90.0))
     assert manager._losing_tension(state).tolist() == [x == 3 for x in range(8)]
 

@@ -14,7 +14,6 @@ from hybrid.adapt.manager import Allowed, DomainManager, Times
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.mesh import cell_errors as e
-from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.wave_lengths import TAU, WAVES, know_new_nodes
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, read, watch_waves
 from hybrid.kernels.state.state import no_sea
@@ -29,7 +28,7 @@ SHARE = 0.05
 def watch(table):
     """A step of the clock's DT has led to the state `new`."""
     job = read(table)
-    watch_waves(job.line, job.new, job.zones, job.zones.clock[z.DT])
+    watch_waves(job.line, job.new, job.zones, job.zones.clock.dt)
 
 
 @kernel
@@ -59,7 +58,7 @@ def watched(velocity, fineness=1.0, tolerance=1e-3):
 
 def after(manager, table, time, steps=1):
     """Squares of the lengths that waves allow, m^2, after so long."""
-    manager.zones.clock[z.DT] = time / steps
+    manager.zones.clock.dt = time / steps
     for _ in range(steps):
         watch(table.numbers)
     return manager.zones.waves.copy()

@@ -18,7 +18,6 @@ from hybrid.kernels.contact.self_contact_friction import (
     link_grips,
 )
 from hybrid.kernels.contact.self_contact_law import FORCE, NORMAL, SPRING
-from hybrid.kernels.contact.self_contact_pairs import FRESH, FRICTION, GRIPS, POINTS, SLIP_WORK, TRIED
 from hybrid.kernels.machine.compile import kernel
 
 MU = 0.3
@@ -31,21 +30,21 @@ def hold(line, contact):
 
 @kernel
 def held(line, contact, out):
-    for k in range(contact.counts[POINTS]):
+    for k in range(contact.counts.points):
         add_held(contact, k, out)
 
 
 @kernel
 def held_product(line, contact, x, out):
-    for k in range(contact.counts[POINTS]):
+    for k in range(contact.counts.points):
         add_held_product(contact, k, x, out)
 
 
 @kernel
 def keep(line, contact):
-    count = contact.counts[POINTS]
+    count = contact.counts.points
     keep_grips(line, contact, count)
-    contact.counts[FRESH], contact.counts[GRIPS] = count, count
+    contact.counts.fresh, contact.counts.grips = count, count
     for k in range(count):
         for j in range(contact.grips.shape[1]):
             contact.grips[k, j] = contact.fresh[k, j]
@@ -169,9 +168,9 @@ def test_nothing_is_gained_and_nothing_creeps(name: str) -> None:
         tangle.rows[:, FORCE] = across * random.uniform(0.2, 3.0, across.size)
         tangle.move(shifts(tangle, 10.0 ** random.uniform(-5.0, -2.0), seed=step))
         numbers = tangle.parts.numbers
-        gained = numbers[SLIP_WORK] + numbers[TRIED] - stored
-        assert gained <= 1e-12 * (abs(numbers[SLIP_WORK]) + stored)
-        stored, lost = numbers[TRIED], lost - gained
+        gained = numbers.slip_work + numbers.tried - stored
+        assert gained <= 1e-12 * (abs(numbers.slip_work) + stored)
+        stored, lost = numbers.tried, lost - gained
         keep(tangle.line, tangle.parts)
     assert lost > 0.0 and stored > 0.0
     tangle.rows[:, FORCE] = 10.0 * across  # sticks
@@ -180,4 +179,4 @@ def test_nothing_is_gained_and_nothing_creeps(name: str) -> None:
         tangle.move(np.zeros((len(tangle.r), 4)))
         keep(tangle.line, tangle.parts)
     np.testing.assert_allclose(tangle.holds[:, TRAVEL : TRAVEL + 2], travel, rtol=1e-12)
-    assert tangle.parts.numbers[FRICTION] == MU
+    assert tangle.parts.numbers.friction == MU

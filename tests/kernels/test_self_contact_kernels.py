@@ -7,7 +7,6 @@ import pytest
 
 from hybrid.kernels.contact import self_contact as k
 from hybrid.kernels.contact.self_contact_law import INNER, OUTER, add_gradient, add_product
-from hybrid.kernels.contact.self_contact_pairs import POINTS, SPEED
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.run.entry import workspace
 from hybrid.kernels.state.books import blank_books
@@ -65,7 +64,7 @@ class Tangle:
 
     @property
     def count(self) -> int:
-        return int(self.contact.contact.counts[POINTS])
+        return int(self.contact.contact.counts.points)
 
     def gradient(self, u: np.ndarray) -> np.ndarray:
         self.energy(u)
@@ -86,7 +85,7 @@ class Tangle:
         self.clock.try_end, self.work.u[:] = 1.0, 0.0
         self.contact.call[ASKED] = PREPARE
         k.contact_task(self.table)
-        return float(self.contact.contact.numbers[SPEED])
+        return float(self.contact.contact.numbers.speed)
 
 
 def crossing(gap: float, angle: float = 70.0, seed: int = 0) -> np.ndarray:

@@ -74,7 +74,7 @@ def test_least_distance_is_that_of_all_pairs(seed: int) -> None:
     _, found = look(r, r, width=0.6)  # within whose horizon all of the curve is
     expected = least_of_all(r)
     assert np.isfinite(expected)
-    assert expected - 0.02 < found[k.DISTANCE] <= expected + 1e-12  # points of the brute force are 5 mm apart
+    assert expected - 0.02 < found.distance <= expected + 1e-12  # points of the brute force are 5 mm apart
 
 
 def test_no_gentle_bend_counts() -> None:
@@ -82,7 +82,7 @@ def test_no_gentle_bend_counts() -> None:
     arch = np.column_stack([x, np.zeros_like(x), 1.2 * x**2])  # steep: it turns by 134 deg
     for r in (arch, arch[::-1], 1e-2 * arch):
         meets, found = look(r, r)
-        assert not meets and found[k.DISTANCE] == np.inf
+        assert not meets and found.distance == np.inf
 
 
 def test_legs_that_pass_within_a_step_are_found() -> None:
@@ -93,12 +93,12 @@ def test_legs_that_pass_within_a_step_are_found() -> None:
     after = before.copy()
     after[101:, 2] = -2.5
     after[101:, 1] = before[101:, 1] = np.linspace(-2.0, 2.0, 101)
-    assert look(before, before)[1][k.DISTANCE] == np.inf
-    assert look(after, after)[1][k.DISTANCE] == np.inf
+    assert look(before, before)[1].distance == np.inf
+    assert look(after, after)[1].distance == np.inf
     meets, found = look(before, after)
-    assert meets and found[k.DISTANCE] < 1e-9
-    assert found[k.S] == pytest.approx(5.0, abs=1e-9)
-    assert found[k.LEAST] == pytest.approx(-WIDTH, abs=1e-9)
+    assert meets and found.distance < 1e-9
+    assert found.s == pytest.approx(5.0, abs=1e-9)
+    assert found.least == pytest.approx(-WIDTH, abs=1e-9)
 
 
 def test_ends_held_at_one_place_are_no_contact() -> None:
@@ -109,14 +109,14 @@ def test_ends_held_at_one_place_are_no_contact() -> None:
 
 
 def test_what_was_told_is_told_again_only_after_it_has_come_apart() -> None:
-    found = np.zeros(k.FOUND)
-    found[k.LEAST] = np.inf
+    found = k.Nearest()
+    found.least = np.inf
     told = []
     for distance in (0.2, 0.04, 0.03, 0.06, 0.01, 0.08, 0.04):
-        found[k.DISTANCE], found[k.CLEARANCE] = distance, distance - WIDTH
+        found.distance, found.clearance = distance, distance - WIDTH
         told.append(bool(k.note_found.py_func(found, 1.0)))
     assert told == [False, True, False, False, False, False, True]
-    assert found[k.LEAST_DISTANCE] == 0.01
+    assert found.least_distance == 0.01
 
 
 # --- whether contact has to begin, or may end -----------------------------------------------------------------
@@ -131,7 +131,7 @@ class Asked:
         line.h[:] = np.linalg.norm(np.diff(after, axis=0), axis=1)
         line.s[:] = np.append(0.0, np.cumsum(line.h))
         self.itself, self._table = k.blank_itself(np.full(n, WIDTH)), Table(k.blank_itself_job())
-        self.itself.ahead[k.ASKED] = what
+        self.itself.ahead.asked = what
         self._bound = {
             "line": line, "ends": no_ends(), "clock": Clock(), "counts": Counts(),
             "itself": self.itself,
@@ -164,7 +164,7 @@ def test_a_look_ahead_from_velocities_is_that_of_a_step() -> None:
     shape = two_legs(1.6)
     asked, state = Asked(shape), state_at(shape)
     state.v[101:, 2] = -0.9
-    asked.itself.ahead[k.SECONDS] = 1.0
+    asked.itself.ahead.seconds = 1.0
     asked._table.bind(old=state, new=state_at(shape), **asked._bound)
     assert int(k.watch_itself(asked._table.numbers)) == k.NEARS
 
@@ -182,7 +182,7 @@ def fold(angle: float) -> np.ndarray:
 def test_a_fold_without_a_shape_hides_what_is_beside_it_and_is_told_once() -> None:
     asked, r = Asked(fold(0.2)), fold(0.2)
     assert [asked.step(r, r) for _ in range(3)] == [k.HIDES, 0, 0]
-    assert int(asked.itself.ahead[k.SHARP]) == 40
+    assert int(asked.itself.ahead.sharp) == 40
     apart = two_legs(5.0)[: len(r)]
     assert [asked.step(apart, apart) for _ in range(k.ENDS)] == [0] * k.ENDS
     assert asked.step(r, r) == k.HIDES
@@ -208,7 +208,7 @@ def test_contact_ends_after_so_many_steps_apart() -> None:
 def test_contact_that_was_given_up_begins_when_surfaces_have_come_apart() -> None:
     near = two_legs(0.07, 0.0)
     asked = Asked(near)
-    asked.itself.found[k.WAITS] = 1.0
+    asked.itself.found.waits = 1.0
     assert asked.step(near, near) == 0
     apart = two_legs(0.09, 0.0)  # by 0.8 diameters, and near
     assert asked.step(apart, apart) == k.NEARS

@@ -12,7 +12,6 @@ from test_self_contact_default import WIDTH, led_through
 import hybrid
 from hybrid.kernels.contact.self_contact_friction import AT, NEAREST, TRAVEL
 from hybrid.kernels.contact.self_contact_law import WX, P
-from hybrid.kernels.contact.self_contact_pairs import GRIPS, POINTS
 from hybrid.kernels.state.state import Line
 from hybrid.solve.self_contact import SelfContact
 
@@ -41,9 +40,9 @@ def travels(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
         contact.s = line.s
 
     def noting(contact: SelfContact, *args: object) -> float:
-        kept = contact.contact.grips[: int(contact.contact.counts[GRIPS]), AT].copy()
+        kept = contact.contact.grips[: int(contact.contact.counts.grips), AT].copy()
         energy = settle(contact, *args)
-        points = int(contact.contact.counts[POINTS])
+        points = int(contact.contact.counts.points)
         rows, lost = contact.contact.points[:points], 0
         for row, hold in zip(rows, contact.contact.holds[:points], strict=True):
             at = row[WX : WX + 3] @ contact.s[int(row[P]) - 1 : int(row[P]) + 2]

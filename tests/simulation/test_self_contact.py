@@ -11,8 +11,6 @@ from bits import Stopping, differences, went_on
 from random_scenes import random_scene
 
 import hybrid
-from hybrid.kernels.contact.self_contact_pairs import ENERGY, POINTS, SPEED
-from hybrid.kernels.contact.self_distance import LEAST_DISTANCE
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.books import FRICTION
 from hybrid.kernels.step.newton import NEAR
@@ -60,7 +58,7 @@ def energy(run: Transient) -> float:
     room = np.zeros((x.T.size + 1, 3))
     observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
     contact = run.run.contact
-    return float(parts.sum()) + (float(contact.contact.numbers[ENERGY]) if contact else 0.0)
+    return float(parts.sum()) + (float(contact.contact.numbers.energy) if contact else 0.0)
 
 
 @pytest.mark.long
@@ -90,7 +88,7 @@ def test_a_throw(seed: int, steps: float) -> None:
         touched |= run.run.contact.contact.counts[0] > 0
     assert touched
     assert most < 1.001 * first
-    assert run.envelope.itself.itself.found[LEAST_DISTANCE] > 0.5 * WIDTH
+    assert run.envelope.itself.itself.found.least_distance > 0.5 * WIDTH
     moved = (mass * run.state.v).sum(axis=0) - momentum
     assert np.abs(moved).max() < 1e-13 * mass.sum() * speed
 
@@ -239,11 +237,11 @@ def test_what_is_at_rest_does_not_depend_on_the_speed_of_the_collision() -> None
         simulation.advance(8.2)
         run = simulation._loop.run
         contact = run.run.contact.contact
-        assert contact.counts[POINTS] > 0
-        contact.numbers[SPEED] = max(speed, contact.numbers[SPEED])
+        assert contact.counts.points > 0
+        contact.numbers.speed = max(speed, contact.numbers.speed)
         simulation.advance(9.0)
         found.append((float(run.state.T[-1]), run.run.contact.least_distance))
-        assert contact.numbers[SPEED] < 1.0
+        assert contact.numbers.speed < 1.0
     (tension, distance), (other, apart) = found
     assert other == pytest.approx(tension, rel=2e-3)
     assert apart == pytest.approx(distance, rel=2e-3)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_contact_law import DISTANCE
-from hybrid.kernels.contact.self_contact_pairs import ENERGY, POINTS
 from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import depths_in_obstacles, stored_energy
 from hybrid.kernels.march.energies import Observed, observe
@@ -140,7 +139,7 @@ def energy(
     models: list[Any], states: SystemState, shared: SharedContact, lines: list[JoinedLine], bodies: Floats
 ) -> float:
     """Kinetic, elastic and contact energy, J, of lines and bodies."""
-    total = float(shared.contact.numbers[ENERGY])
+    total = float(shared.contact.numbers.energy)
     for model, x, joined in zip(models, states.lines, lines, strict=True):
         parts, room = np.zeros(5), np.zeros((x.T.size + 1, 3))
         observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
@@ -191,7 +190,7 @@ def nearest(before: SystemState, after: SystemState) -> float:
 def nearest_curves(shared: SharedContact) -> float:
     """The least distance, m, of the points of contact of the state that was looked at last; infinite: nothing touches."""
     contact = shared.contact
-    return float(contact.points[: contact.counts[POINTS], DISTANCE].min(initial=np.inf))
+    return float(contact.points[: contact.counts.points, DISTANCE].min(initial=np.inf))
 
 
 def polygons_apart(p: Floats, q: Floats) -> float:

@@ -24,33 +24,11 @@ from hybrid.kernels.contact.self_contact_friction import (
 from hybrid.kernels.contact.self_contact_law import FIRST, FORCE, LAST, WX, WY, P, Q, add_gradient
 from hybrid.kernels.contact.self_contact_pairs import (
     CALMS,
-    ENERGY,
-    FADED,
     FADES,
-    FRESH,
-    FRICTION,
-    GRIPS,
     HELD_BETWEEN,
     HELD_WITHIN,
-    HORIZON,
-    KEEPS,
-    LOOKS,
-    OVERFLOW,
-    PART,
-    POINTS,
-    PRODUCTS,
-    QUIET,
-    REMESHED,
     RETURNS,
-    SINCE,
     SLIP_WITHIN,
-    SLIP_WORK,
-    SPEED,
-    STALE,
-    STORED,
-    TRIED,
-    TRIES,
-    WIDEST,
     Contact,
     blank_contact,
     farthest_from_mean,
@@ -126,13 +104,13 @@ read = reader(blank_contact_job())
 def keep_last(contact, now):
     """What the last try has left of friction is kept if that was the step that led to the time now."""
     numbers, counts = contact.numbers, contact.counts
-    if numbers[SINCE] == now:
-        counts[GRIPS], numbers[STORED], counts[REMESHED] = counts[FRESH], numbers[TRIED], 0
-        for k in range(counts[FRESH]):
+    if numbers.since == now:
+        counts.grips, numbers.stored, counts.remeshed = counts.fresh, numbers.tried, 0
+        for k in range(counts.fresh):
             for j in range(GRIP):
                 contact.grips[k, j] = contact.fresh[k, j]
-    numbers[SINCE] = math.nan
-    link_grips(contact, counts[GRIPS])
+    numbers.since = math.nan
+    link_grips(contact, counts.grips)
 
 
 @inner
@@ -140,7 +118,7 @@ def radius(contact, clock, near):
     """Spectral radius at infinity of a step: 0 near contact, and from there back to that of the run."""
     if near:
         return 0.0
-    part = (contact.numbers[QUIET] - CALMS) / RETURNS
+    part = (contact.numbers.quiet - CALMS) / RETURNS
     return clock.rho * min(max(part, 0.0), 1.0)
 
 
@@ -163,16 +141,16 @@ def find_spins(line, contact, clock, near, old, new, u):
 def hold_points(line, contact):
     """Friction of all points of contact at contact.x."""
     numbers = contact.numbers
-    other = contact.counts[REMESHED] != 0
-    numbers[SLIP_WORK], numbers[TRIED] = 0.0, 0.0
+    other = contact.counts.remeshed != 0
+    numbers.slip_work, numbers.tried = 0.0, 0.0
     for l in range(contact.shares.shape[0]):
         for j in (HELD_BETWEEN, HELD_WITHIN, SLIP_WITHIN):
             contact.shares[l, j] = 0.0
-    for k in range(contact.counts[POINTS]):
+    for k in range(contact.counts.points):
         p, q = contact.of[int(contact.points[k, P])], contact.of[int(contact.points[k, Q])]
-        work, energy = hold_point(line, contact, k, contact.rubs[p, q], numbers[TRIES], other)
-        numbers[SLIP_WORK] += work
-        numbers[TRIED] += energy
+        work, energy = hold_point(line, contact, k, contact.rubs[p, q], numbers.tries, other)
+        numbers.slip_work += work
+        numbers.tried += energy
         contact.shares[p, HELD_WITHIN if p == q else HELD_BETWEEN] += 0.5 * energy
         contact.shares[q, HELD_WITHIN if p == q else HELD_BETWEEN] += 0.5 * energy
         if p == q:
@@ -197,7 +175,7 @@ def place(contact, old, u):
     for i in range(u.shape[0]):
         for k in range(3):
             contact.at[i, k] = old.r[i, k] + u[i, k]
-    contact.counts[STALE] = 1
+    contact.counts.stale = 1
 
 
 @inner
@@ -207,7 +185,7 @@ def prepare(line, ends, contact, old, u, now, dt):
     The size of the law follows the speed of what meets.  While anything touches it fades to what still moves: what is
     at rest must not depend on how fast it came there.  It does not grow then, which would put energy in.
     """
-    numbers, speed = contact.numbers, contact.numbers[SPEED]
+    numbers, speed = contact.numbers, contact.numbers.speed
     for i in range(u.shape[0]):
         for k in range(3):
             u[i, k] = 0.0
@@ -215,15 +193,15 @@ def prepare(line, ends, contact, old, u, now, dt):
     place(contact, old, u)
     keep_pairs(line, ends, contact)
     find_points(line, ends, contact, 0.0)
-    numbers[SPEED] = 0.0
+    numbers.speed = 0.0
     limit(line, ends, contact, 0.0)
-    near = numbers[SPEED] > 0.0 or contact.counts[POINTS] > 0
-    seen = numbers[SPEED] / dt
-    if contact.counts[POINTS] > 0:
-        since = now - numbers[FADED] if numbers[FADED] < now else 0.0
-        faded = speed / (1.0 + speed * since / (FADES * numbers[WIDEST]))
+    near = numbers.speed > 0.0 or contact.counts.points > 0
+    seen = numbers.speed / dt
+    if contact.counts.points > 0:
+        since = now - numbers.faded if numbers.faded < now else 0.0
+        faded = speed / (1.0 + speed * since / (FADES * numbers.widest))
         seen = min(speed, max(faded, seen))
-    numbers[SPEED], numbers[FADED] = seen, now
+    numbers.speed, numbers.faded = seen, now
     return near
 
 
@@ -234,9 +212,9 @@ def charge(line, contact, counts):
     A look takes about as long as a cell of a step does, and a product a part of its solution.
     """
     cells = line.h.shape[0]
-    cost = contact.counts[LOOKS] + contact.counts[PRODUCTS] * max(cells // 4, 1)
+    cost = contact.counts.looks + contact.counts.products * max(cells // 4, 1)
     counts.quota -= cost // cells
-    contact.counts[LOOKS], contact.counts[PRODUCTS] = cost % cells, 0
+    contact.counts.looks, contact.counts.products = cost % cells, 0
 
 
 @inner
@@ -245,7 +223,7 @@ def press(line, contact, touch, row):
     n, kind = line.h.shape[0], contact.kind
     for i in range(n + 1):
         touch[row, i] = 0.0
-    for k in range(contact.counts[POINTS]):
+    for k in range(contact.counts.points):
         point = contact.points[k]
         p, q = int(point[P]), int(point[Q])
         for j in range(3):
@@ -263,12 +241,12 @@ def load_ends(line, ends, contact, report):
     for k in range(2):
         for j in range(3):
             y[k * n, j] = 0.0
-    for i in range(contact.counts[POINTS]):
+    for i in range(contact.counts.points):
         point = contact.points[i]
         p, q = int(point[P]), int(point[Q])
         if min(p, q) == 1 or max(p, q) == n - 1:
             add_gradient(point, y)
-            if contact.numbers[FRICTION] > 0.0:
+            if contact.numbers.friction > 0.0:
                 add_held(contact, i, y)
     for k in range(2):
         if ends.held[k] != 0:
@@ -289,16 +267,16 @@ def contact_task(table):
     job = read(table)
     line, ends, contact, work, phase = job.line, job.ends, job.contact, job.work, job.call[ASKED]
     old, new = (job.new, job.old) if job.counts.parity else (job.old, job.new)
-    rubs, numbers = contact.numbers[FRICTION] > 0.0, contact.numbers
+    rubs, numbers = contact.numbers.friction > 0.0, contact.numbers
     if rubs and phase in (PREPARE, REST):
         keep_last(contact, job.clock.now)
     if phase == PREPARE:
         near = prepare(line, ends, contact, old, work.u, job.clock.now, job.clock.try_end - job.clock.now)
         job.call[NEAR] = 1 if near else 0
-        numbers[TRIES] += 1.0
+        numbers.tries += 1.0
         if near:
-            numbers[QUIET] = 0.0
-        return contact.numbers[PART]
+            numbers.quiet = 0.0
+        return contact.numbers.part
     if phase == RADIUS:
         clock, rho = job.clock, radius(contact, job.clock, job.call[NEAR] != 0)
         if not job.counts.controlled:
@@ -309,19 +287,19 @@ def contact_task(table):
     if phase == GAIN:
         if not puts_energy_in(line, ends, contact, job, job.clock, old, new, work):
             return 0.0
-        numbers[QUIET] -= 1.0
+        numbers.quiet -= 1.0
         return 1.0
     if phase == LIMIT:
-        speed = contact.numbers[SPEED]
+        speed = contact.numbers.speed
         for i in range(work.x.shape[0]):
             for k in range(3):
                 contact.move[i, k] = work.x[i, 1 + k]
         limit(line, ends, contact, farthest_from_mean(work.u))
-        contact.numbers[SPEED] = speed
-        return contact.numbers[PART]
+        contact.numbers.speed = speed
+        return contact.numbers.part
     place(contact, old, work.u)
     if phase == REST:
-        numbers[KEEPS] = -1.0
+        numbers.keeps = -1.0
     find_points(line, ends, contact, farthest_from_mean(work.u))
     if rubs and phase == REST:
         rest_points(line, contact)
@@ -329,23 +307,23 @@ def contact_task(table):
         find_spins(line, contact, job.clock, job.call[NEAR] != 0, old, new, work.u)
         hold_points(line, contact)
     if phase == FINISH and rubs:
-        keep_grips(line, contact, contact.counts[POINTS])
-        contact.counts[FRESH], numbers[SINCE] = contact.counts[POINTS], job.clock.try_end
-        work.report[SELF_FRICTION_WORK] = numbers[SLIP_WORK] + numbers[TRIED] - numbers[STORED]
-    if numbers[HORIZON] > 0.0 and phase in (FINISH, REST):
+        keep_grips(line, contact, contact.counts.points)
+        contact.counts.fresh, numbers.since = contact.counts.points, job.clock.try_end
+        work.report[SELF_FRICTION_WORK] = numbers.slip_work + numbers.tried - numbers.stored
+    if numbers.horizon > 0.0 and phase in (FINISH, REST):
         look_ahead(line, ends, contact, new.v if phase == FINISH else old.v)
     if phase == FINISH:
-        numbers[QUIET] += 1.0
+        numbers.quiet += 1.0
         load_ends(line, ends, contact, work.report)
     if phase in (FINISH, REST):
         press(line, contact, job.touch, 2 if phase == FINISH else 0)
     if phase == FIND:
         return 1.0
     if phase != TOUCH:
-        return numbers[ENERGY] + (numbers[TRIED] if rubs else 0.0)
+        return numbers.energy + (numbers.tried if rubs else 0.0)
     charge(line, contact, job.counts)
-    if contact.counts[OVERFLOW] or (
-        contact.counts[POINTS] > 0 and not solve_contact(ends, contact, work, job.carried, job.rolling)
+    if contact.counts.overflow or (
+        contact.counts.points > 0 and not solve_contact(ends, contact, work, job.carried, job.rolling)
     ):
         return 0.0
     return 1.0

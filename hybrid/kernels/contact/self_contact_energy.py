@@ -6,20 +6,8 @@ import math
 
 from hybrid.kernels.algebra.rotations import dot, frame, get3, get9, sub
 from hybrid.kernels.contact.self_contact_pairs import (
-    BALANCE,
-    BEGUN,
     CALMS,
-    ENERGY,
-    GAINED,
-    HAD,
-    HAS,
-    LARGEST,
-    LED,
-    NARROWEST,
-    QUIET,
     RETURNS,
-    STALE,
-    TRIED_BALANCE,
     farthest_from_mean,
 )
 from hybrid.kernels.laws.bending_law import energy_share
@@ -94,7 +82,7 @@ def observe_coupled(line, ends, state, contact, _1, _2):
     """
     observed = Observed(contact.at, contact.move, contact.energy)
     observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
-    contact.counts[STALE] = 1
+    contact.counts.stale = 1
     return 0
 
 
@@ -140,7 +128,7 @@ def work_of_try(line, ends, contact, velocity, before, state, work, clock):
 @inner
 def is_judged(numbers):
     """Whether a try is held against its energy: not where nothing is near, and vibrations of contact have been damped."""
-    return numbers[QUIET] < CALMS + RETURNS or numbers[ENERGY] > 0.0
+    return numbers.quiet < CALMS + RETURNS or numbers.energy > 0.0
 
 
 @inner
@@ -150,14 +138,14 @@ def is_gain(contact, u, done, missed):
     done: J, work that accounts for it, which may be off by `missed`.
     """
     numbers = contact.numbers
-    most, gain = MOST_GAIN * numbers[LARGEST], numbers[HAS] - numbers[HAD] - done
+    most, gain = MOST_GAIN * numbers.largest, numbers.has - numbers.had - done
     gain = max(gain - missed, 0.0) if gain > 0.0 else min(gain + missed, 0.0)
-    numbers[TRIED_BALANCE] = numbers[BALANCE] + gain
-    if gain <= most and (gain <= 0.0 or numbers[TRIED_BALANCE] <= most):
+    numbers.tried_balance = numbers.balance + gain
+    if gain <= most and (gain <= 0.0 or numbers.tried_balance <= most):
         return False
-    if not farthest_from_mean(u) > LEAST_TRAVEL * numbers[NARROWEST]:
+    if not farthest_from_mean(u) > LEAST_TRAVEL * numbers.narrowest:
         return False
-    numbers[GAINED] += 1.0
+    numbers.gained += 1.0
     return True
 
 
@@ -170,14 +158,14 @@ def puts_energy_in(line, ends, contact, books, clock, old, new, work):
     numbers = contact.numbers
     if not is_judged(numbers):
         return False
-    if numbers[BEGUN] != clock.now:
-        if numbers[LED] == clock.now:
-            numbers[HAD], numbers[BALANCE] = numbers[HAS], numbers[TRIED_BALANCE]
+    if numbers.begun != clock.now:
+        if numbers.led == clock.now:
+            numbers.had, numbers.balance = numbers.has, numbers.tried_balance
         else:
-            numbers[HAD] = energy_without_weight(line, ends, contact, old, books.report[0])
-        numbers[BEGUN] = clock.now
-        numbers[LARGEST] = max(numbers[LARGEST], numbers[HAD])
-    numbers[HAS] = energy_without_weight(line, ends, contact, new, work.report)
-    numbers[LED] = clock.try_end
+            numbers.had = energy_without_weight(line, ends, contact, old, books.report[0])
+        numbers.begun = clock.now
+        numbers.largest = max(numbers.largest, numbers.had)
+    numbers.has = energy_without_weight(line, ends, contact, new, work.report)
+    numbers.led = clock.try_end
     done, missed = work_of_try(line, ends, contact, books.velocity, books.power[0], new, work, clock)
     return is_gain(contact, work.u, done, missed)

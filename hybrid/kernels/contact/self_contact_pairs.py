@@ -42,6 +42,7 @@ from hybrid.kernels.contact.self_distance import (
     runs_on,
 )
 from hybrid.kernels.machine.compile import called, inner
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.state.books import RATES
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.newton import LIMIT, TOUCH
@@ -59,40 +60,63 @@ PAIRS_OF_NODE = 8  # that are kept at most
 LEAST_KEEPS = 0.05  # diameters, of KEEPS
 FAR = 2.0  # diameters within which parts of the line are near each other
 LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of what is only foreseen
-(
-    PART,  # of a correction that is safe
-    ENERGY,  # J, of contact
-    SPEED,  # m/s, of the law: with which pieces met; it fades while they touch
-    WIDEST,
-    NARROWEST,  # m, diameters
-    REACH,  # m, distance within which pairs are looked at
-    FRICTION,  # coefficient of friction; 0: none
-    STORED,  # J, in the travels that are kept
-    TRIED,  # J, in those that the last try has led to
-    SINCE,  # s, time that the try led to
-    SLIP_WORK,  # J, of friction in the step
-    HORIZON,  # s, for which it is foreseen how near the line comes to itself; 0: not asked
-    KEEPS,  # m, for displacements up to which the pairs kept are all that there are; < 0: none are kept
-    ROLLS,  # 1 where friction turns any line about itself (`rolls`)
-    FADED,  # s, time up to which SPEED has faded; nan: it has not begun
-    QUIET,  # steps since the last one that was near contact
-    TRIES,  # of steps so far
-    BEGUN, LED,  # s, times of the states of HAD and HAS; nan: of none
-    HAD, HAS,  # J, energy before the step, without that of weight, and where the try has led
-    BALANCE, TRIED_BALANCE,  # J, put in by steps so far though no work accounts for it, likewise
-    LARGEST,  # J, the largest of HAD so far
-    GAINED,  # tries that were given up because they put energy in
-) = range(25)  # fmt: skip
-NUMBERS = 25
+
+
+class ContactNumbers(NamedNumbers):
+    """What contact knows of its law, of the step, and of energy."""
+
+    part: float  # of a correction that is safe
+    energy: float  # J, of contact
+    speed: float  # m/s, of the law: with which pieces met; it fades while they touch
+    widest: float
+    narrowest: float  # m, diameters
+    reach: float  # m, distance within which pairs are looked at
+    friction: float  # coefficient of friction; 0: none
+    stored: float  # J, in the travels that are kept
+    tried: float  # J, in those that the last try has led to
+    since: float  # s, time that the try led to
+    slip_work: float  # J, of friction in the step
+    horizon: float  # s, for which it is foreseen how near the line comes to itself; 0: not asked
+    keeps: float  # m, for displacements up to which the pairs kept are all that there are; < 0: none are kept
+    rolls: float  # 1 where friction turns any line about itself (`rolls`)
+    faded: float  # s, time up to which SPEED has faded; nan: it has not begun
+    quiet: float  # steps since the last one that was near contact
+    tries: float  # of steps so far
+    begun: float  # s, times of the states of HAD and HAS; nan: of none
+    led: float
+    had: float  # J, energy before the step, without that of weight, and where the try has led
+    has: float
+    balance: float  # J, put in by steps so far though no work accounts for it, likewise
+    tried_balance: float
+    largest: float  # J, the largest of HAD so far
+    gained: float  # tries that were given up because they put energy in
+
+
 # Of `shares`: energy of contact with other lines, and of a line with itself; in travels of friction likewise; work of
 # friction of a line on itself in the step.
 BETWEEN, WITHIN_LINE, HELD_BETWEEN, HELD_WITHIN, SLIP_WITHIN = range(5)
 SHARES = 5
 WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
-# Of `counts`.  STALE: the tree is of other positions; REMESHED: the grips are of other cells; LOOKS: sample points, and
-# parts of pieces, that were looked at in the try; PRODUCTS: of GMRES in it.
-POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE, REMESHED, LOOKS, PRODUCTS = range(10)
-COUNTS = 10
+
+
+class ContactCounts(NamedNumbers, number=np.int64):
+    """Stale: the tree is of other positions; remeshed: the grips are of other cells; looks: sample points, and parts of
+
+    pieces, that were looked at in the try; products: of GMRES in it.
+    """
+
+    points: int
+    nodes: int
+    overflow: int
+    grips: int
+    fresh: int
+    pairs: int
+    stale: int
+    remeshed: int
+    looks: int
+    products: int
+
+
 FEW = 16  # sample points of a piece that are looked at without asking which may be within reach
 
 
@@ -112,8 +136,8 @@ class Contact(NamedTuple):
     samples: NDArray[np.int64]  # (N+1,) sample points of pieces
     stiff: Floats  # (N+1,) N, least size of the law
     mass: Floats  # (N+1,) kg/m
-    numbers: Floats  # (NUMBERS,)
-    counts: NDArray[np.int64]  # (COUNTS,)
+    numbers: ContactNumbers
+    counts: ContactCounts
     tree: Floats  # as kernels.contact.self_distance has it, of pieces
     stack: NDArray[np.int64]
     pairs: NDArray[np.int64]  # (L, 2) pieces that may come near each other in a step
@@ -155,8 +179,8 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False, lines: in
     return Contact(
         kind=kind, of=z(nodes, np.int64), rolls=z(nodes), meets=np.ones((lines, lines), np.int64), rubs=z((lines, lines)),
         joined=np.full((lines, 2), -1, np.int64), tips=z((lines, 2), np.int64), shares=z((lines, SHARES)),
-        width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=z(NUMBERS),
-        counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64),
+        width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=ContactNumbers(),
+        counts=ContactCounts(), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64),
         pairs=z((PAIRS_OF_NODE * nodes, 2), np.int64), at=z((nodes, 3)),
         move=z((nodes, 3)), near=z(nodes), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64), energy=z(5),
         observer=z(1, np.int64), power=z(RATES),
@@ -311,7 +335,7 @@ def next_sample(contact, p, q, g, reach):
             if not is_beyond(kind, r, p, g / count, min(g + block, count) / count, q, reach):
                 break
             g += block
-    contact.counts[LOOKS] += 1
+    contact.counts.looks += 1
     return min(g, count)
 
 
@@ -319,7 +343,7 @@ def next_sample(contact, p, q, g, reach):
 def limit_part(line, ends, contact, p, q, width, moved):
     """Shorten the part so that no sample point of piece p comes too near piece q by a difference of `moved`, m."""
     kind, r, numbers, count = contact.kind, contact.at, contact.numbers, contact.samples[p]
-    reach, g = INNER * width + numbers[PART] * moved / SAFE, -1
+    reach, g = INNER * width + numbers.part * moved / SAFE, -1
     while True:
         g = next_sample(contact, p, q, g + 1, reach)
         if g == count:
@@ -332,8 +356,8 @@ def limit_part(line, ends, contact, p, q, width, moved):
                 continue
         away = sub(x, spline_point(r, q, spline_weights(kind, q, v)))
         room = max(SAFE * (math.sqrt(dot(away, away)) - INNER * width), 0.0)
-        if room < numbers[PART] * moved:
-            numbers[PART] = room / moved
+        if room < numbers.part * moved:
+            numbers.part = room / moved
 
 
 @called
@@ -342,7 +366,7 @@ def gather(line, contact, p, q, width):
     kind, r, counts, numbers = contact.kind, contact.at, contact.counts, contact.numbers
     count, nearest = contact.samples[p], OUTER * width
     before, after = end_factors(kind, p)
-    fast = IMPACT * numbers[SPEED] * numbers[SPEED]
+    fast = IMPACT * numbers.speed * numbers.speed
     size = 0.5 * (max(contact.stiff[p], fast * contact.mass[p]) + max(contact.stiff[q], fast * contact.mass[q]))
     g = -1
     while True:
@@ -357,19 +381,19 @@ def gather(line, contact, p, q, width):
         away = sub(x, spline_point(r, q, spline_weights(kind, q, v)))
         if not dot(away, away) < nearest * nearest:
             continue
-        if counts[POINTS] == contact.points.shape[0]:
-            counts[OVERFLOW] = 1
+        if counts.points == contact.points.shape[0]:
+            counts.overflow = 1
             return
-        row = contact.points[counts[POINTS]]
+        row = contact.points[counts.points]
         length = (
             0.5 * ((1.0 - u) * before * line.h[p - 1] + u * after * line.h[p]) / count
         )  # half: each strand has points
         energy = note_point(kind, r, p, u, Foot(q, v, side != 0), width, size, length, row)
-        numbers[ENERGY] += energy
+        numbers.energy += energy
         a, b = contact.of[p], contact.of[q]
         contact.shares[a, WITHIN_LINE if a == b else BETWEEN] += 0.5 * energy
         contact.shares[b, WITHIN_LINE if a == b else BETWEEN] += 0.5 * energy
-        counts[POINTS] += 1
+        counts.points += 1
 
 
 @inner
@@ -391,14 +415,14 @@ def note_near(contact, p, q, width):
 @inner
 def keep_pair(contact, p, q, room):
     """Keep a pair if displacements up to KEEPS use up its room, m."""
-    numbers, count = contact.numbers, contact.counts[PAIRS]
-    if not room < 2.0 * numbers[KEEPS]:
+    numbers, count = contact.numbers, contact.counts.pairs
+    if not room < 2.0 * numbers.keeps:
         return
     if count == contact.pairs.shape[0]:
-        numbers[KEEPS] = -1.0
+        numbers.keeps = -1.0
         return
     contact.pairs[count, 0], contact.pairs[count, 1] = p, q
-    contact.counts[PAIRS] = count + 1
+    contact.counts.pairs = count + 1
 
 
 @called
@@ -411,11 +435,11 @@ def look_at_pair(line, ends, contact, phase, p, q):
         note_near(contact, p, q, width)
     elif phase == LIMIT:
         moved = largest_difference(contact.move, p, q)
-        if SAFE * (apart - INNER * width) < contact.numbers[PART] * moved:
+        if SAFE * (apart - INNER * width) < contact.numbers.part * moved:
             limit_part(line, ends, contact, p, q, width, moved)
             limit_part(line, ends, contact, q, p, width, moved)
         if apart - moved < OUTER * width and least_distance(contact.kind, contact.at, p, q) - moved < OUTER * width:
-            contact.numbers[SPEED] = max(contact.numbers[SPEED], moved)
+            contact.numbers.speed = max(contact.numbers.speed, moved)
     elif apart < OUTER * width:
         gather(line, contact, p, q, width)
         gather(line, contact, q, p, width)
@@ -429,12 +453,12 @@ def look_at_pairs(line, ends, contact, phase):
     not bring it together.
     """
     tree, stack, n = contact.tree, contact.stack, line.h.shape[0]
-    leaves, reach, turned = tree.shape[0] // 2, contact.numbers[REACH], TURNED
+    leaves, reach, turned = tree.shape[0] // 2, contact.numbers.reach, TURNED
     if phase == COLLECT:
-        turned = max(TURNED, (OUTER + 2.0 * contact.numbers[KEEPS] / contact.numbers[NARROWEST]) / WINDOW)
-    if contact.counts[STALE]:
+        turned = max(TURNED, (OUTER + 2.0 * contact.numbers.keeps / contact.numbers.narrowest) / WINDOW)
+    if contact.counts.stale:
         fill_tree(contact.kind, tree, contact.at)
-        contact.counts[STALE] = 0
+        contact.counts.stale = 0
     stack[0, 0], stack[0, 1], top = 1, 1, 1
     while top > 0:
         top -= 1
@@ -476,16 +500,16 @@ def farthest_from_mean(move):
 def keep_pairs(line, ends, contact):
     """Keep the pairs that twice the displacements contact.move, or a part of a diameter, may bring together."""
     numbers = contact.numbers
-    numbers[KEEPS] = max(2.0 * farthest_from_mean(contact.move), LEAST_KEEPS * numbers[WIDEST])
-    numbers[REACH], contact.counts[PAIRS] = OUTER * numbers[WIDEST] + 2.0 * numbers[KEEPS], 0
+    numbers.keeps = max(2.0 * farthest_from_mean(contact.move), LEAST_KEEPS * numbers.widest)
+    numbers.reach, contact.counts.pairs = OUTER * numbers.widest + 2.0 * numbers.keeps, 0
     look_at_pairs(line, ends, contact, COLLECT)
 
 
 @inner
 def look_at_kept(line, ends, contact, phase, gone):
     """Look at the pairs that are kept, or where displacements have gone farther, m, at all."""
-    if gone <= contact.numbers[KEEPS]:
-        for k in range(contact.counts[PAIRS]):
+    if gone <= contact.numbers.keeps:
+        for k in range(contact.counts.pairs):
             look_at_pair(line, ends, contact, phase, contact.pairs[k, 0], contact.pairs[k, 1])
     else:
         look_at_pairs(line, ends, contact, phase)
@@ -498,8 +522,8 @@ def limit(line, ends, contact, gone):
     gone: m, largest displacement in the step so far.
     """
     numbers, far = contact.numbers, farthest_from_mean(contact.move) / SAFE
-    numbers[REACH] = OUTER * numbers[WIDEST] + 2.0 * far
-    numbers[PART] = 1.0
+    numbers.reach = OUTER * numbers.widest + 2.0 * far
+    numbers.part = 1.0
     look_at_kept(line, ends, contact, LIMIT, gone + far)
 
 
@@ -510,8 +534,8 @@ def look_ahead(line, ends, contact, v):
     for i in range(v.shape[0]):
         contact.near[i] = 0.0
         for k in range(3):
-            move[i, k] = numbers[HORIZON] * v[i, k]
-    numbers[REACH] = FAR / LEAST_NEAR * numbers[WIDEST] + 2.0 * farthest_from_mean(move)
+            move[i, k] = numbers.horizon * v[i, k]
+    numbers.reach = FAR / LEAST_NEAR * numbers.widest + 2.0 * farthest_from_mean(move)
     look_at_pairs(line, ends, contact, WATCH)
 
 
@@ -519,17 +543,17 @@ def look_ahead(line, ends, contact, v):
 def find_points(line, ends, contact, gone):
     """The points of contact, their energy, and the nodes in contact; gone: m, largest displacement in the step."""
     counts, numbers = contact.counts, contact.numbers
-    for k in range(counts[NODES]):
+    for k in range(counts.nodes):
         contact.marks[contact.nodes[k]] = 0
-    counts[POINTS], counts[NODES], counts[OVERFLOW], numbers[ENERGY] = 0, 0, 0, 0.0
+    counts.points, counts.nodes, counts.overflow, numbers.energy = 0, 0, 0, 0.0
     for l in range(contact.shares.shape[0]):
         contact.shares[l, BETWEEN], contact.shares[l, WITHIN_LINE] = 0.0, 0.0
-    numbers[REACH] = OUTER * numbers[WIDEST]
+    numbers.reach = OUTER * numbers.widest
     look_at_kept(line, ends, contact, TOUCH, gone)
-    for k in range(counts[POINTS]):
+    for k in range(counts.points):
         for of in (P, Q):
             p = int(contact.points[k, of])
             for i in range(p - 1, p + 2):
                 if contact.marks[i] == 0:
-                    contact.marks[i], contact.nodes[counts[NODES]] = 1, i
-                    counts[NODES] += 1
+                    contact.marks[i], contact.nodes[counts.nodes] = 1, i
+                    counts.nodes += 1

@@ -12,7 +12,7 @@ import math
 from hybrid.kernels.algebra.kept_factors import carry_given, prepare_sweep, solve_backward, sweep
 from hybrid.kernels.contact.self_contact_friction import add_held, add_held_product
 from hybrid.kernels.contact.self_contact_law import add_gradient, add_product
-from hybrid.kernels.contact.self_contact_pairs import FRICTION, MOST_PRODUCTS, NODES, POINTS, PRODUCTS, ROLLS, WIDEST
+from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS
 from hybrid.kernels.laws.sheaves import turn_along
 from hybrid.kernels.machine.compile import called, inner
 
@@ -24,12 +24,12 @@ SOLVED, LARGEST_LEFT, PART_LEFT, LEAST_LEFT = 1e-7, 1e-3, 0.01, 1e-11
 @inner
 def find_forces(contact, with_gradient):
     """contact.y = H x + g of the nodes in contact, g where asked."""
-    held_on = contact.numbers[FRICTION] > 0.0
+    held_on = contact.numbers.friction > 0.0
     x, y = contact.x, contact.y
-    for k in range(contact.counts[NODES]):
+    for k in range(contact.counts.nodes):
         i = contact.nodes[k]
         y[i, 0], y[i, 1], y[i, 2], y[i, 3] = 0.0, 0.0, 0.0, 0.0
-    for k in range(contact.counts[POINTS]):
+    for k in range(contact.counts.points):
         add_product(contact.points[k], x, y)
         if with_gradient:
             add_gradient(contact.points[k], y)
@@ -50,7 +50,7 @@ def enough(s, width, size):
 def first_node(contact):
     """The first node in contact."""
     first = contact.nodes[0]
-    for k in range(contact.counts[NODES]):
+    for k in range(contact.counts.nodes):
         first = min(first, contact.nodes[k])
     return first
 
@@ -75,7 +75,7 @@ def respond(ends, contact, work, carried, rolling, with_gradient, begin):
     find_forces(contact, with_gradient)
     y, z = contact.y, contact.z
     last = y.shape[0] - 1
-    for k in range(contact.counts[NODES]):
+    for k in range(contact.counts.nodes):
         i = contact.nodes[k]
         held = (i == 0 and ends.held[0] != 0) or (i == last and ends.held[1] != 0)
         z[i, 0] = 0.0
@@ -98,7 +98,7 @@ def respond(ends, contact, work, carried, rolling, with_gradient, begin):
 @inner
 def unknowns(contact):
     """Unknowns of a node in contact: its place, with friction the spin of the cell after it too, as a way."""
-    return 4 if contact.numbers[FRICTION] > 0.0 and contact.numbers[ROLLS] > 0.0 else 3
+    return 4 if contact.numbers.friction > 0.0 and contact.numbers.rolls > 0.0 else 3
 
 
 @inner
@@ -125,7 +125,7 @@ def inner_product(a, b, size):
 @inner
 def next_vector(contact, k):
     """Orthogonalise basis vector k + 1 against those before; its length goes into the column k."""
-    V, H, size = contact.basis, contact.hessenberg, unknowns(contact) * contact.counts[NODES]
+    V, H, size = contact.basis, contact.hessenberg, unknowns(contact) * contact.counts.nodes
     new = V[k + 1]
     for j in range(k + 1):
         before = V[j]
@@ -160,7 +160,7 @@ def rotate_column(H, k):
 def take_vector(contact, column):
     """contact.x = the basis vector of a column."""
     x, V, per = contact.x, contact.basis, unknowns(contact)
-    for k in range(contact.counts[NODES]):
+    for k in range(contact.counts.nodes):
         i = contact.nodes[k]
         for j in range(per):
             x[i, j] = V[column, per * k + j] / length_of(contact, j, i)
@@ -174,7 +174,7 @@ def find_solution(ends, contact, work, carried, rolling):
     without contact stays large, as the force of contact is left out of b: what SOLVED leaves of it would never fall.
     """
     x, z, V, H = contact.x, contact.z, contact.basis, contact.hessenberg
-    count, per, rhs, solution = contact.counts[NODES], unknowns(contact), MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
+    count, per, rhs, solution = contact.counts.nodes, unknowns(contact), MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
     begin = first_node(contact)
     prepare_sweep(work.X, work.W, contact.sweep, begin, contact.z.shape[0] - 1)
     begin = first_moved(rolling, begin)
@@ -202,7 +202,7 @@ def find_solution(ends, contact, work, carried, rolling):
     if s > 0.0:
         for i in range(per * count):
             V[0, i] /= s
-        left, most = s, enough(s, contact.numbers[WIDEST], per * count)
+        left, most = s, enough(s, contact.numbers.widest, per * count)
         while done < min(MOST_PRODUCTS, per * count) and left > most:
             take_vector(contact, done)
             if not respond(ends, contact, work, carried, rolling, False, begin):
@@ -214,7 +214,7 @@ def find_solution(ends, contact, work, carried, rolling):
             next_vector(contact, done)
             left = rotate_column(H, done)
             done += 1
-            contact.counts[PRODUCTS] += 1
+            contact.counts.products += 1
     for j in range(done - 1, -1, -1):
         s = H[j, rhs]
         for k in range(j + 1, done):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.state import Ends, Floats, Line, State, blank_line, blank_state, no_ends
@@ -45,22 +46,43 @@ SHARPEST, BESIDE = 0.5403, 8
 MEETS, NEARS, PARTS, HIDES = 1, 2, 4, 8  # bits of what `watch_itself` returns
 UNBENT = 1  # in place of the address of `watch_itself`, while the line is not bent so far
 
-(
-    CLEARANCE,  # m, between surfaces, in the last step; the horizon, or infinite, where there is nothing
-    DISTANCE,  # m, between the centrelines there
-    S, OTHER_S,  # m, where
-    TOLD,  # 1 where it has been told that surfaces meet, until they have come apart
-    MEETING,  # diameters of clearance below which surfaces meet
-    LEAST, LEAST_DISTANCE, LEAST_S, LEAST_OTHER, LEAST_TIME,  # the same of the least clearance so far, and when, s
-    WAITS,  # 1 where contact has been given up, until surfaces have come apart
-    AWAY,  # steps since two parts were near each other
-    HIDDEN,  # steps since a bend has hidden whether they are
-) = range(14)  # fmt: skip
-FOUND, OF_0_6 = 14, 11  # the latter of checkpoints of 0.6
-# Of `ahead`: what is asked, -1: nothing, 1: whether contact has to begin, WIDER: whether it may end; s, from the state
-# on, in which cells move at its velocities, 0: those of the step count; whether parts are near each other; whether a
-# bend hides that; the node of that bend, -1: none was found, and the cells beside it.
-ASKED, SECONDS, IS_NEAR, IS_HIDDEN, SHARP, HIDDEN_I, HIDDEN_J = range(7)
+
+class Nearest(NamedNumbers):
+    """Where the line is nearest to itself."""
+
+    clearance: float  # m, between surfaces, in the last step; the horizon, or infinite, where there is nothing
+    distance: float  # m, between the centrelines there
+    s: float  # m, where
+    other_s: float
+    told: float  # 1 where it has been told that surfaces meet, until they have come apart
+    meeting: float  # diameters of clearance below which surfaces meet
+    least: float  # the same of the least clearance so far, and when, s
+    least_distance: float
+    least_s: float
+    least_other: float
+    least_time: float
+    waits: float  # 1 where contact has been given up, until surfaces have come apart
+    away: float  # steps since two parts were near each other
+    hidden: float  # steps since a bend has hidden whether they are
+
+
+OF_0_6 = 11  # numbers of Nearest in checkpoints of 0.6
+
+
+class Ahead(NamedNumbers):
+    """What is asked of the search, -1: nothing, 1: whether contact has to begin, WIDER: whether it may end; s, from the state
+
+    on, in which cells move at its velocities, 0: those of the step count; whether parts are near each other; whether a
+    bend hides that; the node of that bend, -1: none was found, and the cells beside it.
+    """
+
+    asked: float
+    seconds: float
+    is_near: float
+    is_hidden: float
+    sharp: float
+    hidden_i: float
+    hidden_j: float
 
 
 class Itself(NamedTuple):
@@ -69,9 +91,9 @@ class Itself(NamedTuple):
     width: Floats  # (N,) m, diameters
     tree: Floats  # (2 P, BOX) node k has the children 2 k and 2 k + 1; the root is 1
     stack: NDArray[np.int64]  # (DEPTH 4, 2) pairs of boxes that are still to be looked at
-    found: Floats  # (FOUND,)
+    found: Nearest
     cells: NDArray[np.int64]  # (2,) the pair that was nearest
-    ahead: Floats  # (7,)
+    ahead: Ahead
 
 
 def boxes_of(cells: int) -> int:
@@ -84,11 +106,9 @@ def boxes_of(cells: int) -> int:
 
 def blank_itself(width: Floats) -> Itself:
     """For a line of cells of these diameters (N,) m."""
-    found = np.zeros(FOUND)
-    found[[CLEARANCE, DISTANCE, LEAST]] = np.inf
-    found[HIDDEN] = ENDS
+    found = Nearest(clearance=np.inf, distance=np.inf, least=np.inf, hidden=ENDS)
     stack = np.zeros((4 * DEPTH, 2), np.int64)
-    ahead = np.array([-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0])
+    ahead = Ahead(asked=-1.0, sharp=-1.0)
     return Itself(width, np.zeros((boxes_of(width.size), BOX)), stack, found, np.full(2, -1, np.int64), ahead)
 
 
@@ -272,7 +292,7 @@ def has_shape(state, ahead, i, j):
     e = state.e
     for k in range(max(i + 1, j - BESIDE), min(j, i + BESIDE) + 1):
         if is_sharp(e, k):
-            ahead[SHARP] = k
+            ahead.sharp = k
             return False
     return True
 
@@ -292,17 +312,17 @@ def note_near(before, state, itself, i, j, clearance):
     square = 0.0
     for p in range(i, i + 2):
         for q in range(j, j + 2):
-            d = sub(travel(before, state, ahead[SECONDS], p), travel(before, state, ahead[SECONDS], q))
+            d = sub(travel(before, state, ahead.seconds, p), travel(before, state, ahead.seconds, q))
             square = max(square, dot(d, d))
-    if not clearance < ahead[ASKED] * (CLOSE * width + CLOSING * math.sqrt(square)):
+    if not clearance < ahead.asked * (CLOSE * width + CLOSING * math.sqrt(square)):
         return
-    if ahead[ASKED] == WIDER:
-        ahead[IS_NEAR] = 1.0
+    if ahead.asked == WIDER:
+        ahead.is_near = 1.0
     elif not has_shape(state, ahead, i, j):
-        if ahead[IS_HIDDEN] == 0.0:
-            ahead[IS_HIDDEN], ahead[HIDDEN_I], ahead[HIDDEN_J] = 1.0, i, j
+        if ahead.is_hidden == 0.0:
+            ahead.is_hidden, ahead.hidden_i, ahead.hidden_j = 1.0, i, j
     elif clearance > -2.0 * INSIDE * width:
-        ahead[IS_NEAR] = 1.0
+        ahead.is_near = 1.0
 
 
 @inner
@@ -321,8 +341,8 @@ def compare_cells(line, ends, before, state, itself, i, j):
     )
     distance = least_on_the_way(now, was)
     clearance = distance - 0.5 * (itself.width[i] + itself.width[j])
-    found, n, asked = itself.found, line.h.shape[0], itself.ahead[ASKED] > 0.0 and itself.ahead[IS_NEAR] == 0.0
-    if not (asked or clearance < found[CLEARANCE]):
+    found, n, asked = itself.found, line.h.shape[0], itself.ahead.asked > 0.0 and itself.ahead.is_near == 0.0
+    if not (asked or clearance < found.clearance):
         return
     s, other = line.s[i] + x * line.h[i], line.s[j] + y * line.h[j]
     between = other - s
@@ -333,8 +353,8 @@ def compare_cells(line, ends, before, state, itself, i, j):
         return
     if asked:
         note_near(before, state, itself, i, j, clearance)
-    if clearance < found[CLEARANCE]:
-        found[CLEARANCE], found[DISTANCE], found[S], found[OTHER_S] = clearance, distance, s, other
+    if clearance < found.clearance:
+        found.clearance, found.distance, found.s, found.other_s = clearance, distance, s, other
         itself.cells[0], itself.cells[1] = i, j
 
 
@@ -352,16 +372,16 @@ def search(line, ends, before, state, itself):
     """The least clearance of the step from the positions `before` to a state, into itself.found, and what is asked."""
     tree, stack, found, width, ahead = itself.tree, itself.stack, itself.found, itself.width, itself.ahead
     leaves, widest = tree.shape[0] // 2, 0.0
-    found[CLEARANCE], found[DISTANCE] = math.inf, math.inf
-    ahead[IS_NEAR], ahead[IS_HIDDEN] = 0.0, 0.0
+    found.clearance, found.distance = math.inf, math.inf
+    ahead.is_near, ahead.is_hidden = 0.0, 0.0
     if not is_bent(state):
         return
     for i in range(width.shape[0]):
         widest = max(widest, width[i])
-    found[CLEARANCE] = HORIZON * widest
+    found.clearance = HORIZON * widest
     fill_tree(tree, before, state.r, state.e)
-    if ahead[ASKED] > 0.0:
-        fill_travels(tree, before, state, ahead[SECONDS])
+    if ahead.asked > 0.0:
+        fill_travels(tree, before, state, ahead.seconds)
     if itself.cells[0] >= 0 and itself.cells[1] < width.shape[0]:  # what was nearest is likely to be so again
         compare_cells(line, ends, before, state, itself, itself.cells[0], itself.cells[1])
     stack[0, 0], stack[0, 1], top = 1, 1, 1
@@ -370,9 +390,9 @@ def search(line, ends, before, state, itself):
         a, b = stack[top, 0], stack[top, 1]
         if b - a <= 1 and runs_on(tree, a, b, TURNED):
             continue
-        within = found[CLEARANCE]
-        if ahead[ASKED] > 0.0 and ahead[IS_NEAR] == 0.0:
-            within = max(within, ahead[ASKED] * (CLOSE * widest + CLOSING * largest_approach(tree, a, b)))
+        within = found.clearance
+        if ahead.asked > 0.0 and ahead.is_near == 0.0:
+            within = max(within, ahead.asked * (CLOSE * widest + CLOSING * largest_approach(tree, a, b)))
         if not box_distance(tree, a, b) - widest < within:
             continue
         if a >= leaves:
@@ -393,22 +413,20 @@ def search(line, ends, before, state, itself):
 @inner
 def note_found(found, t):
     """Keep the least clearance so far; whether surfaces have met that were apart."""
-    margin = SAME * abs(
-        found[DISTANCE] - found[CLEARANCE]
-    )  # a line in a plane passes itself at no distance, many times
-    if found[DISTANCE] < math.inf and found[CLEARANCE] < found[LEAST] - (margin if found[LEAST] < math.inf else 0.0):
-        found[LEAST], found[LEAST_DISTANCE], found[LEAST_TIME] = found[CLEARANCE], found[DISTANCE], t
-        found[LEAST_S], found[LEAST_OTHER] = found[S], found[OTHER_S]
+    margin = SAME * abs(found.distance - found.clearance)  # a line in a plane passes itself at no distance, many times
+    if found.distance < math.inf and found.clearance < found.least - (margin if found.least < math.inf else 0.0):
+        found.least, found.least_distance, found.least_time = found.clearance, found.distance, t
+        found.least_s, found.least_other = found.s, found.other_s
     meets = False
-    if found[DISTANCE] < math.inf:
-        width = found[DISTANCE] - found[CLEARANCE]
-        if not found[CLEARANCE] < APART * width:
-            found[TOLD] = 0.0
-        meets = found[CLEARANCE] < found[MEETING] * width and found[TOLD] == 0.0
+    if found.distance < math.inf:
+        width = found.distance - found.clearance
+        if not found.clearance < APART * width:
+            found.told = 0.0
+        meets = found.clearance < found.meeting * width and found.told == 0.0
     else:
-        found[TOLD] = 0.0
+        found.told = 0.0
     if meets:
-        found[TOLD] = 1.0
+        found.told = 1.0
     return meets
 
 
@@ -418,18 +436,14 @@ def note_asked(found, ahead):
 
     until it has not for ENDS steps.
     """
-    hidden, told = ahead[IS_HIDDEN] > 0.0 and ahead[IS_NEAR] == 0.0, found[HIDDEN] < ENDS
-    found[HIDDEN] = 0.0 if hidden else min(found[HIDDEN] + 1.0, ENDS)
-    found[AWAY] = 0.0 if ahead[IS_NEAR] > 0.0 else found[AWAY] + 1.0
-    if ahead[ASKED] == WIDER:
-        return PARTS if found[AWAY] >= ENDS else 0
-    if found[WAITS] > 0.0 and not found[CLEARANCE] < APART * (found[DISTANCE] - found[CLEARANCE]):
-        found[WAITS] = 0.0
-    if (
-        ahead[IS_NEAR] > 0.0
-        and found[WAITS] == 0.0
-        and found[CLEARANCE] > -INSIDE * (found[DISTANCE] - found[CLEARANCE])
-    ):
+    hidden, told = ahead.is_hidden > 0.0 and ahead.is_near == 0.0, found.hidden < ENDS
+    found.hidden = 0.0 if hidden else min(found.hidden + 1.0, ENDS)
+    found.away = 0.0 if ahead.is_near > 0.0 else found.away + 1.0
+    if ahead.asked == WIDER:
+        return PARTS if found.away >= ENDS else 0
+    if found.waits > 0.0 and not found.clearance < APART * (found.distance - found.clearance):
+        found.waits = 0.0
+    if ahead.is_near > 0.0 and found.waits == 0.0 and found.clearance > -INSIDE * (found.distance - found.clearance):
         return NEARS
     return HIDES if hidden and not told else 0
 
@@ -448,5 +462,5 @@ def watch_itself(table):
         state, before = before, state
     search(job.line, job.ends, before.r, state, job.itself)
     found, ahead = job.itself.found, job.itself.ahead
-    asked = note_asked(found, ahead) if ahead[ASKED] > 0.0 else 0
+    asked = note_asked(found, ahead) if ahead.asked > 0.0 else 0
     return (MEETS if note_found(found, job.clock.now) else 0) | asked

@@ -29,7 +29,7 @@ from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions.joined_winches import draw_along, find_lengthenings, give_lengths
 from hybrid.kernels.junctions.junctions import HANDED, START
 from hybrid.kernels.junctions.right_sides import answer_right_sides
-from hybrid.kernels.junctions.system_job import ASKED, PART
+from hybrid.kernels.junctions.system_job import SystemTask
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.sheaves import along, moments, roll_sheave
 from hybrid.kernels.machine.compile import called, inner, kernel
@@ -47,7 +47,7 @@ class SpinningJob(NamedTuple):
     """Arguments of the entry: what kernels.run.system.solve_system works with, and room."""
 
     phase: NDArray[np.int64]  # (1,) what is asked
-    asked: Floats  # of kernels.junctions.system_job.SystemJob
+    asked: SystemTask
     tables: NDArray[np.int64]
     joints: NDArray[np.int64]
     seats: Floats
@@ -82,7 +82,7 @@ def blank_spinning_job() -> SpinningJob:
     """A job with the types that every one has."""
     z, whole, one = np.zeros, np.int64, np.zeros(1, np.int64)
     return SpinningJob(
-        one, z(ASKED), z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), one,
+        one, SystemTask(), z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), one,
         z((3, 1, SIZE)), z(FUNCTIONAL), z((COLUMNS, 1, SIZE)), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)),
         z((1, WORK)), z((HANDED - 1, HANDED)), z((2, 6, 6)), z((6, 2)), z(COLUMNS), one, one, z((2, SIZE)), z((1, 6)),
         z((1, 1, 6)), z((1, 1, SIZE)), z((1, 1, 6)), one,
@@ -221,7 +221,7 @@ def roll_all(job, task):
     for k in range(first.line.moved.shape[0]):
         if first.line.moved[k] == FREE:
             row = first.sea.carried[k]
-            change = -job.asked[PART] * (row[LEFT_OVER] + along_all(job, j)) / row[ALONE]
+            change = -job.asked.part * (row[LEFT_OVER] + along_all(job, j)) / row[ALONE]
             j += 1
             for l in range(job.tables.shape[0]):
                 line_job = read(job.tables[l])

@@ -17,19 +17,10 @@ from hybrid.kernels.junctions.body_contact import (
     keep_corrections,
 )
 from hybrid.kernels.junctions.right_sides import answer_right_sides
-from hybrid.kernels.junctions.system_job import PART
 from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.reel.reel import (
-    ALONE,
-    CHANGE,
-    GROWS_AT,
-    LENGTHENS,
     MOVES,
-    OUT_OF_BALANCE,
-    PULLS_AT,
-    PUTS,
     WAITS,
-    YIELDING,
 )
 from hybrid.kernels.reel.reel import read as read_reel
 from hybrid.kernels.step.job import call_reel, read
@@ -38,7 +29,7 @@ from hybrid.kernels.step.job import call_reel, read
 @inner
 def waits(line_job):
     """Whether the winch of a line is to be corrected with all lines."""
-    return line_job.iterated != 0 and read_reel(line_job.reel_table).reel.stage[LENGTHENS] == WAITS
+    return line_job.iterated != 0 and read_reel(line_job.reel_table).reel.stage.lengthens == WAITS
 
 
 @inner
@@ -54,10 +45,10 @@ def draw_along(job, count, with_left):
             continue
         if w < count:
             stage = read_reel(line_job.reel_table).reel.stage
-            left = -line_job.work.x[int(stage[PULLS_AT]), 0]
+            left = -line_job.work.x[int(stage.pulls_at), 0]
             if with_left:
-                left += stage[OUT_OF_BALANCE]
-            add_corrections(job, -left / stage[YIELDING], job.lengthened[w], job.drawn[w])
+                left += stage.out_of_balance
+            add_corrections(job, -left / stage.yielding, job.lengthened[w], job.drawn[w])
         w += 1
 
 
@@ -68,14 +59,14 @@ def find_lengthening(job, l, w):
         clear_right_side(job, k)
     line_job = read(job.tables[l])
     x, n, stage = line_job.work.x, line_job.line.h.shape[0], read_reel(line_job.reel_table).reel.stage
-    i = int(stage[GROWS_AT])
+    i = int(stage.grows_at)
     job.marks[job.begins[l] + i] = 1
-    x[i, 0] = line_job.work.X[(n + 1) * ROW + i * KEPT + 62] * stage[PUTS]
+    x[i, 0] = line_job.work.X[(n + 1) * ROW + i * KEPT + 62] * stage.puts
     eliminate_right_side(job, l)
     if not answer_right_sides(job, True):
         return False
     draw_along(job, w, False)
-    stage[YIELDING] = stage[ALONE] - x[int(stage[PULLS_AT]), 0]
+    stage.yielding = stage.alone - x[int(stage.pulls_at), 0]
     keep_corrections(job, job.lengthened[w], job.drawn[w])
     return True
 
@@ -99,6 +90,6 @@ def give_lengths(job):
         line_job = read(job.tables[l])
         if waits(line_job):
             stage = read_reel(line_job.reel_table).reel.stage
-            left = stage[OUT_OF_BALANCE] - line_job.work.x[int(stage[PULLS_AT]), 0]
-            stage[CHANGE], stage[LENGTHENS] = -job.asked[PART] * left / stage[ALONE], MOVES
+            left = stage.out_of_balance - line_job.work.x[int(stage.pulls_at), 0]
+            stage.change, stage.lengthens = -job.asked.part * left / stage.alone, MOVES
             call_reel(line_job.iterated, line_job.reel_table)

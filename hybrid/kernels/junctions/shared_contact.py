@@ -23,23 +23,11 @@ from hybrid.kernels.contact.self_contact_energy import energy_without_weight, is
 from hybrid.kernels.contact.self_contact_friction import add_held, arc_length
 from hybrid.kernels.contact.self_contact_law import FOOT_PLACE, PLACE, P, Q, add_gradient
 from hybrid.kernels.contact.self_contact_pairs import (
-    BALANCE,
-    BEGUN,
     BETWEEN,
-    FRICTION,
-    HAD,
-    HAS,
     HELD_BETWEEN,
     HELD_WITHIN,
-    LARGEST,
-    LED,
-    POINTS,
     SHARES,
     SLIP_WITHIN,
-    SLIP_WORK,
-    STORED,
-    TRIED,
-    TRIED_BALANCE,
     WITHIN_LINE,
 )
 from hybrid.kernels.junctions.junctions import move_joints
@@ -141,11 +129,11 @@ def find_pushes(one, pushes):
         for j in range(4):
             y[i, j] = 0.0
     for within in (False, True):
-        for k in range(contact.counts[POINTS]):
+        for k in range(contact.counts.points):
             row = contact.points[k]
             if (contact.of[int(row[P])] == contact.of[int(row[Q])]) == within:
                 add_gradient(row, y)
-                if contact.numbers[FRICTION] > 0.0:
+                if contact.numbers.friction > 0.0:
                     add_held(contact, k, y)
         if not within:
             for i in range(y.shape[0]):
@@ -158,7 +146,7 @@ def find_pushes(one, pushes):
 def note_meetings(job, one, t):
     """When and where two lines met first."""
     contact = one.contact
-    for k in range(contact.counts[POINTS]):
+    for k in range(contact.counts.points):
         p, q = int(contact.points[k, P]), int(contact.points[k, Q])
         a, b = contact.of[p], contact.of[q]
         if a < b and not job.meetings[a, b, MET] <= t:
@@ -171,7 +159,7 @@ def note_meetings(job, one, t):
 def work_on(job, one, k):
     """Work in the step, J, of other lines on line k of these, and of its friction on itself."""
     begin, nodes = job.begins[k], read(job.tables[job.lines[k]]).line.s.shape[0]
-    x, rubs, now, then = one.contact.x, one.contact.numbers[FRICTION] > 0.0, job.shares[LATEST, k], job.shares[KEPT, k]
+    x, rubs, now, then = one.contact.x, one.contact.numbers.friction > 0.0, job.shares[LATEST, k], job.shares[KEPT, k]
     done = now[BETWEEN] - then[BETWEEN]
     if rubs:
         done += now[HELD_BETWEEN] - then[HELD_BETWEEN] + now[HELD_WITHIN] - then[HELD_WITHIN] + now[SLIP_WITHIN]
@@ -199,7 +187,7 @@ def spread(job, one, phase):
         line_job, at, shares = read(job.tables[job.lines[k]]), job.begins[k], one.contact.shares[k]
         report, books, n = line_job.work.report, line_job.books, line_job.line.h.shape[0]
         last = shares[BETWEEN] + shares[WITHIN_LINE]
-        if one.contact.numbers[FRICTION] > 0.0:
+        if one.contact.numbers.friction > 0.0:
             last += shares[HELD_BETWEEN] + shares[HELD_WITHIN]
         report[SELF_CONTACT_ENERGY] = last
         if books.touch.shape[1] > 0:
@@ -239,17 +227,17 @@ def puts_energy_in(job, one):
     for k in range(job.lines.shape[0]):
         if read(job.tables[job.lines[k]]).reel != 0:  # what a winch does is not known here
             return False
-    if numbers[BEGUN] != clock.now:
-        if numbers[LED] == clock.now:
-            numbers[HAD], numbers[BALANCE] = numbers[HAS], numbers[TRIED_BALANCE]
+    if numbers.begun != clock.now:
+        if numbers.led == clock.now:
+            numbers.had, numbers.balance = numbers.has, numbers.tried_balance
         else:
-            numbers[HAD] = energy_of(job, one, False)
-        numbers[BEGUN] = clock.now
-        numbers[LARGEST] = max(numbers[LARGEST], numbers[HAD])
-    numbers[HAS], numbers[LED] = energy_of(job, one, True), clock.try_end
+            numbers.had = energy_of(job, one, False)
+        numbers.begun = clock.now
+        numbers.largest = max(numbers.largest, numbers.had)
+    numbers.has, numbers.led = energy_of(job, one, True), clock.try_end
     done, missed = 0.0, 0.0
-    if numbers[FRICTION] > 0.0:
-        done = numbers[SLIP_WORK] + numbers[TRIED] - numbers[STORED]
+    if numbers.friction > 0.0:
+        done = numbers.slip_work + numbers.tried - numbers.stored
     for k in range(job.lines.shape[0]):
         line_job = read(job.tables[job.lines[k]])
         books = line_job.books

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.block_elimination import ROW, SIZE, SPAN
 from hybrid.kernels.algebra.kept_factors import carry_given, prepare_sweep, sweep
 from hybrid.kernels.contact.self_contact import read as read_contact
-from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS, NODES, OVERFLOW, POINTS, WIDEST
+from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS
 from hybrid.kernels.contact.self_contact_solve import (
     enough,
     find_forces,
@@ -155,7 +155,7 @@ def respond(job, cv, with_gradient):
         lead, touches = max(job.shared[l, 0], 0), False
         contact = read_contact(job.contacts[lead]).contact
         if job.shared[l, 0] >= 0:
-            touches = contact.counts[POINTS] > 0
+            touches = contact.counts.points > 0
         set_right_side(l, read(job.tables[l]), contact, job.shared[l, 1], job.joints, touches, with_gradient)
     if not answer_right_sides(job, job.asked[0] == 0):
         return False
@@ -174,11 +174,11 @@ def prepare_sweeps(job):
             contact, first = read_contact(job.contacts[job.shared[l, 0]]).contact, job.shared[l, 1]
             line_job = read(job.tables[l])
             n, work = line_job.line.h.shape[0], line_job.work
-            if contact.counts[POINTS] > 0:
+            if contact.counts.points > 0:
                 prepare_sweep(work.X, work.W, contact.sweep[first:], first_in_contact(contact, first, n), n)
         if touching(job, l) > 0:
             contact = read_contact(job.contacts[l]).contact
-            size, width = size + unknowns(contact) * contact.counts[NODES], max(width, contact.numbers[WIDEST])
+            size, width = size + unknowns(contact) * contact.counts.nodes, max(width, contact.numbers.widest)
     return size, width
 
 
@@ -188,7 +188,7 @@ def touching(job, l):
     line_job = read(job.tables[l])
     if not line_job.contact[ADDRESS] > 0:
         return 0
-    return read_contact(job.contacts[l]).contact.counts[POINTS]
+    return read_contact(job.contacts[l]).contact.counts.points
 
 
 @inner
@@ -198,7 +198,7 @@ def product(job, k, l):
     for line in range(job.tables.shape[0]):
         if touching(job, line) > 0:
             contact = read_contact(job.contacts[line]).contact
-            s += inner_product(contact.basis[k], contact.basis[l], unknowns(contact) * contact.counts[NODES])
+            s += inner_product(contact.basis[k], contact.basis[l], unknowns(contact) * contact.counts.nodes)
     return s
 
 
@@ -209,7 +209,7 @@ def add_vector(job, k, part, l):
         if touching(job, line) > 0:
             contact = read_contact(job.contacts[line]).contact
             V = contact.basis
-            for i in range(unknowns(contact) * contact.counts[NODES]):
+            for i in range(unknowns(contact) * contact.counts.nodes):
                 V[l, i] = part * V[l, i] if k == l else V[l, i] + part * V[k, i]
 
 
@@ -231,7 +231,7 @@ def put_response(job, column, first):
         if touching(job, l) > 0:
             contact = read_contact(job.contacts[l]).contact
             V, per, z = contact.basis, unknowns(contact), contact.z
-            for k in range(contact.counts[NODES]):
+            for k in range(contact.counts.nodes):
                 i = contact.nodes[k]
                 for j in range(per):
                     y = z[i, 1 + j] * length_of(contact, j, i)
@@ -247,7 +247,7 @@ def set_unknowns(job, column):
             if column >= 0:
                 take_vector(contact, column)
             else:
-                for k in range(contact.counts[NODES]):
+                for k in range(contact.counts.nodes):
                     for j in range(4):
                         contact.x[contact.nodes[k], j] = 0.0
 
@@ -260,7 +260,7 @@ def combine(job, done):
         if touching(job, l) > 0:
             contact = read_contact(job.contacts[l]).contact
             per = unknowns(contact)
-            for k in range(contact.counts[NODES]):
+            for k in range(contact.counts.nodes):
                 i = contact.nodes[k]
                 for m in range(per):
                     s = 0.0
@@ -339,9 +339,9 @@ def touch_system(table):
         if line_job.contact[ADDRESS] > 0:
             ask_contact(line_job.contact, line_job.contact_table, REST if job.asked[0] else FIND)
             contact = read_contact(job.contacts[l]).contact
-            if contact.counts[OVERFLOW]:
+            if contact.counts.overflow:
                 return 0
-            points += contact.counts[POINTS]
+            points += contact.counts.points
     if points == 0:
         return 1
     keep_corrections(job, False)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.newton import Limits, Task
@@ -19,7 +20,7 @@ class SystemJob(NamedTuple):
     P points, B bodies, L lines; m tensions of last cells and coordinates of points and bodies.
     """
 
-    asked: Floats  # (ASKED,) the task: below
+    asked: SystemTask
     tables: NDArray[np.int64]  # (L, ..) jobs of the lines (kernels.run.run), their task ASSEMBLY
     numbers: Floats  # the same memory
     joints: NDArray[np.int64]  # (L, 2) points, then bodies, that start and end are joined to, -1 where they are held
@@ -54,17 +55,29 @@ class SystemJob(NamedTuple):
     spin: int = 0  # of spin_sheaves; 0: no sheave turns freely
 
 
-# Numbers of `asked`: of the task (kernels.step.newton.Task), the time of the new states, s, and the part of a correction
-# that is made.
-(WHAT, DT, BEFORE, RHO_OF_STEP, CV, CA, REACH, SCALE, MOST, RHO_OF_LAST, FIXED, TIME, PART) = range(13)
-ASKED = 13
+class SystemTask(NamedNumbers):
+    """The task (kernels.step.newton.Task), the time of the new states, s, and the part of a correction that is made."""
+
+    what: float
+    dt: float
+    before: float
+    rho_of_step: float
+    cv: float
+    ca: float
+    reach: float
+    scale: float
+    most: float
+    rho_of_last: float
+    fixed: float
+    time: float
+    part: float
 
 
 def blank_system_job() -> SystemJob:
     """A job with the types that every one has."""
     z, one, two = np.zeros, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
     return SystemJob(
-        z(ASKED), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
+        SystemTask(), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
         z((1, 1, 1)), z(1), z((1, 1, 1)), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
         z((2, 6, 6)), z((1, 1)), one, one, one, one, one,
     )  # fmt: skip
@@ -76,8 +89,8 @@ read_system = reader(blank_system_job())
 @inner
 def task_of(asked):
     """The task that is asked."""
-    limits = Limits(asked[REACH], asked[SCALE], int(asked[MOST]))
+    limits = Limits(asked.reach, asked.scale, int(asked.most))
     return Task(
-        int(asked[WHAT]), asked[DT], asked[BEFORE], asked[RHO_OF_STEP], asked[CV], asked[CA], False, limits, False,
-        asked[RHO_OF_LAST], asked[FIXED] != 0.0,
+        int(asked.what), asked.dt, asked.before, asked.rho_of_step, asked.cv, asked.ca, False, limits, False,
+        asked.rho_of_last, asked.fixed != 0.0,
     )  # fmt: skip

@@ -18,7 +18,7 @@ from hybrid.kernels.laws.soil import lie_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.mesh.zone_step import AGE, KNOWN, RECENT_AGE, RELAXING, STRAINED, Zones, blank_zones
+from hybrid.kernels.mesh.zone_step import Zones, blank_zones
 from hybrid.kernels.mesh.zone_transfer import carry_push
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, blank_books
@@ -234,8 +234,8 @@ def renew(table):
     for c in range(job.width.shape[0]):
         job.width[c] = job.widths[job.of[c]]
     job.nearest[0], job.nearest[1] = -1, -1
-    zones.clock[AGE], zones.clock[RECENT_AGE] = 0.0, 0.0
-    zones.counts[KNOWN], zones.counts[STRAINED], zones.counts[RELAXING] = 0, 0, 1
+    zones.clock.age, zones.clock.recent_age = 0.0, 0.0
+    zones.counts.known, zones.counts.strained, zones.counts.relaxing = 0, 0, 1
     clock.wave_step, clock.previous, books.counts.parity = wave_step(job.line, job.scale), clock.now, 0
 
 

@@ -20,6 +20,7 @@ from hybrid.kernels.laws.obstacle_motion import surface_velocity
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_errors import (
@@ -60,46 +61,52 @@ STRAIGHT = 1e-6  # rad: a line that turns through no more at its largest curvatu
 SAMPLES = 16  # of the tension per ramp time
 REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, and repeated with more rod
 
-# Numbers of `clock`; times in s.
-(
-    DT,  # since the last evaluation
-    PACE,  # ramp time of bending stiffness
-    AGE, RECENT_AGE,  # of the tensions `past` and `recent`
-    NEXT_REVIEW,
-    TOLERANCE,  # m, of position
-    LOUDEST,  # largest ratio among catenaries, at the last evaluation
-    TORQUE,  # N m, that a rod from end to end would carry, where there is none
-    TOTAL_TWIST,  # rad, of the ends against each other
-    COMPLIANCE, FREE_TWIST,  # of all the line: rad per N m; rad
-    LETTING_GO,  # over which lengths become true
-    CALM_STEP, RAMP_STEP,  # longest steps: while nothing is ramped, and else
-    SHARE,  # of the largest curvature that the length of cells may make it wrong by, where they follow it; 0: they stay
-    LEFT,  # part of what catenaries leave out that remains in results: 1, but for results that are corrected
-    FINENESS,  # of cells that follow the curvature: those that lengths ask for are so many times as short
-    FASTEST,  # m/s, by how much velocities of nodes differed of late
-    EDGE_TIME,  # s, for which the way of a contact edge is foreseen
-    MEMORY,  # s, over which the largest values of earlier are forgotten
-) = range(20)  # fmt: skip
-CLOCK_SIZE = 20
-# Flags of `counts`.
-(
-    KNOWN,  # tensions of earlier are of these cells
-    HOLDS_TWIST,  # both ends hold the twist
-    ALL_ROD,
-    LOADED,  # moments are given at the ends
-    RELAXING, UNDER_WAY,  # lengths are on their way to true ones; those of the last step were
-    GOING, COMING,  # stiffness is ramped down; up
-    STRAINED,  # `strain` is of the state now
-    CELLS_DUE,  # rods should have other cells
-) = range(10)  # fmt: skip
-FLAG_COUNT = 10
+
+class ZoneClock(NamedNumbers):
+    """What zones that move know of times, in s, and of the line as a whole."""
+
+    dt: float  # since the last evaluation
+    pace: float  # ramp time of bending stiffness
+    age: float  # of the tensions `past` and `recent`
+    recent_age: float
+    next_review: float
+    tolerance: float  # m, of position
+    loudest: float  # largest ratio among catenaries, at the last evaluation
+    torque: float  # N m, that a rod from end to end would carry, where there is none
+    total_twist: float  # rad, of the ends against each other
+    compliance: float  # of all the line: rad per N m; rad
+    free_twist: float
+    letting_go: float  # over which lengths become true
+    calm_step: float  # longest steps: while nothing is ramped, and else
+    ramp_step: float
+    share: float  # of the largest curvature that the length of cells may make it wrong by, where they follow it; 0: they stay
+    left: float  # part of what catenaries leave out that remains in results: 1, but for results that are corrected
+    fineness: float  # of cells that follow the curvature: those that lengths ask for are so many times as short
+    fastest: float  # m/s, by how much velocities of nodes differed of late
+    edge_time: float  # s, for which the way of a contact edge is foreseen
+    memory: float  # s, over which the largest values of earlier are forgotten
+
+
+class ZoneFlags(NamedNumbers, number=np.int64):
+    """What is the case of zones that move."""
+
+    known: int  # tensions of earlier are of these cells
+    holds_twist: int  # both ends hold the twist
+    all_rod: int
+    loaded: int  # moments are given at the ends
+    relaxing: int  # lengths are on their way to true ones; those of the last step were
+    under_way: int
+    going: int  # stiffness is ramped down; up
+    coming: int
+    strained: int  # `strain` is of the state now
+    cells_due: int  # rods should have other cells
 
 
 class Zones(NamedTuple):
     """What zones that move know; n base cells."""
 
-    clock: Floats  # (CLOCK_SIZE,)
-    counts: NDArray[np.int64]  # (FLAG_COUNT,)
+    clock: ZoneClock
+    counts: ZoneFlags
     kinds: NodeKinds
     clamped: Floats  # (2,) 1 where an end holds the tangent
     tangents: Floats  # (2, 3) of the clamped ends, zero where there is none
@@ -143,7 +150,7 @@ def blank_zones(cells: int, base: int) -> Zones:
     """Zones of a line of so many cells and base cells, all catenary."""
     z, nodes = np.zeros, cells + 1
     return Zones(
-        clock=np.where(np.arange(CLOCK_SIZE) == FINENESS, 1.0, 0.0), counts=z(FLAG_COUNT, np.int64),
+        clock=ZoneClock(fineness=1.0), counts=ZoneFlags(),
         kinds=blank_kinds(cells, base),
         clamped=z(2), tangents=z((2, 3)), moments=z((2, 3)), past=z(cells), recent=z(cells),
         asked=z(QUANTITIES), largest=z(QUANTITIES), shares=z(QUANTITIES), limits=z(QUANTITIES), ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
@@ -210,12 +217,12 @@ def copy(x, out):
 def prepare(line, zones, end, dt):
     """Lengths and stiffness as they will be at `end`, after a step of dt."""
     z, flags = zones.clock, zones.counts
-    if flags[RELAXING]:
-        flags[UNDER_WAY] = length_defect(
-            zones.lack, zones.rate, zones.since, zones.keeps, end, z[LETTING_GO], zones.true, line.h
+    if flags.relaxing:
+        flags.under_way = length_defect(
+            zones.lack, zones.rate, zones.since, zones.keeps, end, z.letting_go, zones.true, line.h
         )
-    if flags[GOING] or flags[COMING]:
-        shares(zones.grown, zones.leaving, zones.haste, dt / z[PACE], zones.kinds.base_of_cell, zones.share)
+    if flags.going or flags.coming:
+        shares(zones.grown, zones.leaving, zones.haste, dt / z.pace, zones.kinds.base_of_cell, zones.share)
         soften(zones.share, zones.stiff, line.kb)
 
 
@@ -226,12 +233,12 @@ def prepare(line, zones, end, dt):
 def torque_of_ends(line, ends, state, zones):
     """Torque, N m, of the turn of one end against the other, as if all the line were rod; 0 if it is: rods know."""
     z = zones.clock
-    if zones.counts[ALL_ROD]:
-        z[TOTAL_TWIST] = twist_of_rods(line, ends.frame, state.e, state.a1)
+    if zones.counts.all_rod:
+        z.total_twist = twist_of_rods(line, ends.frame, state.e, state.a1)
         return 0.0
     turn = end_turn(state.e, ends.frame)
-    z[TOTAL_TWIST] += (turn - z[TOTAL_TWIST] + math.pi) % (2.0 * math.pi) - math.pi
-    return (z[TOTAL_TWIST] - z[FREE_TWIST] + twist_of_line(line, state.T)) / z[COMPLIANCE]
+    z.total_twist += (turn - z.total_twist + math.pi) % (2.0 * math.pi) - math.pi
+    return (z.total_twist - z.free_twist + twist_of_line(line, state.T)) / z.compliance
 
 
 @inner
@@ -303,12 +310,12 @@ def find_shares(line, state, zones):
         tension = max(tension, state.T[c])
     for k, size in ((TENSION, tension), (CURVATURE, kappa), (MOMENT, moment)):
         zones.largest[k] = max(zones.largest[k], size)
-        share = zones.asked[k] * zones.largest[k] / z[LEFT]
+        share = zones.asked[k] * zones.largest[k] / z.left
         zones.shares[k], zones.limits[k] = share if share > 0.0 else math.inf, math.inf
-    finer = 1.0 / (z[FINENESS] * z[FINENESS])  # of second order
-    zones.shares[POSITION], zones.limits[POSITION] = z[TOLERANCE] / z[LEFT], z[TOLERANCE] * finer
-    if z[SHARE] > 0.0 and zones.largest[CURVATURE] * (line.s[n] - line.s[0]) > STRAIGHT:
-        zones.limits[CURVATURE] = z[SHARE] * zones.largest[CURVATURE] * finer
+    finer = 1.0 / (z.fineness * z.fineness)  # of second order
+    zones.shares[POSITION], zones.limits[POSITION] = z.tolerance / z.left, z.tolerance * finer
+    if z.share > 0.0 and zones.largest[CURVATURE] * (line.s[n] - line.s[0]) > STRAIGHT:
+        zones.limits[CURVATURE] = z.share * zones.largest[CURVATURE] * finer
 
 
 @kernel
@@ -318,7 +325,7 @@ def asks_layers(zones):
     Results put it back from the joint and the nodes beside it (outputs.strains), so rods are two cells wider, at least,
     than what asks for them.  A moment that a joint takes stays away.
     """
-    return zones.asked[CURVATURE] > 0.0 and not zones.asked[MOMENT] > 0.0 and not zones.clock[SHARE] > 0.0
+    return zones.asked[CURVATURE] > 0.0 and not zones.asked[MOMENT] > 0.0 and not zones.clock.share > 0.0
 
 
 @inner
@@ -328,28 +335,28 @@ def evaluate(line, sea, ends, state, zones, near, dt):
     dt = 0: there was none, or it was on other nodes.
     """
     z, flags = zones.clock, zones.counts
-    if dt == 0.0 or not flags[KNOWN]:
+    if dt == 0.0 or not flags.known:
         copy(state.T, zones.past)
         copy(state.T, zones.recent)
-        z[AGE], z[RECENT_AGE], flags[KNOWN] = 0.0, 0.0, 1
-    z[AGE], z[RECENT_AGE] = z[AGE] + dt, z[RECENT_AGE] + dt
-    ahead = min(LOOKAHEAD * z[PACE] / z[AGE], LONGEST_LOOKAHEAD) if z[AGE] > 0.0 else 0.0
-    z[TORQUE] = torque_of_ends(line, ends, state, zones) if flags[HOLDS_TWIST] else 0.0
+        z.age, z.recent_age, flags.known = 0.0, 0.0, 1
+    z.age, z.recent_age = z.age + dt, z.recent_age + dt
+    ahead = min(LOOKAHEAD * z.pace / z.age, LONGEST_LOOKAHEAD) if z.age > 0.0 else 0.0
+    z.torque = torque_of_ends(line, ends, state, zones) if flags.holds_twist else 0.0
     for k in range(2):
         for j in range(3):
             zones.tangents[k, j] = ends.frame[k, 2 + 3 * j] * zones.clamped[k]
-    find_turns(line, zones.tangents, state.e, state.a1, state.T, z[TORQUE], zones.kinds)
+    find_turns(line, zones.tangents, state.e, state.a1, state.T, z.torque, zones.kinds)
     layers = asks_layers(zones)
     find_curvature(line, state.T, zones.kinds, layers)
     find_shares(line, state, zones)
     raise_ratios(line, sea, state, zones.past, ahead, zones.shares, layers, zones.kinds, zones.ratios)
-    foresee_edges(line, sea, state, zones, layers, z[EDGE_TIME])
-    if flags[LOADED]:
+    foresee_edges(line, sea, state, zones, layers, z.edge_time)
+    if flags.loaded:
         weigh_moments(state, zones)
     weigh_contact(near, zones)
     if line.bits & OBSTACLES:
-        weigh_obstacles(line, sea, state, zones, LOOKAHEAD * z[PACE])
-    z[LOUDEST] = largest_ratio(line, zones.kinds, zones.ratios)
+        weigh_obstacles(line, sea, state, zones, LOOKAHEAD * z.pace)
+    z.loudest = largest_ratio(line, zones.kinds, zones.ratios)
 
 
 # --- after a step -----------------------------------------------------------------------------------
@@ -370,16 +377,16 @@ def find_strain(line, ends, state, zones, k):
 def book(line, ends, before, state, dt, zones):
     """Energy, J, that lengths and stiffness which change put in through an accepted step of dt."""
     z, flags, booked = zones.clock, zones.counts, 0.0
-    if flags[RELAXING]:
+    if flags.relaxing:
         for c in range(line.h.shape[0]):
             pulls = before.T[c] + state.T[c]
             if has_law(line, c):
                 pulls = stretch_work(line, before, c) + stretch_work(line, state, c)
             booked -= 0.5 * pulls * (line.h[c] - zones.lengths[c])
             zones.lengths[c] = line.h[c]
-        flags[RELAXING] = flags[UNDER_WAY] or z[SHARE] > 0.0
-    if flags[GOING] or flags[COMING]:
-        if flags[STRAINED]:
+        flags.relaxing = flags.under_way or z.share > 0.0
+    if flags.going or flags.coming:
+        if flags.strained:
             for i in range(zones.moment.shape[0]):
                 for j in range(3):
                     zones.strain[0, i, j] = zones.strain[1, i, j]
@@ -388,14 +395,14 @@ def book(line, ends, before, state, dt, zones):
         find_strain(line, ends, state, zones, 1)
         shares(zones.grown, zones.leaving, zones.haste, 0.0, zones.kinds.base_of_cell, zones.share)
         booked += freed(line, zones.share, zones.stiff, zones.strain[0], zones.strain[1])
-        advance(zones.grown, zones.leaving, zones.haste, dt / z[PACE])
-        flags[STRAINED], flags[COMING] = 1, is_coming(zones)
+        advance(zones.grown, zones.leaving, zones.haste, dt / z.pace)
+        flags.strained, flags.coming = 1, is_coming(zones)
     else:
-        flags[STRAINED] = 0
-    if z[RECENT_AGE] * SAMPLES >= z[PACE]:  # tensions to extrapolate from
+        flags.strained = 0
+    if z.recent_age * SAMPLES >= z.pace:  # tensions to extrapolate from
         copy(zones.recent, zones.past)
         copy(state.T, zones.recent)
-        z[AGE], z[RECENT_AGE] = z[RECENT_AGE], 0.0
+        z.age, z.recent_age = z.recent_age, 0.0
     return booked
 
 
@@ -403,10 +410,10 @@ def book(line, ends, before, state, dt, zones):
 def watch_waves(line, state, zones, dt):
     """What the velocities after a step of dt ask of lengths."""
     z = zones.clock
-    z[FASTEST] = max(z[FASTEST] * math.exp(-dt / (FADE * z[PACE])), spread_of_velocity(state.v))
-    fast = max(z[FASTEST], QUIET * z[TOLERANCE] / z[PACE])
-    error = WAVES * z[SHARE] * fast / (z[FINENESS] * z[FINENESS])
-    follow_waves(line, state, zones, error, dt / (TAU * z[PACE]), z[FINENESS])
+    z.fastest = max(z.fastest * math.exp(-dt / (FADE * z.pace)), spread_of_velocity(state.v))
+    fast = max(z.fastest, QUIET * z.tolerance / z.pace)
+    error = WAVES * z.share * fast / (z.fineness * z.fineness)
+    follow_waves(line, state, zones, error, dt / (TAU * z.pace), z.fineness)
 
 
 @inner
@@ -415,8 +422,8 @@ def other_cells(line, sea, state, zones, dt):
     z = zones.clock
     for j in range(zones.rod.shape[0]):
         zones.next_rod[j] = zones.rod[j]
-    z[DT] = dt
-    return plan_cells(line, sea, state, zones, dt, z[FINENESS])
+    z.dt = dt
+    return plan_cells(line, sea, state, zones, dt, z.fineness)
 
 
 @inner
@@ -435,7 +442,7 @@ def is_coming(zones):
 def evaluate_criteria(table):
     """`evaluate` for the state `new` of a job."""
     job = read(table)
-    evaluate(job.line, job.sea, job.ends, job.new, job.zones, job.near, job.zones.clock[DT])
+    evaluate(job.line, job.sea, job.ends, job.new, job.zones, job.near, job.zones.clock.dt)
 
 
 @kernel
@@ -452,7 +459,7 @@ def plan_nodes(table):
     """Places of nodes for the state `new` of a job and rods zones.next_rod, into zones.plan."""
     job = read(table)
     clock = job.zones.clock
-    plan_cells(job.line, job.sea, job.new, job.zones, clock[DT], clock[FINENESS])
+    plan_cells(job.line, job.sea, job.new, job.zones, clock.dt, clock.fineness)
 
 
 @kernel
@@ -460,7 +467,7 @@ def plan_next(table):
     """`plan_nodes` between two steps of a run, for the state that it has come to."""
     job = read(table)
     clock, state = job.zones.clock, job.new if job.counts.parity else job.old
-    plan_cells(job.line, job.sea, state, job.zones, clock[DT], clock[FINENESS])
+    plan_cells(job.line, job.sea, state, job.zones, clock.dt, clock.fineness)
 
 
 @kernel
@@ -474,22 +481,22 @@ def follow_zones(table):
         return 0
     if phase == b.JUDGE:
         evaluate(line, job.sea, ends, job.old if count.parity else job.new, zones, job.near, dt)
-        return 1 if zones.clock[LOUDEST] > REJECT_RATIO else 0
+        return 1 if zones.clock.loudest > REJECT_RATIO else 0
     # a step is accepted, and the states have changed places
     state, before = job.old, job.new
     if count.parity:
         state, before = before, state
     for k in range(QUANTITIES):
-        zones.largest[k] *= math.exp(-clock.last_dt / zones.clock[MEMORY])
+        zones.largest[k] *= math.exp(-clock.last_dt / zones.clock.memory)
     job.work[0, b.ZONES] += book(line, ends, before, state, clock.last_dt, zones)
-    if zones.clock[SHARE] > 0.0:
+    if zones.clock.share > 0.0:
         follow_arcs(line, state, zones)
         watch_waves(line, state, zones, clock.last_dt)
-        zones.counts[CELLS_DUE] = other_cells(line, job.sea, state, zones, clock.last_dt)
-    ramping = zones.counts[GOING] or zones.counts[COMING]
-    clock.allowed = zones.clock[RAMP_STEP] if ramping else zones.clock[CALM_STEP]
-    if zones.clock[LOUDEST] > 1.0:
+        zones.counts.cells_due = other_cells(line, job.sea, state, zones, clock.last_dt)
+    ramping = zones.counts.going or zones.counts.coming
+    clock.allowed = zones.clock.ramp_step if ramping else zones.clock.calm_step
+    if zones.clock.loudest > 1.0:
         return 1
-    if clock.now >= zones.clock[NEXT_REVIEW] and (job.review == 0 or call_review(job.review, job.review_table) == 0):
+    if clock.now >= zones.clock.next_review and (job.review == 0 or call_review(job.review, job.review_table) == 0):
         return 1
-    return 1 if zones.counts[CELLS_DUE] != 0 else 0
+    return 1 if zones.counts.cells_due != 0 else 0

@@ -18,7 +18,7 @@ from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.mesh.cell_lengths import arc_less_chord
 from hybrid.kernels.mesh.stiffness_ramp import shares, soften
-from hybrid.kernels.mesh.zone_step import LETTING_GO, SHARE, Zones, blank_zones
+from hybrid.kernels.mesh.zone_step import Zones, blank_zones
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_transfer, old_cell, put3, transfer_state
 from hybrid.kernels.state.forces import AXIAL_LAW, PLANAR, TOUCHES
 from hybrid.kernels.state.state import Ends, Floats, Sea, no_ends, no_sea
@@ -123,7 +123,7 @@ def lengthening(state, c):
 @inner
 def lack_rate(zones, c, t):
     """Rate, m/s, at which what a cell on its way to its true length lacks grows (kernels.mesh.stiffness_ramp)."""
-    duration = zones.clock[LETTING_GO]
+    duration = zones.clock.letting_go
     x = min(max((t - zones.since[c]) / duration, 0.0), 1.0)
     value = 0.0 if zones.keeps[c] else -30.0 * x * x * (1.0 - x) ** 2
     return zones.lack[c] * value / duration + zones.rate[c] * (1.0 - x) ** 2 * (1.0 + 2.0 * x - 15.0 * x * x)
@@ -166,7 +166,7 @@ def relax(job, t):
     zones, before, match = job.target_zones, job.zones, job.transfer.match
     for c in range(match.kept.shape[0]):
         a = match.kept[c]
-        zones.keeps[c] = not job.transfer.target.spin[c] and not zones.clock[SHARE] > 0.0
+        zones.keeps[c] = not job.transfer.target.spin[c] and not zones.clock.share > 0.0
         if a < 0:
             relax_cell(job, c, t)
         elif job.numbers[RELAXES] > 0.0:
@@ -187,7 +187,7 @@ def end_switch(table):
     for c in range(target.h.shape[0]):
         a = transfer.match.kept[c]
         zones.true[c], zones.lengths[c] = target.h[c], transfer.match.lengths[c]
-        if zones.clock[SHARE] > 0.0:
+        if zones.clock.share > 0.0:
             less = arc_less_chord(target, transfer.out, zones, c)
             zones.true[c] = job.zones.true[a] if a >= 0 else target.h[c] - less
     make_stiffness(target, zones)

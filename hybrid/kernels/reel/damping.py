@@ -37,7 +37,7 @@ from hybrid.kernels.laws.element import frames_at, relative_rotation
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.mesh.fill_line import FIRST, PER_LENGTH
 from hybrid.kernels.reel.paid_length import cell, flows, growing, lack_rate, node, shift_layers
-from hybrid.kernels.reel.reel import FAR, FLOW, LENGTH_OF, RATE, SIDE, STRAIN_OF, TURN_FLOW
+from hybrid.kernels.reel.reel import FLOW, LENGTH_OF, STRAIN_OF, TURN_FLOW
 from hybrid.kernels.state.report import FORCE_A, MOMENT_A, NET_A, STIFFNESS_DAMPING_POWER
 
 Z3 = (0.0, 0.0, 0.0)
@@ -63,7 +63,7 @@ def elastic_tension(line, state, i):
 @inner
 def compliance_at(line, reel, j):
     """Compliance, 1/N, of the material at node j."""
-    place, k = reel.numbers[SIDE] * (line.s[node(line, reel, j)] - reel.numbers[FAR]), 0
+    place, k = reel.numbers.side * (line.s[node(line, reel, j)] - reel.numbers.far), 0
     while k + 1 < reel.pieces.shape[0] and reel.pieces[k + 1, 0] <= place:
         k += 1
     return reel.pieces[k, COMPLIANCE]
@@ -80,7 +80,7 @@ def strain_of_face(line, state, reel, j):
         T, U = elastic_tension(line, state, a), elastic_tension(line, state, b)
     else:
         part = 1.0 + line.h[b] / (line.h[a] + line.h[b])
-        if reel.numbers[RATE] > 0.0:  # what comes bears the tension there
+        if reel.numbers.rate > 0.0:  # what comes bears the tension there
             T, U = state.T[a], state.T[b]
         else:
             T, U = elastic_tension(line, state, a), elastic_tension(line, state, b)
@@ -90,7 +90,7 @@ def strain_of_face(line, state, reel, j):
 @inner
 def flow_of_cell(line, state, reel, k, t):
     """x of cell k at t, m/s."""
-    i, g, c = cell(line, reel, k), growing(line, reel), reel.numbers[RATE]
+    i, g, c = cell(line, reel, k), growing(line, reel), reel.numbers.rate
     if not line.ck[i] > 0.0:
         return 0.0
     x = -lack_rate(reel, t, k) * (1.0 + strain_at(line, state, i))
@@ -133,7 +133,7 @@ def flow_through_middle(line, ends, state, reel, k):
 
     of the material at a clamp that is the fairlead.
     """
-    n, g, c = line.h.shape[0], growing(line, reel), reel.numbers[RATE]
+    n, g, c = line.h.shape[0], growing(line, reel), reel.numbers.rate
     if k < g:
         return Z3
     if k == n:
@@ -240,7 +240,7 @@ def moment_of_flow(line, ends, state, reel, i):
 @inner
 def correct_end(line, ends, state, reel, report):
     """The report of a line that was assembled without the flow: force and moment at the fairlead."""
-    n, k = line.h.shape[0], 1 if reel.numbers[SIDE] > 0.0 else 0
+    n, k = line.h.shape[0], 1 if reel.numbers.side > 0.0 else 0
     d, _, il = chord(get3(state.e, k * (n - 1)))
     here, beside = (
         moment_of_flow(line, ends, state, reel, k * n),

@@ -21,27 +21,8 @@ from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B
 from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.mesh.fill_line import B_1, COLUMNS, fill_cell, fill_element, fill_node
 from hybrid.kernels.reel.reel import (
-    ACCELERATION,
-    BALANCE_ON,
-    CHANGED,
-    EASING,
-    FAR,
-    LENGTH,
-    LENGTH_BEFORE,
     LENGTH_OF,
-    LIFT,
-    PLACE,
-    RATE,
-    RIDING_ON,
-    SIDE,
-    SPRING,
     STRAIN_OF,
-)
-from hybrid.kernels.reel.winch import (
-    LENGTH_NOW,
-    RATE_NOW,
-    TENSION,
-    TRUE_NOW,
 )
 from hybrid.kernels.state.forces import BENDING_LAW, VORTICES
 
@@ -89,25 +70,25 @@ def made_between(pieces, begin, end, out, row):
 @inner
 def node(line, reel, i):
     """The number in the line of a node counted from the far end."""
-    return i if reel.numbers[SIDE] > 0.0 else line.h.shape[0] - i
+    return i if reel.numbers.side > 0.0 else line.h.shape[0] - i
 
 
 @inner
 def cell(line, reel, c):
     """The number in the line of a cell counted from the far end."""
-    return c if reel.numbers[SIDE] > 0.0 else line.h.shape[0] - 1 - c
+    return c if reel.numbers.side > 0.0 else line.h.shape[0] - 1 - c
 
 
 @inner
 def place_of(line, reel, i):
     """Place, m, of a node."""
-    return reel.numbers[SIDE] * (line.s[node(line, reel, i)] - reel.numbers[FAR])
+    return reel.numbers.side * (line.s[node(line, reel, i)] - reel.numbers.far)
 
 
 @inner
 def length_that_came(reel):
     """Length, m, that has come out since the last step, up to the end of the try."""
-    return reel.numbers[LENGTH] - reel.numbers[LENGTH_BEFORE]
+    return reel.numbers.length - reel.numbers.length_before
 
 
 @inner
@@ -141,8 +122,8 @@ def fill_between(line, reel, i, a, ha, b, hb):
         if line.bits & BENDING_LAW:
             fill_table(line, i, 0.5 * (ha + hb))
     if line.bits & VORTICES:
-        before, after = (ha, hb) if reel.numbers[SIDE] > 0.0 else (hb, ha)
-        half = 0.5 * reel.numbers[LIFT]
+        before, after = (ha, hb) if reel.numbers.side > 0.0 else (hb, ha)
+        half = 0.5 * reel.numbers.lift
         line.wake_law[i, LIFT_A], line.wake_law[i, LIFT_B] = half * before, half * after
 
 
@@ -150,7 +131,7 @@ def fill_between(line, reel, i, a, ha, b, hb):
 def fill_cells(line, reel):
     """Mass, loads and stiffness of the cell that grows, of those behind it and of their nodes, for the length that is out."""
     n, layer, made, a, b = line.h.shape[0], reel.layer, reel.made, 0, 1
-    length, begin, g, before = reel.numbers[LENGTH], reel.numbers[PLACE], n - reel.layer.shape[0], reel.rest_length[0]
+    length, begin, g, before = reel.numbers.length, reel.numbers.place, n - reel.layer.shape[0], reel.rest_length[0]
     for j in range(COLUMNS):
         made[a, j] = reel.rest[0, j]
     for k in range(g, n):
@@ -158,7 +139,7 @@ def fill_cells(line, reel):
         h, c, i = end - begin, cell(line, reel, k), node(line, reel, k)
         made_between(reel.pieces, begin, end, made, b)
         reel.true[k] = h
-        line.s[node(line, reel, k + 1)] = reel.numbers[FAR] + reel.numbers[SIDE] * end
+        line.s[node(line, reel, k + 1)] = reel.numbers.far + reel.numbers.side * end
         fill_between(line, reel, i, a, before, b, h)
         ck = line.ck[c]
         fill_cell(line, c, made, b, h)
@@ -169,8 +150,8 @@ def fill_cells(line, reel):
         a, b, before, begin = b, a, h, end
     i = node(line, reel, n)
     fill_between(line, reel, i, a, before, b, 0.0)
-    if line.element[i] and reel.numbers[SPRING] < np.inf:
-        put_spring(reel.numbers[SPRING], line, i)
+    if line.element[i] and reel.numbers.spring < np.inf:
+        put_spring(reel.numbers.spring, line, i)
 
 
 @inner
@@ -203,10 +184,10 @@ def lack_rate(reel, t, c):
 def find_length(reel, t):
     """How long the line is at t, of what is prescribed, or of a winch before a step."""
     numbers, winch = reel.numbers, reel.winch
-    if winch[TENSION] > 0.0:
-        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = winch[LENGTH_NOW], winch[RATE_NOW], winch[TRUE_NOW]
+    if winch.tension > 0.0:
+        numbers.length, numbers.rate, numbers.acceleration = winch.length_now, winch.rate_now, winch.true_now
     else:
-        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = length_at(reel.law, t)
+        numbers.length, numbers.rate, numbers.acceleration = length_at(reel.law, t)
 
 
 @inner
@@ -246,7 +227,7 @@ def take_flow_off(line, reel):
 @inner
 def take_riding_off(line, reel):
     """The forces on the line without those by which nodes that ride have more; the line without the flow of damping."""
-    if reel.stage[RIDING_ON] > 0.0:
+    if reel.stage.riding_on > 0.0:
         if reel.flow.shape[0] > 0:
             take_flow_off(line, reel)
         first = growing(line, reel) + 1
@@ -254,15 +235,15 @@ def take_riding_off(line, reel):
             i = node(line, reel, first + k)
             for j in range(3):
                 line.force[i, j] -= reel.riding[k, j]
-        reel.stage[RIDING_ON] = 0.0
+        reel.stage.riding_on = 0.0
 
 
 @inner
 def eased(reel, t):
     """What part of the forces that balanced the neighbours of the last new node still acts at t: a quintic from 1 to 0."""
-    if reel.numbers[CHANGED] == -np.inf:
+    if reel.numbers.changed == -np.inf:
         return 0.0
-    x = min(max((t - reel.numbers[CHANGED]) / reel.numbers[EASING], 0.0), 1.0)
+    x = min(max((t - reel.numbers.changed) / reel.numbers.easing, 0.0), 1.0)
     return 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
 
 
@@ -275,17 +256,17 @@ def put_balance_on(line, reel, t):
             for j in range(3):
                 reel.plain[i, j] = line.force[i, j]
                 line.force[i, j] += part * reel.balance[i, j]
-        reel.stage[BALANCE_ON] = 1.0
+        reel.stage.balance_on = 1.0
 
 
 @inner
 def take_balance_off(line, reel):
     """The forces on the line without them, to the last bit; those on nodes that ride are off."""
-    if reel.stage[BALANCE_ON] > 0.0:
+    if reel.stage.balance_on > 0.0:
         for i in range(line.h.shape[0] + 1):
             for j in range(3):
                 line.force[i, j] = reel.plain[i, j]
-        reel.stage[BALANCE_ON] = 0.0
+        reel.stage.balance_on = 0.0
 
 
 @inner

@@ -52,36 +52,12 @@ from hybrid.kernels.reel.payout_layers import (
 )
 from hybrid.kernels.reel.payout_work import book, book_contact, end_of, leave_to_reel, remember, work_of_balance
 from hybrid.kernels.reel.reel import (
-    ACCELERATION,
-    ALONE,
-    CHANGE,
-    DUE,
     FEWEST_STEPS,
-    FLOW_KNOWN,
-    FLUX,
-    GROWS_AT,
-    LENGTH,
-    LENGTHENS,
-    LONGEST,
     MOVES,
-    OUT_OF_BALANCE,
-    PULLS_AT,
-    PUTS,
-    RATE,
-    RIDING_ON,
-    SHORTEST,
-    SIDE,
-    UNBALANCED,
     WAITS,
     read,
 )
 from hybrid.kernels.reel.winch import (
-    BEGIN,
-    CA,
-    CV,
-    HELD,
-    INERTIA,
-    TENSION,
     accept,
     answer_of_cell,
     at_its_end,
@@ -103,7 +79,7 @@ from hybrid.kernels.state.report import FORCE_A, FORCE_B, LENGTH_OUT, NET_A, PAY
 @inner
 def chord_at(line, state, reel, c):
     """Chord of a cell, towards the fairlead."""
-    return scale(reel.numbers[SIDE], get3(state.e, cell(line, reel, c)))
+    return scale(reel.numbers.side, get3(state.e, cell(line, reel, c)))
 
 
 @inner
@@ -136,7 +112,7 @@ def velocity_at(line, state, reel, i, rate, g):
 def of_material(line, sea, ends, state, reel, i):
     """What the force on node i, N, is more because it does not move as the material does, and r' there."""
     n, numbers, g = line.h.shape[0], reel.numbers, growing(line, reel)
-    rate, acceleration, j = numbers[RATE], numbers[ACCELERATION], min(i, n - 1)
+    rate, acceleration, j = numbers.rate, numbers.acceleration, min(i, n - 1)
     slope, bend = slope_at(line, state, reel, i)
     ha, hb = lengths_at(line, reel, j)
     first, middle = velocity_at(line, state, reel, j - 1, rate, g), velocity_at(line, state, reel, j, rate, g)
@@ -154,7 +130,7 @@ def of_material(line, sea, ends, state, reel, i):
         d, l, il = chord(get3(state.e, k))
         after = Chord(d, l, il)
     for c in range(i, n):
-        z -= numbers[SIDE] * state.e[cell(line, reel, c), 2]
+        z -= numbers.side * state.e[cell(line, reel, c), 2]
     vi, ai = get3(state.v, k), get3(state.vd, k)
     rates = Rates(0.0, 0.0)
     with_material, _, _, _ = inertia_and_water(line, sea, k, z, v, sub(ai, K), before, after, rates, reel.report)
@@ -187,8 +163,8 @@ def put_riding_on(line, sea, ends, state, reel, t):
             line.force[i, j] += reel.riding[k, j]
     if reel.flow.shape[0] > 0:
         put_flow_on(line, ends, state, reel, t)
-        reel.stage[FLOW_KNOWN] = 1.0
-    reel.stage[RIDING_ON] = 1.0
+        reel.stage.flow_known = 1.0
+    reel.stage.riding_on = 1.0
 
 
 @inner
@@ -233,12 +209,12 @@ def correct_force(line, sea, ends, state, velocity, reel, report, t):
     report[at], report[at + 1], report[at + 2] = force
     for j in range(3):
         report[NET_A - FORCE_A + at + j] += there[j]
-    report[LENGTH_OUT], report[PAYOUT_RATE] = numbers[LENGTH], numbers[RATE]
-    report[PAYOUT_POWER] = numbers[RATE] * dot(force, slope)
-    numbers[FLUX] = dot(more, get3(velocity, end_of(reel)))
+    report[LENGTH_OUT], report[PAYOUT_RATE] = numbers.length, numbers.rate
+    report[PAYOUT_POWER] = numbers.rate * dot(force, slope)
+    numbers.flux = dot(more, get3(velocity, end_of(reel)))
     for i in range(growing(line, reel) + 1, line.h.shape[0]):
         more, _ = of_material(line, sea, ends, state, reel, i)
-        numbers[FLUX] += dot(more, get3(state.v, node(line, reel, i)))
+        numbers.flux += dot(more, get3(state.v, node(line, reel, i)))
     return pull_at(force, slope)
 
 
@@ -270,8 +246,8 @@ def limit_step(reel, clock):
     Of a winch that holds a tension the rate and its growth now tell what comes in a step, else the law of the length.
     """
     dt, numbers, fastest = clock.next_dt, reel.numbers, 1e-12
-    if reel.winch[TENSION] > 0.0:
-        fastest = max(fastest, abs(numbers[RATE]) + abs(numbers[ACCELERATION]) * clock.last_dt)
+    if reel.winch.tension > 0.0:
+        fastest = max(fastest, abs(numbers.rate) + abs(numbers.acceleration) * clock.last_dt)
     else:
         length, rate, _ = length_at(reel.law, clock.now)
         later, then, _ = length_at(reel.law, clock.now + dt)
@@ -282,8 +258,8 @@ def limit_step(reel, clock):
 @inner
 def note_pull(reel, t, pull):
     """What the pull is when the brake of a winch opens: the last one before."""
-    if t <= reel.winch[BEGIN]:
-        reel.winch[HELD] = pull
+    if t <= reel.winch.begin:
+        reel.winch.held = pull
 
 
 @kernel
@@ -294,9 +270,9 @@ def pay_out(table):
     phase, numbers, winch = count.phase, reel.numbers, reel.winch
     if phase == b.SOLVE:
         find_length(reel, clock.try_end)
-        if winch[TENSION] > 0.0:
+        if winch.tension > 0.0:
             dt = clock.try_end - clock.now
-            numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = predict(
+            numbers.length, numbers.rate, numbers.acceleration = predict(
                 winch, clock.rho, clock.step_before, clock.rho_before, dt
             )
         prepare(line, reel, clock.try_end)
@@ -310,17 +286,17 @@ def pay_out(table):
         take_balance_off(line, reel)
         pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report, clock.try_end)
         if reel.flow.shape[0] > 0:
-            numbers[FLUX] += power_of_flow(line, job.ends, tried, reel)
+            numbers.flux += power_of_flow(line, job.ends, tried, reel)
         note_pull(reel, clock.try_end, pull)
         leave_to_reel(line, job.zones, reel)
         return 0
     # a step is accepted, and the states have changed places
-    reel.stage[FLOW_KNOWN] = 0.0
+    reel.stage.flow_known = 0.0
     state, before = job.old, job.new
     if count.parity:
         state, before = before, state
-    if winch[TENSION] > 0.0:
-        accept(winch, numbers[LENGTH], numbers[RATE], numbers[ACCELERATION])
+    if winch.tension > 0.0:
+        accept(winch, numbers.length, numbers.rate, numbers.acceleration)
     job.work[0, end_of(reel)] += book(line, job.ends, before, state, reel, clock.last_dt)
     job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock.now, clock.last_dt)
     if line.bits & TOUCHES:
@@ -331,17 +307,17 @@ def pay_out(table):
     if count.controlled:
         limit_step(reel, clock)
     last = reel.true[growing(line, reel)]
-    numbers[DUE] = 1.0 if last > numbers[LONGEST] or last < numbers[SHORTEST] else 0.0
-    return 1 if numbers[DUE] > 0.0 or at_its_end(winch) else 0
+    numbers.due = 1.0 if last > numbers.longest or last < numbers.shortest else 0.0
+    return 1 if numbers.due > 0.0 or at_its_end(winch) else 0
 
 
 @inner
 def correct_length(job, change):
     """The length of a winch that holds a tension changes, m, in the iteration of a step."""
     numbers, winch, t = job.reel.numbers, job.reel.winch, job.clock.try_end
-    numbers[LENGTH] += change
-    numbers[RATE] += winch[CV] * change
-    numbers[ACCELERATION] += winch[CA] * change
+    numbers.length += change
+    numbers.rate += winch.cv * change
+    numbers.acceleration += winch.ca * change
     prepare(job.line, job.reel, t)
     put_balance_on(job.line, job.reel, t)
     if flows(job.line):
@@ -366,12 +342,12 @@ def iterate(table):
     line, reel, clock = job.line, job.reel, job.clock
     numbers, winch, stage, t = reel.numbers, reel.winch, reel.stage, clock.try_end
     state = job.old if job.counts.parity else job.new
-    if stage[LENGTHENS] == MOVES:
-        stage[LENGTHENS] = 0.0
-        correct_length(job, stage[CHANGE])
+    if stage.lengthens == MOVES:
+        stage.lengthens = 0.0
+        correct_length(job, stage.change)
         return 0
-    stage[LENGTHENS] = 0.0
-    if stage[RIDING_ON] == 0.0:
+    stage.lengthens = 0.0
+    if stage.riding_on == 0.0:
         put_riding_on(line, job.sea, job.ends, state, reel, t)
         if rubs(line):
             let_material_rub(line, job.sea, job.new if job.counts.parity else job.old, reel)
@@ -379,7 +355,7 @@ def iterate(table):
     if reel.flow.shape[0] > 0:
         correct_damping_power(line, job.ends, state, reel, job.report, True)
     take_riding_off(line, reel)
-    if t <= winch[BEGIN] or not winch[TENSION] > 0.0:
+    if t <= winch.begin or not winch.tension > 0.0:
         return 0
     at, n, g = last_change(line), line.h.shape[0], growing(line, reel)
     apart = end_of(reel) == 0 or g < n - 1  # the cell that grows is not the last one of the line
@@ -387,16 +363,16 @@ def iterate(table):
     more = (0.0, 0.0, 0.0) if is_joined(job.ends, reel) else sub(more, sum_of_balance(reel, t))
     force, _ = force_of_fairlead(reel, job.report, more)
     pull = pull_at(force, slope)
-    lost, steep = losses(winch, numbers[RATE])
-    taken = winch[INERTIA] * numbers[ACCELERATION] + lost + tension_held(winch, t)
+    lost, steep = losses(winch, numbers.rate)
+    taken = winch.inertia * numbers.acceleration + lost + tension_held(winch, t)
     carried = 0.0  # with the fairlead and the nodes that ride with it
     for j in range(g + 1, n + 1):
         carried += line.mass[node(line, reel, j)] * math.sqrt(dot(slope, slope))
-    stiff = (winch[INERTIA] + carried) * winch[CA] + steep * winch[CV]
+    stiff = (winch.inertia + carried) * winch.ca + steep * winch.cv
     c, before = cell(line, reel, g), n if end_of(reel) else 1
     if is_of_joined(job.ends):
-        stage[LENGTHENS], stage[GROWS_AT], stage[PULLS_AT] = WAITS, c + 1.0, float(before)
-        stage[PUTS], stage[OUT_OF_BALANCE], stage[ALONE] = by_length(line, state, winch, c), taken - pull, stiff
+        stage.lengthens, stage.grows_at, stage.pulls_at = WAITS, c + 1.0, float(before)
+        stage.puts, stage.out_of_balance, stage.alone = by_length(line, state, winch, c), taken - pull, stiff
         return 0
     if apart:
         answer, more_pull = answer_of_cell(line, state, winch, job.X, job.W, reel.columns, c, before)
@@ -418,7 +394,7 @@ def end_payout(table):
     line, reel = job.line, job.reel
     state, n, g = job.new if job.counts.parity else job.old, line.h.shape[0], growing(line, reel)
     for i in range(g + 1, n + 1):
-        v = velocity_at(line, state, reel, i, reel.numbers[RATE], g)
+        v = velocity_at(line, state, reel, i, reel.numbers.rate, g)
         for j in range(3):
             state.v[node(line, reel, i), j] = v[j]
 
@@ -467,23 +443,23 @@ def take_forces_off(table):
 @inner
 def stand(job):
     """The line at clock[NOW], and the force of its fairlead, for a state that no step has led to."""
-    was_on, damped, t = job.reel.stage[FLOW_KNOWN] > 0.0, job.reel.flow.shape[0] > 0, job.clock.now
+    was_on, damped, t = job.reel.stage.flow_known > 0.0, job.reel.flow.shape[0] > 0, job.clock.now
     state = job.new if job.counts.parity else job.old
     find_length(job.reel, t)
     prepare(job.line, job.reel, t)
-    if damped or job.reel.stage[UNBALANCED] > 0.0:
+    if damped or job.reel.stage.unbalanced > 0.0:
         put_riding_on(job.line, job.sea, job.ends, state, job.reel, t)
-        if job.reel.stage[UNBALANCED] > 0.0:
+        if job.reel.stage.unbalanced > 0.0:
             find_balance(job.line, job.sea, job.ends, state, job.reel)
         if damped:
             correct_damping_power(job.line, job.ends, state, job.reel, job.report, was_on)
         if damped and not was_on:
             correct_end(job.line, job.ends, state, job.reel, job.report)
         take_riding_off(job.line, job.reel)
-        job.reel.stage[UNBALANCED], job.reel.stage[FLOW_KNOWN] = 0.0, 0.0
+        job.reel.stage.unbalanced, job.reel.stage.flow_known = 0.0, 0.0
     pull = correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report, t)
     if damped:
-        job.reel.numbers[FLUX] += power_of_flow(job.line, job.ends, state, job.reel)
+        job.reel.numbers.flux += power_of_flow(job.line, job.ends, state, job.reel)
     note_pull(job.reel, t, pull)
     remember_all(job, state)
 

@@ -17,7 +17,6 @@ from hybrid.kernels.laws.obstacles import normal_at, stored_along
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.reel.paid_length import cell, changes_length, growing, length_that_came, node
-from hybrid.kernels.reel.reel import SIDE
 from hybrid.kernels.state.forces import FRICTION, TOUCHES
 from hybrid.kernels.state.obstacle_rows import EACH, FORCE, SWEEP, TRAVEL
 
@@ -37,7 +36,7 @@ def tangent(line, state, reel, i):
         x, y = e, get3(state.e, cell(line, reel, i - 1))
         a, b = math.sqrt(dot(x, x)), math.sqrt(dot(y, y))
         e = (x[0] / a + y[0] / b, x[1] / a + y[1] / b, x[2] / a + y[2] / b)
-    return scale(reel.numbers[SIDE] / math.sqrt(dot(e, e)), e)
+    return scale(reel.numbers.side / math.sqrt(dot(e, e)), e)
 
 
 @inner

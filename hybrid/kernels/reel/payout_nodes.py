@@ -25,21 +25,12 @@ from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_bet
 from hybrid.kernels.reel.payout import slope_at, velocity_at
 from hybrid.kernels.reel.payout_contact import put_travels
 from hybrid.kernels.reel.reel import (
-    CHANGED,
-    EASING,
     ENTERS,
     FEWEST_STEPS,
     LEAVES,
-    LENGTH,
-    LONGEST,
-    PLACE,
-    SHORTEST,
-    SIDE,
-    UNBALANCED,
     Reel,
     blank_reel,
 )
-from hybrid.kernels.reel.winch import ALGORITHMIC_NOW, RATE_NOW, TENSION, TRUE_NOW
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.forces import PLANAR, STIFFNESS_DAMPING
@@ -89,9 +80,9 @@ class Flow(NamedTuple):
 def place_reel(reel, nodes, count):
     """What a reel knows of a line of so many material nodes; none of its cells lacks anything."""
     numbers, before, place, next_ = reel.numbers, nodes[count - 2], nodes[count - 1], nodes[count]
-    numbers[PLACE] = place
-    numbers[LONGEST] = next_ - place + ENTERS * (nodes[count + 1] - next_)
-    numbers[SHORTEST] = LEAVES * (next_ - place)
+    numbers.place = place
+    numbers.longest = next_ - place + ENTERS * (nodes[count + 1] - next_)
+    numbers.shortest = LEAVES * (next_ - place)
     made_between(reel.pieces, before, place, reel.rest, 0)
     reel.rest_length[0] = place - before
     for c in range(reel.true.shape[0]):
@@ -178,12 +169,12 @@ def put(x, i, value):
 @inner
 def chord_at(line, state, reel, c):
     """Chord of a cell, towards the fairlead."""
-    return scale(reel.numbers[SIDE], get3(state.e, cell(line, reel, c)))
+    return scale(reel.numbers.side, get3(state.e, cell(line, reel, c)))
 
 
 @inner
 def put_chord(line, state, reel, c, e):
-    put(state.e, cell(line, reel, c), scale(reel.numbers[SIDE], e))
+    put(state.e, cell(line, reel, c), scale(reel.numbers.side, e))
 
 
 @inner
@@ -191,9 +182,9 @@ def flow_at(reel, clock):
     """How material flows through the fairlead after an accepted step."""
     t, winch = clock.now, reel.winch
     ahead = lead(clock.last_rho) * clock.last_dt
-    if winch[TENSION] > 0.0:
-        rate, acceleration = winch[RATE_NOW], winch[TRUE_NOW]
-        return Flow(rate, acceleration, rate + ahead * acceleration, winch[ALGORITHMIC_NOW])
+    if winch.tension > 0.0:
+        rate, acceleration = winch.rate_now, winch.true_now
+        return Flow(rate, acceleration, rate + ahead * acceleration, winch.algorithmic_now)
     _, rate, acceleration = length_at(reel.law, t)
     _, later, then = length_at(reel.law, t + ahead)
     return Flow(rate, acceleration, later, then)
@@ -254,7 +245,7 @@ def flow_stretch(line, state, reel, rate, c):
 
     0 where the reel holds no sections of another compliance.
     """
-    k, end, at = cell(line, reel, c), reel.numbers[LENGTH] - reel.layer[0], 0
+    k, end, at = cell(line, reel, c), reel.numbers.length - reel.layer[0], 0
     while at + 1 < reel.pieces.shape[0] and reel.pieces[at + 1, 0] < end:
         at += 1
     return rate * state.T[k] * (reel.pieces[at, 1 + COMPLIANCE] - line.ck[k]) if not has_law(line, k) else 0.0
@@ -304,7 +295,7 @@ def put_director(job, c, a, e, turn):
     zero, and that beside it half as much again, until twist waves have levelled it.
     """
     to = chord_at(job.target, job.out, job.new, c)
-    a, side = carried(a, e, to), job.new.numbers[SIDE] / math.sqrt(dot(to, to))
+    a, side = carried(a, e, to), job.new.numbers.side / math.sqrt(dot(to, to))
     if turn != 0.0:
         a = add(scale(math.cos(turn), a), scale(math.sin(turn) * side, cross(to, a)))
     put(job.out.a1, cell(job.target, job.new, c), a)
@@ -337,7 +328,7 @@ def crossing_time(job, g):
         weight += abs(line.force[i, 2])
         mass += line.mass[i]
     pull = max(pull, weight)
-    return math.sqrt(mass * job.reel.numbers[LENGTH] / pull) if pull > 0.0 else math.inf
+    return math.sqrt(mass * job.reel.numbers.length / pull) if pull > 0.0 else math.inf
 
 
 @inner
@@ -390,7 +381,7 @@ def enter(job, flow, g):
     slope = (state.T[cut] - state.T[last]) / (0.5 * (line.h[last] + h))
     kept, rises = mismatch(job, flow, g, g), tension_rate(line, state, job.clock, job.tension, cut)
     late, flows = late_strain(line, state, cut), 0.5 * flow.rate * slope if is_damped(line, cut) else 0.0
-    twist, side = twist_rate(line, state, reel, g), reel.numbers[SIDE]
+    twist, side = twist_rate(line, state, reel, g), reel.numbers.side
     ahead = twist_rate(line, state, reel, i)
     if ahead == 0.0:
         ahead = twist
@@ -433,7 +424,7 @@ def leave(job, flow, g):
     out.wd[k] = a * state.wd[last] + z * state.wd[cut]
     if state.slow.shape[0] > 0:
         out.slow[k] = a * state.slow[last] + z * state.slow[cut]
-    put_director(job, c, get3(state.a1, last), e, 0.5 * reel.numbers[SIDE] * twist_rate(line, state, reel, g) * hb)
+    put_director(job, c, get3(state.a1, last), e, 0.5 * reel.numbers.side * twist_rate(line, state, reel, g) * hb)
     kept = mismatch(job, flow, g, c) + mismatch(job, flow, g, g)
     rises = a * tension_rate(line, state, job.clock, job.tension, last)
     rises += z * tension_rate(line, state, job.clock, job.tension, cut)
@@ -452,7 +443,7 @@ def carry(job):
     line, reel, new = job.line, job.reel, job.new
     n, m = line.h.shape[0], job.target.h.shape[0]
     g, flow, step = n - reel.layer.shape[0], flow_at(reel, job.clock), m - n
-    move_state(job.state, job.out, reel.numbers[SIDE] > 0.0, g + 1 if step > 0 else g, step)
+    move_state(job.state, job.out, reel.numbers.side > 0.0, g + 1 if step > 0 else g, step)
     if step > 0:
         enter(job, flow, g)
     else:
@@ -460,8 +451,8 @@ def carry(job):
     plain = (
         line.torsion.shape[0] == 0 and line.tension_twist.shape[0] == 0
     )  # no force that payout_balance does not know
-    new.stage[UNBALANCED] = 1.0 if plain else 0.0
-    new.numbers[CHANGED], new.numbers[EASING] = job.clock.now if plain else -np.inf, span_of(job, flow, g)
+    new.stage.unbalanced = 1.0 if plain else 0.0
+    new.numbers.changed, new.numbers.easing = job.clock.now if plain else -np.inf, span_of(job, flow, g)
 
 
 @kernel

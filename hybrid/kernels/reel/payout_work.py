@@ -14,14 +14,13 @@ from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.reel.damping import damped_stretch_work
 from hybrid.kernels.reel.paid_length import cell, changes_length, eased, growing, node
 from hybrid.kernels.reel.payout_contact import contact_that_came, friction_of_flow
-from hybrid.kernels.reel.reel import FLUX, FLUX_BEFORE, LENGTH, LENGTH_BEFORE, SIDE
 from hybrid.kernels.state import books as b
 
 
 @inner
 def end_of(reel):
     """Which end of the line the fairlead is: 0 or 1."""
-    return 1 if reel.numbers[SIDE] > 0.0 else 0
+    return 1 if reel.numbers.side > 0.0 else 0
 
 
 @inner
@@ -99,7 +98,7 @@ def remember(line, ends, state, reel):
     i = node(line, reel, n)
     if line.element[i]:
         reel.clamp[0], reel.clamp[1], reel.clamp[2] = turn_at(line, ends, state, i)
-    reel.numbers[FLUX_BEFORE], reel.numbers[LENGTH_BEFORE] = reel.numbers[FLUX], reel.numbers[LENGTH]
+    reel.numbers.flux_before, reel.numbers.length_before = reel.numbers.flux, reel.numbers.length
 
 
 @inner
@@ -118,7 +117,7 @@ def leave_to_reel(line, zones, reel):
 def book(line, ends, old, new, reel, dt):
     """Energy, J, that came in with material through an accepted step of dt, and with lengths that were not true."""
     n, before, numbers = line.h.shape[0], reel.before, reel.numbers
-    booked = 0.5 * dt * (numbers[FLUX] + numbers[FLUX_BEFORE])
+    booked = 0.5 * dt * (numbers.flux + numbers.flux_before)
     for c in range(n):
         more = line.h[c] - before[c, 0]
         if more != 0.0 and changes_length(line, reel, c):

@@ -14,9 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.mesh.fill_line import COLUMNS
-from hybrid.kernels.reel.winch import WINCH
+from hybrid.kernels.reel.winch import Winch
 from hybrid.kernels.state.books import WORKS, Clock, Counts
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
@@ -26,33 +27,50 @@ ENTERS, LEAVES = 0.85, 0.35
 # Steps over which new cells get their true lengths, at least; steps that follow the motion are so short that these have
 # passed when the next node enters.
 FEWEST_STEPS = 8
-# Numbers of a reel.
-(
-    LENGTH, RATE, ACCELERATION,  # L, c and the rate of c at the end of the try
-    PLACE,  # p
-    LONGEST, SHORTEST,  # m, the last cell: beyond the first a node enters, below the second one leaves
-    LENGTH_BEFORE,  # L before the last step
-    DUE,  # 1 when a node is to enter or to leave
-    FLUX,  # W, into the line by what the corrected force of the fairlead does not do
-    FLUX_BEFORE,  # and before the last step
-    SIDE,  # 1 where the fairlead is the end of the line, -1 where it is the start
-    FAR,  # m, arc length of the far end
-    SPRING,  # N m/rad, of an angular spring between the fairlead and a clamped line; infinite: rigid
-    CHANGED, EASING,  # s, when the last node entered or left; over which forces that balance its neighbours end
-    LIFT,  # kg/m2, lift per length of what sheds vortices (kernels.laws.vortices): rho/2 D Cv
-) = range(16)  # fmt: skip
-NUMBERS = 16
-# Parts of `Reel.stage`.
-(
-    RIDING_ON, BALANCE_ON, UNBALANCED, FLOW_KNOWN,
+
+
+class ReelNumbers(NamedNumbers):
+    """What a line that is paid out knows of its length, c its rate and p the place of the last material node."""
+
+    length: float  # L, c and the rate of c at the end of the try
+    rate: float
+    acceleration: float
+    place: float  # p
+    longest: float  # m, the last cell: beyond the first a node enters, below the second one leaves
+    shortest: float
+    length_before: float  # L before the last step
+    due: float  # 1 when a node is to enter or to leave
+    flux: float  # W, into the line by what the corrected force of the fairlead does not do
+    flux_before: float  # and before the last step
+    side: float  # 1 where the fairlead is the end of the line, -1 where it is the start
+    far: float  # m, arc length of the far end
+    spring: float  # N m/rad, of an angular spring between the fairlead and a clamped line; infinite: rigid
+    changed: float  # s, when the last node entered or left; over which forces that balance its neighbours end
+    easing: float
+    lift: float  # kg/m2, lift per length of what sheds vortices (kernels.laws.vortices): rho/2 D Cv
+
+
+class ReelStage(NamedNumbers):
+    """How far the balance at the winch has come."""
+
+    riding_on: float
+    balance_on: float
+    unbalanced: float
+    flow_known: float
     # Of a winch that holds a tension, of a line with a joined end (kernels.junctions.joined_winches): what is asked of it;
     # the block row of the cell that grows, and what its length puts there per m; the block row with the tension before the
     # fairlead; N out of balance at the rotor, and how that grows with the length, N/m, by itself and with the answer of all
     # lines, points and bodies.
-    LENGTHENS, GROWS_AT, PUTS, PULLS_AT, OUT_OF_BALANCE, ALONE, YIELDING,
-    CHANGE,  # m, of the length
-) = range(12)  # fmt: skip
-STAGE = 12
+    lengthens: float
+    grows_at: float
+    puts: float
+    pulls_at: float
+    out_of_balance: float
+    alone: float
+    yielding: float
+    change: float  # m, of the length
+
+
 # What may be asked: to be corrected with the lines; to take its change.
 WAITS, MOVES = 1.0, 2.0
 # Columns of `Reel.flow`.
@@ -63,7 +81,7 @@ FLOWS = 8
 class Reel(NamedTuple):
     """What a line that is paid out knows beside its arrays; N cells."""
 
-    numbers: Floats  # (NUMBERS,)
+    numbers: ReelNumbers
     law: Floats  # (K, 8) s, from which on a row holds; coefficients of L in the time since then, highest power first
     pieces: Floats  # (P, 1 + COLUMNS) m, where a piece of the material begins; its row (kernels.mesh.fill_line)
     rest: Floats  # (1, COLUMNS) of the cell before the last material node
@@ -83,12 +101,12 @@ class Reel(NamedTuple):
     # (m+1, 3) N, by which the forces on them are more because they do not move as the material does; on the fairlead 0
     # where it is held
     riding: Floats
-    # (STAGE,) 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found; where the last
+    # 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found; where the last
     # assembly since the last step had `flow` in it; of a winch of a joined line what is above
-    stage: Floats
+    stage: ReelStage
     balance: Floats  # (N+1, 3) N, forces on nodes, in the order of the line, that balanced them at CHANGED
     plain: Floats  # (N+1, 3) N, the forces on the line without them
-    winch: Floats  # (WINCH,) of a winch that holds a tension (kernels.reel.winch)
+    winch: Winch  # of a winch that holds a tension (kernels.reel.winch)
     # (N+1, FLOWS) of a line that is damped in proportion to stiffness, else empty: of cells length and flow, m/s, of
     # elements strain without stress and flow, rad/s (kernels.reel.damping)
     flow: Floats
@@ -100,7 +118,7 @@ class Reel(NamedTuple):
 
 
 def blank_reel(
-    cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Floats | None = None,
+    cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Winch | None = None,
     layer: Floats | None = None, columns: bool = False, damped: bool = False, slips: int = 0,
 ) -> Reel:  # fmt: skip
     """A reel of a line of so many cells; columns: whether such a winch needs another right-hand side; damped: see `flow`;
@@ -108,13 +126,12 @@ def blank_reel(
     slips: layers that do.
     """
     z = np.zeros
-    numbers = z(NUMBERS)
-    numbers[CHANGED] = -np.inf
+    numbers = ReelNumbers(changed=-np.inf)
     return Reel(
         numbers, z((1, 8)) if law is None else law, z((1, 1 + COLUMNS)) if pieces is None else pieces,
         z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 10)),
         z(3), z(REPORT_SIZE), z((2, COLUMNS)), z(1) if layer is None else layer,
-        z((1 if layer is None else layer.size, 3)), z(STAGE), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
+        z((1 if layer is None else layer.size, 3)), ReelStage(), z((cells + 1, 3)), z((cells + 1, 3)), Winch() if winch is None else winch,
         z((cells + 1 if damped else 0, FLOWS)), z((3, cells + 1, 5) if columns else (3, 0, 5)),
         z((cells + 2 if slips else 0, 1 + 4 * slips)), z(2),
     )  # fmt: skip

@@ -27,20 +27,33 @@ from hybrid.kernels.algebra.rotations import get3
 from hybrid.kernels.laws.axial_law import SHIFT, has_law
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.state.forces import PLANAR, STIFFNESS_DAMPING
 from hybrid.kernels.step.generalized_alpha import radius_of_step, scheme
 
-# Numbers of a winch.
-(
-    TENSION,  # N, that it holds; 0: there is no such winch
-    BEGIN, RAMP,  # s, when its brake opens, and over which time its tension goes there from the pull of that moment
-    INERTIA, DAMPING, MAX_RATE,  # kg, N s/m, m/s
-    HELD,  # N, the pull when the brake opens
-    LENGTH_NOW, RATE_NOW, TRUE_NOW, ALGORITHMIC_NOW,  # m, m/s, m/s2: L, c and both accelerations before the step
-    CV, CA, BE, DT,  # of the step that is tried
-    LEAST, MOST,  # m, lengths between which the winch has line
-) = range(17)  # fmt: skip
-WINCH = 17
+
+class Winch(NamedNumbers):
+    """A winch that holds a tension."""
+
+    tension: float  # N, that it holds; 0: there is no such winch
+    begin: float  # s, when its brake opens, and over which time its tension goes there from the pull of that moment
+    ramp: float
+    inertia: float  # kg, N s/m, m/s
+    damping: float
+    max_rate: float
+    held: float  # N, the pull when the brake opens
+    length_now: float  # m, m/s, m/s2: L, c and both accelerations before the step
+    rate_now: float
+    true_now: float
+    algorithmic_now: float
+    cv: float  # of the step that is tried
+    ca: float
+    be: float
+    dt: float
+    least: float  # m, lengths between which the winch has line
+    most: float
+
+
 # Part of the largest rate over which its limit sets in, and beyond which it takes a force of `TENSION` more to go.
 CORNER = 0.01
 
@@ -48,19 +61,19 @@ CORNER = 0.01
 @inner
 def tension_held(winch, t):
     """Tension, N, that the winch holds at t."""
-    x = min(max((t - winch[BEGIN]) / winch[RAMP], 0.0), 1.0)
+    x = min(max((t - winch.begin) / winch.ramp, 0.0), 1.0)
     part = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
-    return winch[HELD] + part * (winch[TENSION] - winch[HELD])
+    return winch.held + part * (winch.tension - winch.held)
 
 
 @inner
 def losses(winch, rate):
     """Force B, N, that the drive loses at a rate, and its derivative: damping, and a limit that sets in smoothly."""
-    force, slope = winch[DAMPING] * rate, winch[DAMPING]
-    corner = CORNER * winch[MAX_RATE]
-    beyond = abs(rate) - winch[MAX_RATE]
+    force, slope = winch.damping * rate, winch.damping
+    corner = CORNER * winch.max_rate
+    beyond = abs(rate) - winch.max_rate
     if beyond > 0.0:
-        steep = winch[TENSION] / corner
+        steep = winch.tension / corner
         more, grows = 0.5 * steep * beyond * beyond / corner, steep * beyond / corner
         if beyond > corner:
             more, grows = steep * (beyond - 0.5 * corner), steep
@@ -73,25 +86,25 @@ def losses(winch, rate):
 def predict(winch, rho, before, rho_before, dt):
     """L, c and dc/dt at the end of a step, with the algorithmic acceleration kept (kernels.step.step.predict_nodes)."""
     s = scheme(radius_of_step(rho, before, rho_before, dt), before, rho_before, dt)
-    winch[CV], winch[CA], winch[BE], winch[DT] = s.cv, s.ca, s.be, dt
-    c, vd, a = winch[RATE_NOW], winch[TRUE_NOW], winch[ALGORITHMIC_NOW]
-    length = winch[LENGTH_NOW] + dt * c + 0.5 * dt * dt * a
+    winch.cv, winch.ca, winch.be, winch.dt = s.cv, s.ca, s.be, dt
+    c, vd, a = winch.rate_now, winch.true_now, winch.algorithmic_now
+    length = winch.length_now + dt * c + 0.5 * dt * dt * a
     return length, c + dt * a, (s.am * a - s.af * vd) / (1.0 - s.af) + s.ca * s.be * dt * dt * a
 
 
 @inner
 def accept(winch, length, rate, acceleration):
     """A step is accepted: L, c and dc/dt where it ends."""
-    dt, be, a = winch[DT], winch[BE], winch[ALGORITHMIC_NOW]
-    without = winch[LENGTH_NOW] + dt * winch[RATE_NOW] + dt * dt * (0.5 - be) * a
-    winch[ALGORITHMIC_NOW] = (length - without) / (be * dt * dt)
-    winch[LENGTH_NOW], winch[RATE_NOW], winch[TRUE_NOW] = length, rate, acceleration
+    dt, be, a = winch.dt, winch.be, winch.algorithmic_now
+    without = winch.length_now + dt * winch.rate_now + dt * dt * (0.5 - be) * a
+    winch.algorithmic_now = (length - without) / (be * dt * dt)
+    winch.length_now, winch.rate_now, winch.true_now = length, rate, acceleration
 
 
 @inner
 def at_its_end(winch):
     """Whether the winch has no more line to pay out, or none to take in."""
-    return winch[TENSION] > 0.0 and not winch[LEAST] <= winch[LENGTH_NOW] <= winch[MOST]
+    return winch.tension > 0.0 and not winch.least <= winch.length_now <= winch.most
 
 
 @inner
@@ -111,7 +124,7 @@ def by_length(line, state, winch, c):
 @inner
 def grown(line, winch, c):
     """1 + tau cv of cell c, if it is damped: how its damped length answers to its length."""
-    return 1.0 + line.tau[c] * winch[CV] if line.bits & STIFFNESS_DAMPING and line.ck[c] > 0.0 else 1.0
+    return 1.0 + line.tau[c] * winch.cv if line.bits & STIFFNESS_DAMPING and line.ck[c] > 0.0 else 1.0
 
 
 @inner

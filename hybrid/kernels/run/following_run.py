@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_distance import boxes_of
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.machine.references import caller, reader
-from hybrid.kernels.mesh.zone_step import CELLS_DUE, CLOCK_SIZE, FLAG_COUNT, LOUDEST, NEXT_REVIEW, RELAXING
+from hybrid.kernels.mesh.zone_step import ZoneClock, ZoneFlags
 from hybrid.kernels.mesh.zone_switch import AFTER, BEFORE, NUMBERS, RELAXES, TIME
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock, sample_size
@@ -25,23 +26,43 @@ from hybrid.kernels.step.sampling import SAME_TIME
 
 Numbers = NDArray[np.int64]
 
-# Addresses in `calls`.
-(STEPS, SOLVER, LAY_OUT, CLEAR, LINE, BEGIN, KINDS, END, RENEW, BEFORE_FORCES, AFTER_FORCES) = range(11)
-CALLS = 11
-# Numbers of `at`.
-(
-    SIDE, CELLS,  # of the arrays that are in use, and of the line now
-    NEXT_CELLS,  # of a change that has begun
-    CHANGES,  # so far
-    TASK, SAMPLES_AT,  # where the table of the run has its task, and address and rows of its samples
-    ROOM, ROOM_SIZE,  # address of the memory for samples, and numbers in it
-    MOST_ROWS,  # of samples of one line
-    ALONE,  # 1 where cells may change without Python
-    MAY_WAIT,  # 1 where outputs may wait although the cells that they are of change
-    WAITING, PLACED, USED,  # lines whose outputs wait; places of their nodes; numbers of their samples
-    BOXES_AT,  # where the table of kernels.contact.self_distance has the rows of its tree
-) = range(15)  # fmt: skip
-AT_SIZE = 15
+
+class FollowingCalls(NamedNumbers, number=np.int64):
+    """Addresses of the kernels that are called."""
+
+    steps: int
+    solver: int
+    lay_out: int
+    clear: int
+    line: int
+    begin: int
+    kinds: int
+    end: int
+    renew: int
+    before_forces: int
+    after_forces: int
+
+
+class FollowingPlaces(NamedNumbers, number=np.int64):
+    """Where things are: arrays, tables, memory for samples."""
+
+    side: int  # of the arrays that are in use, and of the line now
+    cells: int
+    next_cells: int  # of a change that has begun
+    changes: int  # so far
+    task: int  # where the table of the run has its task, and address and rows of its samples
+    samples_at: int
+    room: int  # address of the memory for samples, and numbers in it
+    room_size: int
+    most_rows: int  # of samples of one line
+    alone: int  # 1 where cells may change without Python
+    may_wait: int  # 1 where outputs may wait although the cells that they are of change
+    waiting: int  # lines whose outputs wait; places of their nodes; numbers of their samples
+    placed: int
+    used: int
+    boxes_at: int  # where the table of kernels.contact.self_distance has the rows of its tree
+
+
 # Columns of `waiting`.
 OFFSET, COUNT, OF_CELLS = range(3)
 
@@ -49,14 +70,14 @@ OFFSET, COUNT, OF_CELLS = range(3)
 class FollowingJob(NamedTuple):
     """A run with all that its changes of cells need.  Tables: (..., 3, size) fixed, per old cell, per new cell."""
 
-    calls: Numbers  # (CALLS,)
-    at: Numbers  # (AT_SIZE,)
+    calls: FollowingCalls
+    at: FollowingPlaces
     clock: Clock  # of the run
-    counts: Numbers
+    counts: b.Counts
     outputs: Floats
     work: Floats
-    zone_clock: Floats
-    zone_counts: Numbers
+    zone_clock: ZoneClock
+    zone_counts: ZoneFlags
     numbers: Floats  # (NUMBERS,) of kernels.mesh.zone_switch
     run: Numbers  # table of the run
     run_places: Numbers  # of those of its numbers that follow the cells
@@ -85,8 +106,8 @@ def blank_following_job() -> FollowingJob:
     """A job with the types that every one has."""
     z, few, pairs, sides = np.zeros, np.zeros(1, np.int64), np.zeros((1, 3), np.int64), np.zeros((2, 3, 1), np.int64)
     return FollowingJob(
-        z(CALLS, np.int64), z(AT_SIZE, np.int64), b.Clock(), b.Counts(), z(0), z((2, b.WORKS)),
-        z(CLOCK_SIZE), z(FLAG_COUNT, np.int64), z(NUMBERS), few, few, sides, few, few, sides, few, few, sides,
+        FollowingCalls(), FollowingPlaces(), b.Clock(), b.Counts(), z(0), z((2, b.WORKS)),
+        ZoneClock(), ZoneFlags(), z(NUMBERS), few, few, sides, few, few, sides, few, few, sides,
         z((2, 1), np.int64), few, sides, few, sides, few, sides, few, sides, z(1, bool), pairs, few,
     )  # fmt: skip
 
@@ -114,35 +135,35 @@ def put_at(numbers, places, cells, table):
 def begin_change(job):
     """Lay out the cells that are planned, and carry the state to them."""
     at, counts, calls = job.at, job.counts, job.calls
-    k, n = at[SIDE], at[CELLS]
-    m = call_count(calls[LAY_OUT], job.layouts[1 - k])
-    at[NEXT_CELLS] = m
+    k, n = at.side, at.cells
+    m = call_count(calls.lay_out, job.layouts[1 - k])
+    at.next_cells = m
     put(job.renews[2 * k + counts.parity], n, m, job.renewed)
     put(job.switches[2 * k + counts.parity], n, m, job.switch)
     put(job.lines[1 - k], n, m, job.line)
-    job.numbers[TIME], job.numbers[RELAXES] = job.clock.now, job.zone_counts[RELAXING]
-    call(calls[CLEAR], job.renewed)
-    call(calls[LINE], job.line)
-    call(calls[BEGIN], job.switch)
+    job.numbers[TIME], job.numbers[RELAXES] = job.clock.now, job.zone_counts.relaxing
+    call(calls.clear, job.renewed)
+    call(calls.line, job.line)
+    call(calls.begin, job.switch)
 
 
 @inner
 def put_samples(job, m):
     """Samples of the line of now come behind those that wait."""
     at, size = job.at, numbers_of_sample(m, True)
-    job.run[at[SAMPLES_AT]] = at[ROOM] + 8 * at[USED]
-    job.run[at[SAMPLES_AT] + 1] = min(at[MOST_ROWS], (at[ROOM_SIZE] - at[USED]) // size)
+    job.run[at.samples_at] = at.room + 8 * at.used
+    job.run[at.samples_at + 1] = min(at.most_rows, (at.room_size - at.used) // size)
 
 
 @inner
 def put_all(job):
     """The run goes on with the line of now."""
-    k, m = job.at[SIDE], job.at[CELLS]
+    k, m = job.at.side, job.at.cells
     put_at(job.in_run[k], job.run_places, m, job.run)
     put_at(job.in_zones[k], job.zone_places, m, job.zones)
     if job.itself_places.shape[0] > 0:
         put_at(job.in_itself[k], job.itself_places, m, job.itself)
-        job.itself[job.at[BOXES_AT]] = boxes(m)
+        job.itself[job.at.boxes_at] = boxes(m)
     put_samples(job, m)
 
 
@@ -150,18 +171,18 @@ def put_all(job):
 def end_change(job):
     """Lengths, books and forces of the new cells, which the run goes on with; the energy is booked."""
     at, calls = job.at, job.calls
-    k, n, m = at[SIDE], at[CELLS], at[NEXT_CELLS]
+    k, n, m = at.side, at.cells, at.next_cells
     put(job.kinds[1 - k], n, m, job.kind)
-    call(calls[KINDS], job.kind)
-    call(calls[END], job.switch)
-    call(calls[RENEW], job.renewed)
-    at[SIDE], at[CELLS], at[CHANGES] = 1 - k, m, at[CHANGES] + 1
+    call(calls.kinds, job.kind)
+    call(calls.end, job.switch)
+    call(calls.renew, job.renewed)
+    at.side, at.cells, at.changes = 1 - k, m, at.changes + 1
     put_all(job)
-    call(calls[BEFORE_FORCES], job.run)
-    job.run[at[TASK]] = ASSEMBLY
-    call_solver(calls[SOLVER], job.run)
-    job.run[at[TASK]] = RUN
-    call(calls[AFTER_FORCES], job.run)
+    call(calls.before_forces, job.run)
+    job.run[at.task] = ASSEMBLY
+    call_solver(calls.solver, job.run)
+    job.run[at.task] = RUN
+    call(calls.after_forces, job.run)
     job.work[0, b.ZONES] += job.numbers[AFTER] - job.numbers[BEFORE]
 
 
@@ -179,13 +200,13 @@ def due_within(job):
 def may_change(job):
     """Whether cells may change now: no outputs of those of now are to come or wait, or there is room for them."""
     at, some = job.at, due_within(job) + job.counts.samples
-    if some == 0 or at[ALONE] == 0:
-        return at[ALONE] != 0
-    room = at[WAITING] < job.waiting.shape[0] and at[PLACED] + at[CELLS] + 1 <= job.places.shape[0]
+    if some == 0 or at.alone == 0:
+        return at.alone != 0
+    room = at.waiting < job.waiting.shape[0] and at.placed + at.cells + 1 <= job.places.shape[0]
     # room for one sample of the finest line must be left, or the run could not go on
-    left = at[ROOM_SIZE] - at[USED] - some * numbers_of_sample(at[CELLS], True)
-    fits = some <= job.run[at[SAMPLES_AT] + 1] and left >= numbers_of_sample(job.here.shape[0] - 1, True)
-    return at[MAY_WAIT] != 0 and room and fits
+    left = at.room_size - at.used - some * numbers_of_sample(at.cells, True)
+    fits = some <= job.run[at.samples_at + 1] and left >= numbers_of_sample(job.here.shape[0] - 1, True)
+    return at.may_wait != 0 and room and fits
 
 
 # --- entries of parts, for Python -------------------------------------------------------------------
@@ -221,14 +242,14 @@ def cells_may_change(table):
 @inner
 def set_aside(job):
     """The outputs that have been sampled wait, with the places of the nodes that they are of."""
-    at, row = job.at, job.waiting[job.at[WAITING]]
-    row[OFFSET], row[COUNT], row[OF_CELLS] = at[USED], job.counts.samples, at[CELLS]
+    at, row = job.at, job.waiting[job.at.waiting]
+    row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, job.counts.samples, at.cells
     for i in range(job.here.shape[0]):
         if job.here[i]:
-            job.places[at[PLACED]] = i
-            at[PLACED] += 1
-    at[USED] += row[COUNT] * numbers_of_sample(row[OF_CELLS], True)
-    at[WAITING] += 1
+            job.places[at.placed] = i
+            at.placed += 1
+    at.used += row[COUNT] * numbers_of_sample(row[OF_CELLS], True)
+    at.waiting += 1
     job.counts.samples = 0
 
 
@@ -238,7 +259,7 @@ def leave(job):
     counts = job.counts
     if due_within(job) > 0:
         counts.inside, counts.asks = 1, b.ASK_SAMPLES
-        call_count(job.calls[STEPS], job.run)
+        call_count(job.calls.steps, job.run)
         counts.inside, counts.asks = 0, 0
     if counts.samples > 0:
         set_aside(job)
@@ -259,15 +280,15 @@ def go_on(table, reviewed):
     job = read(table)
     code = b.STEPPED
     if not reviewed:
-        code = call_count(job.calls[STEPS], job.run)
+        code = call_count(job.calls.steps, job.run)
     while True:
         if code != b.STEPPED or job.counts.notices != 0 or job.counts.asks != 0:
             return code
-        due = job.zone_counts[CELLS_DUE] != 0
+        due = job.zone_counts.cells_due != 0
         if due and not may_change(job):
             return code
         if not reviewed:
-            asked = job.zone_clock[LOUDEST] > 1.0 or job.clock.now >= job.zone_clock[NEXT_REVIEW]
+            asked = job.zone_clock.loudest > 1.0 or job.clock.now >= job.zone_clock.next_review
             if asked or not due:
                 return code
         if due:
@@ -275,4 +296,4 @@ def go_on(table, reviewed):
             begin_change(job)
             end_change(job)
         reviewed = False
-        code = call_count(job.calls[STEPS], job.run)
+        code = call_count(job.calls.steps, job.run)

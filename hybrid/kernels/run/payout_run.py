@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.contact.self_distance import boxes_of
 from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_changes import clear, copy_state, wave_step
@@ -22,8 +23,8 @@ from hybrid.kernels.mesh.fill_line import copy_cell, copy_node, move_line
 from hybrid.kernels.mesh.zone_transfer import carry_push
 from hybrid.kernels.reel.paid_length import cell, node, prepare
 from hybrid.kernels.reel.payout_nodes import CarryJob, blank_carry_job, move_row, place_reel
-from hybrid.kernels.reel.reel import BALANCE_ON, DUE, FAR, FLOW_KNOWN, LONGEST, RIDING_ON, SIDE, Reel, blank_reel
-from hybrid.kernels.reel.winch import at_its_end
+from hybrid.kernels.reel.reel import Reel, blank_reel
+from hybrid.kernels.reel.winch import Winch, at_its_end
 from hybrid.kernels.run.following_run import call, call_count, call_solver, put, put_at
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, Clock, blank_books, sample_size
@@ -100,7 +101,7 @@ def line_as(line, whole, out, reel):
     """The same line in another number of cells, its length still to be given to it."""
     n, m, rides = line.h.shape[0], out.h.shape[0], reel.layer.shape[0]
     g, grows = n - rides, m - rides
-    move_line(line, out, reel.numbers[SIDE] > 0.0, min(g, grows) + 1, m - n)
+    move_line(line, out, reel.numbers.side > 0.0, min(g, grows) + 1, m - n)
     for k in range(g, grows):
         complete(whole, out, reel, k)
     if grows > g:
@@ -137,7 +138,7 @@ def take_in(extremes, bounds, column, at):
 @inner
 def piece_at(reel, s):
     """The piece of the material at an arc length."""
-    place, k = reel.numbers[SIDE] * (s - reel.numbers[FAR]), 0
+    place, k = reel.numbers.side * (s - reel.numbers.far), 0
     while k + 1 < reel.pieces.shape[0] and reel.pieces[k + 1, 0] <= place:
         k += 1
     return k
@@ -196,7 +197,7 @@ def change_line(table):
     reel, new = job.reel, job.new
     for k in range(reel.numbers.shape[0]):
         new.numbers[k] = reel.numbers[k]
-    new.stage[RIDING_ON], new.stage[BALANCE_ON], new.stage[FLOW_KNOWN], new.numbers[DUE] = 0.0, 0.0, 0.0, 0.0
+    new.stage.riding_on, new.stage.balance_on, new.stage.flow_known, new.numbers.due = 0.0, 0.0, 0.0, 0.0
     place_reel(new, job.nodes, job.target.h.shape[0] - reel.layer.shape[0] + 1)
     line_as(job.line, read_node(table).whole, job.target, new)
     prepare(job.target, new, job.clock.now)  # what new cells lack goes by what they are made of
@@ -227,7 +228,7 @@ def book_change(table):
 def renew_run(table):
     """What a run knows beside the line and its state, as of the beginning; what it knew is kept where it must be."""
     job = read_node(table)
-    line, target, clock, forward = job.carry.line, job.carry.target, job.carry.clock, job.carry.new.numbers[SIDE] > 0.0
+    line, target, clock, forward = job.carry.line, job.carry.target, job.carry.clock, job.carry.new.numbers.side > 0.0
     n, m = line.h.shape[0], target.h.shape[0]
     copy_state(job.carry.out, job.twin)
     if job.push.shape[0] > 0:
@@ -272,22 +273,39 @@ def make_line(table):
 
 # --- steps and changes ----------------------------------------------------------------------------
 
-# Addresses in `calls`.
-STEPS, SOLVER, CHANGE, CARRY, FIT, BOOK, RENEW, BEFORE_FORCES, STAND_STILL, AFTER_FORCES = range(10)
-CALLS = 10
-# Numbers of `at`.
-(
-    ON, CELLS,  # the arrays that are in use, and cells of the line now
-    CHANGES,  # so far
-    TASK, SAMPLES_AT,  # where the table of the run has its task, and address and rows of its samples
-    ROOM,  # address of the memory for samples
-    MOST_ROWS,  # of samples of one line
-    MOST,  # cells that there may be
-    MAY_WAIT,  # 1 where outputs may wait although the line that they are of changes
-    WAITING, USED,  # lines whose outputs wait; numbers of their samples
-    BOXES_AT,  # where the table of kernels.contact.self_distance has the rows of its tree
-) = range(12)  # fmt: skip
-AT_SIZE = 12
+
+class PaidCalls(NamedNumbers, number=np.int64):
+    """Addresses of the kernels that are called."""
+
+    steps: int
+    solver: int
+    change: int
+    carry: int
+    fit: int
+    book: int
+    renew: int
+    before_forces: int
+    stand_still: int
+    after_forces: int
+
+
+class PaidPlaces(NamedNumbers, number=np.int64):
+    """Where things are: arrays, tables, memory for samples."""
+
+    on: int  # the arrays that are in use, and cells of the line now
+    cells: int
+    changes: int  # so far
+    task: int  # where the table of the run has its task, and address and rows of its samples
+    samples_at: int
+    room: int  # address of the memory for samples
+    most_rows: int  # of samples of one line
+    most: int  # cells that there may be
+    may_wait: int  # 1 where outputs may wait although the line that they are of changes
+    waiting: int  # lines whose outputs wait; numbers of their samples
+    used: int
+    boxes_at: int  # where the table of kernels.contact.self_distance has the rows of its tree
+
+
 # Columns of `waiting`, and numbers per cell of a reel behind the samples: lack, rate, since, span.
 OFFSET, COUNT, OF_CELLS = range(3)
 OF_REEL = 4
@@ -296,12 +314,12 @@ OF_REEL = 4
 class PaidRunJob(NamedTuple):
     """A run with all that nodes which enter and leave need.  Tables: (..., 3, size) fixed, per old cell, per new cell."""
 
-    calls: Numbers  # (CALLS,)
-    at: Numbers  # (AT_SIZE,)
+    calls: PaidCalls
+    at: PaidPlaces
     clock: Clock  # of the run
-    counts: Numbers
+    counts: b.Counts
     outputs: Floats
-    winch: Floats
+    winch: Winch
     first: Reel  # in the two sets of arrays, with all their room
     second: Reel
     run: Numbers  # table of the run
@@ -323,7 +341,7 @@ def blank_paid_run_job() -> PaidRunJob:
     """A job with the types that every one has."""
     z, few, sides, reel = np.zeros, np.zeros(1, np.int64), np.zeros((2, 3, 1), np.int64), blank_reel(1)
     return PaidRunJob(
-        z(CALLS, np.int64), z(AT_SIZE, np.int64), b.Clock(), b.Counts(), z(0), z(1), reel, reel,
+        PaidCalls(), PaidPlaces(), b.Clock(), b.Counts(), z(0), Winch(), reel, reel,
         few, few, sides, few, few, sides, few, few, sides, few, sides, z((1, 3), np.int64), z(1),
     )  # fmt: skip
 
@@ -334,43 +352,43 @@ numbers_of_sample, boxes = inner(sample_size), inner(boxes_of)
 
 @inner
 def reel_of(job):
-    return job.second if job.at[ON] else job.first
+    return job.second if job.at.on else job.first
 
 
 @inner
 def put_all(job):
     """The run goes on with the line of now; its samples come behind those that wait."""
     at = job.at
-    k, m = at[ON], at[CELLS]
+    k, m = at.on, at.cells
     put_at(job.in_run[k], job.run_places, m, job.run)
     put_at(job.in_paid[k], job.paid_places, m, job.paid)
     if job.itself_places.shape[0] > 0:
         put_at(job.in_itself[k], job.itself_places, m, job.itself)
-        job.itself[at[BOXES_AT]] = boxes(m)
-    job.run[at[SAMPLES_AT]] = at[ROOM] + 8 * at[USED]
-    job.run[at[SAMPLES_AT] + 1] = min(at[MOST_ROWS], (job.room.shape[0] - at[USED]) // numbers_of_sample(m))
+        job.itself[at.boxes_at] = boxes(m)
+    job.run[at.samples_at] = at.room + 8 * at.used
+    job.run[at.samples_at + 1] = min(at.most_rows, (job.room.shape[0] - at.used) // numbers_of_sample(m))
 
 
 @inner
 def change(job):
     """A node enters or leaves, after the outputs of the line as it was."""
     at, calls, counts, reel = job.at, job.calls, job.counts, reel_of(job)
-    k, n = at[ON], at[CELLS]
-    m = n + 1 if reel.true[n - reel.layer.shape[0]] > reel.numbers[LONGEST] else n - 1
+    k, n = at.on, at.cells
+    m = n + 1 if reel.true[n - reel.layer.shape[0]] > reel.numbers.longest else n - 1
     put(job.nodes[2 * k + counts.parity], n, m, job.node)
-    call(calls[CHANGE], job.node)
-    call(calls[CARRY], job.node)
-    call(calls[FIT], job.node)
-    call(calls[BOOK], job.node)
-    call(calls[RENEW], job.node)
-    at[ON], at[CELLS], at[CHANGES] = 1 - k, m, at[CHANGES] + 1
+    call(calls.change, job.node)
+    call(calls.carry, job.node)
+    call(calls.fit, job.node)
+    call(calls.book, job.node)
+    call(calls.renew, job.node)
+    at.on, at.cells, at.changes = 1 - k, m, at.changes + 1
     put_all(job)
-    call(calls[BEFORE_FORCES], job.run)
-    job.run[at[TASK]] = ASSEMBLY
-    call_solver(calls[SOLVER], job.run)
-    job.run[at[TASK]] = RUN
-    call(calls[STAND_STILL], job.paid)
-    call(calls[AFTER_FORCES], job.run)
+    call(calls.before_forces, job.run)
+    job.run[at.task] = ASSEMBLY
+    call_solver(calls.solver, job.run)
+    job.run[at.task] = RUN
+    call(calls.stand_still, job.paid)
+    call(calls.after_forces, job.run)
 
 
 @inner
@@ -389,23 +407,23 @@ def may_change(job):
     at, some = job.at, due_within(job) + job.counts.samples
     if some == 0:
         return True
-    size = numbers_of_sample(at[CELLS])
-    left = job.room.shape[0] - at[USED] - some * size - OF_REEL * at[CELLS]
-    fits = some <= job.run[at[SAMPLES_AT] + 1] and left >= numbers_of_sample(at[MOST])  # or the run could not go on
-    return at[MAY_WAIT] != 0 and at[WAITING] < job.waiting.shape[0] and fits
+    size = numbers_of_sample(at.cells)
+    left = job.room.shape[0] - at.used - some * size - OF_REEL * at.cells
+    fits = some <= job.run[at.samples_at + 1] and left >= numbers_of_sample(at.most)  # or the run could not go on
+    return at.may_wait != 0 and at.waiting < job.waiting.shape[0] and fits
 
 
 @inner
 def set_aside(job):
     """The outputs that have been sampled wait, with what cells of the line lacked."""
-    at, row, reel, n = job.at, job.waiting[job.at[WAITING]], reel_of(job), job.at[CELLS]
-    row[OFFSET], row[COUNT], row[OF_CELLS] = at[USED], job.counts.samples, n
-    at[USED] += row[COUNT] * numbers_of_sample(n)
+    at, row, reel, n = job.at, job.waiting[job.at.waiting], reel_of(job), job.at.cells
+    row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, job.counts.samples, n
+    at.used += row[COUNT] * numbers_of_sample(n)
     for c in range(n):
-        job.room[at[USED] + c], job.room[at[USED] + n + c] = reel.lack[c], reel.rate[c]
-        job.room[at[USED] + 2 * n + c], job.room[at[USED] + 3 * n + c] = reel.since[c], reel.span[c]
-    at[USED] += OF_REEL * n
-    at[WAITING] += 1
+        job.room[at.used + c], job.room[at.used + n + c] = reel.lack[c], reel.rate[c]
+        job.room[at.used + 2 * n + c], job.room[at.used + 3 * n + c] = reel.since[c], reel.span[c]
+    at.used += OF_REEL * n
+    at.waiting += 1
     job.counts.samples = 0
 
 
@@ -426,16 +444,16 @@ def go_on(table):
     """Steps of a run, and nodes that enter and leave, until Python has to decide; a code of kernels.state.books."""
     job = read(table)
     counts = job.counts
-    code = call_count(job.calls[STEPS], job.run)
+    code = call_count(job.calls.steps, job.run)
     while code == b.STEPPED and counts.notices == 0 and counts.asks == 0:
-        if reel_of(job).numbers[DUE] == 0.0 or at_its_end(job.winch) or not may_change(job):
+        if reel_of(job).numbers.due == 0.0 or at_its_end(job.winch) or not may_change(job):
             return code
         if due_within(job) > 0:
             counts.inside, counts.asks = 1, b.ASK_SAMPLES
-            call_count(job.calls[STEPS], job.run)
+            call_count(job.calls.steps, job.run)
             counts.inside, counts.asks = 0, 0
         if counts.samples > 0:
             set_aside(job)
         change(job)
-        code = call_count(job.calls[STEPS], job.run)
+        code = call_count(job.calls.steps, job.run)
     return code

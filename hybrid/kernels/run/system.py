@@ -38,7 +38,7 @@ from hybrid.kernels.junctions.junctions import (
     move_joints,
     place_ends,
 )
-from hybrid.kernels.junctions.system_job import DT, PART, TIME, read_system, task_of
+from hybrid.kernels.junctions.system_job import read_system, task_of
 from hybrid.kernels.laws.bending_slip import BEHIND_REST, BEHIND_STEP
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_in_contact
@@ -381,7 +381,7 @@ def end_system_step(system, task, s, solved):
 def book_system_step(table):
     """Books of the step that was solved last, and is kept."""
     system = read_system(table)
-    dt, t = system.asked[DT], system.asked[TIME]
+    dt, t = system.asked.dt, system.asked.time
     keep_books(system.tables, system.joints, dt, t)
     book_bodies(system.work, dt)
 
@@ -427,7 +427,7 @@ def solve_system(table):
     system = read_system(table)
     asked, tables, joints = system.asked, system.tables, system.joints
     net, bodies, old, new, work, A = system.net, system.bodies, system.old, system.new, system.work, system.A
-    touch, t, task = system.touch, asked[TIME], task_of(asked)
+    touch, t, task = system.touch, asked.time, task_of(asked)
     m, most, count, points = A.shape[1] - 1, task.limits.most, tables.shape[0], net.shape[0]
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
@@ -501,7 +501,7 @@ def solve_system(table):
             update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
         move_bodies(new, work, s.cv, s.ca, part)
         if task.what == STEP:
-            asked[PART] = part
+            asked.part = part
             ask_sheaves(system, ROLL_ON)
         outcome, left = has_converged(size, before, it, part)
         before = size if part == 1.0 else math.inf

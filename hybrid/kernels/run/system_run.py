@@ -16,18 +16,6 @@ from numpy.typing import NDArray
 from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK
 from hybrid.kernels.junctions.members_water import read_members
 from hybrid.kernels.junctions.system_job import (
-    BEFORE,
-    CA,
-    CV,
-    DT,
-    FIXED,
-    MOST,
-    REACH,
-    RHO_OF_LAST,
-    RHO_OF_STEP,
-    SCALE,
-    TIME,
-    WHAT,
     read_system,
 )
 from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
@@ -210,10 +198,10 @@ def try_step(steps, system):
     clock, counts, asked, table = steps.clock, steps.counts, system.asked, steps.joined_even
     if counts.parity:
         table = steps.joined_odd
-    asked[WHAT], asked[DT], asked[TIME] = STEP, clock.try_end - clock.now, clock.try_end
-    asked[BEFORE], asked[RHO_OF_STEP], asked[RHO_OF_LAST] = clock.last_dt, clock.rho, clock.last_rho
-    asked[CV], asked[CA], asked[SCALE], asked[FIXED] = 0.0, 0.0, 1.0, 1.0 - counts.controlled
-    asked[REACH], asked[MOST] = steps.limits[OF_REACH], steps.limits[OF_ITERATIONS]
+    asked.what, asked.dt, asked.time = STEP, clock.try_end - clock.now, clock.try_end
+    asked.before, asked.rho_of_step, asked.rho_of_last = clock.last_dt, clock.rho, clock.last_rho
+    asked.cv, asked.ca, asked.scale, asked.fixed = 0.0, 0.0, 1.0, 1.0 - counts.controlled
+    asked.reach, asked.most = steps.limits[OF_REACH], steps.limits[OF_ITERATIONS]
     for l in range(system.tables.shape[0]):
         books = read(system.tables[l]).books
         books.counts.parity, books.clock.shortest = counts.parity, clock.shortest
