@@ -195,8 +195,8 @@ def change_line(table):
     """One node more, or less, at the fairlead: the line and its reel."""
     job = read_node(table).carry
     reel, new = job.reel, job.new
-    for k in range(reel.numbers.shape[0]):
-        new.numbers[k] = reel.numbers[k]
+    for k in range(reel.numbers.plain.shape[0]):
+        new.numbers.plain[k] = reel.numbers.plain[k]
     new.stage.riding_on, new.stage.balance_on, new.stage.flow_known, new.numbers.due = 0.0, 0.0, 0.0, 0.0
     place_reel(new, job.nodes, job.target.h.shape[0] - reel.layer.shape[0] + 1)
     line_as(job.line, read_node(table).whole, job.target, new)
