@@ -41,12 +41,14 @@ def flaws_of(found: hybrid.Result, scene: dict[str, Any]) -> tuple[list[str], li
     if not left <= BALANCED * largest:
         silent.append(f"{left:.2g} N out of balance under {largest:.2g} N")
     for name, line in found.lines.items():
-        T, kinds = np.ravel(line.tension), {event.kind for event in line.events}
+        T, s, kinds = np.ravel(line.tension), np.asarray(line.s), {event.kind for event in line.events}
+        bends = [event.s_a for event in line.events if event.kind == "unresolved bend"]
         d = np.diff(line.position[-1], axis=0)
         if (np.einsum("ij,ij->i", d[1:], d[:-1]) < 0.0).any():
             (said if kinds & {"unresolved bend", "kink at joint"} else silent).append(f"{name} folded")
         if T.min() < -0.01 * largest and scene["lines"][name]["model"] == "catenary":
-            (said if "slack" in kinds else silent).append(f"{name} compressed")
+            there = any(abs(x - s[np.argmin(T)]) < 1e-9 for x in bends)
+            (said if there or "slack" in kinds else silent).append(f"{name} compressed")
     return silent, said
 
 

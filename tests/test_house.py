@@ -284,3 +284,21 @@ def test_no_test_of_the_default_run_is_timed() -> None:
     tests = Path(__file__).parent
     found = {x.relative_to(tests).as_posix() for x in tests.rglob("*.py") if CLOCKS.search(x.read_text("utf-8"))}
     assert found - {Path(__file__).name} <= WAITING
+
+
+def by_index(source: str) -> list[int]:
+    """Lines in which a number of a run's clock or counts is read or written by its place."""
+    return [
+        node.lineno
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Subscript)
+        and ast.unparse(node.value).split(".")[-1].strip("_") in ("clock", "count", "counts", "winch", "stage")
+        and re.fullmatch(r"(\w+\.)?[A-Z][A-Z0-9_]+", ast.unparse(node.slice))
+    ]
+
+
+def test_numbers_of_a_run_have_names() -> None:
+    """`clock.now`, not `clock[NOW]` (kernels.machine.named_numbers)."""
+    assert by_index("a = job.clock[NOW]\nb = clock.now\nc = self._counts[b.STEPS]") == [1, 3]
+    found = {str(file.relative_to(PACKAGE)): by_index(file.read_text(encoding="utf-8")) for file in FILES}
+    assert not {name: lines for name, lines in found.items() if lines}

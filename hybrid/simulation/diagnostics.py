@@ -55,6 +55,10 @@ OFF = 0.02
 # A turn at the joint of a rod and a catenary beyond the bend on its sides, rad: 20 deg, which a picture shows.  Zones
 # that move stay below, because they take a catenary where bending would move the line little.
 KINK = 0.35
+# A tension below 0 by this part of the largest, between cells of a catenary that are all taut, is none of the line's.
+# It is told where the line turns by more than so much, rad, from cell to cell: fronts of tension waves are no bends.
+NEGATIVE, TURNS_A_LITTLE = 0.01, 0.3
+NOTHING = 1e-6  # of the tension scale: of a line without tension there is no part
 # Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
 SUNK = 0.01
 # Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
@@ -94,7 +98,7 @@ NOWHERE: Floats = np.zeros((0, 3))
 REMEMBERED = (
     "_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off", "_gain", "_loss", "_rested",
     "_left_out", "_jump", "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section", "_kink",
-    "_weight", "_lay", "_knot", "_bent", "_created",
+    "_weight", "_lay", "_knot", "_bent", "_created", "_negative",
 )  # fmt: skip
 # What checkpoints of 0.6 files may lack of it: what was not watched then.
 UNWATCHED: dict[str, Any] = {
@@ -105,6 +109,7 @@ UNWATCHED: dict[str, Any] = {
     "_created": [0.0, 0.0, 0.0, 0.0],
     "_section": False,
     "_kink": KINK,
+    "_negative": NEGATIVE,
     "_within": 1.0,
     "_round": False,
     "_between": False,
@@ -178,7 +183,7 @@ class Diagnostics:
         self._created = [
             *UNWATCHED["_created"]
         ]  # most energy beyond what may be (J), put in till then (J), t (s), s (m)
-        self._kink = KINK
+        self._kink, self._negative = KINK, NEGATIVE
         self._knot, self._lay = [*Knot()], np.full((len(sheaves_of(model.sea.values)), 2), np.nan)
         self._loop, (self._writhe, self._writhes, self._bent) = UNWATCHED["_loop"], Loops()
 
@@ -494,7 +499,7 @@ class Diagnostics:
     def _bounds(self) -> Bounds:
         model = self._model
         return Bounds(
-            self._fold, self._off, self._kink, self._sunk, self._bend <= UNRESOLVED,
+            self._fold, self._off, self._kink, self._negative, self._sunk, self._bend <= UNRESOLVED,
             np.inf if self._rested else PRESSED, model.length, tuple(model.attached),
             None if self._weight else model.cable,
         )  # fmt: skip
@@ -538,6 +543,7 @@ class Diagnostics:
                 sag = 2.0 * np.arctan(half[k]) * length / 8.0
                 if sag.max() > self._off:
                     self._note_sag(float(batch.t[k]), sag)
+            self._negative_between_cells(seen)
         self._kinks(seen)
         self._layers(batch)
         layer = None if self._section else hidden_layer(self._model, seen)
@@ -620,6 +626,27 @@ class Diagnostics:
         )
         self.note(t, cell, "unresolved contact", text)
         self._between = True
+
+    def _negative_between_cells(self, seen: Observation) -> None:
+        """A tension below 0 in a bend of a catenary where its cell is taut: from cell to cell it goes on straight."""
+        line, tension, s = self._model.line, seen.tension, seen.grid.s
+        cell = np.clip(np.searchsorted(line.s, s) - 1, 0, line.h.size - 1)
+        turn = 2.0 * np.arctan(0.5 * seen.bends * line.hn[:, None])
+        turn[1:-1] = np.maximum(turn[1:-1], np.maximum(turn[:-2], turn[2:]))  # at a node, and at those beside it
+        bent = np.maximum(turn[:-1], turn[1:]) > TURNS_A_LITTLE
+        there = bent[cell] & (line.spin[cell] == 0)[:, None] & (seen.T[cell] >= 0.0)
+        largest = np.maximum(np.abs(tension).max(axis=0), NOTHING * self._model.tension_scale)
+        part = np.where(there, -tension, 0.0) / largest
+        for k in np.flatnonzero(part.max(axis=0) > self._negative):
+            at = int(np.argmax(part[:, k]))
+            if part[at, k] > self._negative:
+                text = (
+                    f"between cells the tension comes out as {tension[at, k]:.3g} N at s = {s[at]:g} m, where the cell "
+                    f"of a catenary carries {seen.T[cell[at], k]:.3g} N: it is too long for the bend there; add cells, "
+                    "or make it a rod"
+                )
+                self.events.event(float(seen.batch.t[k]), float(s[at]), float(s[at]), "unresolved bend", text)
+                self._negative = 1.5 * float(part[at, k])
 
     def _note_fold(self, t: float, turn: Floats) -> None:
         node = int(np.argmax(turn)) + 1

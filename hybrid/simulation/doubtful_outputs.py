@@ -24,6 +24,7 @@ class Bounds(NamedTuple):
     fold: float  # rad, of a catenary from cell to cell
     sag: float  # m, of a catenary below its chords
     kink: float  # rad, of a joint of a rod and a catenary beyond the bend beside it
+    negative: float  # part of the largest tension by which one between cells may come out below 0
     sunk: float  # m, depth in the seabed
     layers: bool  # whether clamps and point loads are watched for bends within less than a cell
     pressed: float  # of EI/L, N m: what a rod carries that may buckle; infinite: that is not watched
@@ -52,6 +53,7 @@ def doubtful(seen: JoinedObservation, values: Mapping[str, Floats], bounds: Boun
         half = np.where(inside, 0.5 * seen.bends[:, 0] * line.hn, 0.0)
         found |= np.maximum.reduceat(half, begin) > np.tan(0.5 * min(bounds.fold, np.pi))
         found |= np.maximum.reduceat(half * line.hn, begin) > 4.0 * bounds.sag
+        found |= values["tension"].min(axis=1) < -bounds.negative * np.abs(values["tension"]).max(axis=1)
     joints = np.flatnonzero(line.spin[1:] != line.spin[:-1]) + 1
     joints = joints[~np.isin(joints, seen.end_nodes)]
     joints = joints[~np.isin(line.s[joints], bounds.attached)]

@@ -16,6 +16,7 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.junctions.lines_distance import APART, HAVE_MET
+from hybrid.kernels.state.books import Clock
 from hybrid.model.system import build_system
 from hybrid.simulation.lines_watch import LinesWatch
 from hybrid.simulation.system_start import joined_lines
@@ -322,7 +323,7 @@ def test_legs_of_a_bridle_are_no_passage() -> None:
     }  # fmt: skip
     assert PASSAGE not in {e.kind for e in hybrid.run(tables).events}
     model = build_system(system_of(tables))
-    watch, solver = LinesWatch(system_of(tables), model, set(), np.zeros(64)), SystemSolver(joined_lines(model, 0.0), 1)
+    watch, solver = LinesWatch(system_of(tables), model, set(), Clock()), SystemSolver(joined_lines(model, 0.0), 1)
     watch.attach(solver.line_tables)
     solver.look_at(SystemState([x.start for x in model.models], model.body_places))
     assert not watch.begin(system_of(tables))  # they are looked at beyond the joint
@@ -373,7 +374,7 @@ def test_the_distance_of_lines_is_that_of_their_cells() -> None:
     random = np.random.default_rng(5)
     tables = without_contact()
     model = build_system(system_of(tables))
-    watch = LinesWatch(system_of(tables), model, set(), np.zeros(64))
+    watch = LinesWatch(system_of(tables), model, set(), Clock())
     solver = SystemSolver(joined_lines(model, 0.0), 0)
     watch.attach(solver.line_tables)
     for _ in range(5):
