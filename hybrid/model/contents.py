@@ -8,6 +8,7 @@ from itertools import pairwise
 from math import inf
 
 from hybrid.errors import OF_AN_END
+from hybrid.kernels.march.zone_torque import FIRST, LAST
 from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.state.forces import (
     BENDING_LAW,
@@ -37,7 +38,7 @@ from hybrid.model.sections import swivels
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.accuracy import USUAL
 from hybrid.scene.body_shapes import Carried
-from hybrid.scene.ends import End
+from hybrid.scene.ends import Clamped, End, Pinned
 from hybrid.scene.schema import AdaptiveModel, RecordedWaves, Scene, StreamFunctionWaves
 
 # Part of the variance of a record that is round-off.
@@ -234,6 +235,23 @@ def obstacle_entries(scene: Scene, rows: Floats) -> Iterator[Entry]:
         yield Entry(text, True, f"{key}; stiffness: {why}")
 
 
+def _torque_at_winch(scene: Scene, line: Line) -> Iterator[Entry]:
+    """A torque through a catenary whose length a winch changes: its compliance changes where nodes enter and leave."""
+    if not line.torsion.size:
+        return
+    for name, end, reaches, cell in (
+        ("start", scene.ends.start, line.torsion[0, FIRST] == 0.0, 0),
+        ("end", scene.ends.end, line.torsion[-1, LAST] == line.h.size, -1),
+    ):
+        if isinstance(end, Pinned | Clamped) and end.payout is not None and reaches:
+            most = 100.0 * line.h[cell] / line.s[-1]
+            why = (
+                f"of ends.{name}.payout is that of the length when the last node entered or left, up to {most:.2g} % "
+                "wrong between, and a run that is resumed there differs by as much; a rod zone there, or shorter cells"
+            )
+            yield Entry("torque through the catenary at the winch", False, why, event="torque neglected")
+
+
 def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) -> tuple[Entry, ...]:
     """What is on and by which key, what is off and what would switch it on; flat: whether it is in a plane."""
     kinds = {z.kind for z in zones}
@@ -295,7 +313,7 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
         elif loose is not None:
             why = f"no effect: the catenary zone s = {loose.s_a:g} to {loose.s_b:g} m passes no torque on; a rod does"
         entries.append(Entry(what, loose is None and not free, why, event="torque neglected" if loose else ""))
-    entries += obstacle_entries(scene, obstacle_rows(scene))
+    entries += (*_torque_at_winch(scene, line), *obstacle_entries(scene, obstacle_rows(scene)))
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = end.prescribed_motion is not None
         spring = f", by a spring of {end.spring:g} N m/rad" if end.spring < inf else ""

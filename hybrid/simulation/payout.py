@@ -54,6 +54,7 @@ VARIES_TOO = ("bend_law", "tension_twist", "wake_law")  # likewise, of lines tha
 # What a checkpoint keeps of a reel.
 OF_CELLS = ("lack", "rate", "since", "span")
 OF_EARLIER_VERSIONS = 10, 12, 13, 15  # numbers of a reel in checkpoints of those
+ROUND_OFF = 1e-9  # of the length: places of nodes are no nearer to what they were meant to be
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
 
 
@@ -451,7 +452,7 @@ class PayingOut:
         if not (law.ndim == 2 and law.shape[1] == 8 and len(law) and (np.diff(law[:, 0]) >= 0.0).all()):
             raise ValueError("a length that no winch gives")
         if (
-            not np.searchsorted(self.plan.nodes, self.plan.shortest - self.plan.layer[0])
+            not np.searchsorted(self.plan.nodes, self.plan.shortest - self.plan.layer[0] - ROUND_OFF * model.length)
             < count
             < self.plan.nodes.size - 1
         ):

@@ -291,7 +291,9 @@ class TimeLoop:
         """Whether outputs of other cells can be looked at together: all that is written follows from their states."""
         observer, line = self.observer, self.run.model.line
         of_states = not observer.writes_criteria and observer.quantities is None and self.run.correction is None
-        plain = not (line.law.size or line.bend_law.size or line.slip_law.size or line.tension_twist.size)
+        plain = not (
+            line.law.size or line.bend_law.size or line.slip_law.size or line.torsion.size or line.tension_twist.size
+        )
         return of_states and plain and line.h.size >= FEWEST_JOINED
 
     def _put_aside(self, outputs: list[Output]) -> None:
