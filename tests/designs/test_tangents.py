@@ -38,17 +38,14 @@ def both(tables: dict[str, Any], of: list[str], keys: list[str]) -> tuple[np.nda
     return found.derivatives, theirs.derivatives, found.errors, theirs.errors, floor
 
 
-def agree(tables: dict[str, Any], of: list[str], keys: list[str], part: float = 1e-5, most: float = 0.7) -> None:
-    """Within both stated errors, and more than `most` of them within 1e-6; what answers less than a thousandth, in
-
-    parts by parts, is compared with that.
-    """
+def agree(tables: dict[str, Any], of: list[str], keys: list[str], part: float = 1e-5) -> None:
+    """Within both stated errors; what answers less than a thousandth, in parts by parts, is compared with that."""
     ours, theirs, stated, errors, floor = both(tables, of, keys)
     whole = np.maximum(np.abs(theirs), 1e-3 * floor)
     assert (np.abs(ours - theirs) <= part * whole + 2.0 * errors + stated).all(), (ours, theirs, errors, stated)
     assert (errors <= 1e-4 * whole).mean() > 0.7  # else differences would say nothing
     assert (stated <= 1e-4 * np.maximum(np.abs(theirs), 0.1 * floor)).all()
-    assert (np.abs(ours - theirs) <= 1e-6 * whole + 2.0 * errors).mean() > most
+    assert (np.abs(ours - theirs) <= 1e-6 * whole + 2.0 * errors).mean() > 0.7
 
 
 def in_water(tables: dict[str, Any]) -> dict[str, Any]:
@@ -102,9 +99,9 @@ def test_a_phase_that_is_nothing() -> None:
 
 @pytest.mark.long
 def test_waves_and_a_current_across() -> None:
-    tables = in_water(on_the_bed("rod")) | {"time": {"duration": 4.0, "step": 0.05}}
-    # Where Newton stops decides between 1e-6 and 3e-6, and round-off decides where it stops: 10 or 11 of 15, by processor.
-    agree(tables, OF, [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.fluid.waves.height"], most=0.6)
+    """In steps in which 13 of 15 agree to 1e-6; where Newton stops leaves 1e-6 to 3e-6 of more in steps of 0.05 s."""
+    tables = in_water(on_the_bed("rod")) | {"time": {"duration": 4.0, "step": 0.025}}
+    agree(tables, OF, [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.fluid.waves.height"])
 
 
 @pytest.mark.long
