@@ -18,7 +18,7 @@ import numpy as np
 from hybrid.accuracy.budget import CELL, COMPARISONS, FINER, LEAST, MOST_TIMES, OUTPUT, POINT
 from hybrid.accuracy.model_choice import chosen_and_surveyed
 from hybrid.errors import ComputationError
-from hybrid.kernels.machine.cache import is_warm
+from hybrid.kernels.machine.compile import is_warm
 from hybrid.kernels.state.state import State
 from hybrid.model import plan as tables
 from hybrid.model.build import Model, build

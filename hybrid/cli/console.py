@@ -94,8 +94,8 @@ class Console:
         return self.compiling_kernels(kernels_of(scene, static))
 
     def compiling_kernels(self, names: Sequence[str]) -> bool:
-        """The same of kernels by name, as file.function."""
-        from hybrid.kernels.machine.cache import is_warm
+        """The same of kernels by name, as room.file.function."""
+        from hybrid.kernels.machine.compile import is_warm
         from hybrid.simulation.progress import COMPILING
 
         if is_warm(list(names)):

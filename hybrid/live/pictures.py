@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hybrid.errors import Complaint, ComputationError, HybridError, SceneError
-from hybrid.kernels.machine.cache import is_warm
+from hybrid.kernels.machine.compile import is_warm
 from hybrid.live import drawing
 from hybrid.model.model_costs import with_model
 from hybrid.model.plan import Plan, SystemPlan, plan

@@ -45,7 +45,7 @@ class Worker:
 
     def warm_up(self) -> None:
         """Bring what the first picture needs into memory, unless it would have to be compiled first."""
-        from hybrid.kernels.machine.cache import is_warm
+        from hybrid.kernels.machine.compile import is_warm
         from hybrid.live.pictures import picture_of
         from hybrid.scene.read import parse_scene
         from hybrid.simulation.first_use import kernels_of

@@ -6,6 +6,7 @@ The laws are those of laws.end_motion.driven_position and driven_frame, which mo
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import dist, hypot
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,9 @@ class DrivenEnd:
     def __init__(self, path: Floats, position: Floats, frame: Floats, held: bool, turns: bool) -> None:
         """path: (PATH,) filled here; position: (3,) m; frame: (3, 3); held, turns: what is set of it."""
         self.path, self.held, self.turns, self.record = path, held, turns, np.zeros(RECORD)
-        self._numbers: Any = path.data  # the same, of which one number costs a third of what numpy takes
+        # The same, of which one number costs a third of what numpy takes, and three a tenth of an array of them.
+        self._numbers: Any = path.data
+        self._counted: Any = self.record.data
         self.stand(position, frame)
 
     def set(
@@ -69,7 +72,7 @@ class DrivenEnd:
             record[IMPLIED] = one_step
         numbers[SPEED_THERE], numbers[SPEED_THERE + 1], numbers[SPEED_THERE + 2] = velocity
         numbers[TURN], numbers[TURN + 1], numbers[TURN + 2] = turn
-        if one_step and not record[IMPLIED]:
+        if one_step and not self._counted[IMPLIED]:
             self._compare()
 
     def stay(self, begin: float, end: float, one_step: bool) -> None:
@@ -93,33 +96,40 @@ class DrivenEnd:
 
     def _compare(self) -> None:
         """Count how far the places, and the velocities that are given, go in this step."""
-        p, record = self.path, self.record
-        record[GONE:SAID] += p[THERE:SPEED_THERE] - p[AT:SPEED]
-        record[SAID:APART] += 0.5 * (p[TO] - p[FROM]) * (p[SPEED:THERE] + p[SPEED_THERE:FRAME])
-        record[STEPS] += 1
-        if record[STEPS] == WINDOW:
-            record[APART:WINDOWS] = self._compared()
-            record[WINDOWS] += 1
-            record[STEPS:APART] = 0.0
+        p, counted = self._numbers, self._counted
+        half = 0.5 * (p[TO] - p[FROM])
+        for k in range(3):
+            counted[GONE + k] += p[THERE + k] - p[AT + k]
+            counted[SAID + k] += half * (p[SPEED + k] + p[SPEED_THERE + k])
+        counted[STEPS] += 1.0
+        if counted[STEPS] == WINDOW:
+            self.record[APART:WINDOWS] = self._compared()
+            counted[WINDOWS] += 1.0
+            self.record[STEPS:APART] = 0.0
 
     def _compared(self) -> tuple[float, float]:
         """How far places and velocities are apart, and the way they go, with the window that is not over, m."""
-        gone, said = self.record[GONE:SAID], self.record[SAID:APART]
-        way = max(float(np.linalg.norm(gone)), float(np.linalg.norm(said)))
-        return self.record[APART] + float(np.linalg.norm(gone - said)), self.record[WAY] + way
+        gone, said = self.record[GONE:SAID].tolist(), self.record[SAID:APART].tolist()
+        way = max(hypot(*gone), hypot(*said))
+        return self._counted[APART] + dist(gone, said), self._counted[WAY] + way
 
     def contradiction(self, soon: bool = False) -> str:
         """How far the velocities that are given miss the way of the places, in words; empty: they are not known to.
 
         soon: whether less than ENOUGH windows may say so, since something else has failed.
         """
-        if not soon and (self.record[STEPS] or self.record[WINDOWS] < ENOUGH):
+        if not soon and (self._counted[STEPS] or self._counted[WINDOWS] < ENOUGH):
             return ""
         apart, way = self._compared()
         if way < LEAST_WAY or not apart > CONTRADICTS * way:
             return ""
         steps = int(WINDOW * self.record[WINDOWS] + self.record[STEPS])
         return f"the velocities given miss {apart:.3g} of {way:.3g} m of its way in {steps} steps"
+
+    @property
+    def is_reported(self) -> bool:
+        """Whether a contradiction has been reported."""
+        return bool(self._counted[TOLD])
 
     def keep(self) -> Floats:
         """(PATH + RECORD,) what `bring_back` takes."""
@@ -164,7 +174,7 @@ def contradictions(driven: Mapping[str, DrivenEnd], soon: bool = False) -> str:
     """
     found = ""
     for name, end in driven.items():
-        if (soon or not end.record[TOLD]) and (text := end.contradiction(soon)):
+        if (soon or not end.is_reported) and (text := end.contradiction(soon)):
             end.record[TOLD] = 1.0
             found += f"{name}: {text}; "
     return found and f"{found}{CONTRADICTED}"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.kernels.machine.cache import is_warm
+from hybrid.kernels.machine.compile import is_warm
 from hybrid.model.build import Model, build
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import first_resolution, wants_errors
@@ -25,17 +25,19 @@ if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.system import System
 
 # What is compiled together, by the kernel that stands for it: the last.
-SOLVER = ("run.in_plane", "run.in_space")
-OUTPUTS, ZONES, CRITERIA = "observed_outputs.observe_outputs", "zone_step.follow_zones", "zone_step.evaluate_criteria"
-MODEL_ERROR = "bending_error.advance_error"
-PAYOUT = "payout_run.go_on"
-STEPS = "run.run"  # around the solver of either kind
-STABILITY, TOUCHING = "out_of_plane.wrong_pivots_at_rest", "self_contact.contact_task"
+SOLVER = ("run.run.in_plane", "run.run.in_space")
+OUTPUTS = "watch.observed_outputs.observe_outputs"
+ZONES = "mesh.zone_step.follow_zones"
+CRITERIA = "mesh.zone_step.evaluate_criteria"
+MODEL_ERROR = "watch.bending_error.advance_error"
+PAYOUT = "run.payout_run.go_on"
+STEPS = "run.run.run"  # around the solver of either kind
+STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
 # Of several lines: what all of them call, steps, equilibria, those that touch, those that are paid out.
-OF_LINES = ("system.solve_system", SOLVER[1], OUTPUTS)
-STEPS_OF_LINES, REST_OF_LINES = "system_run.run_system", "system_run.sample_system"
-TOUCHING_LINES = "system_contact.touch_system", "shared_contact.shared_task"
-PAYOUT_OF_LINES = "payout.pay_out", "payout.stand_among"
+OF_LINES = ("run.system.solve_system", SOLVER[1], OUTPUTS)
+STEPS_OF_LINES, REST_OF_LINES = "run.system_run.run_system", "run.system_run.sample_system"
+TOUCHING_LINES = "junctions.system_contact.touch_system", "junctions.shared_contact.shared_task"
+PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among"
 
 # A cable for the second process to compile with; nothing is computed of it.
 SAMPLE = {
@@ -46,7 +48,7 @@ SAMPLE = {
 
 
 def kernels_of(scene: Scene, static: bool = False) -> list[str]:
-    """The kernels that a run of a scene calls, as file.function, by the last of each family; the solver's first.
+    """The kernels that a run of a scene calls, as room.file.function, by the last of each family; the solver's first.
 
     Whether it is computed in a plane follows from the scene; rarely its first shape leaves the plane.
     static: those of its equilibrium, whose stability is judged where there are rods and no end moments.

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TextIO
 
-from hybrid.kernels.machine.cache import is_warm
+from hybrid.kernels.machine.compile import is_warm
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import Resolution
 from hybrid.simulation.notebook_progress import NotebookBar, in_notebook, notebook_bar

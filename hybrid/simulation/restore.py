@@ -21,7 +21,7 @@ import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ResultError
-from hybrid.kernels.machine.cache import kernel_hash
+from hybrid.kernels.machine.cache import compiler_hash
 from hybrid.model.build import MOST_FOLLOWING, Model, build
 from hybrid.model.layout import Layout
 from hybrid.model.mesh import MOST_CELLS, Zone
@@ -48,7 +48,7 @@ FARTHEST = 1e4
 @cache
 def program() -> str:
     """Which program this is: version, and a hash of all that computes.  The same one gives the same bits."""
-    digest, package = hashlib.sha256(kernel_hash().encode()), Path(__file__).parents[1]
+    digest, package = hashlib.sha256(compiler_hash().encode()), Path(__file__).parents[1]
     digest.update(" ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "h5py")).encode())
     digest.update(platform.python_version().encode())
     for file in sorted(package.rglob("*.py")):

@@ -125,12 +125,12 @@ def test_compilation_is_announced_before_it_happens(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene = hybrid.load_scene(Path(hybrid.__file__).parents[1] / "examples" / "02_suspension.yaml")
-    monkeypatch.setattr("hybrid.kernels.machine.cache.is_warm", lambda _: False)
+    monkeypatch.setattr("hybrid.kernels.machine.compile.is_warm", lambda _: False)
     assert commands_console.Console(as_json=False, quiet=False).compiling(scene)
     assert capsys.readouterr().err.startswith("compiling the kernels for this machine (first use only")
     assert commands_console.Console(as_json=True, quiet=False).compiling(scene)
     assert capsys.readouterr().out == '{"event": "compiling"}\n'
-    monkeypatch.setattr("hybrid.kernels.machine.cache.is_warm", lambda _: True)
+    monkeypatch.setattr("hybrid.kernels.machine.compile.is_warm", lambda _: True)
     assert not commands_console.Console(as_json=False, quiet=False).compiling(scene)
     assert tuple(capsys.readouterr()) == ("", "")
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kernel_sizes import Kernels
 
 import hybrid
-from hybrid.kernels.machine.cache import LEVELS, kernel_hash, processor, temporary_folder
+from hybrid.kernels.machine.cache import LEVELS, compiler_hash, processor, temporary_folder
 
 PACKAGE = Path(hybrid.__file__).parent
 
@@ -151,21 +152,50 @@ def test_the_first_scene_from_a_wheel_compiles_nothing(tmp_path: Path) -> None:
             assert shipped.position.tobytes() == result.position.tobytes()
 
 
+DIGESTS = """
+import json, pkgutil
+from importlib import import_module
+import hybrid.kernels
+from hybrid.kernels.machine.compile import Entry
+from hybrid.kernels.machine.source_digest import source_digest
+rooms = pkgutil.walk_packages(hybrid.kernels.__path__, "hybrid.kernels.")
+values = [x for room in rooms for x in vars(import_module(room.name)).values() if isinstance(x, Entry)]
+print(json.dumps({f"{x.__module__}.{x.__qualname__}": source_digest(x.py_func) for x in values}))
+"""
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """Of the sources of each kernel of the copy in a folder."""
+    environment = os.environ | {"PYTHONPATH": str(folder)}
+    done = subprocess.run([sys.executable, "-c", DIGESTS], env=environment, cwd=folder, capture_output=True, check=True)
+    return dict(json.loads(done.stdout))
+
+
 @pytest.mark.long
-def test_an_edit_of_any_file_with_a_kernel_means_another_folder(copy: Path) -> None:
-    """Scenes load what lies in the folder of their hash: an edit of a file that it does not know would go unnoticed."""
-    package = copy / "hybrid"
-    hash_of = kernel_hash.__wrapped__
-    assert hash_of(package) == hash_of(PACKAGE)
-    with_kernels = [
-        x for x in package.rglob("*.py") if re.search(r"^@(kernel|inner)\b|\bnjit\b", x.read_text(), re.MULTILINE)
-    ]
-    assert len(with_kernels) > 40
-    for file in with_kernels:
-        before, text = hash_of(package), file.read_text()
-        file.write_text(text + "# edited\n")
-        assert hash_of(package) != before, file
-        file.write_text(text)
+def test_an_edit_means_new_code_of_the_kernels_that_it_reaches_and_of_no_others(copy: Path) -> None:
+    """Functions, by the calls in the sources; constants and fields of another file; text changes nothing."""
+    before, known = digests(copy), Kernels()
+    reached = {x for x, kind in known.kind.items() if kind == "kernel"}
+    assert {f"{module}.{name}" for module, name in reached} == set(before)
+    function = "hybrid.kernels.algebra.rotations", "get3"
+    reaches = {".".join(x) for x in reached if x == function or function in known.copies(x)}
+    assert 10 < len(reaches) < len(before) - 10
+
+    def changed(file: str, old: str, new: str) -> set[str]:
+        edit(copy, file, old, new)
+        after = digests(copy)
+        edit(copy, file, new, old)
+        return {x for x in before if before[x] != after[x]}
+
+    anew = changed("kernels/algebra/rotations.py", VECTOR, TWICE)
+    assert reaches <= anew and len(anew) < len(before) - 10
+    assert not changed("kernels/algebra/rotations.py", VECTOR, f"    # as a tuple\n{VECTOR}")
+    assert not changed("kernels/run/run.py", '"""Steps of a line of either kind', '"""Some steps of a line')
+    constant = changed("kernels/state/books.py", "FAILED = range(7)", "FAILED = range(50, 57)")
+    assert "hybrid.kernels.run.run.run" in constant and "hybrid.kernels.run.run.in_plane" not in constant
+    field = "    zones: int = 0  # address of"
+    moved = changed("kernels/step/job.py", field, "    another: int = 0\n" + field)
+    assert "hybrid.kernels.run.run.in_plane" in moved and len(moved) < len(before)
 
 
 @pytest.mark.long
@@ -197,13 +227,13 @@ def test_own_numba_functions_keep_their_own_cache(tmp_path: Path) -> None:
 
 
 def test_the_cache_folder_is_where_the_user_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from hybrid.kernels.machine.cache import cache_folder, kernel_hash
+    from hybrid.kernels.machine.cache import cache_folder
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     monkeypatch.delenv("HYBRID_CACHE_DIR", raising=False)
-    assert cache_folder() == tmp_path / "xdg" / "hybrid-cable" / kernel_hash()
+    assert cache_folder() == tmp_path / "xdg" / "hybrid-cable" / compiler_hash()
     monkeypatch.setenv("HYBRID_CACHE_DIR", str(tmp_path / "here"))
-    assert cache_folder() == tmp_path / "here" / "hybrid-cable" / kernel_hash()
+    assert cache_folder() == tmp_path / "here" / "hybrid-cable" / compiler_hash()
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="temporary folders belong to one user")

@@ -15,7 +15,7 @@ import pytest
 from numba.core.registry import cpu_target
 
 from hybrid.kernels.machine import cache, kept_code
-from hybrid.kernels.machine.cache import CacheWarning, Place, cache_folder, is_warm, processor, temporary_folder
+from hybrid.kernels.machine.cache import CacheWarning, Place, cache_folder, processor, temporary_folder
 from hybrid.kernels.machine.code_file import FORMAT, MAGIC, Unusable, read_code, write_code
 from hybrid.kernels.machine.compile import kernel
 
@@ -182,17 +182,15 @@ def test_a_folder_that_others_can_write_to_is_not_used(
 def test_code_is_kept_for_one_processor(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A home that many machines share: what another one has compiled is not there for this one."""
     assert processor() == cpu_target.target_context.codegen().magic_tuple(), "as numba has it"
-    name = "test_code_file.twice"
-    assert not is_warm([name])
+    assert not kernel(twice).is_kept
     assert compiled() == 1
-    assert is_warm([name]) and not is_warm([name, "test_code_file.thrice"])
+    assert kernel(twice).is_kept and not kernel(lambda x: x).is_kept
     without = processor()._replace(features=processor().features.replace("+sse3", "-sse3"))
     monkeypatch.setattr(cache, "processor", lambda: without)
-    assert not is_warm([name])
     kept_code._all_places.cache_clear()
-    assert compiled(warned="settings of numba that were changed") == 1 and not is_warm([name])
+    assert compiled(warned="settings of numba that were changed") == 1 and not kernel(twice).is_kept
     monkeypatch.setattr(cpu_target.target_context.codegen(), "magic_tuple", lambda: without)
-    assert compiled() == 1 and is_warm([name])
+    assert compiled() == 1 and kernel(twice).is_kept
     assert len(list(home.rglob("*.kernel"))) == 2
 
 

@@ -114,8 +114,8 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
         known = first_use.kernels_of_lines(scene, static)
     hybrid.static(scene) if static else hybrid.run(scene)
     texts = [x for value in vars(first_use).values() for x in (value if isinstance(value, tuple) else (value,))]
-    large = {x for x in texts if isinstance(x, str) and x.count(".") == 1}
-    assert {"run.in_space", "run.run"} < large
+    large = {x for x in texts if isinstance(x, str) and x.count(".") == 2}
+    assert {"run.run.in_space", "run.run.run"} < large
     before = {first_use.ZONES: first_use.CRITERIA, first_use.STEPS_OF_LINES: first_use.REST_OF_LINES}
     stood_for = {before[name] for name in known if name in before}  # compiled before those, by the same calls
     if "zones" in kind:

@@ -1,9 +1,9 @@
-"""Where the machine code of the kernels is kept, and whether it is there.
+"""Where the machine code of the kernels is kept.
 
 numba's own cache looks only at the file a kernel stands in, so it keeps a stale
-kernel when a function *imported from another file* is edited.  Here the cache
-folder carries a hash of every source file that can hold a kernel; an edit
-anywhere means a new folder and a fresh compilation.
+kernel when a function *imported from another file* is edited.  Here a folder
+carries a hash of what compiles, and each file in it a digest of all that its
+kernel calls (kernels.machine.source_digest).
 
 Code is looked for in the package first, where a release may bring it for a level
 of processors, then in the folder of the user, then it is compiled.
@@ -21,7 +21,7 @@ import sys
 import sysconfig
 import tempfile
 import warnings
-from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -29,10 +29,9 @@ from typing import NamedTuple
 
 from hybrid.kernels.machine.code_file import SUFFIX, digest, others_may_write
 
-KERNELS = ("kernels/**/*.py", "adapt/zone_rules.py")
 # They keep machine code and call it, and make none.
 KEEPERS = ("argument_types.py", "cache.py", "code_file.py", "kept_code.py", "linked_code.py")
-KEPT_CACHES = 4  # older compilations are deleted; four let a few versions or branches live side by side
+KEPT = 4  # older folders, and codes of a kernel, are deleted; four let a few versions or branches live side by side
 SHIPPED = Path(__file__).parents[1] / "compiled"
 NEEDS = "needs.txt"  # in it: the numba and llvmlite whose code it is, as requirements
 
@@ -69,17 +68,16 @@ _WITHOUT_AVX = "corei7-avx", "core-avx-i", "sandybridge", "ivybridge", "nocona"
 
 
 @cache
-def kernel_hash(package: Path = Path(__file__).parents[2]) -> str:
-    """Hash of all kernel sources, of the compiler's version and of the Python that calls them.
+def compiler_hash(machine: Path = Path(__file__).parent) -> str:
+    """Hash of the sources that compile kernels, of the compiler's version and of the Python that calls them.
 
     numpy and the third number of Python's version are not in it: kernels call numba's functions and Python's C
     interface, which know them.
     """
     made = hashlib.sha256()
-    for where in KERNELS:
-        for file in sorted(x for x in package.glob(where) if x.name not in KEEPERS):
-            made.update(file.relative_to(package).as_posix().encode())
-            made.update(file.read_bytes())
+    for file in sorted(x for x in machine.glob("*.py") if x.name not in KEEPERS):
+        made.update(file.name.encode())
+        made.update(file.read_bytes())
     for name in ("numba", "llvmlite"):
         made.update(f"{name} {version(name)}".encode())
     made.update(f"{_python()} {platform.machine()} {sysconfig.get_platform()}".encode())
@@ -176,8 +174,8 @@ class Place(NamedTuple):
 
     @property
     def mark(self) -> str:
-        """In the name of each file: of the processor and of the kernels' sources."""
-        return digest(*self.processor, kernel_hash())[:12]
+        """In the name of each file: of the processor and of what compiles."""
+        return digest(*self.processor, compiler_hash())[:12]
 
 
 @cache
@@ -199,7 +197,7 @@ def shared() -> bool:
 
 
 def cache_folder() -> Path:
-    """Folder of this version's machine code: HYBRID_CACHE_DIR, else the user's cache folder, else a temporary one.
+    """Folder of this compiler's machine code: HYBRID_CACHE_DIR, else the user's cache folder, else a temporary one.
 
     What is loaded from it is executed: it is used only where nobody but the user and root may write to it.
     """
@@ -207,10 +205,10 @@ def cache_folder() -> Path:
     base = Path(root) / "hybrid-cable"
     try:
         make_folder(base)
-        usable = os.access(base, os.W_OK) and _is_safe(base) and _is_safe(base / kernel_hash())
+        usable = os.access(base, os.W_OK) and _is_safe(base) and _is_safe(base / compiler_hash())
     except OSError:
         usable = False
-    return (base if usable else temporary_folder()) / kernel_hash()
+    return (base if usable else temporary_folder()) / compiler_hash()
 
 
 def make_folder(folder: Path) -> None:
@@ -260,17 +258,20 @@ def temporary_folder() -> Path:
     return own
 
 
-def is_warm(kernels: Sequence[str]) -> bool:
-    """True when these kernels of this version, as file.function, are there compiled for this processor."""
-    there = [(place.folder, place.mark) for place in places()]
-    return all(any(any(folder.glob(f"{name}-{mark}-*{SUFFIX}")) for folder, mark in there) for name in kernels)
-
-
 def prune(folder: Path) -> None:
-    """Delete the oldest sibling caches; another process may be doing the same, so nothing here may fail."""
-    try:
-        siblings = sorted((p for p in folder.parent.iterdir() if p.is_dir() and p != folder), key=os.path.getmtime)
-        for old in siblings[: max(0, len(siblings) - (KEPT_CACHES - 1))]:
+    """Delete the oldest caches of other compilers; another process may be doing the same, so nothing here may fail."""
+    with suppress(OSError):
+        for old in _older([p for p in folder.parent.iterdir() if p.is_dir() and p != folder], KEPT - 1):
             shutil.rmtree(old, ignore_errors=True)
-    except OSError:
-        pass
+
+
+def prune_codes(folder: Path, name: str) -> None:
+    """Delete the oldest codes whose names begin with that of a kernel and of its arguments."""
+    with suppress(OSError):
+        for old in _older(list(folder.glob(f"{name}-*{SUFFIX}")), KEPT):
+            old.unlink()
+
+
+def _older(paths: list[Path], kept: int) -> list[Path]:
+    """All but the newest."""
+    return sorted(paths, key=os.path.getmtime)[: max(0, len(paths) - kept)]

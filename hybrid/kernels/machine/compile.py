@@ -5,8 +5,9 @@ numba is imported where a kernel has to be compiled, not here and not where it i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
+from importlib import import_module
 from types import FunctionType
 from typing import Any
 
@@ -27,14 +28,14 @@ class Inner(_Function):
     def __init__(self, function: Callable[..., Any], apart: bool = False, **options: Any) -> None:
         """apart: whether it stays a function of its own in the code of a kernel."""
         super().__init__(function)
-        self._apart, self._options = apart, options
+        self.apart, self.options = apart, options
 
     @cached_property
     def made(self) -> Any:
         """numba's own of it."""
         from hybrid.kernels.machine.compiler import inner_of
 
-        return inner_of(self.py_func, self._apart, self._options)
+        return inner_of(self.py_func, self.apart, self.options)
 
     @property
     def _numba_type_(self) -> Any:
@@ -51,12 +52,17 @@ class Inner(_Function):
 class Entry(_Function):
     """A kernel that Python calls.  Called by another kernel it is compiled as a part of that one."""
 
+    def __init__(self, function: Callable[..., Any], inlined: bool = True) -> None:
+        """inlined: whether all @inner functions are inlined into it; else the compiler decides."""
+        super().__init__(function)
+        self._inlined = inlined
+
     @cached_property
     def _code(self) -> Any:
         """Its machine code, for each signature."""
         from hybrid.kernels.machine.kept_code import KeptCode
 
-        return KeptCode(self.py_func)
+        return KeptCode(self.py_func, self._inlined)
 
     @cached_property
     def part(self) -> Any:
@@ -81,6 +87,12 @@ class Entry(_Function):
         self._code.make_unless_busy(args)
 
     @property
+    def is_kept(self) -> bool:
+        """Whether its machine code is on disk, for some arguments."""
+        found: bool = self._code.is_kept
+        return found
+
+    @property
     def signatures(self) -> list[Any]:
         """Of the machine code in this process: keys of the types of the arguments (kernels.machine.argument_types)."""
         return self._code.signatures
@@ -91,6 +103,18 @@ class Entry(_Function):
         return self._code.compilations
 
 
+def entry(name: str) -> Entry:
+    """The kernel of a name, as room.file.function."""
+    file, _, function = name.rpartition(".")
+    found: Entry = getattr(import_module(f"hybrid.kernels.{file}"), function)
+    return found
+
+
+def is_warm(kernels: Sequence[str]) -> bool:
+    """Whether these kernels, as room.file.function, are on disk compiled for this processor."""
+    return all(entry(name).is_kept for name in kernels)
+
+
 def named(function: Any, name: str) -> FunctionType:
     """A copy of a function under another name: a kernel of its own, with its own file on disk."""
     copy = FunctionType(function.__code__, function.__globals__, name, function.__defaults__, function.__closure__)
@@ -98,9 +122,12 @@ def named(function: Any, name: str) -> FunctionType:
     return copy
 
 
-def kernel(function: Callable[..., Any]) -> Any:
-    """Compile an entry point: called from Python, kept on disk under `cache_folder`."""
-    return Entry(function)
+def kernel(function: Callable[..., Any] | None = None, inlined: bool = True) -> Any:
+    """Compile an entry point: called from Python, kept on disk under `cache_folder`.
+
+    inlined: False compiles in a tenth of the time, for kernels that do much beside what takes time.
+    """
+    return Entry(function, inlined) if function else lambda decorated: Entry(decorated, inlined)
 
 
 def inner(function: Callable[..., Any]) -> Any:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
+from llvmlite import binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
@@ -81,9 +82,20 @@ class _EntryCode(JITCodeLibrary):
     """Code of an entry with all that it calls: optimised together, once."""
 
     def finalize(self) -> None:
-        _link(self, self._final_module)
+        self._link_all()
         self._linking_libraries = []
         super().finalize()
+
+    def _link_all(self) -> None:
+        _link(self, self._final_module)
+
+
+class _LooseCode(_EntryCode):
+    """The same, of which the optimiser decides what it inlines."""
+
+    def _link_all(self) -> None:
+        super()._link_all()
+        self._final_module = llvm.parse_assembly(str(self._final_module).replace(" alwaysinline ", " inlinehint "))
 
 
 def _link(code: Any, module: Any) -> None:
@@ -111,6 +123,10 @@ class _EntryCompiler(Compiler):
         library = self.made(target.codegen(), "hybrid")
         library.enable_object_caching()
         super().__init__(typing, target, library, *rest)
+
+
+class _LooseCompiler(_EntryCompiler):
+    made = _LooseCode
 
 
 class _InnerCompiler(_EntryCompiler):
@@ -156,9 +172,9 @@ class Made(NamedTuple):
         return Code(lambda args: entry(*args), self.result.library.get_pointer_to_function(symbol))
 
 
-def compile_entry(function: Callable[..., Any], key: tuple[Any, ...]) -> Made:
-    """key: of the types of its arguments (kernels.machine.argument_types)."""
-    entry = _njit(pipeline_class=_EntryCompiler, **_OPTIONS)(function)
+def compile_entry(function: Callable[..., Any], key: tuple[Any, ...], inlined: bool) -> Made:
+    """key: of the types of its arguments (kernels.machine.argument_types); inlined: all that it calls."""
+    entry = _njit(pipeline_class=_EntryCompiler if inlined else _LooseCompiler, **_OPTIONS)(function)
     entry.__class__ = _Kernel
     sig = tuple(map(reference_types.type_for, key))
     entry.compile(sig)

@@ -6,8 +6,6 @@ unpickled, which would execute whatever it says.
 
 from __future__ import annotations
 
-import hashlib
-import inspect
 import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -19,6 +17,7 @@ from hybrid.kernels.machine import cache as kept
 from hybrid.kernels.machine.argument_types import key_of, text_of
 from hybrid.kernels.machine.code_file import SUFFIX, Unusable, digest, read_code, write_code
 from hybrid.kernels.machine.linked_code import Code, link
+from hybrid.kernels.machine.source_digest import key_digest, source_digest
 
 if TYPE_CHECKING:
     from filelock import FileLock
@@ -29,8 +28,9 @@ if TYPE_CHECKING:
 class KeptCode:
     """Machine code of one entry, by the types of the arguments."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
+    def __init__(self, function: Callable[..., Any], inlined: bool) -> None:
+        """inlined: whether all @inner functions are inlined into it."""
+        self._function, self._inlined = function, inlined
         self._known: dict[tuple[Any, ...], Code] = {}
         self.compilations = 0
 
@@ -48,6 +48,12 @@ class KeptCode:
 
         with suppress(Timeout, OSError), self._lock.acquire(timeout=0):
             self.taking(args)
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether machine code of these sources is on disk for this processor, whatever arguments it takes."""
+        names = [(place.folder, f"{self._name}-{place.mark}-*-{self._source[:16]}{SUFFIX}") for place in _all_places()]
+        return any(any(folder.glob(name)) for folder, name in names)
 
     @property
     def signatures(self) -> list[tuple[Any, ...]]:
@@ -75,7 +81,7 @@ class KeptCode:
     def _compiled(self, key: tuple[Any, ...]) -> Code:
         from hybrid.kernels.machine.compiler import compile_entry
 
-        made = compile_entry(self._function, key)
+        made = compile_entry(self._function, key, self._inlined)
         self.compilations += 1
         if not self._can_be_kept(made):
             return made.code_here()
@@ -88,6 +94,7 @@ class KeptCode:
         try:
             kept.make_folder(place.folder)
             write_code(self._file(place, key), self._header(place, key) | names, code)
+            kept.prune_codes(place.folder, self._begin(place, key))
         except OSError as error:
             kept.warn_once(
                 f"machine code cannot be kept in {place.folder} ({error.strerror}) and is compiled at every run: "
@@ -127,15 +134,13 @@ class KeptCode:
 
     @cached_property
     def _name(self) -> str:
-        """file.function, of characters that any file system takes."""
-        module = self._function.__module__.rpartition(".")[2]
+        """room.file.function, of characters that any file system takes."""
+        module = self._function.__module__.removeprefix("hybrid.kernels.")
         return re.sub(r"[^\w.]", "", f"{module}.{self._function.__qualname__}")
 
     @cached_property
     def _source(self) -> str:
-        """Of what the hash of all kernels does not know: kernels of tests and users, and what a closure holds."""
-        code, content = self._function.__code__, _content(inspect.getfile(self._function))
-        return digest(code.co_code, str(code.co_firstlineno), _held(self._function), content)
+        return digest(source_digest(self._function), str(self._inlined))
 
     def _header(self, place: kept.Place, key: tuple[Any, ...]) -> dict[str, Any]:
         """What the file for a signature says of what it is."""
@@ -145,13 +150,17 @@ class KeptCode:
             "triple": place.processor.triple,
             "processor": place.processor.name,
             "features": place.processor.features,
-            "kernels": kept.kernel_hash(),
+            "compiler": kept.compiler_hash(),
+            "arguments": _arguments(key),
             "source": self._source,
         }
 
+    def _begin(self, place: kept.Place, key: tuple[Any, ...]) -> str:
+        """Of the name of a file: kernel, processor and compiler, arguments."""
+        return f"{self._name}-{place.mark}-{_arguments(key)[:12]}"
+
     def _file(self, place: kept.Place, key: tuple[Any, ...]) -> Path:
-        which = digest(*self._header(place, key).values())[:16]
-        return place.folder / f"{self._name}-{place.mark}-{which}{SUFFIX}"
+        return place.folder / f"{self._begin(place, key)}-{self._source[:16]}{SUFFIX}"
 
 
 def _text(key: tuple[Any, ...]) -> str:
@@ -159,15 +168,9 @@ def _text(key: tuple[Any, ...]) -> str:
     return ", ".join(map(text_of, key))
 
 
-def _held(function: Callable[..., Any]) -> bytes:
-    """What a closure holds, as bytes; of most kernels nothing."""
-    cells = tuple(x.cell_contents for x in function.__closure__ or ())
-    if not cells:
-        return b""
-    from numba.core.serialize import dumps
-
-    found: bytes = dumps(cells)
-    return found
+def _arguments(key: tuple[Any, ...]) -> str:
+    """A signature with the layouts of its NamedTuples."""
+    return digest(*map(key_digest, key))
 
 
 @cache
@@ -182,8 +185,3 @@ def _all_places() -> list[kept.Place]:
 
 def _own_place() -> kept.Place:
     return _all_places()[-1]
-
-
-@cache
-def _content(source: str) -> bytes:
-    return hashlib.sha256(Path(source).read_bytes()).digest()

@@ -187,7 +187,7 @@ def in_space(table):
     return solve_job(None, 1, read(table))
 
 
-@kernel
+@kernel(inlined=False)
 def run(table):
     """Steps of a line of either kind until a code of kernels.state.books is returned.
 
