@@ -8,8 +8,9 @@ import numpy as np
 
 from hybrid.kernels.state.state import Floats
 from hybrid.model.payout import whole_scene
+from hybrid.model.sections import bending_stiffness
 from hybrid.outputs.probes import Probe
-from hybrid.store.code_checks import CLAUSES, E301, F201, NAME, Row, use
+from hybrid.store.code_checks import CLAUSES, E301, F201, NAME, Row, moment_of, use
 
 if TYPE_CHECKING:
     from hybrid.outputs.observation import Observation
@@ -50,9 +51,12 @@ class Codes:
         )
         outer = pipe.outer_diameter or section.diameter or np.nan
         of_wall = (code.safety, outer, pipe.wall, pipe.modulus, code.yield_strength, code.tensile_strength)
+        tube = pipe.modulus * np.pi / 64.0 * (outer**4 - (outer - 2.0 * pipe.wall) ** 4)
+        natural = float(np.hypot(*(section.intrinsic_curvature or (0.0, 0.0))[:2]))
+        of_bend = (max(bending_stiffness(section)) or tube, natural)
         z = self._surface if pipe.pressure_z is None else pipe.pressure_z
         pressures = (pipe.pressure, z, pipe.content_density * self._gravity, self._water, self._surface)
-        return Row(first, last, F201, *numbers, *of_wall, code.ovality, code.fabrication, *pressures)
+        return Row(first, last, F201, *numbers, *of_wall, code.ovality, code.fabrication, *pressures, *of_bend)
 
     def probes(self) -> dict[str, Probe]:
         """Probes by name."""
@@ -64,9 +68,11 @@ class Codes:
         s = v.grid.points
         section = np.searchsorted(self._ends, s + (self._near if v.grid.after else -self._near))
         z, found = (v.grid.nodes @ v.r)[:, 2], np.full(v.tension.shape, np.nan)
+        catenary = np.asarray(v.grid.sides @ (~v.side_is_rod[:, None]).astype(float)) > 0.0
         for i, row in enumerate(self._rows):
             if row is not None:
-                M = v.bending_moment if row.kind == F201 else np.zeros_like(v.tension)
+                of_curvature = moment_of(row, v.curvature_twist[:, 0]) if row.kind == F201 else 0.0
+                M = np.where(catenary, of_curvature, v.bending_moment)
                 found = np.where(section == i, 100.0 * use(row, v.tension, M, z), found)
         return found
 

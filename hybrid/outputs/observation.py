@@ -333,6 +333,12 @@ class Observation:
             moment = moment + (self.batch.turn[:, -k, TORQUE, None] * tangent).T
         return moment
 
+    @property
+    def side_is_rod(self) -> NDArray[np.bool_]:
+        """(n sides,), whether the stretch of a side is a rod; a catenary has no moment."""
+        spans = np.array(self.grid.spans).reshape(-1, 3)
+        return np.repeat([zone.kind == "rod" for zone in self.grid.parts], spans[:, 1] - spans[:, 0] + 1)
+
     @cached_property
     def bending_moment(self) -> Floats:
         """(ns, nb) N m."""

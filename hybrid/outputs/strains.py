@@ -51,7 +51,7 @@ def strains(view: Observation) -> tuple[Floats, list[tuple[EndLayer, Floats]]]:
     """Curvature and twist (n sides, 2, outputs), 1/m, of what was computed; what fades at ends, and their curvature."""
     nodes, spans = view.grid.side_nodes, np.array(view.grid.spans).reshape(-1, 3)
     rods = np.array([zone.kind == "rod" for zone in view.grid.parts])
-    of_rod = np.repeat(rods, spans[:, 1] - spans[:, 0] + 1)
+    of_rod = view.side_is_rod
     out = np.zeros((nodes.size, 2, view.columns))
     if rods.any():
         mine = nodes[of_rod]
@@ -127,7 +127,7 @@ def bends_without_natural(view: Observation) -> tuple[Floats, NDArray[np.bool_]]
     """
     nodes, spans = view.grid.side_nodes, np.array(view.grid.spans).reshape(-1, 3)
     rods = np.array([zone.kind == "rod" for zone in view.grid.parts])
-    of_rod = np.repeat(rods, spans[:, 1] - spans[:, 0] + 1)
+    of_rod = view.side_is_rod
     bend = np.zeros((nodes.size, 2, view.columns))
     mine = nodes[of_rod]
     bend[of_rod] = (view.element_strains[mine, :2] - view.of_line("k0", mine)[:, :2]) / view.of_line("hn", mine)[

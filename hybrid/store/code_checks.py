@@ -44,6 +44,7 @@ class Row(NamedTuple):
     """The code of a section from `first` to `last` (m), as a row of the file; pressures at heights as of a pipe.
 
     strength: N, of E301; of F201 0.  outer, wall: m.  safety: g.  ovality: of the wall; fabrication: alpha_fab.
+    stiffness: N m2, of bending; natural: 1/m, curvature without load; files of 1.0.0 have neither.
     """
 
     first: float
@@ -67,6 +68,8 @@ class Row(NamedTuple):
     content: float
     water: float
     surface: float
+    stiffness: float = 0.0
+    natural: float = 0.0
 
 
 def use(row: Row, T: Floats, M: Floats, z: Floats) -> Floats:
@@ -84,6 +87,14 @@ def _design(row: Row, x: Floats, functional: float) -> Floats:
     """Design value of a tension or moment."""
     both = row.functional * functional + row.environment * (x - functional)
     return np.where(x < 0.0, both, np.maximum(both, row.functional * x))
+
+
+def moment_of(row: Row, curvature: Floats) -> Floats:
+    """Bending moment, N m, of a catenary, which has the curvature (1/m) of a line that is not stiff.
+
+    It does not know which way its sections are curved without load.
+    """
+    return np.asarray(row.stiffness * (curvature + row.natural))
 
 
 def of_riser(row: Row, T: Floats, M: Floats, dp: Floats) -> Floats:
@@ -152,36 +163,48 @@ def mooring_of_steps(result: Result) -> tuple[float, float, float] | None:
 def code_of_steps(result: Result) -> float | None:
     """The part that no step and node exceeds, by the ranges of tension and moment over all of them, as if they came at
     once, at the heights of the outputs; None: the result has not all of them."""
-    names = [f"{GROUP}/{x}" for x in ("tension_min", "tension_max", "bending_moment_max")]
-    bends = any(row.kind == F201 for row in rows_of(result))
-    if not has_envelope(result) or any(name not in result for name in names[: 3 if bends else 2]):
+    names = [f"{GROUP}/{x}" for x in ("tension_min", "tension_max")]
+    moment = _moments(result, f"{GROUP}/%s_max", lambda name: np.asarray(result[name]))
+    if moment is None or not has_envelope(result) or any(name not in result for name in names):
         return None
     s, low, high = np.asarray(result[SCALE]), np.asarray(result[names[0]]), np.asarray(result[names[1]])
-    M = np.asarray(result[names[2]]) if bends else np.zeros_like(high)
     z = result.position[:, :, 2]
-    heights = [np.interp(s, result.s, x) for x in (z.min(axis=0), z.max(axis=0))]
-    return _largest(
-        result, s, lambda x, at: np.max([use(x, T[at], M[at], h[at]) for T in (low, high) for h in heights], axis=0)
-    )
+    each = [(T, np.interp(s, result.s, h)) for T in (low, high) for h in (z.min(axis=0), z.max(axis=0))]
+    return _largest(result, s, lambda x, at: np.max([use(x, T[at], moment(x)[at], h[at]) for T, h in each], axis=0))
 
 
 def code_with_errors(result: Result) -> float | None:
     """The part that no output exceeds, whatever the errors of tension and moment; None: they are not known."""
-    bends = any(row.kind == F201 for row in rows_of(result))
-    wanted = ("tension", "bending_moment") if bends else ("tension",)
-    if any(name not in result or f"errors/total/{name}" not in result for name in wanted):
+    group = "errors/total/"
+    moment = _moments(
+        result, f"{group}%s", lambda x: result.both_sides(x.removeprefix(group))[1] + result.both_sides(x)[1]
+    )
+    if moment is None or "tension" not in result or f"{group}tension" not in result:
         return None
     s, T = result.both_sides("tension")
-    dT = result.both_sides("errors/total/tension")[1]
-    M, dM = (
-        result.both_sides(x)[1] if bends else np.zeros_like(T)
-        for x in ("bending_moment", "errors/total/bending_moment")
-    )
+    dT = result.both_sides(f"{group}tension")[1]
     z = np.array([np.interp(s, result.s, x) for x in result.position[:, :, 2]])
     return _largest(
-        result, s,
-        lambda x, at: np.max([use(x, (T + k * dT)[:, at], (M + dM)[:, at], z[:, at]) for k in (-1.0, 1.0)], axis=0),
-    )  # fmt: skip
+        result,
+        s,
+        lambda x, at: np.max([use(x, t[:, at], moment(x)[:, at], z[:, at]) for t in (T - dT, T + dT)], axis=0),
+    )
+
+
+def _moments(result: Result, name: str, read: Callable[[str], Floats]) -> Callable[[Row], Floats] | None:
+    """What has the moments (N m) of a row, from `name` of moment and curvature; None: the result has not all of them.
+
+    A line that is a catenary somewhere, at some time, may have those of its curvature; a mooring line needs none.
+    """
+    if not any(row.kind == F201 for row in rows_of(result)):
+        return lambda row: np.zeros_like(read(name % "tension"))
+    kinds = set(result["zones"]["kind"].tolist())
+    needs = {"bending_moment": "rod" in kinds, "curvature": kinds != {"rod"}}
+    if any(needed and name % x not in result for x, needed in needs.items()):
+        return None
+    known = {x: read(name % x) for x, needed in needs.items() if needed}
+    rods, curvature = known.get("bending_moment", np.zeros(1)), known.get("curvature")
+    return lambda row: rods if curvature is None else np.maximum(rods, moment_of(row, curvature))
 
 
 def _largest(result: Result, s: Floats, part: Callable[[Row, np.ndarray], Floats]) -> float | None:

@@ -127,6 +127,17 @@ def test_every_output_has_what_codes_let_it_use(moved):
             assert name in result.label("code_used")["description"]
 
 
+def test_a_catenary_bends_like_the_rod_in_its_place():
+    """Code and its bound by all steps count the moment of its curvature."""
+    sections = [LINE | WALL | {"length": 300.0, "code": CODE}]
+    more = {"cable": {"sections": sections}, "mesh": {"cells": 40}, "output": {"points": 41}}
+    ends = {k: {"kind": "pinned", "position": [x, 0, -10]} for k, x in (("start", 0), ("end", 270))}
+    rod, catenary = (hybrid.static(hung(ends=ends, model=model, **more)) for model in ("rod", "catenary"))
+    rod_used, used = rod["code_used"][0], catenary["code_used"][0]
+    np.testing.assert_allclose(used[10:31], rod_used[10:31], rtol=0.02)  # away from the ends
+    assert 100.0 * code_of_steps(catenary) == pytest.approx(used.max(), rel=0.01) and used.max() > 20.0
+
+
 @pytest.mark.long
 def test_codes_are_shown(moved, tmp_path):
     """In `hybrid stats`, in the report with pictures along s and over time, and kept by a study."""
