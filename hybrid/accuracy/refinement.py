@@ -259,6 +259,8 @@ def _reached(key: str, unit: str, total: float, most: float | None) -> str:
     """An accuracy that an error of `total` meets, with a tenth to spare; most: that of which a part is asked."""
     amount = 1.1 * total
     if most is not None and (amount <= ROUGHEST * most or key in ALONG):
+        if not most:
+            return f"{key}: {NOT_ASKED}"  # a part of nothing
         amount, unit = 100.0 * amount / most, "%"
         if amount > 100.0 * ROUGHEST and key != "bending_moment":
             return f"{key}: {NOT_ASKED}"

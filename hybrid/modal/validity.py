@@ -48,14 +48,15 @@ def doubts_of(x: LoadedLine, found: LineResponse) -> Iterator[str]:
 
 
 def _slack(x: LoadedLine, found: LineResponse) -> Iterator[str]:
-    """Where tension would be below zero."""
+    """Where tension would be below zero, or of a rod that is compressed at rest above."""
     tension, deviation = found.mean_tension, found.deviation("tension")
-    slack = ndtr(-tension / np.maximum(deviation, 1e-300))
+    slack = ndtr(-np.abs(tension) / np.maximum(deviation, 1e-300))
     k = int(slack.argmax())
     if slack[k] > SLACK_SHARE:
+        side = "below" if tension[k] >= 0.0 else "above"
         yield (
             f"at s = {found.middle[k]:.4g} m the tension of {tension[k]:.4g} N has a standard deviation of "
-            f"{deviation[k]:.4g} N: it would be below zero for {100.0 * slack[k]:.2g} % of the time"
+            f"{deviation[k]:.4g} N: it would be {side} zero for {100.0 * slack[k]:.2g} % of the time"
         )
 
 
@@ -71,7 +72,8 @@ def _swing(x: LoadedLine, found: LineResponse) -> Iterator[str]:
         yield f"at s = {found.middle[k]:.4g} m the line turns by {math.sqrt(square[k]):.2g} rad (standard deviation)"
     compliance = float((x.line.h * x.line.ck).sum())
     deviation = found.deviation("tension")
-    if compliance > 0.0:
+    held = all(x.x.joints[k] >= 0 or x.x.ends.held[k] for k in (0, 1))  # a free end gives way
+    if held and compliance > 0.0:
         pull = 0.5 * float((square * l).sum()) / compliance
         at = int(deviation.argmin())
         if pull > STRETCH * deviation[at]:

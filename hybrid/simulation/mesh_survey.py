@@ -184,7 +184,9 @@ class Survey:
             sharpest = np.maximum(demand.curvature, np.maximum(*self._beside()))
             sharpest = sharpest + self._jumps() * (1.0 - 1.0 / self._smeared)
             less = 0.5 * self._square * demand.least * sharpest**2
-            found = np.maximum(found, less / (OF_ALONG * asked.of_tension * demand.largest.max()))
+            size = max(float(demand.largest.max()), -float(demand.least.min()))
+            allowed = max(asked.of_tension * size, asked.round_off("N"))
+            found = np.maximum(found, less / (OF_ALONG * allowed))
         return np.asarray(found)
 
     def grading(self) -> Grading:

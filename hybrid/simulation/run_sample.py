@@ -89,8 +89,9 @@ class RunSample:
         return np.asarray(np.asarray(self.values[name]).max(axis=0))
 
     def largest(self, name: str) -> float:
-        """The largest value of an output, on either side of places where it has two."""
-        return max(float(np.max(self.most(x), initial=0.0)) for x in (name, f"right/{name}") if x in self.values)
+        """The largest size of an output, on either side of places where it has two."""
+        sides = (np.asarray(self.values[x]) for x in (name, f"right/{name}") if x in self.values)
+        return max(float(max(x.max(initial=0.0), -x.min(initial=0.0))) for x in sides)
 
     @cached_property
     def reach(self) -> Reach:

@@ -435,3 +435,15 @@ def test_curvature_beside_a_pin_is_that_of_a_fine_rod():
         assert one[0] == one[-1] == 0.0
         np.testing.assert_allclose(one[:8], other[:8], atol=0.02 * other.max())
         np.testing.assert_allclose(one[-8:], other[-8:], atol=0.02 * other.max())
+
+
+@pytest.mark.parametrize("held", ["clamped", "pinned"])
+def test_a_mast_and_a_hanging_line_with_a_free_end_are_answered(held: str) -> None:
+    """Neither is slack, and swinging does not stretch them: the one is compressed at rest, a free end gives way."""
+    up = 1 if held == "clamped" else -1
+    scene = hung({"kind": "jonswap", "significant_height": 1.0, "peak_period": 7.0, "depth": 40}, model="rod", cells=18)
+    scene["cable"]["sections"][0] |= {"length": 11.0, "bending_stiffness": 1e6, "axial_stiffness": 1e8}
+    foot = {"kind": held, "position": [0, 0, -12]} | ({"tangent": [0, 0, 1]} if up > 0 else {})
+    scene["ends"] = {"start": foot, "end": "free"}
+    found = hybrid.response(scene)
+    assert (up * found.lines["cable"].mean_tension < 0.0).all() and found.valid_for("tension"), found.notes

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import hybrid
+from hybrid.store.verdicts import MET, verdicts_of
 
 SECTION = {"length": 10.0, "mass": 5.0, "axial_stiffness": 1e7, "bending_stiffness": 2e4}
 
@@ -59,3 +61,19 @@ def test_of_several_lines_each_says_it() -> None:
     }
     found = hybrid.static({"points": points, "lines": lines})
     assert said(found.lines["stands"]) and not said(found.lines["hangs"])
+
+
+@pytest.mark.long
+def test_accuracy_of_a_line_without_tension_is_a_part_of_its_compression() -> None:
+    """A mast and a pressed beam, at rest and in motion: met, of a tension that is never above zero."""
+    moving = {"motion": {"surge": {"amplitude": 0.1, "period": 3}, "ramp": 3}}
+    mast = column(True) | {"time": {"duration": 1.0}, "initial": "equilibrium", "model": "adaptive"}
+    mast["ends"] = {"start": mast["ends"]["start"] | moving, "end": "free"}
+    beam = mast | {"ends": {"start": column(True)["ends"]["start"], "end": {"kind": "clamped", "tangent": [0, 0, 1]}}}
+    beam["ends"]["end"] |= {"position": [0, 0, 9.998]} | moving
+    for scene, compute in ((mast, hybrid.run), (beam, hybrid.static)):
+        found = compute(scene)
+        (tension,) = [x for x in verdicts_of(found).accuracy if x.quantity == "tension"]
+        largest = float(np.abs(found.tension).max())
+        assert found.tension.max() <= 1e-9 * largest
+        assert tension.asked == pytest.approx(0.01 * largest, rel=0.05) and tension.verdict == MET
