@@ -37,6 +37,15 @@ def pytest_sessionstart(session: pytest.Session) -> None:
             process.wait()  # what fails here fails again, with words, in a test
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """What needs a package of an extra that is not installed skips before its fixtures are made."""
+    from extras import skip_without
+
+    for mark in item.iter_markers("needs"):
+        skip_without(*mark.args)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files beside the folders first: they run pages and examples, and what takes a minute is not left to the end."""
     tests = Path(__file__).parent / "tests"

@@ -11,7 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 
 class HybridError(Exception):
@@ -60,6 +62,22 @@ class ResultError(HybridError):
 
 class ResultHeld(ResultError):
     """Another process is writing the result file."""
+
+
+def command_for(extra: str) -> str:
+    """The command that installs an extra (pyproject.toml) beside the package that is there."""
+    return f'pip install "hybrid-cable[{extra}]"'
+
+
+def optional_package(package: str, what: str, extra: str) -> Any:
+    """A package of an extra; ResultError with the command that installs it where it cannot be imported."""
+    try:
+        return import_module(package)
+    except ImportError as error:
+        raise ResultError(
+            f"{what} needs the package '{package}', which cannot be imported\n"
+            f"    detail:   {error}\n    try:      {command_for(extra)}"
+        ) from error
 
 
 class Outcome(IntEnum):

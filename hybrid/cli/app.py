@@ -131,6 +131,8 @@ def session(as_json: bool, quiet: bool) -> Iterator[Console]:
     with _stops() as heard, _cache_warnings(console):
         try:
             yield console
+        except typer.Exit:
+            raise
         except (Exception, KeyboardInterrupt) as error:
             # Where a stop comes while modules are imported or compiled, it can end as any exception.
             stopped = bool(heard) or isinstance(error, KeyboardInterrupt)

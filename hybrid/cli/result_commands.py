@@ -27,7 +27,7 @@ from hybrid.cli.app import (
     window,
     words,
 )
-from hybrid.errors import ResultError
+from hybrid.errors import ResultError, command_for
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -225,7 +225,7 @@ def _film(console: Console, result: Result, source: Path, output: Path | None, o
 
     suffix = ".mp4" if output or ffmpeg() else ".gif"
     if suffix == ".gif":
-        console.note('note: there is no ffmpeg for mp4, so it is a gif; pip install "hybrid-cable[video]" brings one')
+        console.note(f"note: there is no ffmpeg for mp4, so it is a gif; {command_for('video')} brings one")
     film = animate(result, output or source.with_suffix(suffix), overwrite=overwrite)
     size = film.path.stat().st_size
     facts = {"status": result.status, "size": size} | {k: v for k, v in film._asdict().items() if k != "path"}

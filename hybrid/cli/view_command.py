@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hybrid.cli.app import Json, app, flag, session
+from hybrid.errors import optional_package
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -30,11 +30,6 @@ def view(
 ) -> None:
     """Show a scene while it is written, or play a result, in the browser of this machine; Ctrl-C ends it."""
     with session(as_json, False) as console:
-        missing = [name for name in NEEDED if find_spec(name) is None]
-        if missing:
-            fix = 'pip install "hybrid-cable[view]"'
-            console.error("view", f"hybrid view needs {', '.join(missing)}\n    try:      {fix}")
-            raise typer.Exit(1)
         import asyncio
 
         console.source = str(file or "")
@@ -49,6 +44,8 @@ async def _serve(file: Path | None, console: Console, no_browser: bool) -> None:
     workers = Workers()
     await workers.start()
     try:
+        for name in NEEDED:
+            optional_package(name, "hybrid view", "view")
         from hybrid.live.server import listen, make_server
         from hybrid.live.session import session_of
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import ResultError, optional_package
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -44,11 +44,7 @@ def export_fmu(scene: SceneLike | System, path: str | Path, *, name: str | None 
     if target.suffix.lower() != ".fmu":
         raise ResultError(f"{target}: expected a name that ends in .fmu\n    try:      {target.with_suffix('.fmu')}")
     check_target(target, overwrite)
-    try:
-        from pythonfmu3.builder import FmuBuilder
-    except ImportError:
-        advice = 'pip install "hybrid-cable[fmu]"'
-        raise ResultError(f"an FMU is made by pythonfmu3, which is not installed\n    try:      {advice}") from None
+    builder = optional_package("pythonfmu3.builder", "an FMU", "fmu").FmuBuilder
     found = as_scene_or_system(scene)
     model = re.sub(r"\W", "_", name or target.stem)
     if not model[:1].isalpha():
@@ -64,7 +60,7 @@ def export_fmu(scene: SceneLike | System, path: str | Path, *, name: str | None 
         script = folder / f"hybrid_{model}_{token}.py"
         unit = "CableUnit" if isinstance(found, Scene) else "LinesUnit"
         script.write_text(_SCRIPT.format(model=model, unit=unit), encoding="utf-8")
-        made = FmuBuilder.build_FMU(
+        made = builder.build_FMU(
             script, folder / "made", [folder / SCENE, folder / INTERFACE, *files], **ABILITIES
         )  # fmt: skip
         write_atomically({target: made.read_bytes()}, overwrite)

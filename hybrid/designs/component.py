@@ -10,11 +10,10 @@ from hybrid.designs.component_ports import NOTHING, inputs_of, outputs_of, refus
 from hybrid.designs.design import task_of
 from hybrid.designs.edges import refuse_edges
 from hybrid.designs.problem import as_asked, problem_of, refused_result
-from hybrid.errors import SceneError
+from hybrid.errors import SceneError, optional_package
 from hybrid.scene.design import Design
 from hybrid.scene.read import SceneLike
 from hybrid.scene.system import System
-from hybrid.store.selection import optional_package
 
 if TYPE_CHECKING:
     from hybrid.designs.openmdao_component import DesignComponent

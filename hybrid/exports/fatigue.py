@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import ResultError, optional_package
 from hybrid.store.bends import Bends, bends_of
-from hybrid.store.selection import Part, error_name, head_lines, optional_package
+from hybrid.store.selection import Part, error_name, head_lines
 
 # A sine read n times a period shows 1 - cos(pi/n) less than its range at worst: 5 % for 10.
 _SAMPLES = 10
@@ -67,7 +67,7 @@ def count(chosen: Part) -> Counted:
 
     ResultError when there are fewer than three outputs, or rainflow is not installed.
     """
-    optional_package("rainflow", "counting cycles")
+    optional_package("rainflow", "counting cycles", "export")
     part, asked = replace(chosen, at=None), [] if chosen.at is None else chosen.at.tolist()
     if len(part.times) < 3:
         raise ResultError(

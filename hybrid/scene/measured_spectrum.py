@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.scene.motion_file import RecordRefused, read_table
+from hybrid.scene.motion_file import RecordRefused, netcdf_reader, read_table
 from hybrid.scene.wave_files import Recorded, columns_of
 
 Array = NDArray[np.float64]
@@ -115,11 +115,7 @@ def _of_table(path: str, name: str) -> tuple[Array, Array, Array]:
 def _of_wavespectra(path: str, name: str, record: int | None) -> tuple[Array, Array, Array]:
     """Frequencies (Hz), directions from which waves come (deg from north, clockwise), densities."""
     fix = "write it by wavespectra: dataset.to_netcdf(..), or a CSV file of frequency,direction,density"
-    try:
-        import xarray
-    except ImportError:
-        needs = 'pip install "hybrid-cable[export]"'
-        raise RecordRefused("xarray and h5netcdf, which read netCDF", needs, name) from None
+    xarray = netcdf_reader(name)
     try:
         with xarray.open_dataset(path) as opened:
             f, came = (np.asarray(opened[x].values, float) for x in ("freq", "dir"))

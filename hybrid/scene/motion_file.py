@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.errors import ResultError, command_for, optional_package
 from hybrid.scene.base import Finding
 
 Array = NDArray[np.float64]
@@ -56,6 +57,15 @@ class RecordRefused(Exception):
     def __init__(self, expected: str, fix: str, given: str | None = None) -> None:
         self.finding = Finding(("file",), expected, fix, given)
         super().__init__(f"{given or 'motion file'}: expected {expected}")
+
+
+def netcdf_reader(name: str) -> Any:
+    """The package xarray, beside h5netcdf by which it reads a file of this name; RecordRefused without them."""
+    try:
+        optional_package("h5netcdf", "netCDF", "export")
+        return optional_package("xarray", "netCDF", "export")
+    except ResultError:
+        raise RecordRefused("xarray and h5netcdf, which read netCDF", command_for("export"), name) from None
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.scene.motion_file import RecordRefused
+from hybrid.scene.motion_file import RecordRefused, netcdf_reader
 
 FREEDOMS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 NETCDF = (".nc", ".nc4", ".netcdf")
@@ -33,11 +33,7 @@ WHY += "and excitation_force (or Froude_Krylov_force and diffraction_force)"
 
 def read_dataset(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]:
     """Frequencies (F,) rad/s, headings (H,) deg, and the response (F, H, 6) per metre (m, rad).  RecordRefused."""
-    try:
-        import xarray
-    except ImportError:
-        fix = 'pip install "hybrid-cable[export]"'
-        raise RecordRefused("xarray and h5netcdf, which read netCDF", fix, Path(path).name) from None
+    xarray = netcdf_reader(Path(path).name)
     try:
         with xarray.open_dataset(path) as opened:
             data = opened.load()

@@ -5,7 +5,9 @@ from __future__ import annotations
 import sys
 from typing import Any, Protocol
 
-WITHOUT = 'progress as text; a bar in the notebook needs: pip install "hybrid-cable[notebook]"'
+from hybrid.errors import command_for
+
+WITHOUT = f"progress as text; a bar in the notebook needs: {command_for('notebook')}"
 
 
 class Reported(Protocol):

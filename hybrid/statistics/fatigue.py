@@ -12,14 +12,13 @@ import csv
 import math
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib import import_module
 from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hybrid.errors import ResultError
+from hybrid.errors import ResultError, optional_package
 from hybrid.statistics.spectrum import Spectrum
 
 Floats = NDArray[np.float64]
@@ -107,13 +106,7 @@ def curve_of(given: str | Mapping[str, float | str] | Curve) -> Curve:
 
 def rainflow_cycles(x: ArrayLike) -> Floats:
     """Cycles (n, 3) of a history (nt,): range, mean, and count, 1 or a half."""
-    try:
-        package = import_module("rainflow")
-    except ImportError as error:
-        raise ResultError(
-            "counting cycles needs the package rainflow\n"
-            f'    detail:   {error}\n    try:      pip install "hybrid-cable[studies]"'
-        ) from error
+    package = optional_package("rainflow", "counting cycles", "export")
     return np.array([c[:3] for c in package.extract_cycles(turning_points(x).tolist())]).reshape(-1, 3)
 
 

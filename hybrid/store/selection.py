@@ -11,7 +11,6 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from math import inf
 from pathlib import Path
@@ -216,17 +215,6 @@ def error_name(part: Part, name: str) -> tuple[str, str]:
         if f"errors/{kind}/{name}" in part.result:
             return f"errors/{kind}/{name}", said
     return "", ""
-
-
-def optional_package(package: str, what: str, extra: str = "export") -> Any:
-    """A package that only an export needs; ResultError with the command that installs it when it is not there."""
-    try:
-        return import_module(package)
-    except ImportError as error:
-        raise ResultError(
-            f"{what} needs the package '{package}', which cannot be imported\n"
-            f'    detail:   {error}\n    try:      pip install "hybrid-cable[{extra}]"'
-        ) from error
 
 
 def _version() -> str:

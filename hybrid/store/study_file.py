@@ -30,8 +30,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import ResultError
-from hybrid.store.selection import optional_package
+from hybrid.errors import ResultError, optional_package
 
 if TYPE_CHECKING:
     import xarray

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.errors import ResultError
-from hybrid.store.selection import Part, facts, optional_package
+from hybrid.errors import ResultError, optional_package
+from hybrid.store.selection import Part, facts
 
 if TYPE_CHECKING:
     import xarray
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def dataset(part: Part) -> xarray.Dataset:
     """What was chosen, with units, descriptions, `zone_kind` over t and s, the scene, and versions as attributes."""
-    xr = optional_package("xarray", "a Dataset")
+    xr = optional_package("xarray", "a Dataset", "export")
     result = part.result
     used = {dim for name in part.names for dim in result.dims(name)} | {"t", "s"}
     coordinates = {_name(dim): _variable(part, dim) for dim in sorted(used)}
@@ -40,7 +40,7 @@ def dataset(part: Part) -> xarray.Dataset:
 
 def image(part: Part) -> memoryview:
     """The same as a netCDF 4 file."""
-    optional_package("h5netcdf", "netCDF")
+    optional_package("h5netcdf", "netCDF", "export")
     return memoryview(dataset(part).to_netcdf(engine="h5netcdf"))
 
 

@@ -9,8 +9,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from hybrid.errors import ResultError
-from hybrid.store.selection import optional_package
+from hybrid.errors import ResultError, optional_package
 
 # So often a batch is tried whose worker died; then its cases are computed one by one.
 TRIES = 3

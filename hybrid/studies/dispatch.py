@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import ResultError, optional_package
 from hybrid.scene.study import Kept
-from hybrid.store.selection import optional_package
 from hybrid.store.study_file import FAILED, OPEN, StudyFile, counts_of
 from hybrid.studies.cases import Cases
 from hybrid.studies.cluster import client_of

@@ -7,13 +7,12 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hybrid.errors import Complaint, SceneError
-from hybrid.store.selection import optional_package
+from hybrid.errors import Complaint, SceneError, optional_package
 
 
 def evaluated(where: str, text: str, rows: Sequence[Mapping[str, Any]]) -> list[Any]:
     """The value of an expression for each row; SceneError for what is none, or a name that is not known."""
-    package = optional_package("simpleeval", "a condition", "studies")
+    package = optional_package("simpleeval", "an expression", "studies")
     functions = {name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "radians", "pi")}
     pi = functions.pop("pi")
     functions |= {"abs": abs, "min": min, "max": max, "round": round}

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import ResultError
-from hybrid.store.selection import optional_package
+from hybrid.errors import ResultError, optional_package
 from hybrid.store.study_file import DONE, open_study
 
 # Designs for sensitivity, and the levels of a Morris design.

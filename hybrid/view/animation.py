@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import ResultError, command_for
 from hybrid.store.reader import Result
 from hybrid.view.along import along
 from hybrid.view.decimate import even
@@ -58,7 +58,7 @@ def animate(result: Result, path: str | Path, *, overwrite: bool = False, width:
     target = check_target(path, FORMATS, overwrite=overwrite)
     suffix = target.suffix.lower()
     if suffix == ".mp4" and ffmpeg() is None:
-        advice = 'pip install "hybrid-cable[video]", or a name that ends in .gif'
+        advice = f"{command_for('video')}, or a name that ends in .gif"
         raise ResultError(f"{target} needs the program ffmpeg, which is not here\n    try:      {advice}")
     n = len(result.times)
     if n < 2:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from importlib.metadata import entry_points
 
+import extras
 import numpy as np
 import pytest
 
-pytest.importorskip("cosseratbench", reason="cosseratbench is not installed: its problems are not computed")
+pytestmark = extras.of_file("cosseratbench")
 
 from cosseratbench import registry
 from cosseratbench.experiment import COMPLETED, UNSUPPORTED, Result, run

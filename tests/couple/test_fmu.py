@@ -9,9 +9,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import fmpy
+import extras
 import numpy as np
 import pytest
+
+pytestmark = extras.of_file("fmpy", "pythonfmu3")
+
+import fmpy
 from fmpy.fmi3 import FMU3Slave
 from typer.testing import CliRunner
 

@@ -11,8 +11,8 @@ import pytest
 EXAMPLE = Path(__file__).parents[2] / "examples" / "contact" / "mujoco_vehicle.py"
 
 
+@pytest.mark.needs("mujoco")
 def test_a_tether_in_mujocos_loop_pulls_the_vehicle_and_the_pile() -> None:
-    pytest.importorskip("mujoco")
     script = runpy.run_path(str(EXAMPLE))
     found = script["main"](21.0)
     result, stiffness, mu = found.result, 2000.0, script["FRICTION"]

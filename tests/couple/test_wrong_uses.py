@@ -11,10 +11,8 @@ from math import inf, nan
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi3 import FMU3Slave
 
 import hybrid
 from hybrid.couple import moordyn
@@ -187,8 +185,12 @@ time: {duration: 2, step: 0.05}
 """
 
 
+@pytest.mark.needs("fmpy", "pythonfmu3")
 def test_wrong_uses_of_an_fmu(tmp_path: Path) -> None:
     """Times, sizes, inputs that are no numbers, after each of them a step as if nothing had been asked; then closed."""
+    import fmpy
+    from fmpy.fmi3 import FMU3Slave
+
     unit, said = hybrid.export_fmu(hybrid.parse_scene(SCENE), tmp_path / "line.fmu"), list[str]()
     fmpy.extract(unit, tmp_path / "open")
     description = fmpy.read_model_description(tmp_path / "open")

@@ -5,13 +5,16 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import extras
 import numpy as np
 import pytest
 
+pytestmark = extras.of_file("openmdao")
+
+import openmdao.api as om
+
 import hybrid
 from hybrid.scene.design import DESIGN
-
-om = pytest.importorskip("openmdao.api", reason="OpenMDAO is not installed: pip install 'hybrid-cable[openmdao]'")
 
 LENGTH, MASS = "cable.sections[0].length", "cable.sections[0].mass"
 EXAMPLES = Path(__file__).parents[2] / "examples"

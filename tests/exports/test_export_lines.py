@@ -9,7 +9,6 @@ from typing import Any
 
 import h5py
 import numpy as np
-import pandas
 import pytest
 
 import hybrid
@@ -71,8 +70,10 @@ def test_every_dimension_of_a_file_leads_to_its_scale(folder: Path, file: str) -
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
 @pytest.mark.parametrize("file", ["run.h5", "resumed.h5", "static.h5"])
+@pytest.mark.needs("xarray", "h5netcdf")
 def test_a_file_opens_in_xarray(folder: Path, file: str, engine: Any) -> None:
-    xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")
+    import xarray
+
     groups = xarray.open_groups(folder / file, engine=engine)
     with hybrid.open(folder / file) as result:
         for name, line in result.lines.items():
@@ -88,16 +89,21 @@ def test_a_file_opens_in_xarray(folder: Path, file: str, engine: Any) -> None:
 
 
 @pytest.mark.parametrize("file", ["run.h5", "resumed.h5", "static.h5"])
+@pytest.mark.needs("netCDF4")
 def test_a_file_opens_in_netcdf(folder: Path, file: str) -> None:
-    netcdf = pytest.importorskip("netCDF4", reason="the extra `dev` is not installed")
+    import netCDF4 as netcdf
+
     with netcdf.Dataset(folder / file) as opened, hybrid.open(folder / file) as result:
         west = opened["lines/west"]
         assert west["tension"].dimensions == ("t", "s")
         assert np.array_equal(west["tension"][:], result.lines["west"].tension)
 
 
+@pytest.mark.needs("pandas")
 def test_points_and_bodies_are_exported_under_their_names(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As `hybrid.export` of the result does; a name of lines is a file of each, at the places that are asked for."""
+    import pandas
+
     assert exported(capsys, folder, "float.csv", "--names", "points/float/position") == (0, {"float.csv"}, "")
     with hybrid.open(folder / "run.h5") as result:
         table = pandas.read_csv(folder / "float.csv", comment="#")
@@ -116,8 +122,10 @@ def test_points_and_bodies_are_exported_under_their_names(folder: Path, capsys: 
 
 
 @pytest.mark.long
+@pytest.mark.needs("xarray", "h5netcdf")
 def test_netcdf_holds_everything(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")
+    import xarray
+
     assert exported(capsys, folder, "all.nc")[:2] == (0, {"all.nc", "all.west.nc", "all.east.nc"})
     with xarray.open_dataset(folder / "all.nc") as shared, hybrid.open(folder / "run.h5") as result:
         assert np.array_equal(shared.points_float_position, result["points/float/position"])
@@ -157,9 +165,9 @@ def test_a_format_of_one_line_says_to_take_one(folder: Path, name: str) -> None:
             hybrid.export(whole.lines["west"], "vtkhdf")
 
 
+@pytest.mark.needs("pythonfmu3")
 def test_a_scene_of_several_lines_becomes_a_unit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The command makes of a file what `hybrid.export_fmu` makes of it; a wrong ending names the format."""
-    pytest.importorskip("pythonfmu3", reason="the extra `fmu` is not installed")
     (folder / "scene.yaml").write_text(json.dumps(SCENE))
     assert exported(capsys, folder, "lines.fmu", result="scene.yaml") == (0, {"lines.fmu"}, "")
     (folder / "python").mkdir()

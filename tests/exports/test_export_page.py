@@ -16,9 +16,8 @@ PAGE = ROOT / "docs" / "export.md"
 
 
 @pytest.mark.long
+@pytest.mark.needs("xarray", "h5netcdf", "netCDF4", "pandas", "vtk", "rainflow")
 def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    for package in ("xarray", "h5netcdf", "netCDF4", "pandas", "vtk", "rainflow"):
-        pytest.importorskip(package, reason="the extra `dev` is not installed")
     hybrid.run(hybrid.load_scene(ROOT / "examples" / "02_suspension.yaml"), tmp_path / "02_suspension.h5").close()
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"^```(\w+)\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)

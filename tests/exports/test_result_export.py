@@ -107,8 +107,10 @@ def folder_of(path: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+@pytest.mark.needs("xarray", "h5netcdf")
 def test_a_result_opens_directly_in_xarray(result: Result, tmp_path: Path, engine: Any) -> None:
-    xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")
+    import xarray
+
     with xarray.open_dataset(tmp_path / "run.h5", engine=engine) as opened:
         assert opened.tension.dims == ("t", "s") and opened.position.dims == ("t", "s", "xyz")
         assert (opened.t == result.times).all() and (opened.s == S).all()
@@ -130,8 +132,10 @@ def test_a_result_opens_directly_in_xarray(result: Result, tmp_path: Path, engin
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+@pytest.mark.needs("xarray", "h5netcdf")
 def test_netcdf_has_everything(result: Result, tmp_path: Path, engine: Any) -> None:
-    xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")
+    import xarray
+
     made = export(result, tmp_path / "run.nc")
     assert made.files == (tmp_path / "run.nc",) and made.notes == ()
     with xarray.open_dataset(tmp_path / "run.nc", engine=engine) as opened:
@@ -157,8 +161,8 @@ def test_netcdf_has_everything(result: Result, tmp_path: Path, engine: Any) -> N
         hybrid.open(tmp_path / "run.nc")
 
 
+@pytest.mark.needs("xarray", "h5netcdf")
 def test_a_dataset_can_be_a_part(result: Result) -> None:
-    pytest.importorskip("xarray", reason="the extra `export` is not installed")
     part = result.to_xarray(names=["tension", "energy", "zones", "steps"], times=(4.5, 6.0), at=[3.3, 0.0, 3.3])
     assert part.t.values.tolist() == result.times[45:61].tolist() and part.s.values.tolist() == [0.0, 3.3]
     np.testing.assert_array_equal(part.tension, result.at(s=[0.0, 3.3])["tension"][45:61])
@@ -169,8 +173,8 @@ def test_a_dataset_can_be_a_part(result: Result) -> None:
     assert (part.zone_kind.sel(s=3.3) == 1).all()
 
 
+@pytest.mark.needs("xarray", "h5netcdf")
 def test_a_result_in_memory_and_one_output(tmp_path: Path) -> None:
-    pytest.importorskip("xarray", reason="the extra `export` is not installed")
     memory = made(duration=0.0, steps=False)
     assert memory.to_xarray().sizes["t"] == 1
     with pytest.raises(ResultError, match="in memory has no name"):
@@ -217,8 +221,10 @@ def test_csv_keeps_every_digit(result: Result, tmp_path: Path) -> None:
     np.testing.assert_array_equal(table[:, 1:], result.tension[:, [0, 5, 20]])
 
 
+@pytest.mark.needs("pandas")
 def test_csv_of_places_components_and_tables_opens_in_pandas(result: Result, tmp_path: Path) -> None:
-    pandas = pytest.importorskip("pandas", reason="the extra `dev` is not installed")
+    import pandas
+
     file = export(
         result, tmp_path / "a.csv", names=["position", "reaction_end", "energy"], at=[3.3], times=(1, 2)
     ).files[0]
@@ -257,8 +263,8 @@ def test_csv_knows_no_locale(result: Result, tmp_path: Path) -> None:
 # ---- ParaView -------------------------------------------------------------------------------------
 
 
+@pytest.mark.needs("vtk")
 def test_vtk_reads_what_is_in_the_file(tmp_path: Path) -> None:
-    pytest.importorskip("vtk", reason="the extra `dev` is not installed, so ParaView's reader is not there to ask")
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOHDF import vtkHDFReader
 
@@ -298,8 +304,8 @@ def test_vtk_reads_what_is_in_the_file(tmp_path: Path) -> None:
 ANGLE = Path(__file__).parents[1] / "data" / "angle.obj"
 
 
+@pytest.mark.needs("vtk")
 def test_vtk_has_obstacles_where_they_are(tmp_path: Path) -> None:
-    pytest.importorskip("vtk", reason="the extra `dev` is not installed, so ParaView's reader is not there to ask")
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOHDF import vtkHDFReader
 
@@ -346,8 +352,8 @@ def test_vtk_has_obstacles_where_they_are(tmp_path: Path) -> None:
         assert beside.all(axis=1).sum() == facets
 
 
+@pytest.mark.needs("vtk")
 def test_vtk_reads_a_part_and_a_single_output(tmp_path: Path) -> None:
-    pytest.importorskip("vtk", reason="the extra `dev` is not installed, so ParaView's reader is not there to ask")
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOHDF import vtkHDFReader
 
@@ -378,12 +384,13 @@ def test_vtk_reads_a_part_and_a_single_output(tmp_path: Path) -> None:
 
 
 def table_of(file: Path) -> Any:
-    pandas = pytest.importorskip("pandas", reason="the extra `dev` is not installed")
+    import pandas
+
     return pandas.read_csv(file, comment="#")
 
 
+@pytest.mark.needs("rainflow", "pandas")
 def test_cycles_of_a_pull_and_of_a_bend_to_both_sides(result: Result, tmp_path: Path) -> None:
-    pytest.importorskip("rainflow", reason="the extra `export` is not installed")
     made = export(result, format="fatigue")
     assert [file.name for file in made.files] == ["run.cycles.csv", "run.histories.csv"] and made.notes == ()
     cycles, histories = (table_of(file) for file in made.files)
@@ -410,9 +417,9 @@ def test_cycles_of_a_pull_and_of_a_bend_to_both_sides(result: Result, tmp_path: 
     assert "rod 100 % of the outputs" in head
 
 
+@pytest.mark.needs("rainflow")
 def test_counts_are_those_of_a_series_counted_by_hand(tmp_path: Path) -> None:
     """The series of the example in ASTM E1049, section 5.4.4, as the end force: ranges and counts as published there."""
-    pytest.importorskip("rainflow", reason="the extra `export` is not installed")
     from hybrid.exports.fatigue import _cycles
 
     counts: dict[float, float] = {}
@@ -421,9 +428,9 @@ def test_counts_are_those_of_a_series_counted_by_hand(tmp_path: Path) -> None:
     assert counts == {3: 0.5, 4: 1.5, 6: 0.5, 8: 1.0, 9: 0.5}
 
 
+@pytest.mark.needs("rainflow", "pandas")
 def test_round_off_is_no_cycle(tmp_path: Path) -> None:
     """The straight end of the cable has a curvature of round-off: no cycle there, and the head says how many."""
-    pytest.importorskip("rainflow", reason="the extra `export` is not installed")
     made(tmp_path / "run.h5").close()
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         file["curvature"][:, 0] = 1e-12 * np.arange(81) % 3e-12
@@ -435,8 +442,8 @@ def test_round_off_is_no_cycle(tmp_path: Path) -> None:
     assert int(line.split()[3]) > 10
 
 
+@pytest.mark.needs("rainflow", "pandas")
 def test_places_of_a_touchdown_and_those_asked_for(tmp_path: Path) -> None:
-    pytest.importorskip("rainflow", reason="the extra `export` is not installed")
     result = made(tmp_path / "run.h5", bed=True)
     cycles = table_of(export(result, format="fatigue", at=[7.25]).files[0])
     places = {s: place for place, s in zip(cycles["place"], cycles["s (m)"], strict=True)}
@@ -448,8 +455,8 @@ def test_places_of_a_touchdown_and_those_asked_for(tmp_path: Path) -> None:
     assert tension["range"].max() == pytest.approx(np.ptp(result.tension[:, 10]), rel=1e-12)
 
 
+@pytest.mark.needs("rainflow")
 def test_outputs_too_far_apart_are_said_and_how_much_they_lose(tmp_path: Path) -> None:
-    pytest.importorskip("rainflow", reason="the extra `export` is not installed")
     fine = export(made(tmp_path / "fine.h5", every=0.1), format="fatigue")
     assert fine.notes == ()
     (note,) = export(made(tmp_path / "coarse.h5", every=0.4), format="fatigue").notes
@@ -620,9 +627,11 @@ def test_a_result_without_outputs_and_a_closed_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.needs("xarray", "h5netcdf")
 def test_a_killed_run_is_exported_as_far_as_it_came(tmp_path: Path) -> None:
     """xarray cannot open such a file, which has no end; `hybrid` can."""
-    xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")
+    import xarray
+
     code = f"""
 import os, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})

@@ -19,9 +19,9 @@ import hybrid
 TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS / "scene")]
 
-import problems as known  # noqa: E402
-import problems_sea as sea  # noqa: E402
-from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS  # noqa: E402
+import problems as known
+import problems_sea as sea
+from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS
 
 CELLS, STEPS, OUTPUTS, POINTS = 16, 16, 4, 9
 

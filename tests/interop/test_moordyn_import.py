@@ -311,8 +311,8 @@ def test_an_equilibrium_written_as_a_deck_comes_back(tmp_path: Path) -> None:
 # --- MoorDyn's own generator -------------------------------------------------------------------
 
 
+@pytest.mark.needs("moordyn")
 def test_the_generator_still_makes_the_decks_that_are_kept() -> None:
-    pytest.importorskip("moordyn")
     spec = importlib.util.spec_from_file_location("generate", FOLDER / "generate.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -12,10 +12,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import extras
 import pytest
-from browsed import Visited, opened_browser
 
-pytest.importorskip("starlette", reason='not installed: pip install "hybrid-cable[view]"')
+pytestmark = extras.of_file("playwright", "starlette", "uvicorn", "websockets")
+
+from browsed import Visited, opened_browser
 from viewed import SCENE, random_edit, served
 
 LONG = 400.0  # s: kernels may have to be compiled
@@ -222,8 +224,11 @@ def test_random_edits_leave_the_page_alive(browser: Any, scene: Path, many: int)
 
 
 @pytest.mark.slow
+@pytest.mark.needs("axe-playwright-python")
 def test_nothing_is_out_of_reach_of_a_screen_reader(browser: Any, scene: Path) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    from axe_playwright_python.sync_playwright import Axe
+
+    axe = Axe()
     with served(scene) as (address, _):
         for scheme in ("light", "dark"):
             visit = Visit(browser, address, color_scheme=scheme)

@@ -7,9 +7,11 @@ import signal
 import time
 from pathlib import Path
 
+import extras
 import pytest
 
-pytest.importorskip("starlette", reason='not installed: pip install "hybrid-cable[view]"')
+pytestmark = extras.of_file("starlette", "uvicorn", "websockets")
+
 from viewed import SCENE, Page, served
 
 import hybrid

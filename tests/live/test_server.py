@@ -12,9 +12,11 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import extras
 import pytest
 
-pytest.importorskip("starlette", reason='not installed: pip install "hybrid-cable[view]"')
+pytestmark = extras.of_file("starlette", "uvicorn", "websockets")
+
 from viewed import LINES, SCENE, Page, exchange, random_edit, served
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import xarray
 from pydantic import ValidationError
 
 import hybrid
@@ -33,6 +32,8 @@ def table(folder, E, more=()):
 
 
 def netcdf(folder, E, records=1):
+    import xarray
+
     """As wavespectra writes it: where waves come from, clockwise from north, here along y, in an order of its own."""
     came = (90.0 - 180.0 - A) % 360.0
     order = np.argsort(came)[::-1]
@@ -43,7 +44,7 @@ def netcdf(folder, E, records=1):
     return path
 
 
-@pytest.mark.parametrize("form", [table, netcdf])
+@pytest.mark.parametrize("form", [table, pytest.param(netcdf, marks=pytest.mark.needs("xarray", "h5netcdf"))])
 def test_waves_have_the_spectrum(tmp_path, form):
     """Height exactly, the mean rate of crossings, and mean direction and spread by E cos(a - a0) = s/(s + 1)."""
     sea = MeasuredWaves(file=str(form(tmp_path, spectrum())), components=1000)
@@ -65,6 +66,7 @@ def test_waves_have_the_spectrum(tmp_path, form):
     assert not np.allclose(again.recorded.waves[:, 2], sea.recorded.waves[:, 2])
 
 
+@pytest.mark.needs("xarray", "h5netcdf")
 def test_records_and_north(tmp_path):
     path = str(netcdf(tmp_path, spectrum(), 3))
     assert MeasuredWaves(file=path, record=2).significant_height == pytest.approx(HEIGHT * np.sqrt(3.0), rel=1e-6)

@@ -96,8 +96,8 @@ def test_a_csv_has_a_column_for_each_side(hung: hybrid.Result, tmp_path: Path) -
     assert float(row["tension (N) at s = 1 m"]) == pytest.approx(weight_below(1.0), rel=1e-9)
 
 
+@pytest.mark.needs("xarray")
 def test_in_xarray_both_are_variables(hung: hybrid.Result) -> None:
-    pytest.importorskip("xarray")
     found = hung.to_xarray()
     jump = found.tension.sel(s=AT) - found.right_tension.sel(right_s=AT)
     assert float(jump[0]) == pytest.approx(CLUMP * G, rel=1e-9)
@@ -141,9 +141,9 @@ def test_errors_are_known_on_both_sides(tmp_path: Path) -> None:
     assert f"tension at s = {AT} m before: at most" in text and f"tension at s = {AT} m after: at most" in text
 
 
+@pytest.mark.needs("rainflow")
 def test_cycles_are_those_of_the_worse_side(tmp_path: Path) -> None:
     """A cantilever that is shaken: its softer half bends four times as much at the seam as the stiffer one."""
-    pytest.importorskip("rainflow")
     section = {"length": 0.5, "mass": 0.05, "axial_stiffness": 1e5}
     shaken = {"heave": {"amplitude": 0.01, "period": 0.3}, "ramp": 0.2}
     clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "motion": shaken}

@@ -6,8 +6,12 @@ import math
 from pathlib import Path
 from typing import Any
 
+import extras
 import numpy as np
 import pytest
+
+pytestmark = extras.of_file("xarray", "h5netcdf")
+
 import xarray as xr
 from test_scene_vessel import FAIRLEAD, HEADING, scene, table
 

@@ -250,9 +250,11 @@ def test_damage_of_constant_cycles() -> None:
     assert np.array_equal(fatigue.damage(np.stack([x, 0.5 * x], axis=1), "D sea")[:1], [one])
 
 
+@pytest.mark.needs("fatpack")
 def test_damage_is_that_of_another_library() -> None:
     """fatpack counts the same cycles of a random history: the damage is within 1 %."""
-    fatpack = pytest.importorskip("fatpack")
+    import fatpack
+
     _, x = record(HOUR, 11)
     ranges = fatpack.find_rainflow_ranges(30.0 * x, k=4096)
     curve = fatigue.curves()["F sea"]
@@ -298,6 +300,7 @@ def test_life_over_a_scatter_diagram() -> None:
         fatigue.life_in_years([1.0, 1.0], [0.6, 0.6], 1.0)
 
 
+@pytest.mark.needs("rainflow")
 def test_turning_points_keep_all_cycles() -> None:
     import rainflow
 

@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import distributed
+import extras
 import numpy as np
 import pytest
+
+pytestmark = extras.of_file("dask")
+
+import distributed
 
 from hybrid.errors import ResultError
 from hybrid.store.study_file import DONE, FAILED, Column, StudyFile

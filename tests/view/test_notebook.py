@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from reported import reported
-from test_report_browser import browser  # noqa: F401  # a fixture
 
 import hybrid
 from hybrid.simulation import notebook_progress
@@ -28,6 +28,14 @@ for t in (2.0, 10.0):
 tell.close()
 reported(outputs=41)
 """
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from browsed import opened_browser
+
+    with opened_browser() as opened:
+        yield opened
 
 
 @pytest.fixture(scope="module")
@@ -97,8 +105,10 @@ def test_progress_is_text_where_there_is_no_notebook_or_no_widget(
     assert listener_of(False) is None
 
 
+@pytest.mark.needs("ipywidgets")
 def test_the_bar_follows_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    widgets = pytest.importorskip("ipywidgets")
+    import ipywidgets as widgets
+
     bar = notebook_progress.NotebookBar(widgets)
     shown: list[Any] = []
     monkeypatch.setattr("IPython.display.display", shown.append)
@@ -111,10 +121,13 @@ def test_the_bar_follows_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow  # a kernel, and a browser that starts plotly
-def test_a_notebook_made_into_a_page_moves_its_line(tmp_path: Path, browser: Any) -> None:  # noqa: F811
+@pytest.mark.needs("nbconvert", "ipykernel", "ipywidgets", "playwright")
+def test_a_notebook_made_into_a_page_moves_its_line(tmp_path: Path, browser: Any) -> None:
     """Executed by nbclient, exported by nbconvert, opened in Chromium without a network: the slider moves the line."""
-    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
-    nbconvert = pytest.importorskip("nbconvert")
+    import nbclient
+    import nbconvert
+    import nbformat
+
     book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(CELL)])
     nbclient.NotebookClient(book, kernel_name="python3", timeout=300).execute()
     outputs = [output for output in book.cells[0].outputs if "data" in output]

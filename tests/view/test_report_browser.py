@@ -11,8 +11,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import extras
 import numpy as np
 import pytest
+
+pytestmark = extras.of_file("playwright")
+
 from browsed import Visited, opened_browser
 from PIL import Image
 from reported import reported
@@ -286,9 +290,11 @@ def test_without_webgl_the_cable_is_shown_still(browser: Any, page_file: Path) -
 
 
 @pytest.mark.long
+@pytest.mark.needs("pypdfium2")
 def test_paper_has_every_picture(browser: Any, page_file: Path) -> None:
     """Printed from a dark screen before anything was scrolled to: A4, light, every still drawing, folds open."""
-    pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
+    import pypdfium2 as pdfium
+
     opened = Visit(browser, page_file, cable=False, color_scheme="dark")
     sheets = pdfium.PdfDocument(opened.page.pdf(prefer_css_page_size=True, print_background=True))
     plain = pdfium.PdfDocument(opened.page.pdf(prefer_css_page_size=True))  # as browsers print unless told otherwise
@@ -334,10 +340,12 @@ def test_a_dark_screen_gets_a_dark_page_and_the_other_way_round(browser: Any, pa
 
 @pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.needs("axe-playwright-python")
 def test_nothing_serious_for_screen_readers_and_keyboards(browser: Any, page_file: Path, scheme: str) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
+    from axe_playwright_python.sync_playwright import Axe
+
     opened = Visit(browser, page_file, color_scheme=scheme, bypass_csp=True)
-    found = axe.Axe().run(opened.page).response["violations"]
+    found = Axe().run(opened.page).response["violations"]
     serious = [(x["id"], [n["target"] for n in x["nodes"]]) for x in found if x["impact"] in ("serious", "critical")]
     assert not serious
     opened.context.close()
