@@ -14,14 +14,13 @@ from typing import NamedTuple
 from hybrid.model.sea import current_table
 from hybrid.model.sections import bending_stiffness, rotary_inertia, weight
 from hybrid.scene.attachments import BendRestrictor, BendStiffener, Float
+from hybrid.scene.cable import DENSITIES
 from hybrid.scene.motion_tables import SHIFTS
 from hybrid.scene.schema import Scene, Section
 from hybrid.scene.start_checks import apart_in_motion
 from hybrid.scene.waves import GivenWaves
 
 G = 9.81  # m/s^2
-# Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
-DENSITIES = (50.0, 25_000.0)
 # Fluids, kg/m^3: gases, and liquids from oil to heavy brine.
 GASES, LIQUIDS = (0.05, 10.0), (500.0, 2500.0)
 # Friction on a seabed: chain in gravel reaches 1.  Current, m/s: the fastest tidal streams reach 8 m/s in narrows, and

@@ -170,9 +170,12 @@ OneOrTwo = Annotated[
 ]
 
 
-# Mean densities of a section, kg/m^3: nothing that is laid or moored is lighter than foam, and a studless chain is
-# 28 000 by the diameter of its bar.  USUAL_DENSITIES: what a corrected unit should lead to.
-SECTION_DENSITIES, USUAL_DENSITIES = (15.0, 30_000.0), (300.0, 12_000.0)
+# Mean densities of a section, kg/m^3, that no reading but another unit explains: nothing that is laid or moored is
+# lighter than foam, and the lightest usual line with its mass in g/m has 300 000.  Beyond
+# DENSITIES (a studless chain has 28 000 by the diameter of its bar) an event says that it is implausible.
+SECTION_DENSITIES = (15.0, 300_000.0)
+DENSITIES = (50.0, 25_000.0)  # kg/m^3, plausible ones, with room: from hollow and foamed to solid heavy metal
+USUAL_DENSITIES = (300.0, 12_000.0)  # kg/m^3: what a corrected unit should lead to
 # Slips of units: the key, what its value is divided by, and the unit it was written in.
 _SLIPS = (
     ("mass", 1e3, "in g/m or kg/km"), ("diameter", 1e3, "in mm"), ("diameter", 1e2, "in cm"), ("mass", 1e-3, "in t/m"),

@@ -166,6 +166,8 @@ def _no_place(source: Source, deck: Deck) -> list[Note]:
         notes += [note(LEFT_OUT, row, why) for row in section.rows]
     why = "D of an exponent is taken as Fortran does, 1.0D+8 as 1e8; MoorDyn-C stops reading at the D, and takes 1"
     notes += [note(TAKEN, row, why, "write e, as in 1.0e8") for row in source.fortran]
+    fix = "correct the deck if the names, or what stands behind, were meant to count"
+    notes += [note(TAKEN, row, why, fix) for row, why in source.by_place]
     outputs = [row for row in source.rows("outputs") if row.cells[0].upper() != "END"]
     why = "output channels; hybrid stores the whole cable, and both end forces at every step (steps/end_force_end)"
     notes += [note(NOT_NEEDED, row, why) for row in outputs]

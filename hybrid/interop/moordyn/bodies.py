@@ -17,9 +17,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from hybrid.interop.moordyn.deck import Body, Point, Triple
+from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, note
 from hybrid.interop.moordyn.rows import number
 
 Matrix = tuple[Triple, Triple, Triple]
+DAMP = "give `damping`, about its mean motion"
 
 
 def numbers_of(cell: str) -> list[float] | None:
@@ -110,8 +112,8 @@ def body_row(body: Any, place: Triple, rotation: Triple, density: float, surface
     return f"{kind} {' '.join(f'{x:.12g}' for x in numbers)} {' '.join(rest)}", wrong
 
 
-def body_table(body: Body, density: float, parts: Sequence[Point] = ()) -> tuple[dict[str, Any], list[str]] | str:
-    """The table of a body, and what is lost of it; or why there is none.
+def body_table(body: Body, density: float, parts: Sequence[Point] = ()) -> tuple[dict[str, Any], list[Note]] | str:
+    """The table of a body, and notes on what is not as in the deck; or why there is none.
 
     parts: points on it that have a mass, a volume or a drag area of their own.
     """
@@ -125,8 +127,14 @@ def body_table(body: Body, density: float, parts: Sequence[Point] = ()) -> tuple
     drag, added = numbers_of(body.rest[4]), numbers_of(body.rest[5])
     if mass is None or volume is None or centre is None or inertia is None or drag is None or added is None:
         return "a rigid body whose mass, CG, I, Volume, CdA and Ca are not all numbers"
-    if mass[0] <= 0.0 or min(inertia) <= 0.0:
+    if mass[0] <= 0.0 or min(inertia) < 0.0 or max(inertia) <= 0.0:
         return "a free rigid body without mass or moments of inertia"
+    notes = []
+    if min(inertia) == 0.0:
+        why = f"it has no moment of inertia about some axes; {max(inertia):g} kg m^2 is taken there, too"
+        notes.append(note(TAKEN, body.row, why, "give its moments of inertia; at rest they do nothing"))
+        x, y, z = (each or max(inertia) for each in inertia)
+        inertia = (x, y, z)
     masses = [(mass[0], centre), *((p.mass, p.place) for p in parts)]
     whole, about = _centre(masses)
     turning = _inertia(inertia, masses, about)
@@ -136,7 +144,6 @@ def body_table(body: Body, density: float, parts: Sequence[Point] = ()) -> tuple
     found |= {"initial_rotation": turned} if any(turned) else {}
     found |= {"centre": about} if any(about) else {}
     found["inertia"] = (turning[0][0], turning[1][1], turning[2][2])
-    lost = []
     if density:
         volumes = [(volume[0], centre), *((p.volume, p.place) for p in parts)]
         displaced, lift = _centre(volumes)
@@ -145,13 +152,15 @@ def body_table(body: Body, density: float, parts: Sequence[Point] = ()) -> tuple
         moved = (added * 3)[:3] if len(added) == 1 else added[:3]
         found |= _added([density * volume[0] * ca for ca in moved], parts, density)
         if volume[0] and any(added[3:]):
-            lost.append("added inertia of its rotations (Ca)")
+            notes.append(note(LEFT_OUT, body.row, "added inertia of its rotations (Ca)", DAMP))
         if any(drag):
-            lost.append("its drag (CdA); `damping` of a body of hybrid is linear")
+            why = "its drag (CdA); `damping` of a body of hybrid is linear"
+            notes.append(note(LEFT_OUT, body.row, why, DAMP))
         if any(p.drag_area for p in parts):
             which = ", ".join(str(p.id) for p in parts if p.drag_area)
-            lost.append(f"the drag (CdA) of its points {which}; `damping` of a body of hybrid is linear")
-    return found, lost
+            why = f"the drag (CdA) of its points {which}; `damping` of a body of hybrid is linear"
+            notes.append(note(LEFT_OUT, body.row, why, DAMP))
+    return found, notes
 
 
 # Products of inertia that round-off leaves, of the smallest moment of inertia.

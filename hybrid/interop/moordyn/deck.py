@@ -208,13 +208,19 @@ def _triple(source: Source, row: Row, cells: Sequence[str], names: str) -> Tripl
     return x, y, z
 
 
+def _points_are_old(section: Section, row: Row) -> bool:
+    """Whether a force stands before drag, as in MoorDyn 1; the names decide where they have either in column 8."""
+    eighth = simple(section.names.cells[7]) if section.names is not None and len(section.names.cells) > 7 else ""
+    return eighth != "cda" and (eighth == "fx" or len(row.cells) == len(_POINT_V1))
+
+
 def _point(source: Source, row: Row, notes: list[Note]) -> Point | None:
-    old = len(row.cells) == len(_POINT_V1)
+    old = _points_are_old(source.sections["points"], row)
     names = _POINT_V1 if old else _POINT_V2
-    if not (old or source.columns(row, 9, 9, names)):
+    if not source.columns(row, len(names), len(names), names):
         return None
     check_names(source, "points", names, len(names))
-    cells = row.cells
+    cells = row.cells[: len(names)]
     kind, on = _attachment(source, row, cells[1], ("fixed", "coupled", "free", "body", "turbine"))
     mass = source.number(row, cells[5], "mass (kg)", least=0.0)
     volume = source.number(row, cells[6], "volume (m^3)", least=0.0)

@@ -34,6 +34,8 @@ TITLES: dict[str, tuple[str, ...]] = {
     "outputs": ("OUTPUTS", "OUTPUT"),
 }  # fmt: skip
 _SECTIONS = {title: name for name, titles in TITLES.items() for title in titles}
+# A title, with or without a remark beside it; the longest that fits: LINE TYPES are no LINES.
+_TITLE = re.compile(rf"\b({'|'.join(sorted(_SECTIONS, key=len, reverse=True))})\b")
 _ENDS = ("", "NEED THIS LINE", "END")
 _TABLES = tuple(name for name in TITLES if name not in ("options", "outputs"))
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
@@ -86,6 +88,7 @@ class Source:
         self.file = file
         self.complaints: list[Complaint] = []
         self.fortran: list[Row] = []  # rows with an exponent that only Fortran reads
+        self.by_place: list[tuple[Row, str]] = []  # rows that are read by place, whatever their names or length; why
         self.sections: dict[str, Section] = {}
         self.unknown: list[Section] = []
         self.misspelt: set[str] = set()  # sections whose title is not as MoorDyn knows it
@@ -106,13 +109,15 @@ class Source:
         return section.rows if section is not None else []
 
     def columns(self, row: Row, least: int, most: int, names: Sequence[tuple[str, ...]]) -> bool:
-        """Whether a row has `least` to `most` cells; complains if not."""
+        """Whether a row has at least `least` cells; complains if not.  Beyond `most` MoorDyn reads none."""
         n = len(row.cells)
-        if least <= n <= most:
+        if n > most:
+            self.by_place.append((row, f"of {n} columns the first {most} are read, as MoorDyn does"))
+        if n >= least:
             return True
         counted = f"{least}" if least == most else f"{least} to {most}"
         order = " ".join(each[0] for each in names[:least])
-        fix = "put ! before a remark" if n > most else "write 0 where there is nothing, - where there is no word"
+        fix = "write 0 where there is nothing, - where there is no word"
         self.complain(f"{n} columns", row.text, f"{counted} columns: {order}", fix, row.line)
         return False
 
@@ -149,6 +154,7 @@ class Source:
 
     def _cut(self) -> None:
         current: Section | None = None
+        self.begun = {_named(_title(text).upper()) for text in self.lines if "---" in text}
         for n, text in enumerate(self.lines, start=1):
             if "---" in text:
                 current = self._begin(text, n)
@@ -161,11 +167,11 @@ class Source:
             self._strip(section)
 
     def _begin(self, text: str, line: int) -> Section | None:
-        title = show(text.strip(" \t-=:*").rstrip(" \t-=:*"))
-        words = " ".join(title.upper().split())
-        name = _SECTIONS.get(words) or _SECTIONS.get(re.split(r"\s*[-(\[:,!#%]|\s{2,}", words)[0])
+        title = _title(text)
+        words = title.upper()
+        name = _named(words) or next((x for x in map(_named, _TITLE.findall(words)) if x not in self.begun), "") or None
         near = get_close_matches(words, _SECTIONS, n=1, cutoff=MISSPELT)
-        if name is None and near and _SECTIONS[near[0]] not in self.sections:
+        if words not in _SECTIONS and near and _SECTIONS[near[0]] != name and _SECTIONS[near[0]] not in self.sections:
             self._misspelt(near[0], text, line)
             return None
         if name is None:
@@ -202,6 +208,16 @@ class Source:
         section.rows = [clean for clean in map(_uncommented, rows) if clean.cells]
 
 
+def _title(text: str) -> str:
+    return show(text.strip(" \t-=:*"))
+
+
+def _named(words: str) -> str:
+    """The section with whose title, in capitals, some words begin; "" if there is none."""
+    found = _TITLE.match(words)
+    return _SECTIONS[found[1]] if found else ""
+
+
 def _uncommented(row: Row) -> Row:
     text = re.split(r"[!#%]", row.text, maxsplit=1)[0]
     return Row(row.line, text, tuple(text.split()))
@@ -235,7 +251,7 @@ def simple(name: str) -> str:
 
 
 def check_names(source: Source, section: str, columns: Sequence[tuple[str, ...]], least: int) -> None:
-    """Complain of columns named otherwise than MoorDyn reads them; by place, whatever their names.
+    """Note columns that are named otherwise than MoorDyn reads them, which is by place.
 
     columns: the names that are usual for each place, in `simple` form, the first for messages; `least` must be there.
     """
@@ -243,9 +259,7 @@ def check_names(source: Source, section: str, columns: Sequence[tuple[str, ...]]
     if names is None or not least <= len(names.cells) <= len(columns):
         return  # names of several words, or a row of another kind: nothing can be checked
     where = {name: i for i, usual in enumerate(columns) for name in usual}
-    for i, cell in enumerate(names.cells):
-        j = where.get(simple(cell))
-        if j is not None and j != i:
-            expected = f"{columns[i][0]} in column {i + 1}: MoorDyn reads columns by place, not by name"
-            order = " ".join(usual[0] for usual in columns[: len(names.cells)])
-            source.complain(f"column {i + 1}", cell, expected, f"write the columns in the order {order}", names.line)
+    moved = [i for i, cell in enumerate(names.cells) if where.get(simple(cell), i) != i]
+    if moved:
+        taken = ", ".join(f"column {i + 1}, {names.cells[i]}, is read as {columns[i][0]}" for i in moved)
+        source.by_place.append((names, f"columns are read by place, as MoorDyn does, not by name: {taken}"))

@@ -79,8 +79,8 @@ class _Maker(Tables):
     # --- tables --------------------------------------------------------------------------------
 
     def _sections(self) -> list[str]:
-        each = zip(self.cable.lines, self.types, self.lengths, strict=True)
-        return ["cable:", "  sections:", *(f"    {self._section(line, kind, l)}" for (line, _), kind, l in each)]
+        each = self._sections_of([line for line, _ in self.cable.lines], self.types, (self.cable.start, self.cable.end))
+        return ["cable:", "  sections:", *(f"    {section}" for section in each)]
 
     def _attachments(self) -> list[str]:
         items, s = [], 0.0

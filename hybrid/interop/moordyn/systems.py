@@ -24,7 +24,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.bodies import body_table
 from hybrid.interop.moordyn.cables import chain_of, end_of, held_loads, next_line
 from hybrid.interop.moordyn.deck import Body, Deck, Line, Point
-from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, in_order, note
+from hybrid.interop.moordyn.notes import TAKEN, Note, in_order, note
 from hybrid.interop.moordyn.rows import Row, number, show
 from hybrid.interop.moordyn.scenes import ImportedScene
 from hybrid.interop.moordyn.tables import NEAR, Tables, flow, lines_of
@@ -134,13 +134,13 @@ class _SystemMaker(Tables):
         lengths = [self._length(line) for line in lines]
         for line, turned in chain[:-1]:
             self._rod_joint(self.deck.rods[line.ends[0 if turned else 1][1]])
-        each = zip(lines, types, lengths, strict=True)
+        places = end_of(self.deck, ends["start"]), end_of(self.deck, ends["end"])
         parts = [f"  {name}:", f"    start: {start}", f"    end: {end}"]
         clamps = {key: self._clamp(each, key == "start") for key, each in ends.items() if all(bends)}
         if held := {key: {"tangent": x, "swivel": True} for key, x in clamps.items() if x is not None}:
             parts.append(f"    connections: {flow(held)}")
         parts.append("    sections:")
-        parts += [f"      {self._section(line, kind, length)}" for line, kind, length in each]
+        parts += [f"      {section}" for section in self._sections_of(lines, types, places)]
         if any(bends) and not all(bends):
             why = f"{name}: a section without EI is part of it, so all of it is computed without bending"
             self.notes.append(Note(TAKEN, None, "", why, "give bending_stiffness to every section"))
@@ -211,13 +211,13 @@ class _SystemMaker(Tables):
             why = made if isinstance(made, str) else "a free rigid body with rods, whose mass and drag it has"
             self._refuse(body.row, why, "write Fixed or Coupled and its place at rest")
             return {}
-        found, lost = made
+        found, notes = made
         self.notes += [held_loads(point) for point in parts if body.kind != "free"]
         if body.kind == "coupled":
             why = "the calling program of MoorDyn moves this body; a deck does not say how, and the scene holds it"
             instead = f"give bodies.{name}.motion: harmonics, a file, or a vessel with its RAOs"
             self.notes.append(note(TAKEN, body.row, why, instead))
-        self.notes += [note(LEFT_OUT, body.row, why, "give `damping`, about its mean motion") for why in lost]
+        self.notes += notes
         return found
 
     def _parts(self, body: Body) -> list[Point]:

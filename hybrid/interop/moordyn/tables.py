@@ -17,15 +17,18 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from hybrid.interop.moordyn.cables import between
+from hybrid.interop.moordyn.cables import End, between
 from hybrid.interop.moordyn.deck import Deck, Line, Point, Rod
 from hybrid.interop.moordyn.notes import DIFFERS, TAKEN, Note, note
 from hybrid.interop.moordyn.syrope import tables_of
 from hybrid.interop.moordyn.types import LineType
 from hybrid.scene.attachments import sphere_diameter
+from hybrid.scene.cable import Section
 
 # Segments whose lengths differ by less are equal: lengths are written with six digits.
 SAME_SEGMENT = 1e-6
+# Strain of a line between the places of its ends, beyond which it is too short for them: nylon breaks at 0.2 to 0.4.
+MOST_STRAIN = 0.5
 NEAR = 0.05  # part of the depth: a line with an end as near to the bed may lie there
 
 
@@ -94,8 +97,27 @@ class Tables:
             return min(lowest, 0.0)
         return -depth
 
-    def _section(self, line: Line, kind: LineType, length: float) -> str:
-        """A section in one line of YAML."""
+    def _sections_of(self, lines: Sequence[Line], types: Sequence[LineType], ends: tuple[End, End]) -> list[str]:
+        """Sections of lines that are one, each in one line of YAML; ends: of the whole."""
+        lengths = [self._length(line) for line in lines]
+        apart = math.dist(ends[0].place, ends[1].place) if all(end.point is None for end in ends) else 0.0
+        strains = self._strains(types, lengths, apart)
+        return [self._section(*each) for each in zip(lines, types, lengths, strains, strict=True)]
+
+    def _strains(self, types: Sequence[LineType], lengths: Sequence[float], apart: float) -> list[float]:
+        """Strain of each section between ends that are `apart`, m, with room for its weight; 0 where none is needed."""
+        over, linear = apart - sum(lengths), all(not (x.stretch.table or x.stretch.polyester) for x in types)
+        if over <= 0.0 or not linear:
+            return [0.0] * len(types)
+        each = list(zip(types, lengths, strict=True))
+        T = over / sum(l / x.ea for x, l in each)
+        T += self.options.gravity * sum(
+            l * abs(x.mass - self.options.density * 0.25 * math.pi * x.diameter**2) for x, l in each
+        )
+        return [T / x.ea if T / x.ea < MOST_STRAIN else 0.0 for x in types]
+
+    def _section(self, line: Line, kind: LineType, length: float, strain: float) -> str:
+        """A section in one line of YAML; strain: that its ends ask for, 0: none."""
         section: dict[str, Any] = {
             "length": length, "mass": kind.mass, "diameter": kind.diameter,
         }  # fmt: skip
@@ -109,6 +131,10 @@ class Tables:
             section |= {"tension_strain": how.table} if how.table is not None else {"axial_stiffness": kind.ea}
         if dynamic is not None:
             section["dynamic_stiffness"] = dynamic
+        if strain and strain > Section(**section).strain_limit:
+            section["max_strain"] = math.ceil(100.0 * strain) / 100.0
+            why = f"it is stretched by up to {strain:.3g} between its ends, more than it bears without max_strain"
+            self.notes.append(note(TAKEN, line.row, why, "check its length; give more where its ends move apart"))
         if kind.ei:
             section["bending_stiffness"] = kind.ei
         if self.wet and any(kind.drag):

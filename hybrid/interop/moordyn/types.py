@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, note
 from hybrid.interop.moordyn.rows import Row, Section, Source, check_names, simple
 from hybrid.interop.moordyn.stretch import Stretch, is_word, stretch_of
-from hybrid.scene.cable import SECTION_DENSITIES
+from hybrid.scene.cable import DENSITIES, SECTION_DENSITIES
 
 # Speed of waves of tension sqrt(EA/m), m/s, from rubber to aramid: 100 to 12 000.  EA in kN is out by 30.
 SPEEDS = (20.0, 3.0e4)
@@ -60,6 +60,11 @@ def line_type(source: Source, row: Row, notes: list[Note]) -> LineType | None:
     old = len(row.cells) == len(_TYPE_V1) and _types_are_old(source.sections["line types"])
     between = not old and _added_mass_first(source.sections["line types"])
     names = _TYPE_V1 if old else (*_TYPE_V2[:6], *_TYPE_V1[5:]) if between else _TYPE_V2
+    if not old and _types_are_old(source.sections["line types"]):
+        expected = "9 columns, as they are named, or 10 with EI behind BA/-zeta"
+        fix = "name EI, or take out what stands behind Cdt"
+        source.complain(f"{len(row.cells)} columns", row.text, expected, fix, row.line)
+        return None
     if not (old or source.columns(row, 10, len(names), names)):
         return None
     check_names(source, "line types", names, least=len(_TYPE_V1) if old else 10)
@@ -93,22 +98,23 @@ def line_type(source: Source, row: Row, notes: list[Note]) -> LineType | None:
     if len(rest) > 4 and source.number(row, rest[4], "Cl", least=0.0) > 0.0:
         why = "Cl makes lines vibrate in their own eddies; hybrid has no such force"
         notes.append(note(LEFT_OUT, row, why, "raise drag.normal of the sections by what the vibration adds"))
-    _units(source, row, diameter, mass, ea)
+    _units(source, row, (diameter, mass, ea), notes)
     return LineType(name, row, diameter, mass, ea, ba, ei, drag, added, trouble, instead, how)
 
 
-def _units(source: Source, row: Row, diameter: float, mass: float, ea: float) -> None:
-    """Complain of values that only another unit explains."""
+def _units(source: Source, row: Row, values: tuple[float, float, float], notes: list[Note]) -> None:
+    """Complain of a diameter, mass and EA that a scene refuses, and note those that only another unit explains."""
+    diameter, mass, ea = values
     density = mass / (math.pi / 4 * diameter**2) if diameter > 0.0 else math.nan
-    least, most = SECTION_DENSITIES
+    (least, most), (low, high) = SECTION_DENSITIES, DENSITIES
+    why = f"a line of {{:g}} to {{:g}} kg/m^3; this one has {density:.3g} kg/m^3"
+    fix = "diameter in m and mass in kg/m; " + ("mm?" if density < low else "g/m, or a radius?")
     if density < least or density > most:
-        expected = f"a line of {least:g} to {most:g} kg/m^3; this one has {density:.3g} kg/m^3"
-        fix = "diameter in m and mass in kg/m; " + ("mm?" if density < least else "g/m, or a radius?")
-        source.complain("diameter and mass", f"{diameter:g} {mass:g}", expected, fix, row.line)
+        source.complain("diameter and mass", f"{diameter:g} {mass:g}", why.format(least, most), fix, row.line)
+    elif density < low or density > high:
+        notes.append(note(TAKEN, row, f"as it stands, and implausible: expected {why.format(low, high)}", fix))
     speed = math.sqrt(ea / mass) if mass > 0.0 and ea > 0.0 else math.nan
     if speed < SPEEDS[0] or speed > SPEEDS[1]:
-        expected = (
-            f"a line in which tension travels at {SPEEDS[0]:g} to {SPEEDS[1]:g} m/s, sqrt(EA/m); here {speed:.3g}"
-        )
+        why = f"a line in which tension travels at {SPEEDS[0]:g} to {SPEEDS[1]:g} m/s, sqrt(EA/m); here {speed:.3g}"
         fix = "EA in N: " + ("kN or MN?" if speed < SPEEDS[0] else "or the modulus E, in Pa?")
-        source.complain("EA and mass", f"{ea:g} {mass:g}", expected, fix, row.line)
+        notes.append(note(TAKEN, row, f"as it stands, and implausible: expected {why}", fix))
