@@ -17,6 +17,7 @@ import typer
 import typer.core
 
 import hybrid
+from hybrid.cli.pipe import OUTPUT
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -36,6 +37,10 @@ DISK_ERRORS = {
     errno.EDQUOT: _ELSEWHERE,
     errno.ELOOP: "a file that is no link to itself",
 }
+
+
+LOOP = "Symlink loop from"  # how Path.resolve begins to say so
+LESS = "fewer cells (mesh), fewer output.points, a larger output.every"
 
 
 class _Commands(typer.core.TyperGroup):
@@ -136,7 +141,7 @@ def session(as_json: bool, quiet: bool) -> Iterator[Console]:
         except (Exception, KeyboardInterrupt) as error:
             # Where a stop comes while modules are imported or compiled, it can end as any exception.
             stopped = bool(heard) or isinstance(error, KeyboardInterrupt)
-            code = INTERRUPTED if stopped else _told(console, error)
+            code = INTERRUPTED if stopped else tell(console, error)
             if stopped:
                 console.interrupted()
     if code:
@@ -184,7 +189,17 @@ def _stops() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def _told(console: Console, error: BaseException) -> int:
+def _ran_out(error: BaseException) -> bool:
+    """Whether memory ran out: in an error, or in one on the way of which it came."""
+    seen: BaseException | None = error
+    while seen is not None:
+        if isinstance(seen, MemoryError):
+            return True
+        seen = seen.__cause__ or seen.__context__
+    return False
+
+
+def tell(console: Console, error: BaseException) -> int:
     """Say what went wrong; gives the exit code."""
     from hybrid.errors import ComputationError, ResultError, ResultHeld, SceneError
 
@@ -207,7 +222,14 @@ def _told(console: Console, error: BaseException) -> int:
             name = os.fspath(error.filename)
             name = name if len(name) <= 200 else f"{name[:100]} ... {name[-40:]}"
             console.error("result", f"{name}: {error.strerror}\n    try:      {DISK_ERRORS[error.errno]}")
-            return FAILED if console.written else REFUSED
+            return FAILED if console.written or name == OUTPUT else REFUSED
+        case RuntimeError() if str(error).startswith(LOOP):  # of Path.resolve
+            name = str(error).removeprefix(LOOP).strip(" '")
+            console.error("result", f"{name}: {os.strerror(errno.ELOOP)}\n    try:      {DISK_ERRORS[errno.ELOOP]}")
+            return REFUSED
+        case _ if _ran_out(error):
+            console.error("memory", f"not enough memory\n    try:      {LESS}", file=console.written)
+            return FAILED
     head = f"this is a bug in hybrid {hybrid.__version__}; please report it with the scene and these lines"
     console.error("bug", f"{head}\n{''.join(traceback.format_exception(error))}")
     return FAILED

@@ -45,6 +45,7 @@ from hybrid.cli.app import (
     output_option,
     picture_beside,
     session,
+    tell,
     words,
 )  # fmt: skip
 from hybrid.cli.pipe import guard_output
@@ -372,4 +373,8 @@ def main(arguments: list[str] | None = None) -> None:
             "usage", f"{error.format_message()}\n    try:      {command} --help"
         )
         code = REFUSED
+    except OSError as error:
+        from hybrid.cli.console import Console
+
+        code = tell(Console("--json" in arguments, False), error)
     sys.exit(code)

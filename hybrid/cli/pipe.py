@@ -1,25 +1,32 @@
-"""The output and error streams where they are pipes, as in `hybrid schema | head`."""
+"""The output and error streams where they are no terminal, as in `hybrid schema | head`, `hybrid schema > file`."""
 
 from __future__ import annotations
 
 import io
 import os
-import stat
 import sys
 from typing import Any
 
+OUTPUT = "the output"  # name of the stream, for messages
 
-class _Pipe(io.FileIO):
-    """A stream that is a pipe: what nobody reads any more, as behind `| head`, is dropped."""
+
+class _Stream(io.FileIO):
+    """A stream to a pipe or file: what cannot be written is dropped, of a full disk with an error that names it.
+
+    What nobody reads any more, as behind `| head`, is no error.
+    """
 
     dropped = False
+    name_told = ""  # in errors; "": there are none
 
     def write(self, data: Any) -> int:
         try:
             return super().write(data) or 0
-        except BrokenPipeError:
+        except OSError as error:
             self.dropped = True
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+            if self.name_told and not isinstance(error, BrokenPipeError):
+                raise OSError(error.errno, error.strerror, self.name_told) from None
             return memoryview(data).nbytes
 
 
@@ -28,13 +35,15 @@ def guard_output() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         try:
-            piped = stat.S_ISFIFO(os.fstat(stream.fileno()).st_mode)
+            piped = not os.isatty(stream.fileno())
         except (OSError, ValueError, AttributeError):  # a stream without a file, as in tests; none under pythonw
             continue
         if piped and isinstance(stream, io.TextIOWrapper):
-            raw = io.BufferedWriter(_Pipe(stream.fileno(), "w", closefd=False))
+            raw = _Stream(stream.fileno(), "w", closefd=False)
+            raw.name_told = OUTPUT if name == "stdout" else ""
+            to = io.BufferedWriter(raw)
             setattr(
-                sys, name, io.TextIOWrapper(raw, stream.encoding, stream.errors, line_buffering=stream.line_buffering)
+                sys, name, io.TextIOWrapper(to, stream.encoding, stream.errors, line_buffering=stream.line_buffering)
             )
 
 
