@@ -397,6 +397,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     sea_checks.wave_is_steady,
     sea_checks.record_lasts,
     sea_checks.followed,
+    sea_checks.seabed_is_no_depth,
     sea_checks.surface_over_seabed,
     sea_checks.nothing_in_the_ground,
     magnitude_checks.friction,

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from hybrid.scene.base import Finding, Kinds, Place, Table, Words, dotted, unit_of
 from hybrid.scene.schema_walk import Spot, all_keys, arms, follow, is_tag, item, meaning, tables
-from hybrid.scene.suggestions import decimal_comma, nearest, speaks_of
+from hybrid.scene.suggestions import PATHS, decimal_comma, nearest, speaks_of
 
 # A larger number would not help, as an example of how to write it.
 LARGEST = 1e12
@@ -253,6 +253,8 @@ def _fix(kind: str, key: str, value: Any, spot: Spot) -> str:
     if kind == "string_type":
         return "put it in quotes"
     if kind == "one_line":
+        if isinstance(value, str) and re.search(r"(^|/)[A-Za-z]:[\a\b\t\n\v\f\r]", value):  # "C:\new.csv"
+            return PATHS
         return "take out line breaks and control characters"
     if kind == "tuple_type" and isinstance(value, Mapping):
         return "start each entry with a dash"

@@ -164,12 +164,32 @@ def surface_over_seabed(environment: Environment, ends: Ends) -> Iterator[Findin
     places = {f"ends.{name}": p for name, p in (ends.held() | ends.initial_guesses()).items()} or {
         "x = y = 0": (0.0, 0.0, 0.0)
     }
+    if is_a_depth(environment, ends):
+        return
     for name, (x, y, _) in places.items():
         bed = seabed.height(x, y)
         if fluid.surface <= bed:
             expected = f"a height above {bed:.8g} m, the seabed at {name}"
             yield Finding(("environment", "fluid", "surface"), expected, "z points up; lower the seabed")
             return
+
+
+def is_a_depth(environment: Environment, ends: Ends) -> bool:
+    """Whether `seabed.z` is above the water, or ends in it, and would be right with the other sign."""
+    seabed, fluid = environment.seabed, environment.fluid
+    if seabed is None or seabed.z <= 0.0 or fluid is None or fluid.surface is None:
+        return False
+    places = list((ends.held() | ends.initial_guesses()).values())
+    over = [fluid.surface, *(z - (seabed.height(x, y) - seabed.z) for x, y, z in places)]  # over a bed at z = 0
+    return min(over) < seabed.z and min(over) >= -(1.0 + SUNK) * seabed.z
+
+
+def seabed_is_no_depth(environment: Environment, ends: Ends) -> Iterator[Finding]:
+    """A depth in place of the height of the bed."""
+    if is_a_depth(environment, ends):
+        z = environment.seabed.z if environment.seabed is not None else 0.0
+        expected = f"the height of the bed, {-z:.8g} m where it is {z:.8g} m under z = 0: z points up"
+        yield Finding(("environment", "seabed", "z"), expected, f"write z: {-z:.8g}")
 
 
 def deepest_place(seabed: Seabed, depth: float) -> float:
@@ -180,7 +200,7 @@ def deepest_place(seabed: Seabed, depth: float) -> float:
 def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
     """Ends, bodies and initial shapes under the seabed."""
     seabed, fluid = environment.seabed, environment.fluid
-    if seabed is None:
+    if seabed is None or is_a_depth(environment, ends):
         return
     depth = cable.length
     if fluid is not None and fluid.surface is not None:

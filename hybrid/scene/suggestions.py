@@ -6,6 +6,8 @@ import difflib
 import re
 from collections.abc import Iterable, Mapping
 
+# Of a path of Windows in double quotes, where YAML takes \n and \t for characters.
+PATHS = "write the path with /, as in C:/folder/file.csv, or in single quotes"
 MOST = 3  # so many of the schema's words are proposed at most
 
 

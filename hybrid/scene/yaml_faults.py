@@ -23,6 +23,7 @@ from ruamel.yaml.tokens import (
 )
 
 from hybrid.errors import Complaint
+from hybrid.scene.suggestions import PATHS
 from hybrid.scene.yaml_nodes import READABLE, WRITE_OUT
 
 OPENING, CLOSING = (FlowMappingStartToken, FlowSequenceStartToken), (FlowMappingEndToken, FlowSequenceEndToken)
@@ -100,11 +101,16 @@ def _fault(text: str, lines: list[str], error: MarkedYAMLError) -> Fault:
         if re.match(r"\s*(- +)?[A-Za-z_]\w* *[{\[]", here):
             return mark.line, mark.column, problem, _COLON
         return mark.line, mark.column, problem, "check the indentation, and put text that contains a colon in quotes"
-    return mark.line, mark.column, problem, _remedy(problem, here)
+    fix = _remedy(problem, here)
+    if "escape" in problem:
+        problem = "in double quotes \\ begins a special character"
+    return mark.line, mark.column, problem, fix
 
 
 def _remedy(problem: str, here: str) -> str:
     """What to try where a fault is where the parser stopped."""
+    if "escape" in problem:
+        return PATHS
     if "tab" in problem or "\t" in here:
         return "indent with spaces, not tabs"
     if "undefined alias" in problem:

@@ -296,6 +296,7 @@ CASES = {
     "soft as water": (SEA, "stiffness: 5.0e+3", "stiffness: §0", "environment.seabed.stiffness", "> 0"),
     "ground": (SEA, SEABED, f"{SEABED}\n  §ground: 3", "environment.ground", "did you mean seabed: {z: ..., stiffness: ...}?"),
     "depth of the environment": (SEA, SEABED, f"{SEABED}\n  §depth: 100", "environment.depth", "seabed: {z: ..., stiffness: ...}"),
+    "a depth for a height": (SEA, "z: -100.0, slope", "z: §100.0, slope", "environment.seabed.z", "write z: -100"),
     "surface under the seabed": (SEA, "surface: 0.0", "surface: §-101.0", "environment.fluid.surface", "seabed at ends.start"),
     "an end in the ground": (OCEAN, "  fluid", "  seabed: {z: -95, stiffness: 1.0e4}\n  fluid", "ends.start.position", "raise it"),
     "a body in the ground": (SEA, "initial_guess: [60.0, 0.0, -80.0]", "initial_guess: §[60.0, 0.0, -110.0]", "ends.end.initial_guess", "raise it"),

@@ -73,6 +73,9 @@ FAULTS = [
     ("A line", "@A", 1, "in quotes"),
     ("  seabed", "\tseabed", 3, "not tabs"),
     ("  end:", "   end:", 11, "indentation"),
+    # paths of Windows in double quotes
+    ("A line", '"C:\\x.csv"', 1, "C:/folder/file.csv"),
+    ("A line", '"C:\\data\\motion.csv"', 1, "in single quotes"),
     # a second document
     ("model: cat", "---\nmodel: cat", 14, "one scene to a file"),
     ("model: cat", "  model: cat", 14, "indentation"),
@@ -88,6 +91,13 @@ def test_a_fault_is_named_at_the_line_to_change(right: str, wrong: str, line: in
         (found,) = refused.value.complaints
         assert found.line == line
         assert words in f"{found.expected} {found.fix}"
+
+
+def test_a_path_of_windows_whose_name_begins_with_a_special_character() -> None:
+    """`"C:\\new.csv"` is YAML: a line break in the middle."""
+    motion = '-20], motion: {file: "C:\\new.csv"}}'
+    (found, *_) = complaints(TEXT.split("mesh: {\n")[0].replace("-20]}", motion) + "time: {duration: 4.0}\n")
+    assert found.where == "ends.start.motion.file" and "C:/folder/file.csv" in found.fix
 
 
 @pytest.mark.parametrize(
