@@ -82,7 +82,7 @@ an initial shape that misses a held end; a normal along its tangent; waves witho
 break (height / length ≥ 0.142 tanh(k depth)); an end in the ground, or carried out of the reach of the cable; a float
 that sinks; an attachment beyond the end of the cable; a cable that nothing holds, unless it lies on a seabed or floats
 at a surface; a time step that cannot follow a period, a ramp or a move; a section whose mass and diameter make a mean
-density below 15 or above 30 000 kg/m³; a fluid of 1.02 to 1.03 kg/m³ (sea water in t/m³), below 0.0005 or above 14 000;
+density below 15 or above 300 000 kg/m³; a fluid of 1.02 to 1.03 kg/m³ (sea water in t/m³), below 0.0005 or above 14 000;
 over a seabed one that is neither air (0.5 to 2 kg/m³) nor a liquid (400 to 3000), with a surface one that is no
 liquid.
 

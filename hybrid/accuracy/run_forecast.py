@@ -24,7 +24,7 @@ from hybrid.model import plan as tables
 from hybrid.model.build import Model, build
 from hybrid.model.contents import with_accuracy
 from hybrid.model.model_costs import NAMED
-from hybrid.model.plan import Plan, SystemPlan, count_steps, output_interval
+from hybrid.model.plan import Plan, SystemPlan, count_steps
 from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
 from hybrid.model.run_time import COST_STEP
 from hybrid.scene.read import SceneLike, as_scene_or_system
@@ -176,7 +176,7 @@ def _measured(scene: Scene, found: Plan) -> Plan:
     survey += still
     steps = _steps(scene, resolution, loop, coarse, case.seen)
     motion = steps * _dearer(found) * spent / max(loop.run.steps, 1)
-    seconds, most = _of_passes(scene, setup, motion, duration / output_interval(scene), found)
+    seconds, most = _of_passes(scene, setup, motion, duration / scene.output_interval, found)
     if scene.contact.self:  # by name: the first steps show nothing of it
         seconds, most = seconds + (TOUCHING - 1.0) * motion, most + (MOST_TOUCHING - 1.0) * motion
     model = build(case.scene, resolution)
@@ -287,7 +287,7 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
         torques = {name: tables.critical_torque(scenes[name], x, T) for name, x, T in at_rest}
         lines = {name: replace(x, critical_torque=torques[name]) for name, x in found.lines.items()}
         found = replace(found, lines=lines)
-    outputs = time.duration / output_interval(system)
+    outputs = time.duration / system.output_interval
     each = [_of_passes(scene, 0.0, 0.0, outputs, found.lines[name]) for name, scene in scenes.items()]
     expected, most = max(_of_passes(scene, setup, motion, 0.0, found.lines[name]) for name, scene in scenes.items())
     more = sum(x for x, _ in each)

@@ -36,7 +36,7 @@ from hybrid.accuracy.system_samples import compared, sample_of, touch_unasked
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.output_points import output_points
-from hybrid.model.plan import output_interval, output_times
+from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
     Resolution,
     is_irregular,
@@ -230,7 +230,7 @@ class SystemPasses:
         changed: dict[str, Any] = {"output": output}
         if self.moves:
             until = max(survey_duration(self.scenes[name]) for name in free)
-            every = output_interval(self.system)
+            every = self.system.output_interval
             changed["output"] = output.model_copy(update={"every": every})
             changed["time"] = self.system.require_time().model_copy(update={"duration": until})
         try:

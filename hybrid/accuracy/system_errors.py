@@ -20,7 +20,6 @@ from hybrid.accuracy.system_samples import touch_unasked
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.lines_contact import passing_each_other
-from hybrid.model.plan import output_interval
 from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import build_system
@@ -75,7 +74,7 @@ def longer_steps(system: System) -> System:
     """The same with steps twice as long and half the outputs, which end steps."""
     data = system.model_dump(mode="json", exclude_none=True)
     data["time"]["step"] = 2.0 * (system.require_time().step or 0.0)
-    data.setdefault("output", {})["every"] = 2.0 * output_interval(system)
+    data.setdefault("output", {})["every"] = 2.0 * system.output_interval
     return System.model_validate(data)
 
 

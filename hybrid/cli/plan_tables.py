@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from hybrid.cli.progress_line import span
 from hybrid.kernels.state.forces import FORCES
 from hybrid.model.lines_contact import OTHERS
+from hybrid.model.plan import parts, size_of_result
 from hybrid.model.self_reach import WHERE_NEAR
+from hybrid.scene.analysis import PER_PERIOD
 from hybrid.store.hockling import kink_torque
 
 if TYPE_CHECKING:
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from hybrid.simulation.listed_outputs import Listed
 
 NAME, COLUMNS = 13, 80  # columns of names, and of the short form
+LARGE = 2e7  # bytes of a file that are worth a word
 MOST_PAIRS = 6  # of lines that touch each other, by name
 # Forces whose names are too long for it.
 SHORT = {
@@ -56,6 +59,7 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
         "hockling": _hockling(plan),
         "time": _steps(scene.time, plan, bool(scene.contact.self)),
         "runs": _runs(plan),
+        "outputs": _outputs(scene),
         "accuracy": _accuracy(on),
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
     }
@@ -87,6 +91,7 @@ def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
         "contact": "; ".join(x for x in (_of_lines(system, on), _contact(on)) if x),
         "time": _steps(system.time, plan),
         "runs": _runs(max(every, key=lambda x: x.most_runs)),
+        "outputs": _outputs(system),
         "accuracy": _accuracy(on),
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
     }
@@ -145,6 +150,19 @@ def _of_lines(system: System, on: Mapping[str, str]) -> str:
     for what, names in (("obstacles", [*system.obstacles]), ("bodies", shapes)):
         found += [f"of every line with {what} {', '.join(names)}"] if names else []
     return "; ".join(found)
+
+
+def _outputs(scene: Scene | System) -> str:
+    """How often and how much, where the file is large or they do not show the shortest period of waves and motions."""
+    if scene.time is None:
+        return ""
+    every, period, size = scene.output_interval, scene.lasting_period, size_of_result(scene)
+    if size < LARGE and every * PER_PERIOD <= 1.01 * period:
+        return ""
+    count = parts(scene.time.duration, every) + 1
+    large = f"{size / 1e9:.2g} GB" if size >= 1e9 else f"{max(size / 1e6, 0.1):.2g} MB"
+    few = f"; fewer than {PER_PERIOD} in the period of {period:.3g} s: set output.every"
+    return f"{count}, every {every:.4g} s, in a file of some {large}{few * (every * PER_PERIOD > 1.01 * period)}"
 
 
 def _accuracy(on: Mapping[str, str]) -> str:

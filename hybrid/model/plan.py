@@ -24,6 +24,7 @@ from hybrid.model.payout_law import said_of_line
 from hybrid.model.resolution import first_resolution, model_is_free, predicted_runs
 from hybrid.model.run_time import foretold_steps, processor_time
 from hybrid.model.sections import limits_along, outer_diameter
+from hybrid.scene.analysis import VALUES
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 
@@ -79,9 +80,7 @@ class Plan:
 
 
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
-# Numbers that a result has per point and output, some twenty, and the largest file that still fits a disk.
-VALUES, MOST_BYTES = 20, 1e11
-OUTPUTS = 100  # of a run whose scene does not say how often
+MOST_BYTES = 1e11  # of the largest file that still fits a disk
 
 
 def parts(length: float, step: float) -> int:
@@ -89,22 +88,20 @@ def parts(length: float, step: float) -> int:
     return max(1, ceil(min(length / step, 1e18) * (1.0 - 1e-12) - 1e-9))
 
 
-def output_interval(scene: Scene | System) -> float:
-    """Time between two outputs, s; a scene that does not say how often gets OUTPUTS, or one a step."""
-    time = scene.require_time()
-    return scene.output.every or max(time.duration / OUTPUTS, time.step or 0.0)
+def size_of_result(scene: Scene | System) -> float:
+    """Bytes of the file of a run, roughly."""
+    return (scene.require_time().duration / scene.output_interval + 1.0) * scene.points_kept * VALUES * 8
 
 
 def refuse_too_much(scene: Scene) -> None:
     """SceneError for more outputs, points or steps than a disk and a life have room for, before any is made."""
-    time, every = scene.require_time(), output_interval(scene)
+    time, every = scene.require_time(), scene.output_interval
     count = time.duration / every
     if count > MOST_OUTPUTS:
         fix = f"output.every: {time.duration / 1000:.3g} makes a thousand"
         expected = f"at most {MOST_OUTPUTS} outputs"
         raise SceneError([Complaint("output.every", f"{every:g} s, {count:.3g} outputs", expected, fix)])
-    points = scene.output.points if isinstance(scene.output.points, int) else len(scene.output.points)
-    size = (count + 1.0) * points * VALUES * 8
+    points, size = scene.points_kept, size_of_result(scene)
     if size > MOST_BYTES:
         given = f"{points} points at {count + 1.0:.6g} times, some {size / 1e9:.3g} GB"
         fix = f"output.points: 101, or output.every: {time.duration / 100:.3g}"
@@ -118,7 +115,7 @@ def refuse_too_much(scene: Scene) -> None:
 def output_times(scene: Scene) -> list[float]:
     """Times (s) of the outputs after the first."""
     refuse_too_much(scene)
-    time, every = scene.require_time(), output_interval(scene)
+    time, every = scene.require_time(), scene.output_interval
     return [k * every for k in range(1, parts(time.duration, every))] + [time.duration]
 
 
@@ -195,7 +192,7 @@ def _plan(scene: Scene) -> Plan:
         resolution = first_resolution(scene)
         steps = foretold_steps(scene, model, resolution, count_steps(scene))
         step = min(resolution.step, scene.time.duration / steps)
-    outputs = scene.time.duration / output_interval(scene) if scene.time else 0.0
+    outputs = scene.time.duration / scene.output_interval if scene.time else 0.0
     paid = model.payout.forecast(scene.time.duration) if model.payout is not None and scene.time else None
     if paid is not None and not isnan(paid.mean_cells):
         mean = (*cells[:-1], max(cells[-1] + round(paid.mean_cells) - sum(cells), 1))

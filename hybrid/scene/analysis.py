@@ -410,12 +410,29 @@ OutputPoints = Annotated[
 ]
 
 
+# Outputs of a run that does not say how often, at least; of the shortest period of its waves and motions, as of steps.
+OUTPUTS, PER_PERIOD = 100, 6
+# Numbers that a result has per point and output, some twenty, and the most bytes of a file that nobody has asked for.
+VALUES, UNASKED_BYTES = 20, 2e8
+EVERY = (
+    f"time between outputs; absent: a hundredth of the duration, or a sixth of the shortest period of waves and "
+    f"motions, as far as the file has less than {UNASKED_BYTES / 1e6:g} MB, but no more than one a step [s]"
+)
+
+
+def interval_of_outputs(every: float | None, time: Time, period: float, points: int) -> float:
+    """Time between two outputs, s; period: the shortest of waves and motions, s; points: of all lines."""
+    if every is not None:
+        return every
+    wanted = max(OUTPUTS, math.ceil(min(PER_PERIOD * time.duration / period, 1e9)))
+    most = max(OUTPUTS, int(UNASKED_BYTES / (8 * VALUES * points)))
+    return max(time.duration / min(wanted, most), time.step or 0.0)
+
+
 class Output(Table):
     """What is kept."""
 
-    every: Positive | None = Field(
-        default=None, description="time between outputs; absent: a hundredth of the duration [s]"
-    )
+    every: Positive | None = Field(default=None, description=EVERY)
     points: OutputPoints = Field(
         default=101,
         description="number of output points, evenly spread, or a list of their arc lengths; points of `history`, "

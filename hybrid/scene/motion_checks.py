@@ -7,7 +7,7 @@ Files are read only if a scene has one, and numpy is imported only then.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hybrid.errors import Complaint, SceneError
@@ -258,20 +258,32 @@ def _all_periods(ends: Ends, environment: Environment | None) -> dict[str, float
     return periods | {key: h.period for here, _, motion in _motions(ends) for key, _, h in _periods(here, motion)}
 
 
-def shortest_period(ends: Ends, environment: Environment | None, obstacles: Obstacles | None = None) -> float:
-    """The shortest period, ramp or move of a scene, s; infinity if it names none."""
-    times = list(_all_periods(ends, environment).values())
-    moved: list[tuple[End | Held, Motion]] = [(end, motion) for _, end, motion in _motions(ends)]
-    for place, held in _obstacles(obstacles):
-        times += [h.period for _, _, h in _periods(place, held.motion)]
-        moved.append((held, held.motion))
+def moved_in(ends: Ends | None, obstacles: Obstacles | None = None) -> list[tuple[End | Held, Motion]]:
+    """The ends and obstacles that are moved, with their motions."""
+    found: list[tuple[End | Held, Motion]] = [(x, motion) for _, x, motion in (_motions(ends) if ends else ())]
+    return found + [(held, held.motion) for _, held in _obstacles(obstacles)]
+
+
+def lasting_period(moved: Iterable[tuple[End | Held, Motion]], environment: Environment | None) -> float:
+    """The shortest period of waves, and of motions with what they move, s; infinity if there is none."""
+    waves = environment.waves if environment is not None else None
+    times = [] if waves is None else [waves.main_period]
     for end, motion in moved:
-        times += [t for t in (motion.ramp, motion.travel.over if motion.travel else None) if t]
+        times += [h.period for _, _, h in _periods((), motion)]
         if motion.file is not None:
             from hybrid.scene.motion_file import shortest_in
             from hybrid.scene.vessel_record import motion_record
 
             times.append(shortest_in(motion_record(motion, end.held_position, end.held_tangent is not None)))
+    return min(times, default=math.inf)
+
+
+def shortest_period(ends: Ends, environment: Environment | None, obstacles: Obstacles | None = None) -> float:
+    """The shortest period, ramp or move of a scene, s; infinity if it names none."""
+    moved = moved_in(ends, obstacles)
+    times = [lasting_period(moved, environment)]
+    for _, motion in moved:
+        times += [t for t in (motion.ramp, motion.travel.over if motion.travel else None) if t]
     times += [over for begin, over in _winch_ramps(ends)]
     for spin in (getattr(x, "spin", None) for x in (obstacles or {}).values()):
         if spin is not None:

@@ -31,6 +31,7 @@ from hybrid.scene.analysis import (
     Straight,
     Time,
     ZonesModel,
+    interval_of_outputs,
     usual_model,
 )
 from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
@@ -39,6 +40,7 @@ from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environ
 from hybrid.scene.checks import contradictions
 from hybrid.scene.end_loads import Load
 from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned
+from hybrid.scene.motion_checks import lasting_period, moved_in
 from hybrid.scene.motion_tables import Harmonic, Motion, Travel
 from hybrid.scene.obstacles import (
     BoxObstacle,
@@ -197,6 +199,21 @@ class Scene(Table):
     def model_json_schema(cls, *args: Any, **kwargs: Any) -> dict[str, Any]:
         """JSON Schema of a scene file; bounds in the words that editors know."""
         return dict(_standard(super().model_json_schema(*args, **kwargs)))
+
+    @property
+    def points_kept(self) -> int:
+        """How many places along the line are kept at every output, but for those that are added."""
+        return self.output.points if isinstance(self.output.points, int) else len(self.output.points)
+
+    @property
+    def lasting_period(self) -> float:
+        """The shortest period of waves and motions [s]; infinity: there is none."""
+        return lasting_period(moved_in(self.ends, self.obstacles), self.environment)
+
+    @property
+    def output_interval(self) -> float:
+        """Time between two outputs [s]."""
+        return interval_of_outputs(self.output.every, self.require_time(), self.lasting_period, self.points_kept)
 
     def require_time(self) -> Time:
         """The `time` table; SceneError if the scene has none."""

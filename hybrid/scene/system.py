@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 from hybrid.errors import SceneError
 from hybrid.scene.accuracy import USUAL, Accuracy, AskedAccuracy, of_unnamed_model
 from hybrid.scene.analysis import (
+    EVERY,
     AdaptiveModel,
     CatenaryModel,
     Equilibrium,
@@ -27,6 +28,7 @@ from hybrid.scene.analysis import (
     RodModel,
     Straight,
     Time,
+    interval_of_outputs,
 )
 from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import Finding, NonNegative, Pair, Positive, Table, Text, Truth, Whole, refuse, turned
@@ -36,6 +38,7 @@ from hybrid.scene.connections import ClampedConnection, Connections
 from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
 from hybrid.scene.lines_contact import LinesContact
+from hybrid.scene.motion_checks import Held, lasting_period, moved_in
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.points import WINCH, Failure, Fairlead, FixedPoint, FreePoint, Name, Point
 from hybrid.scene.quantities import Quantities
@@ -169,9 +172,7 @@ def _between(initial: Initial, ends: Mapping[str, End]) -> Initial:
 class SystemOutput(Table):
     """What is kept."""
 
-    every: Positive | None = Field(
-        default=None, description="time between two outputs; absent: a hundredth of the duration, or one a step [s]"
-    )
+    every: Positive | None = Field(default=None, description=EVERY)
     points: Annotated[Whole, Field(ge=2)] = Field(
         default=101,
         description="points along each line, evenly over its length, its ends included; those of `history`, point "
@@ -464,7 +465,8 @@ class System(Table):
         if scene is not None:
             return scene.model_copy(update=tables)
         tables["title"] = f"{self.title}, line {name}" if self.title else f"line {name}"
-        given = {key: getattr(self.output, key) for key in ("points", "every", "errors")}
+        given: dict[str, Any] = {key: getattr(self.output, key) for key in ("points", "errors")}
+        given["every"] = self.output_interval if self.time is not None else self.output.every
         given["history"] = self.output.history.get(name)
         given["criteria"] = self.output.criteria and (name in self.adaptive or not self.adaptive)  # none: each says so
         tables["output"] = {key: value for key, value in given.items() if value is not None}
@@ -505,6 +507,23 @@ class System(Table):
                 places[key] = (a + part * (x - a), b + part * (y - b), c + part * (z - c))
                 break
         return places
+
+    @property
+    def points_kept(self) -> int:
+        """How many places along all lines are kept at every output, but for those that are added."""
+        return self.output.points * len(self.lines)
+
+    @property
+    def lasting_period(self) -> float:
+        """The shortest period of waves and motions [s]; infinity: there is none."""
+        held = [x for x in (*self.points.values(), *self.bodies.values()) if x.kind == "fixed"]
+        moved = [Held(x.motion, x.position, (1.0, 0.0, 0.0)) for x in held if x.motion is not None]
+        return lasting_period([*moved_in(None, self.obstacles), *((x, x.motion) for x in moved)], self.environment)
+
+    @property
+    def output_interval(self) -> float:
+        """Time between two outputs [s]."""
+        return interval_of_outputs(self.output.every, self.require_time(), self.lasting_period, self.points_kept)
 
     def require_time(self) -> Time:
         """The `time` table; SceneError if there is none."""

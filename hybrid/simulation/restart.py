@@ -19,7 +19,6 @@ from hybrid.model.ends import EndConditions
 from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.payout import longest_out, winch_at, winch_side
-from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Resolution
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.motion_checks import check_motions
@@ -47,6 +46,7 @@ MAY_CHANGE_OF_LINES = (
 )  # fmt: skip
 # Of the length, and of the length in the time of a transverse wave: what an end may jump by, and its velocity.
 SAME_PLACE, SAME_SPEED = 1e-6, 1e-3
+SAME_INTERVAL = 1e-9  # part of the interval of outputs: round-off
 
 
 S = TypeVar("S")
@@ -136,7 +136,7 @@ def remaining_system(
         if isinstance(found, Scene):
             return None
         meets = _knows_lines_that_meet(path)
-        found = as_begun(found, result, meets)
+        found = _as_often(as_begun(found, result, meets), result)
         done, reached = result.done, float(result.times[-1]) if len(result.times) else 0.0
         changes = tuple(LoadChange(t, as_begun(_several(text), result, meets)) for t, text in _told(path, result))
     if start is not None and not settings:
@@ -175,7 +175,7 @@ def _longer_lines(
     """As `_longer`, of several lines."""
     _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).lines[name].at(t=...)")
     _refuse_before_changes(changes, until)
-    every = output_interval(system)
+    every = system.output_interval
     other = tuple(LoadChange(x.t, _several(_text_until(x.scene, until, every))) for x in changes)
     return _several(_text_until(system, until, every)), other
 
@@ -235,12 +235,22 @@ def _found(path: Path) -> tuple[Scene, tuple[LoadChange[Scene], ...], str, Tree,
     with opened(path) as file:
         before, point = read_before(file), read_checkpoint(file)
         with open_result(path) as result:
-            scene = parse_scene(result.scene_text)
+            scene = _as_often(parse_scene(result.scene_text), result)
             status = result.status
             with refused(path):
                 points = restored_points(result, longest_out(scene), scene.length if not winch_side(scene) else None)
             changes = tuple(LoadChange(t, parse_scene(text)) for t, text in _told(path, result))
     return scene, changes, status, before, point, points
+
+
+def _as_often(scene: Any, result: Result) -> Any:
+    """The scene of a result with the interval of its outputs, which a scene that does not say so had of its version."""
+    if scene.output.every is not None or len(result.times) < 2:
+        return scene
+    every = float(result.times[1])
+    if abs(scene.output_interval - every) <= SAME_INTERVAL * every:
+        return scene
+    return scene.model_copy(update={"output": scene.output.model_copy(update={"every": every})})
 
 
 def _told(path: Path, result: Result) -> list[tuple[float, str]]:
@@ -275,7 +285,7 @@ def _longer(
     """The same until another time, with outputs as often as before."""
     _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).at(t=...)")
     _refuse_before_changes(changes, until)
-    every = output_interval(scene)
+    every = scene.output_interval
     out, longest = parse_scene(_text_until(scene, until, every)), longest_out(scene)
     if longest_out(out) > longest * (1.0 + SAME_PLACE):
         expected = f"a time up to which at most {longest:.6g} m are out, for which the result has points"
