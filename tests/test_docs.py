@@ -63,7 +63,8 @@ def test_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyte
         with pytest.raises(SystemExit) as left:
             main(arguments)
         assert not left.value.code, f"hybrid {' '.join(arguments)}: {capsys.readouterr().err}"
-    assert (clone / "02_suspension.h5").is_file() and (clone / "02_suspension.png").is_file()
+    for name in ("touchdown", "02_suspension"):
+        assert (clone / f"{name}.h5").is_file() and (clone / f"{name}.png").is_file()
 
 
 @pytest.mark.long
@@ -79,9 +80,10 @@ def test_readme_says_what_the_first_command_says(
         if line.startswith("note:"):
             assert line in " ".join(out.err.split()), "README.md shows another note than the program"
         if " steps, " in line:  # a step more or less is no matter
-            assert re.match(r"20 s in 20\d\d steps, ", line) and re.search(r"^20 s in 20\d\d steps, ", out.out, re.M)
+            steps = r"^100 s in 10\d\d steps, "
+            assert re.match(steps, line) and re.search(steps, out.out, re.M)
             assert line.split("->")[1].split() == out.out.split("->")[1].split()
-        if line.startswith(("largest", "smallest")):
+        if line.startswith(("rod", "largest", "smallest")):
             assert line.split() in [x.split() for x in out.out.splitlines()]
 
 
@@ -91,22 +93,24 @@ def test_readme_python_runs(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys
     (block,) = blocks(README, "python")
     exec(compile(block, "README.md", "exec"), {})
     said = capsys.readouterr().out
-    assert said.startswith("(201, 101) N\n"), "as the comment beside it says"
-    assert (clone / "suspension.png").stat().st_size > 10_000
+    assert said.startswith("(501, 101) N\n"), "as the comment beside it says"
+    assert (clone / "mooring.png").stat().st_size > 10_000
 
 
 def test_ci_reads_its_commands_from_the_readme() -> None:
     first, second, *_ = blocks(README, "bash")
     assert len(first.splitlines()) == 1, "one line to copy"
     assert re.fullmatch(
-        r"python3 -m venv \S+ && \. \S+/bin/activate && pip install -e \"\.\[dev\]\" && hybrid run \S+ --plot\n", first
+        r"python3 -m venv \S+ && \. \S+/bin/activate && pip install -e \. && hybrid run \S+ --plot\n", first
     )
-    assert second == "pytest\n"
+    assert second == 'pip install -e ".[test]" && pytest\n'
     later = [line for block in blocks(README, "bash")[2:] for line in block.splitlines()]
     assert all(line.startswith("hybrid ") for line in later), "test_commands_run runs these and no others"
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     assert "first=$(block 1)" in script and "second=$(block 2)" in script
-    assert "pip install" not in script
+    newcomer, _, developer = script.partition('eval "$second"')
+    assert "pip install" not in newcomer and "pip install -q -e '.[dev]'\n" in developer
+    assert 'HYBRID_TEST_EXTRAS=all pytest -m "slow or long or needs"' in developer, "no test is lost, none skips"
 
 
 @pytest.mark.long
