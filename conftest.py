@@ -1,18 +1,29 @@
-"""How tests run: in two processes (pytest-xdist), with kernels that are compiled once.
+"""How tests run: in two processes (pytest-xdist), while two others compile the kernels that most tests call.
 
-Before the two processes start, the kernels are compiled if they are not yet, one half in each of two others
-(tests/compile_kernels.py).  What times something (-m bench), shows figures (-s) or writes a page of the manual runs in
-one process.
+Tests that call few kernels come first.  The others wait until tests/compile_kernels.py has compiled its list, one half
+in each process; what is not in it the tests compile.  Where files are named nothing is compiled beforehand.  What times
+something (-m bench), shows figures (-s) or writes a page of the manual runs in one process.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
+import time
+from collections.abc import Generator
 from pathlib import Path
+from threading import Thread
 
 import pytest
+
+TESTS = Path(__file__).parent / "tests"
+FEW_KERNELS = ("scene", "store", "view", "statistics", "interop", "cli", "exports", "live")
+# Of the environment: a folder with a file for each process that compiles.
+COMPILING = "HYBRID_TEST_COMPILING"
+STARTED = pytest.StashKey[list[subprocess.Popen[bytes]]]()
 
 # Python keeps what it compiles of the package and of tests, also where the user asks it not to: some hundred processes
 # are started, and reading the sources takes each of them a second.
@@ -29,12 +40,48 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
         option.numprocesses, option.dist, option.tx = 0, "no", []
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist starts its processes, which are told the folder
 def pytest_sessionstart(session: pytest.Session) -> None:
-    if getattr(session.config.option, "numprocesses", 0) and not hasattr(session.config, "workerinput"):
-        script = Path(__file__).parent / "tests" / "compile_kernels.py"
-        commands = [[sys.executable, str(script), half, "tests"] for half in ("plane", "space")]
-        for process in [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]:
-            process.wait()  # what fails here fails again, with words, in a test
+    config = session.config
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    if whole and getattr(config.option, "numprocesses", 0) and not hasattr(config, "workerinput"):
+        folder = Path(tempfile.mkdtemp(prefix="hybrid-compiling-"))
+        os.environ[COMPILING] = str(folder)
+        config.stash[STARTED] = [_compile(half, folder / half) for half in ("plane", "space")]
+
+
+def _compile(half: str, marker: Path) -> subprocess.Popen[bytes]:
+    """Start to compile half of the kernels; the marker is there until that is over, whatever becomes of it."""
+    script = TESTS / "compile_kernels.py"
+    process = subprocess.Popen([sys.executable, str(script), half, "tests"], stdout=subprocess.DEVNULL)
+    marker.touch()
+
+    def wait() -> None:
+        process.wait()  # what fails here fails again, with words, in a test
+        marker.unlink(missing_ok=True)
+
+    Thread(target=wait, daemon=True).start()
+    return process
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    started = session.config.stash.get(STARTED, [])
+    for process in started:
+        process.terminate()  # a session that is stopped does not wait for them
+    if started:
+        shutil.rmtree(os.environ.pop(COMPILING), ignore_errors=True)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)  # around the time within which a test has to end
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    folder = os.environ.get(COMPILING)
+    while folder and not _has_few_kernels(item) and any(Path(folder).iterdir()):
+        time.sleep(0.2)
+    return (yield)
+
+
+def _has_few_kernels(item: pytest.Item) -> bool:
+    return any(item.path.is_relative_to(TESTS / room) for room in FEW_KERNELS)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -46,7 +93,18 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         skip_without(*mark.args)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files beside the folders first: they run pages and examples, and what takes a minute is not left to the end."""
-    tests = Path(__file__).parent / "tests"
-    items.sort(key=lambda item: item.path.parent != tests)
+@pytest.hookimpl(trylast=True)  # of what is left by then
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Files with few kernels first, then those beside the folders: they run pages and examples, which take long.
+
+    xdist gives each process a stretch of the list to begin with: each has its share of both.
+    """
+    first = [item for item in items if _has_few_kernels(item)]
+    rest = sorted((item for item in items if not _has_few_kernels(item)), key=lambda item: item.path.parent != TESTS)
+    shares = getattr(config, "workerinput", {}).get("workercount", 1)
+    items[:] = [
+        item
+        for k in range(shares)
+        for part in (first, rest)
+        for item in part[k * len(part) // shares : (k + 1) * len(part) // shares]
+    ]

@@ -1,0 +1,48 @@
+"""How the suite is run (conftest.py): what needs no kernels first, in each process, and nothing is lost."""
+
+from __future__ import annotations
+
+import os
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+CONFTEST = runpy.run_path(str(Path(__file__).parents[1] / "conftest.py"))
+TESTS = CONFTEST["TESTS"]
+
+
+def items(*files: str) -> list[SimpleNamespace]:
+    return [SimpleNamespace(path=TESTS / file) for file in files]
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3])
+def test_each_process_begins_with_files_of_few_kernels(processes: int) -> None:
+    made = items(*["solve/a.py"] * 9, *["scene/b.py"] * 6, *["test_c.py"] * 3)
+    ordered = list(made)
+    config = SimpleNamespace(workerinput={"workercount": processes})
+    CONFTEST["pytest_collection_modifyitems"](config, ordered)
+    assert sorted(map(id, ordered)) == sorted(map(id, made))
+    share = len(ordered) // processes
+    for k in range(processes):
+        first = [item.path.parent.name for item in ordered[k * share : (k + 1) * share]][: 6 // processes]
+        assert set(first) == {"scene"}
+    assert [x.path.name for x in ordered if x.path.name != "b.py"] == ["test_c.py"] * 3 + ["a.py"] * 9
+
+
+def test_only_what_calls_many_kernels_waits_for_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(os.environ, CONFTEST["COMPILING"], str(tmp_path))
+    marker, (few, many) = tmp_path / "plane", items("scene/b.py", "solve/a.py")
+    marker.touch()
+    waits: list[float] = []
+
+    def sleep(seconds: float) -> None:
+        waits.append(seconds)
+        marker.unlink()
+
+    monkeypatch.setattr("time.sleep", sleep)
+    next(CONFTEST["pytest_runtest_protocol"](few))
+    assert not waits
+    next(CONFTEST["pytest_runtest_protocol"](many))
+    assert len(waits) == 1
