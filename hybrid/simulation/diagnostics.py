@@ -50,6 +50,9 @@ from hybrid.solve.statics import Equilibrium
 
 # A rod that bends or twists by more than this (rad) from one cell to the next is not resolved by its mesh.
 UNRESOLVED = 1.0
+# The same part of it of zones that move: where they neglect bending, or repeat a step, a bend comes out some percent
+# milder than that of rods on the same cells, which is not to decide whether it is told.
+OF_ZONES_THAT_MOVE = 0.8
 # What a catenary sags below the chord of a cell, as a part of the line's length, beyond which its shape is poor.
 OFF = 0.02
 # A turn at the joint of a rod and a catenary beyond the bend on its sides, rad: 20 deg, which a picture shows.  Zones
@@ -170,9 +173,10 @@ class Diagnostics:
 
     def __init__(self, model: Model, events: EventLog) -> None:
         self.events, self._model, self._longest = events, model, 1.0 + borne_strain(model)
-        self._bend = self._twist = UNRESOLVED
-        self._slack = model.slack_floor
-        self._fold, self._sunk = UNRESOLVED, SUNK * model.length
+        self._sharp = UNRESOLVED * (OF_ZONES_THAT_MOVE if model.layout is not None else 1.0)
+        self._bend = self._sharp
+        self._fold, self._twist, self._slack = self._bend, UNRESOLVED, model.slack_floor
+        self._sunk = SUNK * model.length
         self._within, self._round, self._between = 1.0, False, False
         self._off = OFF * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
@@ -366,7 +370,7 @@ class Diagnostics:
         stiffness = float(line.kb[node, :2].max() * line.hn[node])
         leaving = float(np.sqrt(stiffness / tension)) if tension > 0.0 else np.inf
         place = "the cable leaves its end" if node in (0, line.s.size - 1) else "the cable leaves its point load"
-        if leaving <= first and (bend < UNRESOLVED or node in (0, line.s.size - 1)):
+        if leaving <= first and (bend < self._sharp or node in (0, line.s.size - 1)):
             finer = 0.25 * leaving
             how = f"{place} at s = {s:g} m within {leaving:.2g} m, less than its cell of {first:.2g} m"
         elif 0 < node < line.s.size - 1:
