@@ -235,7 +235,7 @@ def _move_lines(
                 if source is None:
                     resolution = system_with_layers(system, True, reporter, stopped, criterion)
                 recording = Recording(source=source, pending=pending, notes=notes)
-                run_system(
+                computed = run_system(
                     system, target, scene_text(system), reporter, stopped, resolution=resolution, recording=recording,
                     criterion=criterion, changes=changes,
                 )  # fmt: skip
@@ -253,11 +253,12 @@ def _move_lines(
 
             def compare(other: System, memory: MemoryTarget) -> None:
                 text = scene_text(other)
+                cells = system_with_layers(other, True, reporter, stopped, criterion)
                 run_system(
-                    other, memory, text, reporter, stopped, ESTIMATION, criterion=criterion, changes=changes
+                    other, memory, text, reporter, stopped, ESTIMATION, cells, criterion=criterion, changes=changes
                 )  # fmt: skip
 
-            write_system_errors(system, target, compare)
+            write_system_errors(system, target, compare, computed.resolution)
 
 
 def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelChoice, Resolution]:

@@ -45,7 +45,7 @@ from hybrid.accuracy.refinement import (
     sizes_of,
 )
 from hybrid.accuracy.snap_scatter import snap_excess
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, Outcome
 from hybrid.model.model_costs import NAMED, WORDS, ModelChoice
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import output_times
@@ -75,6 +75,8 @@ from hybrid.store.stored_rows import MissingRows
 STALLED = 0.8
 # Processor time, s, after which runs are not made finer for what they miss: a longer wait should be asked for.
 MOST_CPU = 600.0
+# Results of cells half as long, at most, where no equilibrium is found on those of the runs to compare with.
+MOST_HALVINGS = 2
 # Cells from which on an equilibrium is not made finer: it takes seconds.  No clock, by which the first scene of a run,
 # while code is compiled, and one beside others would be less accurate than the same again.
 CELLS_AT_REST = 20_000
@@ -142,6 +144,7 @@ class ErrorController:
     excess: np.ndarray = field(default_factory=lambda: np.zeros(2))  # N, by which snaps may exceed the largest forces
     _ratio: float = np.inf  # of the error of the result to what is asked
     _judged: int = 0  # results
+    _at_rest: bool = False  # whether the run to compare with that has failed did so before it moved
     _slow_from: list[float] | None = None  # cells and steps of the first result, where errors fell slowly until then
     _lost: bool = False  # whether the runs to compare with are to be computed again
     _every: int = 1  # outputs to one of which the statistics are
@@ -216,11 +219,18 @@ class ErrorController:
         """The same from the next result on."""
         if self._lost:
             self.runs, self._notes, self._lost = [], [], False
+        unknown: RunSample | None = None  # the last result, as long as its errors are not known
         while self.next is not None:
             resolution, own = self.next, len(self.runs)
             try:
                 result = self._counted(self.result(resolution))
             except ComputationError as error:
+                if self.estimate is None and unknown is not None:
+                    self._lacks_errors(error, "finer run")
+                    return unknown, None
+                if self.estimate is None and self._finds_no_rest(error):
+                    self.first = self.next = resolution.coarser(0.5)
+                    continue
                 if self.estimate is None:
                     raise
                 why = f"a finer run failed: {str(error).splitlines()[0]}"
@@ -231,6 +241,10 @@ class ErrorController:
             if self.estimate is None:
                 if self.comparisons is None:
                     self.comparisons = self._compute_comparisons(self.first or resolution)
+                if self.comparisons is None and self._halves(result):
+                    self.settle(True)  # it may be beside the one before
+                    unknown = result
+                    continue
                 if self.asked is not None:  # else no finer result follows, and they need not stay in memory
                     self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own), "budget": []}
                 known = self.first_estimate(result)
@@ -250,6 +264,33 @@ class ErrorController:
             if verdict.ratio > 1.0:
                 self.note_missed(verdict)
         return self.estimate.run, errors
+
+    def _finds_no_rest(self, error: ComputationError) -> bool:
+        """Whether cells half as long may find the equilibrium that a result has not: its rods fold or buckle."""
+        again = error.t is None and error.outcome in (Outcome.UNSTABLE, Outcome.FOLDED)
+        again = again and self.asked is not None and self.free.mesh and self._judged < MOST_HALVINGS
+        self._judged += again
+        return again
+
+    def _halves(self, result: RunSample) -> bool:
+        """Whether a result of cells half as long follows, because those of the runs to compare with are too long.
+
+        So they are where no equilibrium is found on them; a motion that fails may have other reasons.
+        """
+        too_long = self._at_rest and self.asked is not None and self.free.mesh
+        finer = result.resolution.coarser(0.5)
+        if not too_long or self._judged >= MOST_HALVINGS or (self.budget and not self.budget.allows([result], [finer])):
+            return False
+        self._judged += 1
+        self._notes.pop()  # that errors are not known
+        self.first = self.next = finer
+        return True
+
+    def _lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
+        """Note that errors are not known, as such a run has failed."""
+        self._at_rest = error.t is None
+        text = f"error not known: a {what} failed: {str(error).splitlines()[0]}"
+        self._notes.append(("no error figure", text))
 
     def _judge(self, resolution: Resolution) -> None:
         """Whether the result is as accurate as asked, and what follows."""
@@ -361,8 +402,7 @@ class ErrorController:
                     found[k] = self._counted(run())
                 except ComputationError as error:
                     if not k:
-                        text = f"error not known: a coarser run to compare with failed: {str(error).splitlines()[0]}"
-                        self._notes.append(("no error figure", text))
+                        self._lacks_errors(error)
                         return None
         assert found[0] is not None
         return found[0], found[1], found[2]

@@ -28,7 +28,7 @@ from hybrid.model.run_time import foretold_steps
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.case import Case
 from hybrid.simulation.initial_zones import HOLD
-from hybrid.simulation.layer_mesh import layered
+from hybrid.simulation.layer_mesh import layered, survey_of
 from hybrid.simulation.mesh_survey import lack_along, with_survey
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.zone_switching import LONGEST_IN_PACE, READY
@@ -38,9 +38,10 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     """Give the scene of a case the model that costs least; with cells, and zones, as a pre-run of rods asks for."""
     scene = case.scene
     case.scene = with_model(scene, "rod")
-    survey = case.survey(resolution)
+    survey, coarse = survey_of(case, resolution)
     if survey is None:
-        return ModelChoice("rod", "the pre-run that would show what others cost failed"), resolution
+        failed = ModelChoice("rod", "the pre-run that would show what others cost failed")
+        return failed, replace(resolution, grading=coarse.grading)
     resolution = with_survey(resolution, scene, survey)
     model, demand = survey.model, survey.demand
     gradings: dict[str, Grading] = {"rod": survey.grading(), "catenary": survey.grading_of_catenary}
@@ -81,7 +82,7 @@ def surveyed(case: Case | StaticCase, resolution: Resolution) -> Resolution:
     if isinstance(scene.model, AdaptiveModel):
         case.scene = with_model(scene, "rod")
     try:
-        survey = case.survey(resolution)
+        survey, _ = survey_of(case, resolution)
     finally:
         case.scene = scene
     return with_survey(resolution, scene, survey)
@@ -90,7 +91,8 @@ def surveyed(case: Case | StaticCase, resolution: Resolution) -> Resolution:
 def rods_instead(case: Case, resolution: Resolution, why: str) -> tuple[ModelChoice, Resolution]:
     """Give the scene of a case rods, after what was chosen has failed; how finely it is computed then."""
     case.scene = with_model(case.scene, "rod")
-    survey, choice = case.survey(resolution), ModelChoice("rod", f"catenaries, which cost less, were tried: {why}")
+    choice = ModelChoice("rod", f"catenaries, which cost less, were tried: {why}")
+    survey, coarse = survey_of(case, resolution)
     if survey is None:
-        return choice, resolution
+        return choice, replace(resolution, grading=coarse.grading)
     return choice, replace(for_motion(resolution, case.scene, survey.reach), grading=survey.grading())

@@ -35,6 +35,7 @@ from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bendi
 from hybrid.accuracy.system_samples import compared, sample_of, touch_unasked
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
+from hybrid.model.mesh_grading import SAMPLES
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
@@ -50,6 +51,7 @@ from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import scene_text
 from hybrid.scene.system import System
+from hybrid.simulation.layer_mesh import layered_lines, shown_lines
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution, with_survey
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange
@@ -219,14 +221,17 @@ class SystemPasses:
             return {n: sample_of(line, resolution.lines[n], models[n], cpu) for n, line in result.lines.items()}
 
     def surveyed(self, first: SystemResolution) -> SystemResolution:
-        """With cells where a coarse run shows that they should be."""
+        """With cells where a coarse run shows that they should be; where nothing is asked, the equilibrium."""
+        first = layered_lines(self.system, first, self.moves)
         free = [name for name, scene in self.scenes.items() if wants_survey(scene)]
         if not free:
             return first
         coarse = SystemResolution({name: survey_resolution(x) for name, x in first.lines.items()})
         if not self.moves:
             coarse = SystemResolution({name: replace(x, every=1) for name, x in coarse.lines.items()})
-        output = self.system.output.model_copy(update={"points": POINTS, "quantities": {}})
+        coarse = shown_lines(self.system, coarse, self.moves)
+        points = POINTS if all(x.grading is None for x in coarse.lines.values()) else SAMPLES
+        output = self.system.output.model_copy(update={"points": points, "quantities": {}})
         changed: dict[str, Any] = {"output": output}
         if self.moves:
             until = max(survey_duration(self.scenes[name]) for name in free)
@@ -464,12 +469,13 @@ def _tree(resolution: SystemResolution) -> Tree:
 def system_with_layers(
     system: System, moves: bool, reporter: ProgressReporter, interrupted: Callable[[], bool],
     criterion: UserCriterion | None = None,
-) -> SystemResolution | None:  # fmt: skip
-    """How finely a system is computed whose lines say how many cells their layers have and ask for no errors.
+) -> SystemResolution:  # fmt: skip
+    """How finely a system is computed whose lines ask for no errors.
 
-    A coarse run shows the layers, as of one cable.  None: none says so.
+    As of one cable: its equilibrium shows bends and layers, or a coarse run, of lines that say how many cells these
+    have.
     """
     if all(x.resolution is None for x in system.lines.values()):
-        return None
+        return layered_lines(system, SystemResolution.first(system), moves)
     passes = SystemPasses(system, io.BytesIO(), moves, reporter, interrupted, criterion=criterion)
     return passes.surveyed(SystemResolution.first(system))

@@ -22,7 +22,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import system_without_contact
-from hybrid.model.system import build_system
+from hybrid.model.system import SystemResolution, build_system
 from hybrid.outputs.edge_errors import EDGE_ERRORS
 from hybrid.scene.base import Invalid
 from hybrid.scene.system import System
@@ -53,11 +53,11 @@ TOO_COARSE = {
 }
 
 
-def coarser(system: System) -> System:
+def coarser(system: System, resolution: SystemResolution | None = None) -> System:
     """The same with half the cells of every line; nodes at changes of section, at what is attached, and where zones
-    meet stay.
+    meet stay.  resolution: how finely it was computed; None: as its meshes say.
     """
-    model, lines = build_system(system), {}
+    model, lines = build_system(system, resolution), {}
     for name, x in zip(model.names, model.models, strict=True):
         s, zones = x.line.s, x.zones
         given = [*section_changes(system.scene_of(name)), *x.attached, *(z.s_b for z in zones)]
@@ -78,10 +78,12 @@ def longer_steps(system: System) -> System:
     return System.model_validate(data)
 
 
-def write_system_errors(system: System, target: Path | io.BytesIO, compute: Compute) -> None:
+def write_system_errors(
+    system: System, target: Path | io.BytesIO, compute: Compute, resolution: SystemResolution
+) -> None:
     """Add errors to a complete result, of every line; compute: makes a run to compare with.
 
-    Where such a run fails, an event says so.
+    resolution: of the result.  Where such a run fails, an event says so.
     """
     given = passing_each_other(system)  # as they do where errors are estimated
     given = given.model_copy(update={"output": system.output.model_copy(update={"errors": None})})
@@ -93,8 +95,9 @@ def write_system_errors(system: System, target: Path | io.BytesIO, compute: Comp
         for cause, make in (("mesh", coarser), ("time", longer_steps)):
             other = given
             for again in ("", " again"):
+                first = cause == "mesh" and not again
                 try:
-                    other, memory = make(other), MemoryTarget()
+                    other, memory = coarser(other, resolution) if first else make(other), MemoryTarget()
                     compute(other, memory)
                 except (ComputationError, Invalid, SceneError):
                     if not again:

@@ -37,6 +37,7 @@ from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
+from hybrid.simulation.layer_mesh import layered_lines
 from hybrid.simulation.system_run import static_system
 from hybrid.solve.joined import SystemState
 from hybrid.solve.system import SystemSolver
@@ -85,7 +86,7 @@ class SystemAtRest(OfScene):
         """
         refuse_use(system, "derivatives", given="hybrid sensitivity")
         wanted = [parse_result_of(system, x) for x in of]
-        resolution = SystemResolution.first(system)
+        resolution = layered_lines(system, SystemResolution.first(system), False)
         finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
         resolution = replace(resolution, lines=finely)
         run = static_system(system, None, lambda: scene_text(system), resolution=resolution)

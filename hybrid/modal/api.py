@@ -25,6 +25,7 @@ from hybrid.scene.motion_tables import Harmonic
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
+from hybrid.simulation.layer_mesh import layered_lines
 from hybrid.simulation.static_case import StaticCase
 
 MOST = 200  # modes that may be asked for
@@ -172,7 +173,7 @@ def equilibrium_of(asked: Scene | System, cells: float = 1.0) -> Rest:
         case = StaticCase(asked)
         resolution = resolution_at_rest(case)
         return line_at_rest(case, resolution.coarser(cells=cells) if cells > 1.0 else resolution)
-    system = SystemResolution.first(asked)
+    system = layered_lines(asked, SystemResolution.first(asked), False)
     if cells > 1.0:
         system = replace(system, lines={k: x.coarser(cells=cells) for k, x in system.lines.items()})
     return system_at_rest(asked, system)

@@ -47,7 +47,7 @@ from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import reasons_at_start, zones_at_start
 from hybrid.simulation.interrupts import at_once
-from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution
+from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import program, refused, require_same, resolution_from, resolution_tree, restored_parts
@@ -405,21 +405,23 @@ class Case:
             bound, notes, rows, found.steps, catenary, doubt_of(loop.run), loop.run.touches, self.places,
         )  # fmt: skip
 
-    def survey(self, resolution: Resolution) -> Survey | None:
+    def survey(self, resolution: Resolution, coarse: Resolution) -> Survey | None:
         """A coarse run that shows where cells should be short; None: it failed.
 
-        ComputationError: it failed in steps as short as those of the result too, and the scene gives cells to a layer.
+        resolution: of the result.  ComputationError: it failed in steps as short as those of the result too, and the
+        scene gives cells to a layer.
         """
-        coarse, until = survey_resolution(resolution), None if self.changes else survey_duration(self.scene)
-        s = np.linspace(0.0, self.scene.length, POINTS)
+        until = None if self.changes else survey_duration(self.scene)
         try:
             model, _ = self.first_shape(coarse)
+            s = survey_points(model, coarse)
             found = self.sample(coarse, s, until).values
         except ComputationError:
             if self.scene.resolution is None:
                 return None
             coarse = coarse.coarser(steps=resolution.step / coarse.step)  # as short as those of the result
             model, _ = self.first_shape(coarse)
+            s = survey_points(model, coarse)
             found = self.sample(coarse, s, until).values
         survey = Survey.of(self.scene, resolution, model, s, found)
         self.reach = survey.reach

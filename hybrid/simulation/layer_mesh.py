@@ -11,7 +11,7 @@ mesh stays as it is.  Where an accuracy is asked for, a pre-run places the cells
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -24,9 +24,14 @@ from hybrid.model.mesh import DEFAULT_CELLS
 from hybrid.model.mesh_grading import GROWTH, SAMPLES, Grading, layers
 from hybrid.model.model_costs import with_model
 from hybrid.model.payout import payout_of
-from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free
-from hybrid.scene.schema import AdaptiveModel
+from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free, shows_bends, wants_survey
+from hybrid.model.system import SystemResolution, build_system
+from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.system import System
+from hybrid.simulation.interrupts import at_once
+from hybrid.simulation.mesh_survey import Survey, survey_resolution
 from hybrid.simulation.section_layers import MORE
+from hybrid.simulation.system_start import equilibrium_of_system
 
 if TYPE_CHECKING:
     from hybrid.simulation.case import Case
@@ -41,6 +46,8 @@ SHORTEST = 1e-6
 TURNED = 0.02
 # rad that a cell may turn through before it is cut, and does turn through then.
 MOST_TURN, TURN = 0.3, 0.1
+# rad that a cell of a pre-run may turn through in its first state, and how often its cells are placed anew until then.
+MOST_FOLD, ROUNDS = 0.6, 6
 # Places in geometric order on either side of a disturbed one, as parts of lambda.
 BESIDE = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 40)])
 
@@ -51,9 +58,7 @@ def layered(case: Case | StaticCase, resolution: Resolution) -> Resolution:
     Zones that move have the mesh of rods, hence that of an equilibrium of rods.
     """
     scene = case.scene
-    if follows_curvature(scene) or resolution.grading is not None or not mesh_is_free(scene):
-        return resolution
-    if payout_of(scene) is not None:
+    if not _is_open(scene, resolution):
         return resolution
     moves = isinstance(scene.model, AdaptiveModel)
     shown = replace(resolution) if moves else resolution  # a run begins with what was kept for its own resolution
@@ -61,7 +66,7 @@ def layered(case: Case | StaticCase, resolution: Resolution) -> Resolution:
         case.scene = with_model(scene, "rod")
     try:
         model, state = case.first_shape(shown)
-        grading = grading_of(case, model, state)
+        grading = grading_of(scene, model, state)
     except ComputationError:
         return resolution  # the run says why
     finally:
@@ -69,7 +74,96 @@ def layered(case: Case | StaticCase, resolution: Resolution) -> Resolution:
     return resolution if grading is None else replace(resolution, grading=grading)
 
 
-def grading_of(case: Case | StaticCase, model: Model, state: State) -> Grading | None:
+def layered_lines(system: System, resolution: SystemResolution, moves: bool) -> SystemResolution:
+    """The same of several lines, of those that leave their mesh open and ask for no pre-run.
+
+    moves: the equilibrium is that with which a motion begins, else that under full loads.
+    """
+    scenes = {name: system.scene_of(name) for name in system.lines}
+    wanted = [x for x, scene in scenes.items() if _is_open(scene, resolution.lines[x]) and not wants_survey(scene)]
+    if not any(shows_bends(scenes[name]) for name in wanted):
+        return resolution
+    try:
+        rest = _rest_of(system, resolution, moves)
+    except ComputationError:
+        return resolution  # the run says why
+    lines = dict(resolution.lines)
+    for name in wanted:
+        if (grading := grading_of(scenes[name], *rest[name])) is not None:
+            lines[name] = replace(lines[name], grading=grading)
+    return SystemResolution(lines)
+
+
+def _rest_of(system: System, resolution: SystemResolution, moves: bool) -> dict[str, tuple[Model, State]]:
+    """Models of several lines with their first states, by name; moves: as of `layered_lines`.  ComputationError."""
+    with at_once():
+        model = build_system(system, resolution=resolution)
+        states: Sequence[State] = [x.start for x in model.models]
+        if not (moves and system.starts_as_placed):
+            states = equilibrium_of_system(system, model, 0.0 if moves else np.inf).state.lines
+    return dict(zip(model.names, zip(model.models, states, strict=True), strict=True))
+
+
+def shown_lines(system: System, resolution: SystemResolution, moves: bool) -> SystemResolution:
+    """As `shown`, of several lines that have a pre-run; moves: as of `layered_lines`."""
+    scenes = {name: system.scene_of(name) for name in system.lines}
+    wanted = [x for x, scene in scenes.items() if _is_open(scene, resolution.lines[x]) and wants_survey(scene)]
+    wanted = [name for name in wanted if shows_bends(scenes[name])]
+    tried, found = resolution, resolution
+    for _ in range(ROUNDS if wanted else 0):
+        lines = dict(tried.lines)
+        try:
+            rest = _rest_of(system, tried, moves)
+        except ComputationError:
+            tried = SystemResolution({k: x.coarser(cells=0.5) if k in wanted else x for k, x in lines.items()})
+            continue
+        found, gradings = tried, {name: _unfolded(scenes[name], *rest[name]) for name in wanted}
+        lines |= {name: replace(lines[name], grading=x) for name, x in gradings.items() if x is not None}
+        if not any(x is not None for x in gradings.values()):
+            return tried
+        tried = SystemResolution(lines)
+    return found
+
+
+def survey_of(case: Case | StaticCase, resolution: Resolution) -> tuple[Survey | None, Resolution]:
+    """The pre-run of rods that shows where cells should be short, and how finely it was computed; None: it failed."""
+    coarse = shown(case, survey_resolution(resolution))
+    return case.survey(resolution, coarse), coarse
+
+
+def shown(case: Case | StaticCase, resolution: Resolution) -> Resolution:
+    """With cells on which the equilibrium is found, and bends no rod by more than MOST_FOLD from one cell to the next.
+
+    A slack bend is often shorter than the cells of a pre-run by far, and on such cells it may be anywhere.
+    """
+    if not _is_open(case.scene, resolution):
+        return resolution
+    tried, found = resolution, resolution
+    for _ in range(ROUNDS):
+        try:
+            model, state = case.first_shape(tried)
+        except ComputationError:
+            tried = tried.coarser(cells=0.5)
+            continue
+        found, grading = tried, _unfolded(case.scene, model, state)
+        if grading is None:
+            return tried
+        tried = replace(tried, grading=grading)
+    return found
+
+
+def _unfolded(scene: Scene, model: Model, state: State) -> Grading | None:
+    """The cells that show the bends of a state, where a rod folds from one cell to the next; None: none does."""
+    return grading_of(scene, model, state) if float(_turns(model, state).max()) > MOST_FOLD else None
+
+
+def _is_open(scene: Scene, resolution: Resolution) -> bool:
+    """Whether the cells of a line are for the program to place, and not yet placed."""
+    placed = follows_curvature(scene) or resolution.grading is not None or payout_of(scene) is not None
+    return mesh_is_free(scene) and not placed
+
+
+def grading_of(scene: Scene, model: Model, state: State) -> Grading | None:
     """The cells that show all bends of a state; None: its own do."""
     line, length = model.line, model.length
     if not line.spin.any():
@@ -87,7 +181,7 @@ def grading_of(case: Case | StaticCase, model: Model, state: State) -> Grading |
     density = np.interp(x, line.s, np.maximum(sharp, 0.0)) + DEFAULT_CELLS / length
     for s, fade in found:
         density += layers(x, np.array([0.0, length]), np.full(2, fade), [s], CELLS)
-    density = np.maximum(density, twist_rate(case.scene, model.cable, x))
+    density = np.maximum(density, twist_rate(scene, model.cable, x))
     grown = GROWTH * x
     cell = np.minimum.accumulate(1.0 / density - grown) + grown
     cell = np.minimum.accumulate((cell + grown)[::-1])[::-1] - grown

@@ -43,6 +43,12 @@ def survey_resolution(resolution: Resolution) -> Resolution:
     return resolution.coarser(CELLS, STEPS)
 
 
+def survey_points(model: Model, coarse: Resolution) -> Floats:
+    """Places (K,) m at which a pre-run is looked at: evenly spread, and its nodes where a bend has placed these."""
+    s = np.linspace(0.0, model.length, POINTS)
+    return s if coarse.grading is None else np.union1d(s, model.line.s)
+
+
 def survey_duration(scene: Scene) -> float:
     """How long the pre-run is, s: of an irregular motion that is stationary, PERIODS of it, else all of the run."""
     duration = scene.require_time().duration

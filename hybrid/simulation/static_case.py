@@ -32,7 +32,7 @@ from hybrid.simulation.envelope import Envelope, of_equilibrium
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import reasons_at_start, zones_at_start
-from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution
+from hybrid.simulation.mesh_survey import Survey, survey_points
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, catenary_share, compared_cells
 from hybrid.simulation.zone_switching import ZoneSwitching
@@ -95,19 +95,18 @@ class StaticCase:
         values, at_edges, doubt = _values(model, found, self.observer(model, COMPARED))
         return _sample(resolution, model, values, at_edges, doubt, clock.process_time() - begin)
 
-    def survey(self, resolution: Resolution) -> Survey | None:
+    def survey(self, resolution: Resolution, coarse: Resolution) -> Survey | None:
         """A coarse equilibrium that shows where cells should be short; None: there is none.
 
-        ComputationError: there is none, and the scene gives cells to a layer.
+        resolution: of the result.  ComputationError: there is none, and the scene gives cells to a layer.
         """
-        coarse = survey_resolution(resolution)
-        s = np.linspace(0.0, self.scene.length, POINTS)
         try:
             model, found, _ = self._equilibrium(coarse)
         except ComputationError:
             if self.scene.resolution is not None:
                 raise
             return None
+        s = survey_points(model, coarse)
         values, _, _ = _values(model, found, self.observer(model, COMPARED, s))
         run = {name: np.asarray(values[name])[None] for name in ("position", "curvature", "tension")}
         return Survey.of(self.scene, resolution, model, s, run)

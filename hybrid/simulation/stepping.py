@@ -30,7 +30,7 @@ from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.direct_steps import DirectSteps
 from hybrid.simulation.failure import driven_of
 from hybrid.simulation.first_use import compile_beside
-from hybrid.simulation.layer_mesh import layered
+from hybrid.simulation.layer_mesh import layered, survey_of
 from hybrid.simulation.mesh_survey import with_survey
 from hybrid.simulation.set_obstacles import ONE_STEP
 from hybrid.simulation.static_case import StaticCase
@@ -111,7 +111,7 @@ class Simulation(SteppedEnds):
             if self.scene.resolution is None:
                 resolution = layered(self._case, first)
             else:  # nobody knows the motion: layers are those of the equilibrium under full loads
-                resolution = with_survey(first, self.scene, StaticCase(self.scene).survey(first))
+                resolution = with_survey(first, self.scene, survey_of(StaticCase(self.scene), first)[0])
             self._loop, recorder, equilibrium = self._case.prepare(resolution, self._target)
         except BaseException:
             self._stack.close()

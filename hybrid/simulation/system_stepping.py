@@ -26,6 +26,7 @@ from hybrid.scene.points import FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.scene.system import System
+from hybrid.simulation.layer_mesh import layered_lines
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution, with_survey
 from hybrid.simulation.set_obstacles import ONE_STEP, SettableObstacles
 from hybrid.simulation.stepped import SLIVER, CableState, Triple, end_of_step, no_such_method, one_thread, triple
@@ -48,12 +49,13 @@ OF_ONE_CABLE = {
 }
 
 
-def layers_at_rest(system: System) -> SystemResolution | None:
-    """Cells of lines that say how many a layer has: of the equilibrium under full loads; None: no line says so."""
+def layers_at_rest(system: System) -> SystemResolution:
+    """Cells by the equilibrium of the start; where a line says how many cells a layer has, by that of full loads."""
     asked = [name for name, line in system.lines.items() if line.resolution is not None]
+    first = layered_lines(system, SystemResolution.first(system), True)
     if not asked:
-        return None
-    first, memory = SystemResolution.first(system), MemoryTarget()
+        return first
+    memory = MemoryTarget()
     coarse = SystemResolution({name: replace(survey_resolution(x), every=1) for name, x in first.lines.items()})
     output = system.output.model_copy(update={"points": POINTS, "quantities": {}})
     shown = system.model_copy(update={"output": output})
