@@ -66,9 +66,9 @@ def _rows(found: Response, hours: float) -> list[dict[str, Any]]:
     rows = []
     for name, line in found.lines.items():
         of = f"{name} " if len(found.lines) > 1 else ""
-        rows.append(_row(line, f"{of}tension", "tension", line.middle, line.mean_tension, "N", hours))
+        rows.append(_row(found, line, f"{of}tension", "tension", line.middle, line.mean_tension, "N", hours))
         if (line.mean_curvature > 0.0).any():
-            rows.append(_row(line, f"{of}curvature", "curvature", line.s, line.mean_curvature, "1/m", hours))
+            rows.append(_row(found, line, f"{of}curvature", "curvature", line.s, line.mean_curvature, "1/m", hours))
         most = line.deviation("position").max()
         for k, axis in enumerate("xyz"):
             deviation = line.deviation("position")[:, k]
@@ -79,23 +79,27 @@ def _rows(found: Response, hours: float) -> list[dict[str, Any]]:
             row = {"quantity": f"{of}{axis}", "unit": "m", "s": line.s[at], "mean": mean, "deviation": deviation[at]}
             row["period"] = line.period("position")[at, k]
             row["largest"] = mean + line.most_probable("position", hours)[at, k]
-            rows.append({key: x if isinstance(x, str) else float(x) for key, x in row.items()})
+            each = {key: x if isinstance(x, str) else float(x) for key, x in row.items()}
+            rows.append(each | {"valid": found.valid_for("position")})
     for kind, parts, axes in (("point", found.points, "xyz"), ("body", found.bodies, MOTIONS)):
         for name, x in parts.items():
             for k, axis in enumerate(axes):
                 unit = "deg" if k > 2 else "m"
                 size = float(np.sqrt(0.5 * (np.abs(x[:, k]) ** 2).sum())) * (180.0 / np.pi if k > 2 else 1.0)
-                rows.append({"quantity": f"{kind} {name} {axis}", "unit": unit, "deviation": size})
+                held = {"quantity": f"{kind} {name} {axis}", "unit": unit, "deviation": size}
+                rows.append(held | {"valid": found.valid_for("position")})
     return rows
 
 
 def _row(
-    line: LineResponse, label: str, name: str, s: Any, mean: Any, unit: str, hours: float
+    found: Response, line: LineResponse, label: str, name: str, s: Any, mean: Any, unit: str, hours: float
 ) -> dict[str, Any]:  # fmt: skip
     deviation = line.deviation(name)
     at = int(deviation.argmax())
+    known = name not in ADDED or bool(line.resolved(name)[at])
     return {
         "quantity": label, "unit": unit, "s": float(s[at]), "mean": float(mean[at]), "deviation": float(deviation[at]),
+        "valid": found.valid_for(name) and known,
         "period": float(line.period(name)[at]), "largest": float(mean[at] + line.most_probable(name, hours)[at]),
     }  # fmt: skip
 
@@ -111,5 +115,5 @@ def _table(found: Response, rows: list[dict[str, Any]], hours: float) -> Any:
     table.add_column("unit", no_wrap=True)
     for row in rows:
         cells = [f"{row[key]:.4g}" if key in row else "" for key in ("s", "mean", "deviation", "period", "largest")]
-        table.add_row(row["quantity"], *cells, row["unit"])
+        table.add_row(row["quantity"] + ("" if row["valid"] else ", not valid"), *cells, row["unit"])
     return table

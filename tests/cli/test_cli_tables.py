@@ -1,12 +1,15 @@
 """Rows of the closing tables: what stands beside the error of the bending moment."""
 
+import numpy as np
 import pytest
 from rich.table import Table
 
 import hybrid
+from hybrid.cli import response_command
 from hybrid.cli.console import Console
 from hybrid.cli.grid import Grid
 from hybrid.cli.tables import _largest_moment
+from hybrid.linear.response_results import ADDED, LineResponse, Response
 
 CABLE = {"sections": [{"length": 2.2, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 0.5}]}
 ENDS = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [2, 0, 0]}}
@@ -52,3 +55,18 @@ def test_lines_of_tables_end_without_blanks(
         Console(False, False).show(lambda content=content: content)
         lines = capsys.readouterr().out.splitlines()
         assert len(lines) >= 3 and lines == [x.rstrip() for x in lines]
+
+
+def test_rows_of_a_response_that_is_not_valid_are_marked() -> None:
+    """A curvature that is not known, or that a note speaks against, stood unmarked beside valid tensions."""
+    s, f = np.linspace(0.0, 10.0, 5), np.array([0.1])
+    amplitudes = np.outer(f, np.ones(5))
+    line = LineResponse(
+        s, s[:-1], f, amplitudes[:, :, None] * np.ones(3), 10.0 * amplitudes[:, :-1], amplitudes, 0.0 * amplitudes,
+        np.zeros((5, 3)), np.ones(4), np.ones(5), {"curvature": np.full(5, 2.0 * ADDED["curvature"])}, np.ones(5),
+    )  # fmt: skip
+    for notes, valid in (((), {"tension", "x", "y", "z"}), (("tension at s = 5 m: not valid",), {"x", "y", "z"})):
+        rows = response_command._rows(Response("", {"cable": line}, {}, {}, 1, {}, notes), 3.0)
+        assert {row["quantity"] for row in rows if row["valid"]} == valid
+        shown = response_command._table(Response("", {"cable": line}, {}, {}, 1, {}, notes), rows, 3.0)
+        assert "curvature, not valid" in [*shown.columns[0].cells] and ("x" in [*shown.columns[0].cells])
