@@ -169,6 +169,7 @@ EVENTS_BY_WEIGHT = (
     "end rotated in",
     "envelope incomplete",
     "other program",
+    "laid one way",
     "events omitted",
 )
 
@@ -190,7 +191,7 @@ OF_THE_RUN = frozenset({
     "largest force uncertain", "windows uncertain", "irregular motion", "snaps", "costly accuracy",
     "finer run not kept", "torque neglected", "ignored", "undamped", "model error not estimated", "zones fixed",
     "static friction neglected",
-    "numerical dissipation", "model chosen",
+    "numerical dissipation", "model chosen", "laid one way",
 })  # fmt: skip
 # How an event "ignored" begins that is about what an end bends the line by.
 OF_AN_END = "moment and tangent at ends."

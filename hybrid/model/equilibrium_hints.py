@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import math
 
+from hybrid.model.initial_shape import HARDLY
 from hybrid.model.scales import net_weight
-from hybrid.scene.schema import Body, Free, Scene
+from hybrid.scene.schema import Body, Equilibrium, Free, Scene
 
-# A line that is longer than taut by less than this part of its length is not called slack.
-HARDLY = 1e-3
+
+def end_laid_anywhere(scene: Scene) -> str:
+    """The end that lies on a level bed in any direction as well, because nothing in the scene says which; "": none."""
+    bed, fluid, initial, ends = scene.environment.seabed, scene.environment.fluid, scene.initial, scene.ends
+    said = not isinstance(initial, Equilibrium) or initial.points is not None or initial.direction is not None
+    if bed is None or not bed.is_level or said or len(ends.held()) != 1 or (fluid is not None and fluid.flows()):
+        return ""
+    (held,) = ends.held()
+    other = "end" if held == "start" else "start"
+    tangent = ends.named()[held].held_tangent
+    pulled = any(any(x.value[:2]) for x in ends.named()[other].loads if x.what == "force")
+    return "" if pulled or (tangent is not None and any(tangent[:2])) else other
 
 
 def reasons_against(scene: Scene, rod_ends: tuple[bool, bool], flexible: float = 0.0) -> list[str]:

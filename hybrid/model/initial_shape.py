@@ -23,6 +23,8 @@ from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Body, Equilibrium, Points, RodZone, Scene, Straight, ZonesModel
 from hybrid.scene.sea import Seabed
 
+# A line that is longer than taut by less than this part of its length is not called slack.
+HARDLY = 1e-3
 SHORTEST_SPAN = 1e-3  # of the length: a line between nearer ends has no straight span to start from
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
 GIVEN = "the polyline given"  # name of a first shape that the scene gives
@@ -167,7 +169,8 @@ def hung(scene: Scene, line: Line, sea: Sea, clamp_leads: bool = True) -> Hangin
             drag = 0.5 * (drag + current_drag(line, sea, found.r))
         if all(places):
             first = np.array(places[0], float)
-            found = hang(loads + drag, line.h, line.ck, first, np.array(places[1], float) - first)
+            slack = None if drag.any() or line.spin.any() else slack_on_bed(scene, line)
+            found = slack or hang(loads + drag, line.h, line.ck, first, np.array(places[1], float) - first)
         else:
             held = 0 if places[0] else 1
             place, bed = np.array(places[held], float), scene.environment.seabed
@@ -235,6 +238,45 @@ def current_drag(line: Line, sea: Sea, r: Floats) -> Floats:
     if line.bits & BODIES:
         f += np.column_stack(body(u, np.sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2), line.point_drag)[0])
     return f
+
+
+def slack_on_bed(scene: Scene, line: Line) -> Hanging | None:
+    """A catenary that is longer than along a level bed and straight up: it hangs straight down, the rest lies slack.
+
+    What lies carries nothing, on an arc beside the span of the ends, in chords as long as its cells.  None: the line is
+    shorter, or kept in a plane.
+    """
+    bed, (start, end) = scene.environment.seabed, (np.array(x.held_position or (), float) for x in scene.ends.both)
+    weight = -dead_loads(line)[:, 2]
+    if bed is None or not bed.is_level or weight[1:-1].min() <= 0.0 or scene.dimension == 2:
+        return None
+    s, h, span = line.s, line.h, (end - start)[:2]
+    over = s[-1] - sum(max(x[2] - bed.z, 0.0) for x in (start, end)) - float(np.hypot(*span))
+    if over <= HARDLY * s[-1]:
+        return None
+    sunk = bed.z - np.r_[0.0, 2.0 * weight[1:-1] / (h[1:] + h[:-1]), 0.0] / bed.spring
+    z = np.maximum(sunk, np.maximum(start[2] - s, end[2] - (s[-1] - s)))
+    z[[0, -1]] = start[2], end[2]
+    straight = (z > sunk)[:-1] & (z > sunk)[1:]
+    level = np.where(straight, 0.0, np.sqrt(np.maximum(h**2 - np.diff(z) ** 2, 0.0)))
+    r = np.column_stack([_polygon(level, span) + start[:2], z])
+    r[-1] = end
+    low = int(np.argmin(np.append(straight, False)))  # what hangs from the start is above it
+    hung = np.where(straight, weight[1:], 0.0)
+    T = np.where(np.arange(h.size) < low, hung[:low].sum() - np.cumsum(hung) + hung, np.cumsum(hung) - hung[:low].sum())
+    return Hanging(r, np.where(straight, T, 0.0))
+
+
+def _polygon(l: Floats, span: Floats) -> Floats:
+    """Corners (N+1, 2) m on a circle from 0 to `span` (2,), m, shorter than all sides l (N,) m together."""
+    low, high = 0.0, 1.0 / float(l.max())  # 1/m, half of the curvature
+    across = float(np.hypot(*span))
+    while low < (c := 0.5 * (low + high)) < high:
+        turn = float(np.arcsin(c * l).sum())
+        low, high = (low, c) if turn > np.pi or np.sin(turn) < c * across else (c, high)
+    turns = 2.0 * np.arcsin(low * l)
+    way = 0.5 * turns.sum() - np.cumsum(turns) + 0.5 * turns + np.arctan2(span[1], span[0])
+    return np.vstack([np.zeros(2), np.cumsum(l[:, None] * np.column_stack([np.cos(way), np.sin(way)]), axis=0)])
 
 
 def _arc(start: Floats, end: Floats, s: Floats, side: float) -> Floats:

@@ -43,7 +43,13 @@ from hybrid.simulation.doubtful_outputs import Bounds, doubtful, kinks_at
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, Loops, note_hockling, note_loops
 from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
-from hybrid.simulation.slack_bends import TURNS, too_long_for_weight, turns_by_weight, weight_text
+from hybrid.simulation.slack_bends import (
+    TURNS,
+    slack_text_of,
+    too_long_for_weight,
+    turns_by_weight,
+    weight_text,
+)
 from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left, passed_obstacles, rubs_on
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
@@ -286,6 +292,8 @@ class Diagnostics:
             text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"
             self.note(0.0, slack, "slack", f"{text}: it stands like a strut, which no cable does")
         self._compressed(state)
+        if (lies := slack_text_of(self._model, state)) is not None:
+            self.events.event(0.0, lies[0], lies[1], "slack", lies[2])
         if self._model.line.bits & OBSTACLES:
             if self._model.start_shape == HUNG:
                 self._lies_behind(state)

@@ -15,10 +15,16 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.state.state import Floats, Line
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.model.build import LEAST_WEIGHT, Model
+from hybrid.model.equilibrium_hints import end_laid_anywhere
+from hybrid.model.initial_shape import dead_loads
 from hybrid.model.material import Material
 from hybrid.outputs.observation import Observation
+from hybrid.scene.schema import Scene
+from hybrid.simulation.events import EventLog
+from hybrid.solve.flaws import lies_slack
 
 # rad, from one cell to the next: less is the sag of a line that lies or hangs almost straight.
 TURNS = 0.05
@@ -56,6 +62,35 @@ def weight_text(l: float, s: float, h: float, turn: float, ask: str) -> str:
     )
 
 
+def slack_text_of(model: Model, state: State) -> tuple[float, float, str] | None:
+    """From where to where (m) a catenary lies slack on the bed, and what an event says of it; None: nowhere."""
+    line, sea = model.line, model.sea.values
+    cells = np.flatnonzero(lies_slack(line, sea, state))
+    if not cells.size:
+        return None
+    half = 0.5 * float(np.abs(dead_loads(line)[cells[0] : cells[-1] + 2, 2]).max())
+    text = (
+        f"{float(line.h[cells].sum()):.4g} m of catenary lie slack on the seabed, which carry nothing, in one of many "
+        f"shapes; forces at ends above it do not depend on that, but are known to {half:.3g} N, half the weight of the "
+        f"cell that comes down: shorter cells, or `accuracy`, for less"
+    )
+    return float(line.s[cells[0]]), float(line.s[cells[-1] + 1]), text
+
+
+def note_laid(scene: Scene, model: Model, state: State, events: EventLog) -> None:
+    """Say which way a free end lies on the bed where nothing in the scene does."""
+    end = end_laid_anywhere(scene)
+    free, held = (-1, 0) if end == "end" else (0, -1)
+    if not end or not planes_under(model.sea.values, state.r[[free]])[1][0] > 0.0:
+        return
+    x, y = (state.r[free] - state.r[held])[:2]
+    text = (
+        f"the {end} lies free on the seabed at [{x:.4g}, {y:.4g}] m from the other one: nothing in the scene says "
+        f"which way, and any other is as good; initial.direction chooses it"
+    )
+    events.event(0.0, 0.0, model.length, "laid one way", text)
+
+
 def slack_remedy(model: Model, outcome: Outcome, s: float | None) -> str:
     """What to write where a catenary is slack at s, m, so that its bending carries it; empty: nothing is known."""
     if outcome != Outcome.SLACK or s is None or model.layout is not None:
@@ -71,5 +106,6 @@ def slack_remedy(model: Model, outcome: Outcome, s: float | None) -> str:
     least = float(f"{w * (SPANS * h) ** 3:.2g}")
     return (
         f"`model: adaptive`, and the bending_stiffness of the section; where none is known, {least:g} N m^2 makes its "
-        f"slack bends as long as a cell of {h:.3g} m, and shorter cells take less"
+        f"slack bends as long as a cell of {h:.3g} m and changes forces by up to {w * SPANS * h:.2g} N; cells a tenth "
+        f"as long take a thousandth of it, which changes them by up to a tenth"
     )

@@ -35,6 +35,7 @@ from hybrid.simulation.initial_zones import reasons_at_start, zones_at_start
 from hybrid.simulation.mesh_survey import Survey, survey_points
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, catenary_share, compared_cells
+from hybrid.simulation.slack_bends import note_laid
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import POWERS
@@ -65,6 +66,7 @@ class StaticCase:
             diagnostics = Diagnostics(model, events)
             diagnostics.begin()
             diagnostics.equilibrium(found)
+            note_laid(self.scene, model, found.state, events)
             report, work = np.zeros(REPORT_SIZE), np.zeros(len(POWERS))
             diagnostics.mesh(observer.look(batch_of_one(0.0, ends, found.state, report, work, model.sea.values)))
             if switching is not None and not model.line.torsion.size:

@@ -26,6 +26,7 @@ from hybrid.simulation.load_change import change_loads
 from hybrid.simulation.releases import due
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
+from hybrid.simulation.slack_bends import note_laid
 from hybrid.simulation.step_events import count_energy_gains, count_iterations
 from hybrid.simulation.transient import StepFailed, Transient
 from hybrid.simulation.transient_checkpoint import checkpoint, restore
@@ -115,6 +116,7 @@ class TimeLoop:
         self.diagnostics.begin()
         if equilibrium is not None:
             self.diagnostics.equilibrium(equilibrium)
+            note_laid(run.scene, run.model, equilibrium.state, run.events)
         try:
             run.begin(equilibrium)
         except StepFailed as failed:

@@ -36,6 +36,7 @@ BURIED, BURIED_ONSETS = 0.02, 100.0
 # shape is right to a cell, as the diagnostics say.  A rod that presses on the fold by more than that load, and than the
 # EI/h^2 that its bend there bears, stands on it, which no bend of its true size lets it.
 FOLDED = 0.5 * np.pi
+LIES_SLACK = 1e-9  # of the largest tension: what round-off leaves in a line that lies slack
 HARDLY = 1e-3  # of the tension scale: a catenary that is compressed by less is slack
 RESOLVED = 0.3  # rad from one cell to the next, of a bend that cells show
 # From how near an obstacle on a line counts as on it, as a part of how deep it may lie.
@@ -50,10 +51,21 @@ PASSED, SECTIONS, PLACES = 0.8, 24, 4
 
 
 def lowest_tension(line: Line, sea: Sea, state: State) -> tuple[float, int]:
-    """Lowest tension of a catenary cell that no friction on the bed holds, N, and the cell."""
+    """Lowest tension of a catenary cell that does not lie slack, or held by friction, on the bed, N, and the cell."""
     if line.bits & FRICTION:
         return lowest_not_held(line, sea, state.T)
-    return lowest(line, state.T)
+    lies = lies_slack(line, sea, state)
+    return lowest(line, np.where(lies, np.inf, state.T) if lies.any() else state.T)
+
+
+def lies_slack(line: Line, sea: Sea, state: State) -> np.ndarray:
+    """Cells (N,) of a catenary that lie, or come down, on the bed without tension: they carry nothing, in any shape."""
+    if not line.bits & SEABED:
+        return np.zeros(line.h.size, bool)
+    nothing = LIES_SLACK * float(np.abs(state.T).max())
+    rests = planes_under(sea, state.r)[1] > 0.0
+    rests[[0, -1]] |= rests[[1, -2]]  # an end at the height of the bed
+    return np.asarray((line.spin == 0) & (np.abs(state.T) <= nothing) & (rests[:-1] | rests[1:]))
 
 
 def flaw_of_line(line: Line, sea: Sea, state: State, length: float, floor: float) -> tuple[Outcome, int]:
