@@ -44,7 +44,7 @@ from hybrid.accuracy.refinement import (
     refined,
     sizes_of,
 )
-from hybrid.accuracy.snap_scatter import snap_excess
+from hybrid.accuracy.snap_scatter import errors_between, finer_between, snap_excess
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.model_costs import NAMED, WORDS, ModelChoice
 from hybrid.model.output_points import OutputPoints
@@ -132,6 +132,7 @@ class ErrorController:
     settle: Callable[[bool], None] = lambda kept: None  # whether a finer result takes the place of that before it
     from_rest: bool = True  # whether it begins from an equilibrium, or is one
     rubs: bool = False  # whether obstacles on which the line may lie have friction
+    times: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) s, of the outputs of a result
     budget: Budget | None = None  # of all results; None: there is no limit
     stopped: str = ""  # why it is refined no further although it misses what is asked; empty: more would not help
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
@@ -430,6 +431,8 @@ class ErrorController:
         if estimate.share_unknown and (faster := self._in_shorter_steps(self.comparisons[0])) is not None:
             estimate.show_steps(faster)
         self.excess = snap_excess(result.forces, self.comparisons[0].forces)
+        if not self.irregular:  # else statistics count all steps
+            estimate.between = errors_between(self.times, result, self.comparisons[0], self.comparisons[2])
         self._set_statistics(result, *self.comparisons)
         if not estimate.has_mesh:
             few = f"{result.cells} cells are so few that there is nothing coarser to compare with"
@@ -458,6 +461,7 @@ class ErrorController:
             if self.comparisons is not None and self.first_estimate(result):
                 return
         self.excess = snap_excess(result.forces, estimate.run.forces)
+        estimate.between = finer_between(self.times, estimate.between, result, estimate.run)
         estimate.update(result)
         if self.statistics:
             found = statistics_of(result, self._every)

@@ -8,6 +8,7 @@ docs/errors.md
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
@@ -40,6 +41,7 @@ from hybrid.accuracy.error_order import (
     with_neighbours,
 )
 from hybrid.accuracy.errors_by_cause import Block, Errors
+from hybrid.accuracy.snap_scatter import Between
 from hybrid.accuracy.step_ratios import usual_ratio
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.scene.schema import Scene
@@ -77,6 +79,8 @@ LEAST_PART = 0.25
 LEAST_RATIO = 1.1
 # Part of the length of catenaries, or of rods, by which two runs may differ whose model errors count as the same.
 OTHER_ZONES = 0.1
+# Outputs whose errors all steps show where those at outputs do not.
+PULLS = (*END_FORCES, "tension", "right/tension")
 # What a checkpoint calls the cells, the outputs and the catenaries of the run that model errors are of.
 MODEL_OF = "cells", "every", "catenary"
 
@@ -88,6 +92,7 @@ class Estimate:
     """
 
     cancels = True  # whether errors by mesh and time step add with their signs; else their sizes add
+    between: Mapping[str, Between] = MappingProxyType({})  # of end forces whose outputs do not show all that they do
     _apart: RunSample | None = None  # a finer run that is no better, from which the result is not less far than it is
     _errors: Errors | None = None  # of the result and the model error as they are; None: not asked for yet
 
@@ -494,10 +499,22 @@ class Estimate:
                 at_edges = self.run.at_edges[name][a:b]
                 out["mesh"], out["total"] = np.maximum(out["mesh"], at_edges), np.maximum(out["total"], at_edges)
             out["total"] = out["total"] + (model if model is not None else 0.0)
+            if self.between and name in PULLS:
+                out["total"] = np.maximum(out["total"], self._by_steps(name, a, b))
             if self._apart is not None and name in self._apart.values:
                 far = np.asarray(self.run.values[name][a:b]) - np.asarray(self._apart.values[name][a:b])
                 out["total"] = np.maximum(out["total"], magnitude(far, name))
         return out
+
+    def _by_steps(self, name: str, a: int, b: int) -> np.ndarray:
+        """Errors that all steps show of the outputs from number a to b: of an end force, or of tension along the line.
+
+        Of tension that of the end where it is less: what rings at both ends has run along the line.
+        """
+        known = {raw: self.between[shown].errors[a:b] for raw, shown in END_FORCES.items() if shown in self.between}
+        if name in END_FORCES:
+            return known.get(name, np.zeros(b - a))
+        return np.min([*known.values()], axis=0)[:, None] if len(known) == len(END_FORCES) else np.zeros((b - a, 1))
 
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
@@ -519,7 +536,8 @@ class Estimate:
         }
         of = dict(zip(MODEL_OF, self._model_of, strict=True))
         found |= {"notes": self.notes, "run": self.run.checkpoint(), "model_of": of}
-        return found | {"doubt": self._model_doubt}
+        between = {name: {"errors": x.errors, "order": x.order} for name, x in self.between.items()}
+        return found | {"doubt": self._model_doubt, "between": between}
 
     @classmethod
     def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Self:
@@ -550,6 +568,10 @@ class Estimate:
         self.has_step, self.has_mesh = bool(late), bool(cells)
         self.share_unknown = bool(tree.get("share_unknown", False))  # of checkpoints that have it
         self.shares_mixed = {name for name in self.order if name in list(tree.get("shares_mixed", ()))}
+        row = {"errors": np.zeros(shape[0]), "order": 1.0}
+        between = tree.get("between", {})  # of checkpoints that have it
+        between = matched(between, {name: row for name in between}, "errors between outputs")
+        self.between = {name: Between(**x) for name, x in between.items() if name in END_FORCES.values()}
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
             raise ValueError("errors of outputs that are not there")
         if not (set(self.at_start) <= set(self.order) and set(self.at_start) <= set(END_FORCES)):

@@ -11,6 +11,8 @@ import time as clock
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from hybrid.accuracy.budget import Budget
 from hybrid.accuracy.error_control import ErrorController, comparison_resolutions
 from hybrid.accuracy.error_report import write_errors
@@ -185,10 +187,11 @@ class Passes:
         """What chooses how finely the case is computed from now on."""
         case, scene = self.case, self.case.scene
         from_rest = scene.initial.kind == "equilibrium" and not any(end.release for end in scene.ends.both)
+        times = output_times(scene)
         self.control = ErrorController(
             requested_accuracy(scene), free_in(scene), True, case.sample, compute, case.beside, is_irregular(scene),
-            choice, compute.settle, from_rest, rubs_on_obstacles(scene),
-            Budget(len(output_times(scene)), case.points.s.size),
+            choice, compute.settle, from_rest, rubs_on_obstacles(scene), np.array([0.0, *times]),
+            Budget(len(times), case.points.s.size),
         )  # fmt: skip
         return self.control
 

@@ -1,8 +1,9 @@
-"""How far snaps of a line differ from run to run, and whether the largest force may be another one for that.
+"""How far forces at the ends differ from run to run between outputs: by snaps, and where a line rings.
 
 A snap is a force at the ends that rises after a line that was taut went slack.  Its size follows from how the line lay
 while it was slack, which is another in every run, however fine: the largest force of a run can be a smooth one that
-converges, and in the next run a snap exceeds it.
+converges, and in the next run a snap exceeds it.  A line that rings faster than its outputs is late by another part of
+a period in every run: outputs meet that by chance, and few of them show hardly any of it.
 
     symbol   meaning                                                                unit
     t, F     times at which steps end, force at the end where it is largest          s, N
@@ -11,14 +12,24 @@ converges, and in the next run a snap exceeds it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import NamedTuple
+
 import numpy as np
 
+from hybrid.accuracy.error_order import COARSER
 from hybrid.kernels.state.state import Floats
+from hybrid.simulation.result_checks import PART, beyond_outputs
+from hybrid.simulation.run_sample import END_FORCES, RunSample
 
 # Part of its largest force to which the force at an end comes back where a line snaps.
 SLACKENS = 0.1
 # Chance that a snap of all of a run is larger than is foretold: that of two standard deviations.
 CHANCE = 0.0228
+# Bounds of the order by which forces of all steps converge: of order 1 is what rings, and damped by the step.
+BETWEEN_ORDERS = 1.0, 2.0
+# Times as many cells or steps below which a run is hardly finer, and what it changes is no part of an order.
+HARDLY_FINER = 1.5
 
 
 def snap_times(t: Floats, F: Floats) -> list[tuple[float, float]]:
@@ -83,3 +94,58 @@ def snap_excess(after: Floats, before: Floats) -> Floats:
     deviation, n = np.sqrt(0.5 * np.mean((now - then) ** 2, axis=0)), len(times)
     most = now.max(axis=0) + float(stdtrit(n, 1.0 - CHANCE / n)) * deviation
     return np.asarray(np.maximum(most - after[:, 1:].max(axis=0), 0.0))
+
+
+class Between(NamedTuple):
+    """Errors (nt,) N of an end force around every output, by all steps, and the order with which these converge."""
+
+    errors: Floats
+    order: float
+
+
+def errors_between(
+    times: Floats, result: RunSample, coarse: RunSample, coarsest: RunSample | None
+) -> dict[str, Between]:
+    """By end force, where it leaves the curve through its outputs at `times` (nt,) s; runs: as of `Estimate`."""
+    found: dict[str, Between] = {}
+    least = PART * float(result.forces[:, 1:].max(initial=0.0))
+    if not any(off.max() > least for off in beyond_outputs(times, result).values()):
+        return found
+    for column, (raw, name) in enumerate(END_FORCES.items(), start=1):
+        if raw not in result.values or raw not in coarse.values:
+            continue
+        p, change = BETWEEN_ORDERS[0], _changes(times, result, coarse, column)
+        if coarsest is not None and change.max() > 0.0:
+            before = float(_changes(times, coarse, coarsest, column).max())
+            p = float(np.clip(np.log(max(before / change.max(), 1.0)) / np.log(COARSER), *BETWEEN_ORDERS))
+        found[name] = Between(change / (max(_finer(result, coarse)) ** p - 1.0), p)
+    return found
+
+
+def finer_between(
+    times: Floats, known: Mapping[str, Between], result: RunSample, before: RunSample
+) -> dict[str, Between]:
+    """The same of a finer result; known: of that before it."""
+    found, finer = {}, _finer(result, before)
+    for column, name in enumerate(END_FORCES.values(), start=1):
+        if name in known:
+            (errors, p), change = known[name], _changes(times, result, before, column)
+            if change.max() > errors.max() * (1.0 - max(finer) ** -p):  # more than that order has foretold
+                p = BETWEEN_ORDERS[0]
+            found[name] = Between(np.maximum(change / (max(finer) ** p - 1.0), errors / min(finer) ** p), p)
+    return found
+
+
+def _changes(times: Floats, after: RunSample, before: RunSample, column: int) -> Floats:
+    """Largest change (nt,) N of a force of steps between the outputs beside each output."""
+    t = after.forces[:, 0]
+    change = np.abs(after.forces[:, column] - np.interp(t, before.forces[:, 0], before.forces[:, column]))
+    most = np.zeros(times.size)
+    np.maximum.at(most, np.clip(np.searchsorted(times, t), 1, times.size - 1), change)  # since the output before
+    return np.asarray(np.maximum(most, np.append(most[1:], 0.0)))
+
+
+def _finer(result: RunSample, before: RunSample) -> tuple[float, float]:
+    """How many times as many cells and steps a run has; as COARSER counts what is hardly more of both."""
+    cells, steps = result.cells / before.cells, result.steps / max(before.steps, 1)
+    return max(cells, 1.0), max(steps, 1.0 if cells > HARDLY_FINER or steps > HARDLY_FINER else COARSER)

@@ -131,11 +131,13 @@ class SystemPasses:
         self.scenes = {name: system.scene_of(name) for name in system.lines}
         time = system.time
         self._steps_free = moves and time is not None and time.controlled and time.tolerance is None
+        times = output_times(next(iter(self.scenes.values()))) if moves else []
         self.controls = {
             name: LineController(
                 requested_accuracy(scene), free_in(scene)._replace(steps=self._steps_free), moves, _elsewhere,
                 _elsewhere, irregular=moves and is_irregular(scene),
                 from_rest=not (moves and system.starts_as_placed), rubs=rubs_on_obstacles(scene),
+                times=np.array([0.0, *times]),
             )
             for name, scene in self.scenes.items()
         }  # fmt: skip
@@ -144,7 +146,7 @@ class SystemPasses:
         # Whether a line has touched itself in a result: then lines may in runs to compare with; and whether they could.
         self._touches = self._compared_touching = False
         points = sum(output_points(scene).s.size for scene in self.scenes.values())
-        self._budget = Budget(len(output_times(next(iter(self.scenes.values())))), points) if moves else None
+        self._budget = Budget(len(times), points) if moves else None
         self._costs: list[float] = []  # s of processor time, of all runs
         self._notes: list[tuple[str, str]] = []  # events of the system
         self._begin = clock.process_time()

@@ -10,7 +10,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import OF_VIBRATION
 from hybrid.model.start_vibration import Vibration, start_vibrations, strain_travel
 from hybrid.scene.schema import Scene
-from hybrid.simulation.run_sample import RunSample
+from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.reader import Result
 
 # Worth a word: so many times the estimated error, and this part of the largest end force.
@@ -34,31 +34,37 @@ def undersampled_end_forces(
     times: (nt,) s, of the outputs; changes: s, when zones have changed.
     """
     out: list[tuple[str, str]] = []
-    t = result.forces[:, 0]
-    if len(times) < 4 or len(t) <= len(times):
-        return out
-    largest = float(result.forces[:, 1:].max())
-    for end, force in (("start", result.forces[:, 1]), ("end", result.forces[:, 2])):
-        name = f"end_force_{end}"
-        if name not in errors or f"reaction_{end}" not in result.values:
+    t, largest = result.forces[:, 0], float(result.forces[:, 1:].max(initial=0.0))
+    for name, off in beyond_outputs(times, result).items():
+        if name not in errors:
             continue
-        outputs = np.linalg.norm(np.asarray(result.values[f"reaction_{end}"]), axis=1)
-        inside = (t >= times[1]) & (t <= times[-2])  # at the first and last output the curve has one side only
-        off = np.where(inside, np.abs(force - cubic_spline(times, outputs, t)), 0.0)
-        i = int(off.argmax())
-        error = errors[name]
+        i, error, end = int(off.argmax()), errors[name], name.removeprefix("end_force_")
         if off[i] > max(TIMES_THE_ERROR * error, PART * largest):
             every = float(np.median(np.diff(times)))
             text = (
                 f"between outputs the force at the {end} leaves the curve through them by up to {off[i]:.3g} N, at "
-                f"t = {t[i]:.4g} s; the error figure ({error:.2g} N) is that of outputs; output.every: "
-                f"{every / 10:.2g} shows it"
+                f"t = {t[i]:.4g} s; the error figure ({error:.2g} N) is by what all steps of the runs differ; "
+                f"output.every: {every / 10:.2g} shows it"
             )
             shaken = [x for x in changes if 0.0 <= t[i] - x <= SOON * every]
             if shaken:
                 text += f"; zones that change (t = {shaken[-1]:.4g} s) may have shaken it: model: rod has none"
             out.append(("end force between outputs", text))
     return out
+
+
+def beyond_outputs(times: Floats, result: RunSample) -> dict[str, Floats]:
+    """By how much end forces of all steps (n,) N leave the curves through their outputs, at times (nt,) s, by name."""
+    found: dict[str, Floats] = {}
+    t = result.forces[:, 0]
+    if len(times) < 4 or len(t) <= len(times):
+        return found
+    inside = (t >= times[1]) & (t <= times[-2])  # at the first and last output the curve has one side only
+    for force, (raw, name) in zip(result.forces[:, 1:].T, END_FORCES.items(), strict=True):
+        if raw in result.values:
+            outputs = np.linalg.norm(np.asarray(result.values[raw]), axis=1)
+            found[name] = np.where(inside, np.abs(force - cubic_spline(times, outputs, t)), 0.0)
+    return found
 
 
 def cubic_spline(x: Floats, y: Floats, at: Floats) -> Floats:
