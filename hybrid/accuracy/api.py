@@ -101,6 +101,7 @@ def run(
             if instead is None:
                 raise
             emptied(target, error)
+            case.progress.begin_anew()
             case.scene, case.late_file, case.late_finer = instead.scene, None, None
             case.notes.append((CHOSEN, instead.text))
             Passes(case, target).compute()
@@ -245,6 +246,7 @@ def _move_lines(
                 if instead is None:
                     raise
                 emptied(target, error)
+                reporter.begin_anew()
                 system = instead.system
                 notes.append((CHOSEN, instead.text))
         if system.output.errors:

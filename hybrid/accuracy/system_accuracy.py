@@ -232,6 +232,7 @@ class SystemPasses:
         if not self.moves:
             coarse = SystemResolution({name: replace(x, every=1) for name, x in coarse.lines.items()})
         coarse = shown_lines(self.system, coarse, self.moves)
+        self._expect(first, coarse)
         points = POINTS if all(x.grading is None for x in coarse.lines.values()) else SAMPLES
         output = self.system.output.model_copy(update={"points": points, "quantities": {}})
         changed: dict[str, Any] = {"output": output}
@@ -258,11 +259,15 @@ class SystemPasses:
             out[name] = with_survey(first.lines[name], scene, survey)
         return SystemResolution(out)
 
-    def _expect(self, first: SystemResolution) -> None:
+    def _expect(self, first: SystemResolution, coarse: SystemResolution | None = None) -> None:
+        """Tell the progress which passes are to come; coarse: of a pre-run that is still to be computed."""
         if not self.moves:
             return
-        passes = [(ESTIMATION, x) for x in comparison_resolutions(first.one, self.moves)]
-        self.reporter.expect([(RESULT, first.one), *passes], first.one)
+        passes = [(PRE_RUN, coarse.one)] if coarse is not None else []
+        passes += [(RESULT, first.one)]
+        if is_refined(self.system, self.moves):
+            passes += [(ESTIMATION, x) for x in comparison_resolutions(first.one, self.moves)]
+        self.reporter.expect(passes, first.one)
 
     def _compare(self, first: SystemResolution) -> None:
         """The runs to compare with, as of `ErrorController`."""

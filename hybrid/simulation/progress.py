@@ -118,6 +118,13 @@ class ProgressReporter:
         self._result = result
         self._expected = [(name, cost_of(resolution, result)) for name, resolution in passes]
 
+    def begin_anew(self) -> None:
+        """What was computed so far is of no use, and all passes begin again."""
+        with self._lock:
+            self._expected, self._beside, self._run, self._begun = [], {}, 0, 0
+            self._done = self._cost = 0.0
+        self._past.clear()
+
     def begin(self, name: str, resolution: Resolution) -> None:
         """A pass begins; those expected before it that did not take place are dropped."""
         cost, here = cost_of(resolution, self._result or resolution), threading.get_ident()

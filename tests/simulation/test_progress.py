@@ -78,6 +78,28 @@ def test_a_refinement_is_added_when_it_begins(heard: list[Progress]) -> None:
     assert heard[-1].seconds_left is None, "the speed of the pass before says little"
 
 
+def test_a_run_that_begins_anew_is_at_its_beginning(heard: list[Progress]) -> None:
+    """A line that went slack at 4 of 10 s is computed again with rods: nothing of the result is done then."""
+    made, resolution = reporter(heard.append)
+    made.begin(RESULT, resolution)
+    made(4.0, 40, 1, ())
+    made.begin_anew()
+    made.begin(RESULT, resolution)
+    made(0.0, 0, 1, ())
+    assert (heard[-1].fraction, heard[-1].run, heard[-1].runs) == (0.0, 1, 1)
+
+
+def test_the_pre_run_of_several_lines_is_a_part_of_all(heard: list[Progress]) -> None:
+    section = {"length": 10.0, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e5}
+    points = {"a": {"position": [0, 0, 0]}, "b": {"position": [8, 0, 0]}, "c": {"position": [8, 4, 0]}}
+    lines = {x: {"start": "a", "end": x, "sections": [section], "model": "catenary"} for x in "bc"}
+    scene = {"points": points, "lines": lines, "time": {"duration": 0.5, "step": 0.05}, "accuracy": "10 %"}
+    hybrid.run(scene, progress=heard.append).close()
+    shown = {p.name: p for p in reversed(heard)}  # the first of each
+    assert heard[0].name == PRE_RUN and heard[0].runs == 5
+    assert max(p.fraction for p in heard if p.name == PRE_RUN) < 0.5 and shown[RESULT].fraction < 0.5
+
+
 def test_reports_come_about_ten_times_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     now, heard = [0.0], []
     monkeypatch.setattr(module.clock, "perf_counter", lambda: now[0])
