@@ -212,8 +212,8 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
 def _ran_off(space: Space, k: int, point: Point) -> str:
     side = "high" if abs(point.x[k]) > abs(space.start[k]) else "low"
     return (
-        f"{space.names[k]} ran off from {space.start[k]:.6g} to {point.x[k]:.6g}, and further on nothing is "
-        f"worse: this is no optimum; give a {side} that can be built, or a limit that holds it"
+        f"{space.names[k]} ran off from {space.start[k]:.6g} to {point.x[k]:.6g} without an optimum, and "
+        f"could go on; give a {side} that can be built, or a limit that holds it"
     )
 
 
@@ -324,7 +324,7 @@ def _refuse_what_fights(problem: Problem, point: Point) -> None:
         for name, x, low, high, size in zip(space.names, point.x, space.low, space.high, sizes, strict=True)
     ]
     what = "these cannot all be kept" if len(fights) > 1 else "this cannot be kept"
-    detail = f"{what}; nearest is " + "; ".join(told) + ", with " + ", ".join(at)
+    detail = f"{what}; closest result: " + "; ".join(told) + ", with " + ", ".join(at)
     raise ComputationError(Outcome.NOT_REACHED, None, None, detail)
 
 

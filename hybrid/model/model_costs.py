@@ -106,7 +106,7 @@ def structural(scene: Scene, cable: Material) -> str:
     if any(load.what == "moment" for end in scene.ends.both for load in end.loads):
         return "a moment acts on an end"
     if any(x.min_bend_radius for x in scene.cable.sections) or holds_stress(scene.cable.sections):
-        return "a limit of its bending is judged"
+        return "min_bend_radius or a stress is to be checked"
     if cable.at.size:
         return "point loads bend it"
     if np.ptp(cable.mean_bending) > 0.0 or np.ptp(cable.submerged_weight) > 0.0:
@@ -163,13 +163,16 @@ def united(a: Floats, b: Floats) -> list[tuple[float, float]]:
 def no_catenary(found: Sequence[Floats], s: Floats) -> str:
     """Which criterion rules catenaries out and where; empty: none."""
     bend, slack, edge, along = found
-    for name, ratio, most in (("slack", slack, CALM), ("bend", bend, 1.0), ("edge", edge, 1.0)):
-        at = int(np.argmax(ratio))
-        if ratio[at] > most:
-            return f"criterion {name} comes to {ratio[at]:.2g} at s = {s[at]:.4g} m"
-    if along.max(initial=0.0) > 1.0:
-        at = int(np.argmax(along))
-        return f"they lack {along[at]:.2g} times what is asked along the line at s = {s[at]:.4g} m"
+    if slack.max() > CALM:
+        return f"the line goes slack, or nearly so, at s = {s[slack.argmax()]:.4g} m"
+    for ratio, what in (
+        (bend, "neglected bending moves the line by"),
+        (edge, "neglected bending at the touchdown moves the line by"),
+        (along, "the error along the line is"),
+    ):
+        if ratio.max(initial=0.0) > 1.0:
+            at = int(np.argmax(ratio))
+            return f"{what} {ratio[at]:.2g} times what is asked, at s = {s[at]:.4g} m"
     return ""
 
 
@@ -204,7 +207,7 @@ def reasons(found: Sequence[Cost]) -> str:
 
 def _in_words(cost: Cost) -> str:
     if cost.why_not:
-        return f"is no choice: {cost.why_not}"
+        return f"excluded: {cost.why_not}"
     cells = f"{cost.cells} cells, {cost.rods}" if cost.rods is not None else f"{cost.cells} cells"
     more = f"; {cost.steps:.2g} times as many steps" if cost.steps > VISIBLY else ""
     return f"{float(f'{1e6 * cost.seconds:.2g}'):g} µs of processor time per step ({cells}{more})"

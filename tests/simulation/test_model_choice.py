@@ -194,7 +194,11 @@ def test_curvature_that_is_asked_rules_catenaries_out_beforehand() -> None:
     asked = ["model=adaptive", "mesh=null", "accuracy={position: 1%, tension: 1%, curvature: 3%}", "time.duration=8"]
     result = hybrid.run(hybrid.load_scene(Path(__file__).parents[2] / "examples" / "touchdown.yaml", asked))
     (why,) = (x.text for x in result.events if x.kind == "model chosen")
-    assert kind_of(result) == "rod" and "catenary is no choice: they lack" in why and "asked along the line" in why
+    assert (
+        kind_of(result) == "rod"
+        and "catenary excluded: the error along the line is" in why
+        and "times what is asked" in why
+    )
 
 
 @pytest.mark.long
