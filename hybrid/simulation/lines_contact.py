@@ -13,6 +13,7 @@ from hybrid.simulation.contact_equilibrium import JUMP, jumps
 from hybrid.simulation.self_watch import diameters, least_bending
 from hybrid.solve.joined import SystemState
 from hybrid.solve.shared_contact import SharedContact, TouchingLine
+from hybrid.store.partners import meeting_text
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun
@@ -61,8 +62,5 @@ def tell_meetings(run: SystemRun) -> None:
         if (a, b) in told:
             continue
         told.add((a, b))
-        names = run.model.names
-        text = (
-            f"line {names[a]} touches line {names[b]}: at s = {s:.4g} m of {names[a]}, s = {other:.4g} m of {names[b]}"
-        )
+        text = meeting_text(run.model.names[a], run.model.names[b], s, other)
         run.recorder.event(t, 0.0, 0.0, "lines touch", text)

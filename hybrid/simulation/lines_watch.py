@@ -33,6 +33,9 @@ from hybrid.simulation.self_watch import diameters
 if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun
 
+# Diameters by which ways from a joint to where lines that lie along each other meet differ at most.
+ALONG = 2.0
+
 
 def watched_pairs(system: System, model: SystemModel) -> list[tuple[int, int]]:
     """Numbers of lines, two each, that have diameters, and between which no contact is computed."""
@@ -117,12 +120,36 @@ class LinesWatch:
         ]
 
 
+def _side_by_side(run: SystemRun, a: int, b: int, s: float, other: float) -> bool:
+    """Whether two lines that met at s and other (m) of them lay along each other all the way from a common joint.
+
+    They did where both places are as far from it along the lines, and one of the lines is straight up to there.
+    """
+    joined = joined_ends_of(run.system)
+    width = max(float(diameters(run.model.models[k]).max()) for k in (a, b))
+    for m, k in ((m, k) for m in (0, -1) for k in (0, -1) if joined[a, m] == joined[b, k] > 0):
+        ways, bows = [], []
+        for line, at, tip in ((a, s, m), (b, other, k)):
+            nodes, r = run.model.models[line].line.s, run.state.lines[line].r
+            place = [np.interp(at, nodes, r[:, j]) for j in range(3)]
+            ways.append(abs(at - float(nodes[tip])))
+            bows.append(ways[-1] - float(np.linalg.norm(place - r[tip])))
+        if abs(ways[0] - ways[1]) < ALONG * width and min(bows) < width:
+            return True
+    return False
+
+
 def tell_passages(run: SystemRun) -> None:
-    """An event for every two lines that have met without contact, when they do first."""
+    """An event for every two lines that have met without contact, when they do first.
+
+    Of lines that lie along each other from what both are joined to there is nothing to tell, as at the start.
+    """
     for a, b, t, s, other in sorted(run.watch.met() if run.watch is not None else (), key=lambda x: x[2]):
         if (a, b) in run.passed:
             continue
         run.passed.add((a, b))
+        if _side_by_side(run, a, b, s, other):
+            continue
         one, two = run.model.names[a], run.model.names[b]
         text = (
             f"lines {one} and {two} pass through each other: no contact between them is computed, and at s = {s:.4g} m "

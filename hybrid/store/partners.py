@@ -2,6 +2,7 @@
 
 Outputs have the forces by partner (outputs.obstacle_forces, outputs.line_forces), without friction.  The envelope has
 the largest force per length of every step by kind of partner alone; the name is found at the outputs beside it.
+Where contact began by itself, outputs have no such forces, and partners are those that events name.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from hybrid.store.reader import Result
 
 OBSTACLES, LINES, ITSELF = "obstacles", "contacts", "the line itself"
+# Kinds of events, of the first contact of two lines and of a line with itself.
+TOUCH = "lines touch"
+TOUCHES_ITSELF = "line touches itself"
 
 
 class Pressed(NamedTuple):
@@ -53,10 +57,29 @@ def partner_of(result: Result, quantity: str, t: float) -> str | None:
         return ITSELF
     whole, name = result.whole
     mine = [x for x in _groups(whole) if x.startswith(LINES) and name in x.split("/")[1:]]
-    found = _most({x: _other(x, name) for x in mine}, whole, t) if mine else ITSELF
+    found = _most({x: _other(x, name) for x in mine}, whole, t) if mine else _touched(whole, name, t)
     if whole.file is not None:  # in memory they are one
         whole.close()
     return found
+
+
+def meeting_text(a: str, b: str, s: float, other: float) -> str:
+    """The text of the event of two lines that touch, at s (m) of a and other (m) of b."""
+    return f"line {a} touches line {b}: at s = {s:.4g} m of {a}, s = {other:.4g} m of {b}"
+
+
+def _touched(whole: Result, name: str, t: float) -> str:
+    """The lines that a line has touched up to the time t (s), in words; itself, where there is none."""
+    soon = float(np.diff(whole.times).max(initial=0.0))  # an event is of the end of a step
+    texts = [x.text for x in whole.events if x.kind == TOUCH and x.t <= t + soon]
+    found = [
+        f"line {x}"
+        for x in whole.lines
+        if any(y.startswith((f"line {name} touches line {x}: ", f"line {x} touches line {name}: ")) for y in texts)
+    ]
+    if not found or any(x.kind == TOUCHES_ITSELF and x.t <= t + soon for x in whole.lines[name].events):
+        found.append(ITSELF)
+    return " or ".join(found)
 
 
 def _most(groups: dict[str, str], result: Result, t: float) -> str | None:

@@ -56,6 +56,15 @@ def test_contact_begins_where_lines_come_near_and_is_that_which_is_asked_for(beg
     assert same(begun, hybrid.run(unasked(contact={}))) < 1e-9
 
 
+def test_what_presses_is_called_by_its_name(begun: Any) -> None:
+    """Nobody asked for contact, so that outputs have no forces by partner: events name the other line."""
+    from hybrid.store.envelope import largest_contact
+
+    for name, other in (("upper", "line lower"), ("lower", "line upper")):
+        found = largest_contact(begun.lines[name])
+        assert found is not None and found[0] == other and found[1].value > 1.0
+
+
 def test_taut_catenaries_touch_as_if_asked() -> None:
     tables = unasked()
     for line in tables["lines"].values():
@@ -119,6 +128,29 @@ def test_legs_that_leave_a_point_by_a_narrow_angle_are_not_pressed_apart(half: f
     found = hybrid.run(bridle(half))
     assert same(found, hybrid.run(bridle(half) | {"contact": NOT_ASKED}), ("position", "tension")) == 0.0
     assert not any(x["self_contact"].any() for x in found.lines.values())
+
+
+def bight(away: float) -> Tables:
+    """A taut rope from a point, and a loose one whose bight comes back beside that rope, so far (m) from the point."""
+    rope = {"mesh": {"cells": 80}, "contact": {"self": False}, "model": "rod"}
+    points = [[0, 0, 0], [0, 0, 0.2], [away, 0.01035, 0.2], [away, 0.01035, -0.2], [0.2, 0.2, -0.2]]
+    length = float(np.linalg.norm(np.diff(np.array(points, float), axis=0), axis=1).sum())
+    taut = {"kind": "straight", "direction": [1, 0, 0]}
+    return {
+        "environment": {"gravity": 0}, "time": {"duration": 0.002, "step": 0.001}, "output": {"points": 21},
+        "points": {"knot": {"position": [0, 0, 0]}, "e": {"position": [0.8, 0, 0]}, "f": {"position": points[-1]}},
+        "lines": {
+            "taut": rope | {"start": "knot", "end": "e", "sections": [ROPE | {"length": 0.8}], "initial": taut},
+            "loose": rope | {"start": "knot", "end": "f", "sections": [ROPE | {"length": length}],
+                             "initial": {"kind": "points", "points": points}},
+        },
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("away", "begins"), [(0.02, False), (0.4, True)])
+def test_what_lies_against_the_joint_of_another_line_is_no_contact(away: float, begins: bool) -> None:
+    """Within six diameters of the point that both are joined to, however far along itself the loose rope is there."""
+    assert (BEGINS in kinds(hybrid.run(bight(away)))) == begins
 
 
 def hung_apart(part: float = 1.0, **more: Any) -> Tables:

@@ -30,7 +30,7 @@ from hybrid.kernels.step.job import read
 
 BOX = 8  # cells in a box
 # Of the width: way from line to line about a joint on which nothing is looked at; legs that leave it by 10 degrees or
-# more are apart beyond.
+# more are apart beyond.  Within half of it from the joint, on either line, another one lies against the joint.
 JOINT = 12.0
 # Steps that lines which may touch look ahead, and of the mean diameter how far apart they are near at least: contact acts
 # from there on.
@@ -169,6 +169,18 @@ def are_neighbours(job, a, b, line, other, i, j, window):
 
 
 @inner
+def are_at_joint(job, a, b, line, other, s, t, reach):
+    """Whether s of line a, or t of line b, is within `reach`, m, of an end that is joined to one of the other line."""
+    for m in range(2):
+        for k in range(2):
+            if job.joined[a, m] >= 0 and job.joined[a, m] == job.joined[b, k]:
+                way, rest = abs(s - line.s[m * line.h.shape[0]]), abs(t - other.s[k * other.h.shape[0]])
+                if min(way, rest) < reach:
+                    return True
+    return False
+
+
+@inner
 def cells_apart(before, after, other_before, other_after, i, j):
     """Least distance of two cells on their straight ways in a step, m, and where they are nearest after it."""
     p, q = get3(after, i), get3(other_after, j)
@@ -219,6 +231,7 @@ def search(job, row, a, b, reach):
     one, two = read(job.tables[a]), read(job.tables[b])
     line, other = one.line, two.line
     n, m, best, near = line.h.shape[0], other.h.shape[0], math.inf, False
+    at_joint = math.inf  # the least clearance of what is near a joint, where one line lies against what holds the other
     for first in range(0, n, BOX):
         last = min(first + BOX, n)
         low, high = box_of(one.old.r, one.new.r, first, last)
@@ -242,13 +255,17 @@ def search(job, row, a, b, reach):
                         continue
                     if are_neighbours(job, a, b, line, other, i, j, JOINT * width):
                         continue
+                    s, t = line.s[i] + x * line.h[i], other.s[j] + y * other.h[j]
+                    if are_at_joint(job, a, b, line, other, s, t, 0.5 * JOINT * width):
+                        at_joint = min(at_joint, max(clear, 0.0))
+                        continue
                     if clear < best:
                         best = clear
-                        row[AT], row[OTHER] = line.s[i] + x * line.h[i], other.s[j] + y * other.h[j]
+                        row[AT], row[OTHER] = s, t
                     if clear < ahead and not near:
                         moves = moves_apart(one.old.r, one.new.r, i, i + 1, two.old.r, two.new.r, j, j + 1)
                         near = clear < max(AHEAD * moves, LEAST_APART * width)
-    row[APART] = best
+    row[APART] = min(best, at_joint)  # what is near a joint may slide away from it: looked at in the next step again
     return near
 
 
