@@ -114,6 +114,7 @@ class Outcome(IntEnum):
 EVENTS_BY_WEIGHT = (
     "gains energy",
     "implausible",  # a wrong unit, from which everything else may follow
+    "slack line as rods",  # with a bending stiffness that nobody gave
     "bend radius below limit",
     "tension above limit",
     "tension below limit",
@@ -191,7 +192,7 @@ OF_THE_RUN = frozenset({
     "largest force uncertain", "windows uncertain", "irregular motion", "snaps", "costly accuracy",
     "finer run not kept", "torque neglected", "ignored", "undamped", "model error not estimated", "zones fixed",
     "static friction neglected",
-    "numerical dissipation", "model chosen", "laid one way",
+    "numerical dissipation", "model chosen", "laid one way", "slack line as rods",
 })  # fmt: skip
 # How an event "ignored" begins that is about what an end bends the line by.
 OF_AN_END = "moment and tangent at ends."

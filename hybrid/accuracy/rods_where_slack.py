@@ -21,7 +21,7 @@ from hybrid.scene.schema import Environment, Scene
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.system import System
 
-CHOSEN = "model chosen"  # of the event that says so
+CHOSEN = "slack line as rods"  # of the event that says so
 CELLS = 100  # of a mesh that is not given
 # Of the weight in vacuum at the earth's surface: what a line that floats, or has no weight, counts as having.
 LEAST_WEIGHT = 1e-2
@@ -49,7 +49,7 @@ def rods_instead_of_slack(scene: Scene, error: ComputationError) -> Instead | No
         return None
     sections, given = _stiffened(scene.cable.sections, scene.environment)
     cable = scene.cable.model_copy(update={"sections": sections})
-    return Instead(scene.model_copy(update={"cable": cable, "model": RodModel()}), _text("the line", error, given))
+    return Instead(scene.model_copy(update={"cable": cable, "model": RodModel()}), _text(error, given))
 
 
 def rods_of_system(system: System, error: ComputationError) -> SystemInstead | None:
@@ -60,7 +60,8 @@ def rods_of_system(system: System, error: ComputationError) -> SystemInstead | N
     sections, given = _stiffened(line.sections, system.environment)
     other = line.model_copy(update={"sections": sections, "model": RodModel()})
     lines = {name: other if name == error.line_name else x for name, x in system.lines.items()}
-    return SystemInstead(system.model_copy(update={"lines": lines}), _text(f"line {error.line_name}", error, given))
+    text = f"line {error.line_name}: {_text(error, given)}" + "; no other line has changed" * (len(lines) > 1)
+    return SystemInstead(system.model_copy(update={"lines": lines}), text)
 
 
 def _stiffened(sections: tuple[Section, ...], around: Environment) -> tuple[tuple[Section, ...], list[float]]:
@@ -77,11 +78,11 @@ def _stiffened(sections: tuple[Section, ...], around: Environment) -> tuple[tupl
     return tuple(found), given
 
 
-def _text(what: str, error: ComputationError, given: list[float]) -> str:
+def _text(error: ComputationError, given: list[float]) -> str:
     """What the event says."""
     stiffness = " and ".join(f"{x:.3g}" for x in dict.fromkeys(given))
     return (
-        f"rods: as a catenary, which stands for no model where sections have no bending stiffness, {what} went into "
-        f"compression at t = {error.t:.4g} s, s = {error.s or 0.0:.4g} m, and the run began anew; sections without "
-        f"bending_stiffness have {stiffness} N m^2, by which they bend over a hundredth of the line: give theirs"
+        f"computed as rods, because as a catenary it went into compression at t = {error.t:.4g} s, "
+        f"s = {error.s or 0.0:.4g} m, and the run began anew; bending_stiffness is not given and taken as {stiffness} "
+        "N m^2, by which the line bends over a hundredth of its length: give its own"
     )

@@ -49,6 +49,9 @@ FILE, JUDGING = 0.02, 0.1
 ONCE, SETTLED = 1.0, 40
 # How much dearer steps are, over a whole run, of a line that is to touch itself: expected, and at most.
 TOUCHING, MOST_TOUCHING = 2.5, 6.0
+# Iterations of Newton's method in a step of several lines once loads have grown: of a fish farm of 33 lines 3.1, and
+# fewer while its waves grow, which is all that a plan sees.
+LATER = 3.0
 # Results that an accuracy takes at most over the first, where its budget allows them: finer ones may follow it.
 MOST_FINER = 9.0
 
@@ -250,6 +253,12 @@ def _of_passes(scene: Scene, setup: float, motion: float, outputs: float, found:
     return expected, min(first + MOST_FINER * one, max(MOST_TIMES * expected, LEAST))
 
 
+def _grown(system: System) -> float:
+    """When all loads and motions of a system that grow from nothing have grown, s."""
+    moved = [getattr(x, "motion", None) for x in (*system.points.values(), *system.bodies.values())]
+    return max((getattr(x, "ramp", None) or 0.0 for x in (system.environment.waves, *moved)), default=0.0)
+
+
 def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     """The same of several lines: their first steps, as often as all runs would take them."""
     if found.cells > MOST_CELLS or not is_warm(kernels_of_lines(system)):
@@ -263,8 +272,10 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
         run.begin_motion()
         first = [x.T.copy() for x in run.state.lines]
         begun = clock.process_time()
+        tried: list[int] = []  # iterations of Newton's method, of steps that were looked at
 
         def look() -> None:
+            tried.append(run.loop.counts.iterations)
             if clock.process_time() - begun > FIRST_STEPS:
                 raise KeyboardInterrupt
 
@@ -281,6 +292,8 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
             rate = min(rate, 1.0 / float(run.loop.clock.next_dt))
         steps = run.steps + rate * max(time.duration - run.t, 0.0)
     motion = steps * spent / max(run.steps, 1)
+    if run.t < min(_grown(system), time.duration):
+        motion *= max(1.0, LATER / max(float(np.mean(tried)), 1.0))
     scenes = {name: system.scene_of(name) for name in system.lines}
     if not system.starts_as_placed:
         at_rest = zip(run.model.names, run.model.models, first, strict=True)
@@ -291,6 +304,8 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     each = [_of_passes(scene, 0.0, 0.0, outputs, found.lines[name]) for name, scene in scenes.items()]
     expected, most = max(_of_passes(scene, setup, motion, 0.0, found.lines[name]) for name, scene in scenes.items())
     more = sum(x for x, _ in each)
+    if system.slack_becomes_rod:
+        most += (TOUCHING - 1.0) * motion
     return replace(
         found, seconds=expected + more, most_seconds=most + more, measured=True, steps=round(steps),
         step=min(found.step, time.duration / steps),

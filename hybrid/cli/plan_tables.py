@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 NAME, COLUMNS = 13, 80  # columns of names, and of the short form
 LARGE = 2e7  # bytes of a file that are worth a word
+MOST_LISTED = 12  # lines with a row each: of more, those that are alike share one
 MOST_PAIRS = 6  # of lines that touch each other, by name
 # Forces whose names are too long for it.
 SHORT = {
@@ -72,15 +73,7 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
 
 def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
     """The plan of several lines: each of them, what joins them, and what they have in common."""
-    rows: dict[str, str] = {}
-    for name, line in plan.lines.items():
-        joined = system.lines[name]
-        length = sum(section.length for section in joined.sections)
-        ends = f"{joined.start} to {joined.end}"
-        clamps = "".join(f"; {text}" for text in _clamps(system, name))
-        rows[f"line {name}"] = f"{length:.6g} m, {ends}, {_model(line)}, {_count(sum(line.cells), 'cell')}{clamps}"
-        rows |= {f"  {name}, {kind}": _noted(line, kind) for kind in ("implausible", "ignored")}
-        rows[f"  {name}, hockling"] = _hockling(line)
+    rows = _rows_of_lines(system, plan)
     every = list(plan.lines.values())
     on = {entry.what: entry.why for line in every for entry in line.contents if entry.on}
     rows |= {
@@ -100,6 +93,30 @@ def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
         *_table(rows),
         "of each line, what is on and off, and why: --verbose",
     ]
+
+
+def _rows_of_lines(system: System, plan: SystemPlan) -> dict[str, str]:
+    """A row for each line, with its ends; of many lines one for all that are alike, with their names."""
+    rows: dict[str, str] = {}
+    alike: dict[str, list[str]] = {}
+    for name, line in plan.lines.items():
+        joined = system.lines[name]
+        length = sum(section.length for section in joined.sections)
+        what = f"{_model(line)}, {_count(sum(line.cells), 'cell')}"
+        what += "".join(f"; {text}" for text in _clamps(system, name))
+        if len(plan.lines) > MOST_LISTED:
+            alike.setdefault(f"{length:.6g} m, {what} each", []).append(name)
+        else:
+            rows[f"line {name}"] = f"{length:.6g} m, {joined.start} to {joined.end}, {what}"
+        rows |= {f"  {name}, {kind}": _noted(line, kind) for kind in ("implausible", "ignored")}
+        rows[f"  {name}, hockling"] = _hockling(line)
+    groups: dict[str, str] = {}
+    for what, names in alike.items():
+        key = _count(len(names), "line")
+        while key in groups:
+            key += " "  # another row of the same name
+        groups[key] = f"{what}: {', '.join(names)}" if len(names) > 1 else f"{what.removesuffix(' each')}: {names[0]}"
+    return groups | rows
 
 
 def _noted(plan: Plan, kind: str) -> str:
@@ -258,8 +275,9 @@ def _steps(time: Time | None, plan: Plan | SystemPlan, touches: bool = False) ->
 
 def _cpu(plan: Plan | SystemPlan, touches: bool) -> str:
     """Processor time of all runs, and what it rests on."""
-    most = plan.most_seconds
-    notes = [f"up to {span(most)} if finer runs are needed"] if most is not None and most > 1.05 * plan.seconds else []
+    most, every = plan.most_seconds, [*getattr(plan, "lines", {"": plan}).values()]
+    why = "finer runs are needed" if any(x.most_runs > x.runs for x in every) else "a line goes slack and becomes a rod"
+    notes = [f"up to {span(most)} if {why}"] if most is not None and most > 1.05 * plan.seconds else []
     notes += ["several times as much while it touches itself"] if touches else []
     notes += [] if plan.measured else ["estimated from tables: no step was tried"]
     return f"about {span(plan.seconds)} of CPU for all runs" + (f" ({'; '.join(notes)})" if notes else "")

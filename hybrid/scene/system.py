@@ -249,6 +249,11 @@ class System(Table):
         return tuple(name for name, line in self.lines.items() if isinstance(line.model, AdaptiveModel))
 
     @property
+    def slack_becomes_rod(self) -> bool:
+        """Whether a line is a catenary that stands for no model: should it go slack, the run begins anew with rods."""
+        return any(x.model is None and x.chosen_model.kind == "catenary" for x in self.lines.values())
+
+    @property
     def starts_as_placed(self) -> bool:
         """Whether the motion starts where the scene has lines, points and bodies, at rest, and not in equilibrium."""
         return any(not isinstance(line.initial, Equilibrium) for line in self.lines.values())

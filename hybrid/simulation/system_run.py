@@ -529,6 +529,14 @@ class SystemRun:
         """Room for the state after the next step, of lines as they are now."""
         self.other = self.state.copy()
 
+    def _note(self, kind: str, text: str) -> None:
+        """An event of the whole run; of the line that its text names first, if any."""
+        for line in self.lines:
+            if text.startswith(name := f"line {line.name}: "):
+                line.events.event(0.0, 0.0, line.model.length, kind, text.removeprefix(name))
+                return
+        self.recorder.event(0.0, 0.0, 0.0, kind, text)
+
     def begin_motion(self) -> None:
         """Make the start ready for steps, and record it."""
         time = self.system.require_time()
@@ -542,7 +550,7 @@ class SystemRun:
         begin_where_near(self)
         blended = [("motion blended in", text) for text in blended_of_lines(self.system) if text]
         for kind, text in (*self._notes, *blended):
-            self.recorder.event(0.0, 0.0, 0.0, kind, text)
+            self._note(kind, text)
         self._settle(self.solver)
         self._look_for_overlaps()
         if self.watch is not None and self.watch.near() and begin_between(self):

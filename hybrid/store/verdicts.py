@@ -56,6 +56,7 @@ Doubtful = Mapping[str, tuple[frozenset[str], str]]
 DOUBTS: Doubtful = {
     "gains energy": (ALL, SHORTER),
     "implausible": (ALL, "check the units that the note names"),
+    "slack line as rods": (BENDING, "give bending_stiffness"),
     "error uncertain": (ALL, NOTE),
     "several equilibria": (ALL, "initial.points near the equilibrium that is meant"),
     "largest force uncertain": (PULL, "a longer run, or several seeds"),

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import hybrid
+from hybrid.accuracy.run_forecast import _grown
+from hybrid.cli.plan_tables import system_plan_lines
 from hybrid.errors import ComputationError, Outcome
+from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.system import System
 
 SECTION = {"length": 10.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5}
 HEAVE = {"position": [9, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period": 0.8}, "ramp": 1.6}}
@@ -34,14 +39,14 @@ def system(**more: Any) -> dict[str, Any]:
 
 
 def chosen(events: Any) -> list[str]:
-    return [x.text for x in events if x.kind == "model chosen"]
+    return [x.text for x in events if x.kind == "slack line as rods"]
 
 
 def test_a_cable_that_goes_slack_becomes_a_rod(tmp_path: Path) -> None:
     result = hybrid.run(cable(), tmp_path / "a.h5")
     assert result.status == "complete" and result.times[-1] == 2.0
     (text,) = chosen(result.events)
-    assert text.startswith("rods: ") and "compression at t = " in text
+    assert text.startswith("computed as rods") and "compression at t = " in text
     assert {x.kind for zones in result.zones for x in zones} == {"rod"}
     stiffness = 9.81 * 2.0 * 0.1**3  # under its weight it bends over a hundredth of its length
     assert f"{stiffness:.3g} N m^2" in text and "bending_stiffness: 0.019" in result.scene_text
@@ -52,7 +57,8 @@ def test_a_line_of_a_system_that_goes_slack_becomes_a_rod() -> None:
     result = hybrid.run(system())
     assert result.status == "complete" and result.times[-1] == 2.0
     (text,) = chosen(result.events)
-    assert "line right went into compression" in text
+    assert text.startswith("line right: computed as rods") and "no other line has changed" in text
+    assert not chosen(result.lines["left"].events) and len(chosen(result.lines["right"].events)) == 1
     kinds = {name: {x.kind for zones in line.zones for x in zones} for name, line in result.lines.items()}
     assert kinds == {"left": {"catenary"}, "right": {"rod"}}
 
@@ -62,3 +68,13 @@ def test_a_catenary_that_is_asked_for_stops(scene: dict[str, Any]) -> None:
     with pytest.raises(ComputationError) as stopped:
         hybrid.run(scene)
     assert stopped.value.outcome == Outcome.SLACK
+
+
+def test_the_plan_says_what_a_slack_line_may_cost() -> None:
+    """And counts steps whose loads still grow as those of grown loads: the motion of the end has a ramp of 1.6 s."""
+    open_, named = as_scene_or_system(system()), as_scene_or_system(system(model="catenary"))
+    assert isinstance(open_, System) and isinstance(named, System)
+    assert open_.slack_becomes_rod and not named.slack_becomes_rod and _grown(open_) == 1.6
+    plan = replace(hybrid.plan(open_, measure=False), seconds=8.0, most_seconds=19.0)
+    said = " ".join(" ".join(system_plan_lines(open_, plan)).split())
+    assert "about 8 s of CPU for all runs (up to 19 s if a line goes slack and becomes a rod" in said
