@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -12,13 +13,27 @@ from typing import TYPE_CHECKING, Any
 import hybrid
 from hybrid.cli.app import picture_beside
 from hybrid.cli.plan_tables import contents_table, system_plan_lines
-from hybrid.cli.tables import extremes_facts, judged_text, quantities_facts, unknown_text, verdict_text, verdicts_of
+from hybrid.cli.tables import (
+    extremes_facts,
+    judged_text,
+    place_text,
+    quantities_facts,
+    unknown_text,
+    verdict_text,
+    verdicts_of,
+)
+from hybrid.store.envelope import NOT_VERIFIED
+from hybrid.store.partners import TOUCH
 from hybrid.store.records import error_words
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
     from hybrid.scene.system import System
     from hybrid.store.reader import Result
+
+# Lines, points and bodies that are listed each; of more so many, the worst, are shown.
+MOST_LISTED = 12
+SHOWN = 8
 
 
 def run_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
@@ -69,18 +84,21 @@ def static_lines(console: Console, asked: System, target: Path, plot: bool, keep
 
 def ended(console: Console, result: Result, target: Path, picture: Path | None, text: str, **facts: Any) -> None:
     """Print what lines and points have reached, and draw them; picture: as of `_moved`."""
+    from hybrid.view.worst import worst_first
+
     if picture is not None:
         from hybrid.view.matplotlib_import import import_matplotlib
 
         import_matplotlib()
         hybrid.plot(result, picture)
-    lines = {name: extremes_facts(line) | verdicts_of(line) for name, line in result.lines.items()}
+    names = list(result.lines) if len(result.lines) <= MOST_LISTED else worst_first(result)
+    lines = {name: extremes_facts(result.lines[name]) | verdicts_of(result.lines[name]) for name in names}
     moves = len(result.times) > 1
     held = quantities_facts(result)
     points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
     end = float(result.times[-1]) if moves else None
-    meetings = [(x.t, x.text) for x in result.events if x.kind == "lines touch"]
+    meetings = [(x.t, x.text) for x in result.events if x.kind == TOUCH]
     meetings += [(x.t_force, f"{x.partner}: {x.text}") for x in result.contacts()]
     console.show(lambda: _table(lines, points, bodies, held, end, meetings))
     pictures = [picture] if picture is not None else []
@@ -108,51 +126,114 @@ def _table(
 
     when (s) and where they touched first, and with what force.
     """
+    from rich.console import Group
     from rich.table import Table
-
-    def at(x: dict[str, Any]) -> str:
-        when = "" if end is None else f", t = {x['t']:.5g} s"
-        return f"{x['value']:.5g} N at s = {x['s']:.5g} m{when}"
 
     last = "" if end is None else f"at t = {end:.5g} s: "
     table = Table.grid(padding=(0, 2))
-    for name, facts in lines.items():
-        most, least = facts["tension_max"], facts["tension_min"]
-        limits = {x["limit"]: x for x in facts["limits"]}
-        low, high = (
-            at(x) + judged_text(limits.get(limit), "N", x)
-            for x, limit in ((least, "min_tension"), (most, "max_tension"))
-        )
-        table.add_row(f"line {name}", f"tension {low}, to {high}{unknown_text(facts, 'N')}")
-        bent, bend = facts.get("bend_radius_min"), limits.get("min_bend_radius")
-        if bent is not None and bend is not None:
-            radius = f"{bent['value']:.5g} m at s = {bent['s']:.5g} m" + f", t = {bent['t']:.5g} s" * (end is not None)
-            table.add_row("", f"smallest bend radius {radius}{judged_text(bend, 'm', bent)}{unknown_text(facts, 'm')}")
-        if (pressed := facts.get("contact_max")) is not None:
-            force = f"{pressed['value']:.5g} N/m at s = {pressed['s']:.5g} m" + f", t = {pressed['t']:.5g} s" * (
-                end is not None
-            )
-            held_force = judged_text(limits.get("max_contact_force"), "N/m", pressed)
-            table.add_row("", f"largest contact force {force}, of {pressed['partner']}{held_force}")
-        for x in facts["quantities"]:
-            table.add_row("", x["text"] + x["when"] + x["ending"])
-        for each in facts.get("accuracy", ()):
-            table.add_row("", verdict_text(each))
-    for name, facts in points.items():
-        turned = f", turned by {_vector(facts['rotation'], 1e-6)} deg" if "rotation" in facts else ""
-        force = f", force of the lines {_vector(facts['force'])} N" if "force" in facts else ""
-        moment = f", moment {_vector(facts['moment'])} N m" if "moment" in facts else ""
-        table.add_row(f"point {name}", f"{last}{_vector(facts['position'])} m{turned}{force}{moment}")
-    for name, facts in bodies.items():
-        turned = f"{_vector(facts['position'])} m, turned by {_vector(facts['rotation'], 1e-6)} deg"
-        loads = f"force of the lines {_vector(facts['force'])} N, moment {_vector(facts['moment'])} N m"
-        table.add_row(f"body {name}", f"{last}{turned}, {loads}")
-    for t, text in meetings:
+    for name, facts in lines.items() if len(lines) <= MOST_LISTED else ():
+        for k, text in enumerate(_of_line(facts, end is not None)):
+            table.add_row("" if k else f"line {name}", text)
+    for name, text in _shown(points, "point", last + "{}", _of_point):
+        table.add_row(name, text)
+    for name, text in _shown(bodies, "body", last + "{}", _of_body):
+        table.add_row(name, text)
+    for t, text in meetings[:SHOWN]:
         table.add_row("contact", f"{'' if end is None else f't = {t:.5g} s: '}{text}")
+    if len(meetings) > SHOWN:
+        table.add_row("", f"{len(meetings) - SHOWN} more contacts are among the events of the report")
     for x in held:
         table.add_row(x["name"], x["text"] + x["when"] + x["ending"])
     table.columns[0].style = "bold"
+    return table if len(lines) <= MOST_LISTED else Group(_ranked(lines, end is not None), "", table)
+
+
+def _of_line(facts: dict[str, Any], moves: bool) -> Iterator[str]:
+    """What a line has reached; moves: whether there are times."""
+
+    def at(x: dict[str, Any], unit: str) -> str:
+        return f"{x['value']:.5g} {unit} {place_text(x)}" + f", t = {x['t']:.5g} s" * moves
+
+    most, least = facts["tension_max"], facts["tension_min"]
+    limits = {x["limit"]: x for x in facts["limits"]}
+    low, high = (
+        at(x, "N") + judged_text(limits.get(limit), "N", x)
+        for x, limit in ((least, "min_tension"), (most, "max_tension"))
+    )
+    yield f"tension {low}, to {high}{unknown_text(facts, 'N')}"
+    bent, bend = facts.get("bend_radius_min"), limits.get("min_bend_radius")
+    if bent is not None and bend is not None:
+        yield f"smallest bend radius {at(bent, 'm')}{judged_text(bend, 'm', bent)}{unknown_text(facts, 'm')}"
+    if (pressed := facts.get("contact_max")) is not None:
+        held = judged_text(limits.get("max_contact_force"), "N/m", pressed)
+        yield f"largest contact force {at(pressed, 'N/m')}, of {pressed['partner']}{held}"
+    yield from (x["text"] + x["when"] + x["ending"] for x in facts["quantities"])
+    yield from map(verdict_text, facts.get("accuracy", ()))
+
+
+def _ranked(lines: dict[str, Any], moves: bool) -> Any:
+    """A row for each of the worst of many lines, which come first, and one for all others."""
+    from rich.table import Table
+
+    from hybrid.view.style import prefix
+
+    most = max(x["tension_max"]["value"] for x in lines.values())
+    factor, unit = prefix("N", most)
+    table = Table(box=None, padding=(0, 1), pad_edge=False)
+    where = ["s (m)"] + ["t (s)"] * moves
+    table.add_column("line", style="bold", no_wrap=True)
+    for name in (f"largest {unit}", *where, f"smallest {unit}", *where):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("limits and accuracy")
+    for name, facts in [*lines.items()][:SHOWN]:
+        ends = [facts["tension_max"], facts["tension_min"]]
+        cells = [[f"{factor * x['value']:.4g}", f"{x['s']:.4g}", *[f"{x['t']:.4g}"] * moves] for x in ends]
+        table.add_row(name, *cells[0], *cells[1], _verdict(facts))
+    others = dict([*lines.items()][SHOWN:])
+    highest = factor * max(x["tension_max"]["value"] for x in others.values())
+    least = min(others, key=lambda name: others[name]["tension_min"]["value"])
+    low = factor * others[least]["tension_min"]["value"]
+    text = f"{len(others)} other lines: tension from {low:.4g} {unit} ({least}) to {highest:.4g} {unit}"
+    table.caption = f"{text}; `hybrid report` has them all"
+    table.caption_justify = "left"
     return table
+
+
+def _verdict(facts: dict[str, Any]) -> str:
+    """What of the limits and of the accuracy of a line is broken, missed or not verified."""
+    held = [*facts["limits"], *facts["quantities"]]
+    broken = [x["limit"] for x in held if x["broken"]]
+    words = [f"{', '.join(broken)} BROKEN"] if broken else []
+    open_ = sum(x["verdict"] == NOT_VERIFIED for x in held)
+    words += [f"{open_} of {len(held)} not verified"] if open_ else []
+    words += ["within limits"] if held and not words else []
+    return "; ".join(words + sorted({x["verdict"] for x in facts.get("accuracy", ())}))
+
+
+def _shown(
+    each: dict[str, dict[str, Any]], what: str, around: str, text: Callable[[dict[str, Any]], str]
+) -> Iterator[tuple[str, str]]:
+    """Names and texts of points or bodies; of many those with the largest forces, and how many others there are."""
+    names = list(each)
+    if len(names) > MOST_LISTED:
+        names.sort(key=lambda name: -math.hypot(*each[name].get("force", (0.0,))))
+        names = names[: SHOWN // 2]
+    for name in names:
+        yield f"{what} {name}", around.format(text(each[name]))
+    if len(names) < len(each):
+        yield "", f"{len(each) - len(names)} others with smaller forces: `hybrid report` has them all"
+
+
+def _of_point(facts: dict[str, Any]) -> str:
+    turned = f", turned by {_vector(facts['rotation'], 1e-6)} deg" if "rotation" in facts else ""
+    force = f", force of the lines {_vector(facts['force'])} N" if "force" in facts else ""
+    moment = f", moment {_vector(facts['moment'])} N m" if "moment" in facts else ""
+    return f"{_vector(facts['position'])} m{turned}{force}{moment}"
+
+
+def _of_body(facts: dict[str, Any]) -> str:
+    turned = f"{_vector(facts['position'])} m, turned by {_vector(facts['rotation'], 1e-6)} deg"
+    return f"{turned}, force of the lines {_vector(facts['force'])} N, moment {_vector(facts['moment'])} N m"
 
 
 def _vector(x: list[float], least: float = 0.0) -> str:

@@ -62,6 +62,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
     for key, low in (("tension_max", False), ("tension_min", True)):
         x = worst(result, "tension", lowest=low)
         found[key] = {"value": x.value + 0.0, "s": x.s, "t": x.t}  # a tension of -0 is 0
+        found[key] |= {"s_range": list(x.over)} if x.over is not None else {}
     if "curvature" in result:
         x = worst(result, "curvature")
         straight = not x.value * float(result.s[-1] - result.s[0]) > 1e-6
@@ -94,11 +95,18 @@ def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str
         x, held = facts.get(key), limits.get(limit)
         if x is None:
             continue
-        text = f"{x['value']:.5g} {unit} at s = {x['s']:.5g} m" + f", t = {x['t']:.5g} s" * moves
+        text = f"{x['value']:.5g} {unit} {place_text(x)}" + f", t = {x['t']:.5g} s" * moves
         text += f", of {x['partner']}" if "partner" in x else ""
         yield title, text + judged_text(held, unit, x) + unknown_text(facts, unit) * (unit != "N/m")
     for x in facts["quantities"]:
         yield x["name"], x["text"] + x["when"] + x["ending"]
+
+
+def place_text(extreme: dict[str, Any]) -> str:
+    """Where an extreme is, in words."""
+    if "s_range" in extreme:
+        return "from s = {:.5g} to {:.5g} m".format(*extreme["s_range"])
+    return f"at s = {extreme['s']:.5g} m"
 
 
 def judged_text(held: dict[str, Any] | None, unit: str, extreme: dict[str, Any]) -> str:

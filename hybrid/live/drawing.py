@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from hybrid.view.projections import bed_heights, whole_zones
 from hybrid.view.scenery import box_and_planes
 from hybrid.view.style import BED, BODY, INK, colour_of
 from hybrid.view.summary import facts_of, status_facts
-from hybrid.view.system_views import AllLines, arms_of, bodies_of, colours, points_of
+from hybrid.view.system_views import LINE_COLOURS, AllLines, arms_of, bodies_of, points_of
 
 DIGITS = 7  # of the largest number of a curve: more than a screen shows apart
 MOST_NODES = 1201  # of a line whose cells are marked: more would be one grey bar
@@ -36,7 +37,7 @@ def around(result: Result) -> dict[str, Any]:
 
 def heads(result: Result) -> list[dict[str, Any]]:
     """What stays the same of each line: its name, colour and length (m)."""
-    named = colours(result)
+    named = dict(zip(result.lines, cycle(LINE_COLOURS), strict=False))
     return [
         {"name": name, "colour": named.get(name, ""), "length": float(np.ptp(line.s))}
         for name, line in lines_of(result).items()

@@ -36,6 +36,9 @@ PARTNERS = {"contact": "the seabed", "self_contact": "the line itself or another
 UNITS = {"min_bend_radius": "m", "max_contact_force": "N/m", "max_stress": "Pa", "capacity": "%", "code": "%"}
 # Of the largest tension: what is below is what the solver's tolerance leaves of a force of zero, as at a free end.
 NOTHING = 1e-6
+# Part of a line over which an extreme is the same to round-off (NOTHING) from which on its place is that range: as of
+# the tension of what lies on a flat bed without friction.
+PLATEAU = 0.1
 # Verdicts on limits: `verdicts` decides which.
 WITHIN, BROKEN, NOT_VERIFIED = "within", "broken", "not verified"
 # Part of a value by which an output at a node may differ from that of its step: sums in another order.
@@ -59,12 +62,16 @@ class Recorded(Arrays, Protocol):
 
 
 class Extreme(NamedTuple):
-    """A value, where (s, m) and when (t, s); side: -1 or 1, before or after a place with two values, else 0."""
+    """A value, where (s, m) and when (t, s); side: -1 or 1, before or after a place with two values, else 0.
+
+    over: m, the range about s in which the value is the same to round-off, where that is a part of the line.
+    """
 
     value: float
     s: float
     t: float
     side: int
+    over: tuple[float, float] | None = None
 
 
 class Judged(NamedTuple):
@@ -153,8 +160,13 @@ def extreme(values: Arrays, name: str, bound: str) -> Extreme | None:
     x = values[full]
     k = int(np.nanargmin(x) if bound == "min" else np.nanargmax(x))
     s = values[SCALE]
+    other = ~(np.abs(x - x[k]) <= NOTHING * float(np.nanmax(np.abs(x))))
+    first, last = (s[np.flatnonzero(part) + shift] for part, shift in ((other[:k], 1), (other[k:], k - 1)))
+    over = float(first[-1] if len(first) else s[0]), float(last[0] if len(last) else s[-1])
+    wide = over[1] - over[0] > PLATEAU * (s[-1] - s[0])
     side = int(k > 0 and s[k - 1] == s[k]) - int(k + 1 < len(s) and s[k + 1] == s[k])
-    return Extreme(float(x[k]), float(s[k]), float(values[f"{GROUP}/{name}_t_{bound}"][k]), side)
+    when = float(values[f"{GROUP}/{name}_t_{bound}"][k])
+    return Extreme(float(x[k]), float(s[k]), when, side, over if wide else None)
 
 
 def extremes_of_outputs(values: Recorded, name: str) -> dict[str, np.ndarray]:

@@ -15,6 +15,10 @@ from hybrid.store.reader import Result
 # are not visible.  Frames times points: a page has up to ten such arrays of 4 bytes, and is to stay below 8 MB.
 MOST_FRAMES, MOST_POINTS, MOST_VALUES = 1000, 251, 80_000
 MOST_ON_CURVE = 1200
+# On paper a panel is two to four inches wide: a curve that turns more than so often in each of so many stretches is a
+# block of ink.
+STRETCHES = 150
+TURNS = 4
 
 
 class Kept(NamedTuple):
@@ -63,6 +67,27 @@ def outline(values: np.ndarray, most: int = MOST_ON_CURVE) -> np.ndarray:
     found = [a + x for a, b in pairwise(bounds) for x in (low[a:b].argmin(), high[a:b].argmax())]
     gaps = np.flatnonzero(np.diff(known))
     return np.unique([0, *found, *gaps, *(gaps + 1), n - 1])
+
+
+class Stretches(NamedTuple):
+    """A curve that swings too often to be seen: its middle times, and of each stretch the range and the mean."""
+
+    x: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    mean: np.ndarray
+
+
+def stretches_of(x: np.ndarray, y: np.ndarray) -> Stretches | None:
+    """A history of hours in STRETCHES of one length; None: a picture on paper shows its swings one by one."""
+    if len(x) < 4 * STRETCHES or not np.isfinite(y).all() or not (np.diff(x) > 0.0).all():
+        return None
+    turns = int((np.diff(np.sign(np.diff(y))) != 0.0).sum())
+    if turns < TURNS * STRETCHES:
+        return None
+    bounds = np.linspace(0, len(x), STRETCHES + 1).astype(int)
+    rows = [(x[a:b].mean(), y[a:b].min(), y[a:b].max(), y[a:b].mean()) for a, b in pairwise(bounds)]
+    return Stretches(*np.array(rows).T)
 
 
 class Store:

@@ -134,6 +134,7 @@ class Axis(NamedTuple):
     peak: float | None = None
     log: bool = False
     ticks: tuple[float, ...] = ()
+    names: tuple[str, ...] = ()  # in place of the numbers of ticks
 
     @property
     def label(self) -> str:

@@ -20,12 +20,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from hybrid.view.decimate import Stretches, stretches_of
 from hybrid.view.figure import Area, Band, Box, Item, Line, Map, Marks, Page, Panel, Rule, Text, changes_sign
 from hybrid.view.save import DPI
-from hybrid.view.style import ALARM, GREY, INK, NORMAL, SMALL
+from hybrid.view.style import ALARM, GREY, INK, NORMAL, SMALL, short
 
 _DASHES: dict[str, Any] = {"": "-", "dash": (0, (4, 1.5)), "dot": ":"}
 _ENTRIES = 8  # of a legend, in a row
+_FEW = 4  # labels of a legend inside a panel that stand below each other
+_SAMPLE, _LETTER = 0.45, 0.055  # inches of its samples of curves with their margins, and of a letter
 _LEFT = 0.0125  # of the width of a page: where lines of text begin
 
 # ---- items ----------------------------------------------------------------------------------------
@@ -36,6 +39,8 @@ def artists_of(ax: Axes, item: Item, label: str) -> list[Artist]:
     look: dict[str, Any]
     match item:
         case Line():
+            if (thinned := stretches_of(item.x, item.y)) is not None:
+                return _range_and_mean(ax, item, thinned, label)
             return [_line(ax, item, label)]
         case Marks():
             look = {"linestyle": "", "marker": item.symbol, "markersize": item.size, "label": label}
@@ -72,6 +77,17 @@ def _line(ax: Axes, item: Line, label: str) -> Artist:
     if item.symbol:
         look |= {"marker": item.symbol, "markersize": item.size, "markevery": [-1] if item.last_only else None}
     return ax.add_line(Line2D(item.x, item.y, label=label, solid_capstyle="round", **look))
+
+
+def _range_and_mean(ax: Axes, item: Line, thinned: Stretches, label: str) -> list[Artist]:
+    """A curve that swings too often to be seen, as the range and the mean of each stretch."""
+    band = ax.fill_between(thinned.x, thinned.low, thinned.high, color=item.colour, alpha=0.35, linewidth=0)
+    x, y = np.append(thinned.x, item.x[-1]), np.append(thinned.mean, item.y[-1] if item.symbol else thinned.mean[-1])
+    mean = item._replace(x=x, y=y, width=min(item.width, 1.0))
+    every = f"mean and range of each {short(float(thinned.x[1] - thinned.x[0]), 2)} s"
+    look: dict[str, Any] = {"fontsize": SMALL, "color": GREY, "va": "top", "xycoords": "axes fraction"}
+    look["bbox"] = {"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 0.8}
+    return [band, _line(ax, mean, label), ax.annotate(every, (0.02, 0.98), **look)]
 
 
 def _box(ax: Axes, item: Box, label: str) -> Artist:
@@ -121,8 +137,19 @@ def draw_panel(panel: Panel, ax: Axes, *, legend: bool | None = None) -> dict[st
         ax.dataLim.set_points(np.array([(left + x, bottom + y), (right - x, top - y)]))
         ax.set_aspect(panel.aspect, adjustable="datalim")
     if panel.legend if legend is None else legend:
-        ax.legend(fontsize=SMALL, framealpha=0.75, edgecolor="none", handlelength=2.0, borderpad=0.2)
+        look: Any = {"fontsize": SMALL, "framealpha": 0.75, "edgecolor": "none", "handlelength": 2.0, "borderpad": 0.2}
+        ax.legend(ncols=_columns(ax, sorted(seen - {"_"})), **look)
     return images
+
+
+def _columns(ax: Axes, labels: Sequence[str]) -> int:
+    """Columns of a legend inside a panel: one of few labels, of more as many as its width has room for."""
+    if len(labels) <= _FEW:
+        return 1
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    wide = ax.get_position().width * figure.get_size_inches()[0]
+    return max(1, min(len(labels), int(wide / (_SAMPLE + _LETTER * max(map(len, labels))))))
 
 
 def _is_within(marks: Marks, limits: tuple[tuple[float, float], tuple[float, float]]) -> bool:
@@ -154,7 +181,7 @@ def _style(ax: Axes, panel: Panel) -> None:
             ax.ticklabel_format(axis=axis.axis_name, useOffset=False, scilimits=(-4, 6))
             axis.get_offset_text().set_fontsize(SMALL)
             if of.ticks:
-                axis.set_ticks(of.ticks)
+                axis.set_ticks(of.ticks, of.names or None)
     _small_ticks(ax)
 
 

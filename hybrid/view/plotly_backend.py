@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.view.decimate import Store, outline
-from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule, Text
+from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule, Text
 from hybrid.view.style import INK
 
 Spec = dict[str, Any]
@@ -54,7 +54,8 @@ def colour_scale(colours: Sequence[str]) -> list[list[Any]]:
 
 def _layout(panel: Panel, across: tuple[float, float], up: tuple[float, float]) -> Spec:
     def axis(of: Axis, limits: tuple[float, float]) -> Spec:
-        return {
+        named = {"tickvals": list(of.ticks), "ticktext": [escape(x) for x in of.names]} if of.names else {}
+        return named | {
             "title": {"text": escape(of.label), "standoff": 6}, "range": list(limits), "showgrid": panel.grid,
             "zeroline": False, "gridcolor": "#EDEDED", "linecolor": "#BDBDBD", "ticks": "outside", "ticklen": 4,
             "tickcolor": "#BDBDBD", "automargin": True, "exponentformat": "SI",
@@ -111,6 +112,12 @@ def _traces(item: Item, store: Store, unit: str | None) -> list[Spec]:
                 "line": {"width": 0},
             }
             return [{"type": "scatter", "name": escape(item.label), "hoverinfo": "skip"} | around | look]
+        case Area():
+            gaps = np.full((len(item.outlines), 1, 2), np.nan)
+            x, y = np.concatenate([item.outlines, gaps], axis=1).reshape(-1, 2).T
+            filled: Spec = {"type": "scatter", "name": escape(item.label), "mode": "lines", "line": {"width": 0}}
+            filled |= {"x": store.add(x), "y": store.add(y), "fill": "toself", "fillcolor": item.fill}
+            return [filled | {"hoverinfo": "skip"}]
         case Map():
             values = store.add(item.values)
             low, high = (float(np.log10(x)) if item.log else x for x in (item.low, item.high))

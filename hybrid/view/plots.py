@@ -28,7 +28,7 @@ from hybrid.view.projections import (
     whole_zones,
 )
 from hybrid.view.save import save_figure
-from hybrid.view.style import short
+from hybrid.view.style import distinct_texts, short
 from hybrid.view.zones import counted, share_of_rod, why_rods, zone_map
 
 if TYPE_CHECKING:
@@ -150,5 +150,5 @@ def _facts(result: Result, earlier: np.ndarray) -> list[str]:
         facts.insert(0, f"estimated error {error_words(result.attributes)}")
     facts += [text for view in (views_of(result) if len(result.times) else ()) if (text := not_to_scale(view, result))]
     if len(earlier):
-        facts.append("earlier shapes at t = " + ", ".join(f"{short(t, 3)}" for t in earlier) + " s")
+        facts.append("earlier shapes at t = " + ", ".join(distinct_texts(earlier)) + " s")
     return facts

@@ -21,6 +21,8 @@ from hybrid.view.summary import CAUSES, Fact, amount, attention
 from hybrid.view.svg_graph import draw_graph
 from hybrid.view.zones import event_rows
 
+# Rows that are seen at once: the others of a long table, or list, fold away.
+MOST_ROWS = 10
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
 _SETTINGS = {
@@ -72,8 +74,10 @@ def verdict_html(facts: list[Fact], several: bool) -> str:
     limits = [f for f in facts if f.key.startswith("limits") and f.values]
     count = sum(len(f.values["limits"]) for f in limits)
     if alarms:
-        rows = "".join(f"<li><b>{escape(f.title)}.</b> {_code(f.text)} {_show(f, several)}</li>" for f in alarms)
-        head = f'<div class="attention" role="alert"><h2>Look at this first</h2><ul>{rows}</ul></div>'
+        each = [f"<li><b>{escape(f.title)}.</b> {_code(f.text)} {_show(f, several)}</li>" for f in alarms]
+        rows, left = "".join(each[:MOST_ROWS]), each[MOST_ROWS:]
+        more = f"<details><summary>{len(left)} more</summary><ul>{''.join(left)}</ul></details>" if left else ""
+        head = f'<div class="attention" role="alert"><h2>Look at this first</h2><ul>{rows}</ul>{more}</div>'
     else:
         open_ = sum(x["verdict"] == NOT_VERIFIED for f in limits for x in f.values["limits"])
         kept = "no limits were given to hold it against" if not count else f"within all {count} limits"
@@ -137,7 +141,8 @@ def _error_table(fact: Fact) -> str:
 
 
 def _limit_table(fact: Fact) -> str:
-    rows = []
+    """Limits with a bar each; of several lines with their names."""
+    rows, of_lines = [], "line" in fact.values["limits"][0]
     for x in fact.values["limits"]:
         unit = UNITS.get(x["limit"], "N")
         used = "–" if x["used"] is None else f"{short(100 * x['used'], 3)} %"
@@ -146,21 +151,47 @@ def _limit_table(fact: Fact) -> str:
         numbers = [amount(x["allowed"], unit), amount(x["value"], unit), used, short(x["s"], 5), short(x["t"], 5)]
         cells = "".join(f'<td class="number">{escape(y)}</td>' for y in numbers)
         bar = f'<span class="used {look}" aria-hidden="true"><i style="width:{short(100 * part, 3)}%"></i></span>'
-        rows.append(f'<tr class="{look}"><td>{escape(x["limit"])}</td><td>{verdict}</td><td>{bar}</td>{cells}</tr>')
+        names = "".join(f"<td>{escape(x[key])}</td>" for key in ["line"] * of_lines + ["limit"])
+        rows.append(f'<tr class="{look}">{names}<td>{verdict}</td><td>{bar}</td>{cells}</tr>')
     heads = ["allowed", "reached", "used", "s (m)", "t (s)"]
-    head = "<th>limit</th><th>verdict</th><td></td>" + "".join(f'<th class="number">{x}</th>' for x in heads)
-    return f'<div class="scroll" tabindex="0"><table class="limits"><tr>{head}</tr>{"".join(rows)}</table></div>'
+    head = "<th>line</th>" * of_lines + "<th>limit</th><th>verdict</th><td></td>"
+    head += "".join(f'<th class="number">{x}</th>' for x in heads)
+    return folded(rows, f"<tr>{head}</tr>", "limits" + " of-lines" * of_lines, "limits")
 
 
-def table_html(rows: list[list[str]], head: Sequence[str] = (), numbers: int = 0) -> str:
-    """A table of texts, which are escaped; numbers: so many columns, the last, hold numbers."""
+def folded(rows: list[str], head: str, look: str, what: str) -> str:
+    """A table of rows below a head, of which those after MOST_ROWS fold away; look: its class; what: they are of."""
+
+    def table(some: list[str]) -> str:
+        return f'<div class="scroll" tabindex="0"><table class="{look}">{head}{"".join(some)}</table></div>'
+
+    left = rows[MOST_ROWS:]
+    if len(left) < 3:  # as many lines as the fold itself takes
+        return table(rows)
+    return f"{table(rows[:MOST_ROWS])}<details><summary>{len(left)} other {what}</summary>{table(left)}</details>"
+
+
+def table_html(rows: list[list[str]], head: Sequence[str] = (), numbers: int = 0, what: str = "") -> str:
+    """A table of texts, which are escaped; numbers: so many columns, the last, hold numbers.
+
+    what: rows after the first MOST_ROWS fold away, and are called so.  A second line of a text is small.
+    """
 
     def row(cells: Sequence[str], tag: str) -> str:
         looks = [""] * (len(cells) - numbers) + [' class="number"'] * numbers
-        return f"<tr>{''.join(f'<{tag}{look}>{escape(x)}</{tag}>' for x, look in zip(cells, looks, strict=True))}</tr>"
+        each = zip(cells, looks, strict=True)
+        return f"<tr>{''.join(f'<{tag}{look}>{_two_lines(x)}</{tag}>' for x, look in each)}</tr>"
 
-    lines = row(head, "th") * bool(head) + "".join(row(cells, "td") for cells in rows)
-    return f'<div class="scroll" tabindex="0"><table>{lines}</table></div>'
+    first, lines = row(head, "th") * bool(head), [row(cells, "td") for cells in rows]
+    if what:
+        return folded(lines, first, "rows", what)
+    return f'<div class="scroll" tabindex="0"><table>{first}{"".join(lines)}</table></div>'
+
+
+def _two_lines(text: str) -> str:
+    """A text, escaped, with what stands in its second line small."""
+    first, _, second = text.partition("\n")
+    return escape(first) + f'<br><span class="at">{escape(second)}</span>' * bool(second)
 
 
 def space_html(scene: dict[str, Any], poster: str, moves: bool, notice: str, caption: str) -> str:
@@ -186,7 +217,8 @@ def figure_html(k: int, panel: Panel, before: int = 1) -> str:
     """A graph with its title and caption; k: its place in the index; before: figures before that of place 0, such as
     the cable in space."""
     title = panel.title[:1].upper() + panel.title[1:]
-    return f"<figure><h3>{escape(title)}</h3>{plot_html(k, panel)}{caption_html(k, panel, before)}</figure>"
+    wide = ' class="wide"' * (panel.aspect is not None)
+    return f"<figure{wide}><h3>{escape(title)}</h3>{plot_html(k, panel)}{caption_html(k, panel, before)}</figure>"
 
 
 def caption_html(k: int, panel: Panel, before: int = 1) -> str:
@@ -199,7 +231,8 @@ def plot_html(k: int, panel: Panel) -> str:
     """The place of a graph, with its still drawing; a map is taller, with its colour bars above."""
     maps = [item for item in panel.items if isinstance(item, Map)]
     bars = f'<div class="legend">{"".join(map(_bar, maps))}</div>' if maps else ""
-    place = f'class="plot{" tall" * bool(maps)}" id="plot-{panel.key}" data-figure="{k}"'
+    look = " tall" * bool(maps) + " shape" * (panel.aspect is not None)
+    place = f'class="plot{look}" id="plot-{panel.key}" data-figure="{k}"'
     return f"{bars}<div {place}>{draw_graph(panel)}</div>"
 
 

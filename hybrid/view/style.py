@@ -7,6 +7,7 @@ one colour on a whole page; grey is what was earlier; sand and water are pale, b
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 INK, GREY, ALARM = "#222222", "#6E6E6E", "#C00000"
 KIND_COLOURS = {
@@ -60,6 +61,7 @@ def prefix(unit: str, peak: float) -> tuple[float, str]:
         return (1e3, "mm") if ZERO < peak < 0.01 else (1e-3, "km") if peak >= 1e4 else (1.0, "m")
     if unit.replace("/", " ").split(" ")[0] in ("N", "J", "W", "Pa") and peak > ZERO:
         power = min(max(math.floor(math.log10(peak) / 3.0 + 1e-12), -4), 4)
+        power += power == -1 and " " in unit  # of "mN m" nobody knows what the first letter is
         return 10.0 ** (-3 * power), ("p", "n", "µ", "m", "", "k", "M", "G", "T")[power + 4] + unit
     return 1.0, unit or "–"
 
@@ -68,3 +70,13 @@ def short(value: float, digits: int) -> str:
     """So many digits, without an exponent where a person would write none."""
     rounded = float(f"{value:.{digits}g}")
     return f"{rounded:.9g}" if 1e-4 <= abs(rounded) < 1e6 or rounded == 0.0 else f"{rounded:g}"
+
+
+def distinct_texts(values: Iterable[float], digits: int = 3) -> list[str]:
+    """Numbers with so many digits, or as many more as it takes until different ones look different."""
+    numbers = [float(x) for x in values]
+    for n in range(digits, 10):
+        texts = [short(x, n) for x in numbers]
+        if len(set(texts)) == len(set(numbers)):
+            break
+    return texts if numbers else []

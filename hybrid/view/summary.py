@@ -7,7 +7,7 @@ values where a quantity jumps, whatever a page later draws of them.  A fact has 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from hybrid.errors import LIMIT_EVENTS, is_of_the_run
 from hybrid.store.code_checks import clauses_of
 from hybrid.store.envelope import BROKEN, GROUP, NOT_VERIFIED, NOTHING, SCALE, has_envelope, not_verified
 from hybrid.store.hockling import formation_ratio, formation_tension
+from hybrid.store.partners import ITSELF, partner_of
 from hybrid.store.reader import Result
 from hybrid.store.records import UNKNOWN, not_converged_in
 from hybrid.store.verdicts import accuracy_text, asked_accuracy, doubt_of, quantity_limits, section_limits
@@ -75,8 +76,10 @@ def amount(value: float, unit: str, digits: int = 4) -> str:
     return f"{short(value * factor, digits)} {name}"
 
 
-def place(result: Result, s: float) -> str:
-    """An arc length in words: "at the start", "at the end (s = 250 m)", "at s = 85 m"."""
+def place(result: Result, s: float, over: tuple[float, float] | None = None) -> str:
+    """An arc length in words: "at the start", "at the end (s = 250 m)", "at s = 85 m"; over: a range of them, m."""
+    if over is not None:
+        return f"from s = {short(over[0], 4)} to {short(over[1], 5)} m"
     length = length_of(result)
     if s <= 1e-9 * length:
         return f"at the start (s = {short(s, 4)} m)"
@@ -134,7 +137,7 @@ def _warnings(result: Result) -> list[Fact]:
 def _tension(result: Result) -> Fact:
     found = worst(result, "tension")
     doubt = _doubt(result, "tension", found)
-    text = f"{amount(found.value, 'N')} {place(result, found.s)}{moment(result, found.t)}{doubt}."
+    text = f"{amount(found.value, 'N')} {place(result, found.s, found.over)}{moment(result, found.t)}{doubt}."
     values: dict[str, Any] = {"tension": found.value, "headline": f"{amount(found.value, 'N')}{doubt}"}
     for end in ("start", "end"):  # every step is logged there, outputs are farther apart
         if f"steps/end_force_{end}" in result and len(result["steps/t"]):
@@ -254,7 +257,7 @@ def _slack(result: Result) -> Fact:
     length, outputs = _compressed(along_line, zero)
     values: dict[str, Any] = {"tension": found.value, "outputs": outputs, "length": length}
     values["headline"] = f"{amount(found.value, 'N')}{_doubt(result, 'tension', found)}" if found.value else "0 N"
-    there, weight = f"{place(result, found.s)}{moment(result, found.t)}", "plain"
+    there, weight = f"{place(result, found.s, found.over)}{moment(result, found.t)}", "plain"
     if outputs:
         part = f"at {outputs} of {len(result.times)} outputs" if len(result.times) > 1 else "at rest"
         text = f"{amount(found.value, 'N')} {there}: the cable is slack or compressed {part}"
@@ -274,25 +277,41 @@ def _slack(result: Result) -> Fact:
 
 def _limits(result: Result) -> Fact:
     """All limits of the sections in one table."""
-    keys = "limit", "value", "allowed", "broken", "s", "t", "verdict", "why", "remedy"
-    title, stresses = (
-        "Limits of the sections",
-        [x for x in quantity_limits(result) if x.limit in ("max_stress", "capacity", "code")],
-    )
-    rows = [x._asdict() for x in section_limits(result)]
-    for x in stresses:
-        used = None if x.verdict == NOT_VERIFIED else x.value / x.allowed
-        rows.append({key: getattr(x, key) for key in keys} | {"used": used})
+    rows = _limit_rows(result)
     if not rows:
         none = (
             "None given: min_bend_radius, max_tension, min_tension, max_contact_force, capacity, code, or max_stress "
             "of the pipe, of a section."
         )
-        return Fact("limits", title, none, "absent")
+        return Fact("limits", "Limits of the sections", none, "absent")
+    return _limits_fact("Limits of the sections", rows, [result])
+
+
+def limits_of_lines(lines: Mapping[str, Result]) -> list[Fact]:
+    """The same of several lines, in one table with what is broken first; empty: none has any."""
+    rows = [{"line": name} | row for name, line in lines.items() if len(line.times) for row in _limit_rows(line)]
+    rows.sort(key=lambda x: (x["broken"], x["verdict"] == NOT_VERIFIED, x["used"] or 0.0), reverse=True)
+    return [_limits_fact("Limits of the lines", rows, [*lines.values()])] * bool(rows)
+
+
+def _limit_rows(result: Result) -> list[dict[str, Any]]:
+    keys = "limit", "value", "allowed", "broken", "s", "t", "verdict", "why", "remedy"
+    rows = [x._asdict() for x in section_limits(result)]
+    for x in quantity_limits(result):
+        if x.limit in ("max_stress", "capacity", "code"):
+            used = None if x.verdict == NOT_VERIFIED else x.value / x.allowed
+            rows.append({key: getattr(x, key) for key in keys} | {"used": used})
+    return rows
+
+
+def _limits_fact(title: str, rows: list[dict[str, Any]], results: list[Result]) -> Fact:
+    """The table in words: how many are broken or not verified, and why."""
     counts = [(sum(x["verdict"] == word for x in rows), word) for word in (BROKEN, NOT_VERIFIED)]
     text = ", ".join(f"{n} of {len(rows)} {word}" for n, word in counts if n) or "All are within"
-    text += ", over every accepted step and output." if has_envelope(result) else ", at the outputs that were saved."
-    text += f" By {clauses}." if (clauses := clauses_of(result)) else ""
+    every_step = all(has_envelope(x) for x in results)
+    text += ", over every accepted step and output." if every_step else ", at the outputs that were saved."
+    by = dict.fromkeys(clauses for x in results if (clauses := clauses_of(x)))
+    text += f" By {'; '.join(by)}." if by else ""
     why = dict.fromkeys(f"{not_verified(x['why'], x['remedy'])}." for x in rows if x["verdict"] == NOT_VERIFIED)
     return Fact("limits", title, " ".join([text, *(x[:1].upper() + x[1:] for x in why)]), "plain", {"limits": rows})
 
@@ -438,16 +457,18 @@ def _seabed(result: Result) -> Fact:
 
 def _pressed(result: Result, name: str, key: str, partner: str) -> Fact:
     """The largest force per length of what the line touches, by its quantity in the envelope."""
-    force, title = np.nan_to_num(result[f"{GROUP}/{name}_max"]), f"On {partner}"
+    force = np.nan_to_num(result[f"{GROUP}/{name}_max"])
     k = int(force.argmax())
     if not force[k] > 0.0:
-        return Fact(key, title, f"The cable never touches {partner}.", "plain", {"force": 0.0})
+        return Fact(key, f"On {partner}", f"The cable never touches {partner}.", "plain", {"force": 0.0})
     s, t = float(result[SCALE][k]), float(result[f"{GROUP}/{name}_t_max"][k])
+    named = partner_of(result, name, t)
+    partner = partner if named in (None, ITSELF) else named
     text = f"It presses on {partner} with at most {amount(force[k], 'N/m', 3)} {place(result, s)}{moment(result, t)}."
     if key == "obstacles":
         for x in result.contacts():
             text += f" At an output {x.partner} bears at most {amount(x.force, 'N', 3)}{moment(result, x.t_force)}."
-    return Fact(key, title, text, "plain", {"force": float(force[k])}, t, s)
+    return Fact(key, f"On {partner}", text, "plain", {"force": float(force[k])}, t, s)
 
 
 def _errors(result: Result) -> Fact:

@@ -14,6 +14,7 @@ from hybrid.view.style import GREY
 WIDTH = 460.0  # of a drawing, px
 _TALLEST, _STRIP, _FOOT = 280.0, 26.0, 24.0  # of a panel with an aspect, of one without, and of the texts below one
 _EDGE = 2.0  # left and right
+_LETTER = 7.0  # width of a letter, px, at most
 _PIXELS = 1.2  # for each point of a line's width
 
 
@@ -83,9 +84,11 @@ def _item(item: Item, at: _Place) -> str:
 
 
 def _names(panel: Panel, y: float) -> str:
-    parts, x = "", WIDTH - _EDGE
+    parts, x, caption = "", WIDTH - _EDGE, _LETTER * len(panel.caption)
     names = {item.label: item.colour for item in panel.items if isinstance(item, Line | Box) and item.label}
+    if x - sum(_LETTER * len(name) + 8.0 for name in names) < caption:  # no room beside it
+        return ""
     for name, colour in reversed(names.items()):
         parts += f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="end" fill="{colour}">{escape(name)}</text>'
-        x -= 7.0 * len(name) + 8.0
+        x -= _LETTER * len(name) + 8.0
     return parts

@@ -16,12 +16,13 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.view.decimate import outline
-from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule, Text
-from hybrid.view.style import GREY, INK
+from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule, Text
+from hybrid.view.style import GREY, INK, SMALL
 
 # px; type is readable where a page shows it half as wide as a screen, on a phone and in a column of A4.
 WIDTH, HEIGHT = 440.0, 264.0
 MAP_WIDTH, MAP_HEIGHT = 620.0, 300.0  # a map has a row of its own
+SHAPE_HEIGHT = 420.0  # px, of a shape, which has one, too
 _TYPE, _TICK_TYPE = 12, 11
 _LETTER = 0.56  # width of a letter on average, of the size of the type
 _TOP, _RIGHT, _FOOT, _ROW = 8.0, 10.0, 36.0, 16.0
@@ -55,9 +56,8 @@ def draw_graph(panel: Panel) -> str:
     """The panel with axes and legend as an SVG element of the class `still`.  ValueError: an axis is logarithmic."""
     if panel.x.log or panel.y.log:
         raise ValueError(f"{panel.key}: a page has no logarithmic axes")
-    (left, right), (low, high) = panel.limits()
-    is_map = any(isinstance(item, Map) for item in panel.items)
-    width, height = (MAP_WIDTH, MAP_HEIGHT) if is_map else (WIDTH, HEIGHT)
+    (left, right), (low, high) = _of_one_scale(panel)
+    width, height = _size(panel)
     across, up = ticks_of(panel.x, left, right, _TICKS_ACROSS), ticks_of(panel.y, low, high, _TICKS_UP)
     entries = _legend(panel.items, width)
     rows = max((row for row, *_ in entries), default=-1) + 1
@@ -82,13 +82,37 @@ def draw_graph(panel: Panel) -> str:
     )
 
 
+def _size(panel: Panel) -> tuple[float, float]:
+    """Of a drawing, px: a map has a row of its own, and so has a shape."""
+    if panel.aspect is not None:
+        return MAP_WIDTH, SHAPE_HEIGHT
+    return (MAP_WIDTH, MAP_HEIGHT) if any(isinstance(x, Map) for x in panel.items) else (WIDTH, HEIGHT)
+
+
+def _of_one_scale(panel: Panel) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The limits of a panel, of which one pair is wider where both axes are to have one scale."""
+    across, up = panel.limits()
+    if panel.aspect is None:
+        return across, up
+    width, height = _size(panel)
+    wide = (width - 60.0) / (height - 70.0)  # of the axes, about: beside numbers and legend
+    ratio = (across[1] - across[0]) / (panel.aspect * (up[1] - up[0])) / wide
+    return _wider(across, max(1.0 / ratio, 1.0)), _wider(up, max(ratio, 1.0))
+
+
+def _wider(limits: tuple[float, float], factor: float) -> tuple[float, float]:
+    middle, half = 0.5 * (limits[0] + limits[1]), 0.5 * factor * (limits[1] - limits[0])
+    return middle - half, middle + half
+
+
 # --- axes -------------------------------------------------------------------------------------------
 
 
 def ticks_of(axis: Axis, low: float, high: float, most: int) -> list[tuple[float, str]]:
     """Round numbers on an axis, at most so many, with their texts; those of the axis where it has its own."""
     if axis.ticks:
-        return [(x, f"{x:g}") for x in axis.ticks if low <= x <= high]
+        names = axis.names or [f"{x:g}" for x in axis.ticks]
+        return [(x, name) for x, name in zip(axis.ticks, names, strict=True) if low <= x <= high]
     rough = (high - low) / most
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(k * power for k in (1.0, 2.0, 5.0, 10.0) if k * power >= rough * (1.0 - 1e-9))
@@ -115,7 +139,7 @@ def _axis(
         y = float(place.y(value))
         yield f'<path d="M{a:.1f} {y:.1f}H{b:.1f}" stroke="{_GRID}"/>' * panel.grid
         yield f'<path d="M{a - 4:.1f} {y:.1f}h4" stroke="{_FRAME}"/>'
-        yield f'<text x="{a - 7:.1f}" y="{y + 4:.1f}" text-anchor="end">{text}</text>'
+        yield f'<text x="{a - 7:.1f}" y="{y + 4:.1f}" text-anchor="end">{escape(text)}</text>'
     yield f'<path d="M{a:.1f} {top:g}V{bottom:.1f}H{b:.1f}" fill="none" stroke="{_FRAME}"/>'
     middle = 0.5 * (top + bottom)
     look = f'font-size="{_TYPE}" text-anchor="middle"'
@@ -142,6 +166,9 @@ def _drawn(item: Item, at: _Place) -> str:
             x = np.append(item.x[known], item.x[known][::-1])
             y = np.append(item.low[known], item.high[known][::-1])
             return f'<path d="{_path(at.x(x), at.y(y))}" fill="{item.colour}" fill-opacity="{item.opacity:g}"/>'
+        case Area():
+            paths = (_path(at.x(x[:, 0]), at.y(x[:, 1])) for x in item.outlines)
+            return f'<path d="{"".join(f"{path}Z" for path in paths if path)}" fill="{item.fill}"/>'
         case Box():
             a, b = (at.left, at.right) if item.x is None else (float(at.x(x)) for x in item.x)
             c, d = (at.bottom, at.top) if item.y is None else (float(at.y(y)) for y in item.y)
@@ -159,7 +186,7 @@ def _drawn(item: Item, at: _Place) -> str:
             up = at.bottom - item.y * (at.bottom - at.top) if "y" in item.parts else float(at.y(item.y))
             up += _TICK_TYPE * (item.up == "top") - item.offset[1]
             anchor = "end" if item.across == "right" else "start"
-            look = f'text-anchor="{anchor}" fill="{item.colour}"'
+            look = f'text-anchor="{anchor}" fill="{item.colour}" font-size="{_TICK_TYPE * item.size / SMALL:.3g}"'
             return f'<text x="{across + item.offset[0]:.1f}" y="{up:.1f}" {look}>{escape(item.text)}</text>'
     raise TypeError(f"a page does not draw {type(item).__name__}")
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.store.envelope import extreme
+from hybrid.store.partners import partner_of
 from hybrid.store.reader import Result
 from hybrid.view import report_parts as parts
 from hybrid.view.decimate import Kept, Store, even, kept, script_json
@@ -17,14 +18,13 @@ from hybrid.view.plotly_backend import colour_scale, figure_of
 from hybrid.view.save import REPORT_MARK
 from hybrid.view.scenery import box_and_planes, speed_of
 from hybrid.view.style import BODY, INK, prefix, short
-from hybrid.view.summary import Fact, amount, facts_of, status_facts
+from hybrid.view.summary import Fact, amount, facts_of, limits_of_lines, status_facts
 from hybrid.view.svg_backend import draw
 from hybrid.view.system_views import (
     AllLines,
     arms_of,
     bodies_of,
     clearest_view,
-    colours,
     facts_line,
     fairleads_of,
     largest_tensions,
@@ -32,27 +32,28 @@ from hybrid.view.system_views import (
     points_of,
     rotations,
     shape,
+    tension_ranges,
+    views_of_lines,
 )
 from hybrid.view.worst import is_without_moment
 from hybrid.view.zones import COLOURS
 
 # Numbers of the moving picture, all lines together: frames times points, as of one cable.
 MOST_VALUES = 80_000
-# Lines whose statistics are on the page: of more the first ones, `hybrid stats --line` has all.
-MOST_STATISTICS = 20
 # Facts of a line that are alarms where a limit of its sections is broken.
 LIMITED = ("tension", "bend", "slack", "quantity")
 # Extremes of each line in the table: quantity, bound, heading, unit.
 EXTREMES = (
     ("tension", "max", "largest tension", "N"), ("tension", "min", "smallest tension", "N"),
     ("curvature", "max", "largest curvature", "1/m"), ("bending_moment", "max", "largest bending moment", "N m"),
+    ("self_contact", "max", "contact with lines", "N/m"),
 )  # fmt: skip
 
 
 def html(result: Result, modes: str = "") -> str:
     """The page as text; modes: the section of `modes_page`."""
-    store, facts = Store(), facts_of_all(result)
-    every = AllLines(result)
+    store, every = Store(), AllLines(result)
+    facts = facts_of_all(result, every)
     several = every.outputs > 1
     shown = _kept(every)
     scene = scenery(result, every, shown, store) if every.outputs else None
@@ -64,10 +65,10 @@ def html(result: Result, modes: str = "") -> str:
         "title": escape(result.title or "(no title)"),
         "subtitle": escape(_subtitle(result, every)),
         "verdict": parts.verdict_html(facts, several),
-        "facts": parts.facts_html([f for f in facts if f.weight != "alarm"], several) + _tables(result),
+        "facts": _facts([f for f in facts if f.weight != "alarm"], every) + _tables(result, every),
         "cable": _space(result, every, scene, shown) if scene else "",
-        "figures": _graphs(numbered) + modes,
-        "statistics": _statistics(result),
+        "figures": _graphs(numbered, every) + modes,
+        "statistics": _statistics(result, every),
         "events": parts.events_html(result, several),
         "energy": "",
         "settings": parts.settings_html(result),
@@ -80,26 +81,44 @@ def html(result: Result, modes: str = "") -> str:
     return parts.filled_page(made, store)
 
 
-def _statistics(result: Result) -> str:
-    """Statistics of what the scene asks for, and of every line."""
+def _statistics(result: Result, every: AllLines) -> str:
+    """Statistics of what the scene asks for, and of every line; of many the worst."""
     found = parts.statistics_html(result)
-    for name, line in [*result.lines.items()][:MOST_STATISTICS]:
+    for name in every.named:
+        line = every.lines[name]
         own = parts.statistics_html(line).replace('<section id="statistics">', "<section>")
         found += own.replace("<summary>Statistics of", f"<summary>Line {escape(name)}: statistics of")
-    return found
+    return found + _of_others(every, "hybrid stats") * bool(found)
 
 
-def facts_of_all(result: Result) -> list[Fact]:
+def _of_others(every: AllLines, command: str) -> str:
+    """That lines are left out on the page, and which command has them; "" where none is."""
+    others = len(every.lines) - len(every.named)
+    text = f"Of the {len(every.named)} worst lines; <code>{command} --line NAME</code> has the others."
+    return f'<p class="quiet">{text}</p>' if others else ""
+
+
+def facts_of_all(result: Result, every: AllLines) -> list[Fact]:
     """What to know first: warnings with the names of lines, how the run ended, and limits of each line."""
-    facts = status_facts(result)
-    for name, line in result.lines.items():
+    facts = [*status_facts(result), *limits_of_lines({x: every.lines[x] for x in every.worst})]
+    for name in every.worst:
+        line = every.lines[name]
         for fact in facts_of(line) if len(line.times) else []:
-            if fact.key in ("limits", "errors") and fact.weight != "absent":
+            if fact.key == "errors" and fact.weight != "absent":
                 facts.append(fact._replace(title=f"{fact.title} of line {name}", key=f"{fact.key}-{name}"))
             elif fact.key in LIMITED and fact.weight == "alarm":
                 title = f"Line {name}: {fact.title[:1].lower()}{fact.title[1:]}"
                 facts.append(fact._replace(title=title, key=f"{fact.key}-{name}", values={}))
     return facts
+
+
+def _facts(facts: list[Fact], every: AllLines) -> str:
+    """Rows of the summary; errors of lines that are not among the worst fold away."""
+    several, left = every.outputs > 1, {f"errors-{x}" for x in every.worst if x not in every.named}
+    others = parts.facts_html([x for x in facts if x.key in left], several)
+    folded = f"<details><summary>Estimated errors of {len(left)} other lines</summary>{others}</details>"
+    shown = parts.facts_html([x for x in facts if x.key not in left], several)
+    return shown + folded * any(x.key in left for x in facts)
 
 
 def _subtitle(result: Result, every: AllLines) -> str:
@@ -128,26 +147,31 @@ def _kept(every: AllLines) -> dict[str, Kept]:
 
 
 def _extreme_text(line: Result, quantity: str, bound: str, unit: str) -> str:
-    """A number of the table with its place and time, or why there is none."""
+    """A number of the table with its place and time, or that there is none."""
     found = extreme(line, quantity, bound)
-    if found is None:
+    if found is None or (quantity == "bending_moment" and is_without_moment(line)):
         return "–"
-    if quantity == "bending_moment" and is_without_moment(line):
-        return "– (a catenary, which has none; model: rod computes it)"
-    return f"{amount(found.value, unit)} at s = {short(found.s, 5)} m, t = {short(found.t, 5)} s"
+    if quantity == "self_contact" and not found.value > 0.0:
+        return "–"
+    partner = f", {partner_of(line, quantity, found.t) or 'lines'}" * (quantity == "self_contact")
+    where = " to ".join(short(s, 5) for s in found.over or (found.s,))
+    return f"{amount(found.value, unit)}{partner}\ns = {where} m, t = {short(found.t, 5)} s"
 
 
-def _tables(result: Result) -> str:
+def _tables(result: Result, every: AllLines) -> str:
     """Extremes of all lines, forces at points, and where bodies were."""
-    heads = [x for x in EXTREMES if any(extreme(line, x[0], x[1]) for line in result.lines.values())]
-    rows = []
-    for name, line in result.lines.items():
-        row = [name, f"{short(float(line.attributes.get('length', line.s[-1])), 6)} m"]
-        for quantity, bound, _, unit in heads:
-            row.append(_extreme_text(line, quantity, bound, unit))
-        rows.append(row)
-    out = "<h3>Lines: extremes of all steps</h3>"
-    out += parts.table_html(rows, ["line", "length", *(x[2] for x in heads)], numbers=len(heads) + 1)
+    rows = {
+        name: [_extreme_text(line, quantity, bound, unit) for quantity, bound, _, unit in EXTREMES]
+        for name, line in every.lines.items()
+    }
+    seen = [k for k in range(len(EXTREMES)) if any(row[k] != "–" for row in rows.values())]
+    lengths = {x: f"{short(float(line.attributes.get('length', line.s[-1])), 6)} m" for x, line in every.lines.items()}
+    out = f"<h3>Lines: extremes of all steps{', the worst first' * (len(rows) > len(every.named))}</h3>"
+    head = ["line", "length", *(EXTREMES[k][2] for k in seen)]
+    shown = [[x, lengths[x], *(rows[x][k] for k in seen)] for x in every.worst]
+    out += parts.table_html(shown, head, len(seen) + 1, "lines")
+    if any(EXTREMES[k][0] == "bending_moment" and any(row[k] == "–" for row in rows.values()) for k in seen):
+        out += '<p class="quiet">A catenary has no bending moment; <code>model: rod</code> computes it.</p>'
     if len(result.times):
         out += _points(result) + _bodies(result)
     return out
@@ -157,17 +181,22 @@ def _largest(result: Result, name: str, unit: str) -> str:
     sizes = np.linalg.norm(result[name], axis=1)
     k = int(sizes.argmax())
     vector = _vector(result[name][k] * prefix(unit, float(sizes[k]))[0], 4)
-    return f"{amount(float(sizes[k]), unit)} [{vector}] at t = {short(result.times[k], 5)} s"
+    return f"{amount(float(sizes[k]), unit)}\n[{vector}], t = {short(result.times[k], 5)} s"
 
 
 def _points(result: Result) -> str:
-    rows = []
+    rows, held = [], fairleads_of(result)
     for name in points_of(result):
         at, force = result[f"points/{name}/position"], f"points/{name}/force"
-        row = [name, fairleads_of(result).get(name, ""), _vector(at[-1]), _vector(np.ptp(at, axis=0))]
-        rows.append([*row, _largest(result, force, "N") if force in result else "–"])
-    head = ["point", "on body", "last place (m)", "range of motion (m)", "largest force of its lines"]
-    return "<h3>Points</h3>" + parts.table_html(rows, head, numbers=3) + _clamped(result)
+        row = [name, held.get(name, ""), _vector(at[-1]), _vector(np.ptp(at, axis=0))]
+        size = float(np.linalg.norm(result[force], axis=1).max()) if force in result else 0.0
+        rows.append((size, [*row, _largest(result, force, "N") if force in result else "–"]))
+    if many := len(rows) > parts.MOST_ROWS + 2:
+        rows.sort(key=lambda row: -row[0])
+    shown = [row if held else [row[0], *row[2:]] for _, row in rows]
+    head = ["point", *["on body"] * bool(held), "last place (m)", "range of motion (m)", "largest force of its lines"]
+    title = f"<h3>Points{', the largest force first' * many}</h3>"
+    return title + parts.table_html(shown, head, 3, "points") + _clamped(result)
 
 
 def _clamped(result: Result) -> str:
@@ -216,22 +245,33 @@ def _panels(result: Result, every: AllLines, shown: dict[str, Kept]) -> dict[str
     )
     along = [
         panel._replace(key=f"{panel.key}-{name}", title=f"line {name}: {panel.title}")
-        for name, line in every.lines.items()
-        for panel in ranges(line, shown[name])
+        for name in every.named
+        for panel in ranges(every.lines[name], shown[name])
     ]
-    return {"histories": over, "ranges": along}
+    return {"lines": _of_many(result, every), "histories": over, "ranges": along}
 
 
-def _graphs(groups: dict[str, list[tuple[int, Panel]]]) -> str:
+def _of_many(result: Result, every: AllLines) -> list[Panel]:
+    """A plan with names, and the tensions of the worst lines, where there are many."""
+    if len(every.named) == len(every.lines):
+        return []
+    plans = [shape(result, every, view)._replace(key="plan") for view in views_of_lines(every) if not view.upright]
+    return [*plans, tension_ranges(every)]
+
+
+def _graphs(groups: dict[str, list[tuple[int, Panel]]], every: AllLines) -> str:
     out = ""
-    heads = {"histories": "Over time", "ranges": "Along the lines"}
-    texts = {"histories": "Click a graph to set the time.",
-             "ranges": "Lowest, mean and highest of all outputs, and now: the time of the slider."}  # fmt: skip
+    heads = {
+        "lines": ("All lines", "The worst lines are in colour."),
+        "histories": ("Over time", "Click a graph to set the time."),
+        "ranges": ("Along the lines", "Lowest, mean and highest of all outputs, and now: the time of the slider."),
+    }
     for name, figures in groups.items():
         if figures:
             drawn = "".join(parts.figure_html(k, panel) for k, panel in figures)
-            out += f'<section id="{name}"><h2>{heads[name]}</h2><p class="quiet">{texts[name]}</p>'
-            out += f'<div class="grid">{drawn}</div></section>'
+            title, text = heads[name]
+            out += f'<section id="{name}"><h2>{title}</h2><p class="quiet">{text}</p>'
+            out += f'<div class="grid">{drawn}</div>{_of_others(every, "hybrid plot") * (name == "ranges")}</section>'
     return out
 
 
@@ -245,8 +285,8 @@ def scenery(result: Result, every: AllLines, shown: dict[str, Kept], store: Stor
     factors = np.maximum(0.45 * np.ptp(box, axis=0).max() / np.ptp(box, axis=0), 1.0)
     gap = np.full((len(frames), 1), np.nan)
     curves: dict[str, list[np.ndarray]] = {"x": [], "y": [], "z": [], "s": [], "tension": [], "line": []}
-    for k, (name, line) in enumerate(every.lines.items()):
-        rows = np.ix_(frames, shown[name].points)
+    for k, name in enumerate(every.colours):
+        line, rows = every.lines[name], np.ix_(frames, shown[name].points)
         for axis, at in zip("xyz", line.position[rows].transpose(2, 0, 1), strict=True):
             curves[axis] += [at, gap]
         curves["s"].append(np.append(line.s[shown[name].points], np.nan))
@@ -261,7 +301,8 @@ def scenery(result: Result, every: AllLines, shown: dict[str, Kept], store: Stor
         curves["line"].append(np.full((len(frames), arms.shape[1] + 1), len(every.lines)))
     tension = np.nan_to_num(np.concatenate(curves["tension"], axis=1))
     factor, unit = prefix("N", float(np.abs(tension).max()))
-    named = [*colours(result).items()] + [("bodies", INK)] * bool(bodies_of(result))
+    named = [(every.label(name), colour) for name, colour in every.colours.items()]
+    named += [("bodies", INK)] * bool(bodies_of(result))
     count = len(named)
     steps = [[(k + d) / count, colour] for k, (_, colour) in enumerate(named) for d in (0, 1)]
     by_line: dict[str, Any] = {
@@ -269,7 +310,7 @@ def scenery(result: Result, every: AllLines, shown: dict[str, Kept], store: Stor
         "label": "line",
         "values": store.add(np.concatenate(curves["line"], axis=1), "u1"),
     }
-    by_line |= {"scale": steps, "legend": [list(x) for x in named], "low": -0.5, "high": count - 0.5}
+    by_line |= {"scale": steps, "legend": [list(x) for x in dict.fromkeys(named)], "low": -0.5, "high": count - 0.5}
     low, high = float(tension.min() * factor), float(tension.max() * factor)
     by_tension: dict[str, Any] = {
         "key": "tension",

@@ -6,6 +6,7 @@ A panel of shapes asks the functions for one cable for its frame, with all lines
 from __future__ import annotations
 
 import json
+from functools import cached_property
 from itertools import cycle
 from typing import Any, cast
 
@@ -13,15 +14,21 @@ import numpy as np
 
 from hybrid.store.reader import Result
 from hybrid.view.along import along
-from hybrid.view.figure import Axis, Band, Item, Line, Marks, Page, Panel
+from hybrid.view.figure import Axis, Band, Item, Line, Marks, Page, Panel, Text
 from hybrid.view.headed_page import page_of
 from hybrid.view.obstacles import outlines
 from hybrid.view.panels import framed, sea
 from hybrid.view.projections import Numbers, View, aspect_of, telling_times, view_named, views_of
 from hybrid.view.style import BODY, INK, earlier_grey, prefix, short
+from hybrid.view.worst import worst, worst_first
 
 LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#000000", "#7F7F7F")
+OTHERS = "#9FB1BB"  # of lines without a colour of their own
 MOST_NAMED = 12  # lines in a legend: more would hide the picture
+WORST = 6  # of more lines: so many, the worst, have a colour and a name
+BARS = 20  # lines whose range of tension is drawn: more have no room for their names
+MOST_TEXTS = 60  # lines that are named in a plan: names of more lie on each other
+NAME_AT = (0.5, 0.35, 0.65, 0.2, 0.8)  # parts of a line at which its name may stand
 AT_REST = 1e-6  # of the longest line: steps are solved to no less, and a motion below it is round-off
 NAME_ROOM = 0.13  # of the range of a panel, for a name in its legend
 # Part of the plan of a line that a picture has to show, and of its length that is level, so that it has a plan at all.
@@ -39,6 +46,27 @@ class AllLines:
         self.times = result.times[: self.outputs]
         self.position = np.concatenate([x.position[: self.outputs] for x in self.lines.values()], axis=1)
         self.s = np.arange(self.position.shape[1], dtype=float)
+        self._result = result
+
+    @cached_property
+    def worst(self) -> list[str]:
+        """Names of lines, of many the worst first."""
+        return worst_first(self._result) if len(self.lines) > MOST_NAMED else list(self.lines)
+
+    @property
+    def named(self) -> list[str]:
+        """Names of the lines with a colour and graphs of their own: of many the worst."""
+        return self.worst if len(self.lines) <= MOST_NAMED else self.worst[:WORST]
+
+    @cached_property
+    def colours(self) -> dict[str, str]:
+        """A colour for every line, in the order of drawing; of many lines the worst have their own, and come last."""
+        others = dict.fromkeys((x for x in self.worst if x not in self.named), OTHERS)
+        return others | dict(zip(self.named, cycle(LINE_COLOURS), strict=False))
+
+    def label(self, name: str) -> str:
+        """What a line is called in a legend: by its name, or as one of those without a colour of their own."""
+        return name if name in self.named else f"{len(self.lines) - WORST} other lines"
 
     def __contains__(self, name: str) -> bool:
         return name.startswith(("seabed", "surface", "obstacles/")) and name in self._around
@@ -96,11 +124,6 @@ def _upright(angle: float) -> View:
     return View(across, np.eye(3)[2], f"horizontal, {short(np.degrees(angle), 3)}° from x", "z")
 
 
-def colours(result: Result) -> dict[str, str]:
-    """A colour for every line."""
-    return dict(zip(result.lines, cycle(LINE_COLOURS), strict=False))
-
-
 def bodies_of(result: Result) -> list[str]:
     """Names of the bodies of a result."""
     return [n.split("/")[1] for n in result.names if n.startswith("bodies/") and n.endswith("/position")]
@@ -119,15 +142,32 @@ def fairleads_of(result: Result) -> dict[str, str]:
 def shapes(result: Result, every: AllLines, view: View, output: int = -1) -> list[Item]:
     """The lines at an output, each in its colour, points and bodies with arms to their fairleads."""
     items: list[Item] = outlines(every.as_result, view, output, moving=True)
-    for k, (name, colour) in enumerate(colours(result).items()):
-        label = name if k < MOST_NAMED else ""
-        items.append(Line(*view.project(every.lines[name].position[output]), label, colour, 1.8))
+    for name, colour in every.colours.items():
+        width = 1.0 if colour == OTHERS else 1.8
+        items.append(Line(*view.project(every.lines[name].position[output]), every.label(name), colour, width))
     items += [Line(*view.project(arms_of(result, name, [output])[0]), "", INK, 0.9) for name in bodies_of(result)]
     points = np.array([result[f"points/{name}/position"][output] for name in points_of(result)])
     items.append(Marks(*view.project(points), "o", "points", size=3.5))
     for name in bodies_of(result):
         at = result[f"bodies/{name}/position"][[output]]
         items.append(Marks(*view.project(at), "s", "origins of bodies", BODY, size=8.0))
+    return items
+
+
+def names_in(every: AllLines, view: View) -> list[Item]:
+    """Names beside the lines as they are last, each at the part of its line that is farthest from other names."""
+    if len(every.lines) > MOST_TEXTS:
+        return []
+    size = float(np.ptp(every.position[-1] @ np.column_stack([view.across, view.up]), axis=0).max())
+    taken, items = np.full((1, 2), np.inf), list[Item]()
+    for name, colour in reversed(every.colours.items()):  # the worst first
+        line = np.column_stack(view.project(every.lines[name].position[-1]))
+        places = line[(np.array(NAME_AT) * (len(line) - 1)).astype(int)]
+        room = np.linalg.norm(places[:, None] - taken[None], axis=2).min(axis=1)
+        best = int((room >= min(0.08 * size, float(room.max()))).argmax())  # the first that has room
+        taken = np.vstack([taken, places[best]])
+        (x, y), ink, size_of = places[best].tolist(), INK if colour == OTHERS else colour, 5.5 + (colour != OTHERS)
+        items.append(Text(x, y, name, ink, (1.5, 1.5), size=size_of))
     return items
 
 
@@ -149,6 +189,8 @@ def shape(result: Result, every: AllLines, view: View) -> Panel:
         for line in every.lines.values():
             items.append(Line(*view.project(line.position[output]), label, earlier_grey(k, len(times)), 0.6))
     items += shapes(result, every, view)
+    if not view.upright and len(every.lines) > MOST_NAMED:
+        items += names_in(every, view)
     when = f" at t = {short(every.times[-1], 4)} s" if every.outputs > 1 else ""
     return framed(every.as_result, view, items, when)
 
@@ -157,6 +199,23 @@ def tensions(result: Result, every: AllLines, output: int | None = None) -> Pane
     """Tension along every line: the last one over the range of all times; output: that one, without ranges."""
     title = "tension along the lines" + ", and its range over all times" * (every.outputs > 1 and output is None)
     return _along_lines(result, every, "tension", "tension", "N", title, output)
+
+
+def tension_ranges(every: AllLines) -> Panel:
+    """From the smallest to the largest tension of the worst lines, one below the other."""
+    names = every.worst[:BARS]
+    found = [[worst(every.lines[x], "tension", lowest=low).value for low in (True, False)] for x in names]
+    peak = float(np.abs(found).max())
+    factor, unit = prefix("N", peak)
+    items: list[Item] = [
+        Line(factor * np.array(ends), np.full(2, -float(k)), "", every.colours[name], 3.0)
+        for k, (name, ends) in enumerate(zip(names, found, strict=True))
+    ]
+    places = tuple(-float(k) for k in range(len(names)))
+    y = Axis("", "", 0.7 - len(names), 0.7, ticks=places, names=tuple(names))
+    title = f"tension ranges, worst {len(names)} of {len(every.lines)}"
+    caption = "From the smallest to the largest of every step; the worst line is at the top."
+    return Panel("ranked", title, Axis("tension", unit, peak=peak * factor), y, items, caption=caption)
 
 
 def moments(result: Result, every: AllLines) -> Panel | None:
@@ -174,14 +233,16 @@ def _along_lines(
     peak = max(float(np.abs(line[name]).max()) for line in lines.values())
     factor, unit = prefix(unit, peak)
     items: list[Item] = []
-    for label, colour in colours(result).items():
+    for label, colour in every.colours.items():
         if label not in lines:
             continue
         found = along(lines[label], name)
         values = found.values * factor
-        if len(values) > 1 and output is None:
+        if len(values) > 1 and output is None and colour != OTHERS:
             items.append(Band(found.s, values.min(axis=0), values.max(axis=0), colour=colour, opacity=0.15))
-        items.append(Line(*found.curve(values[-1 if output is None else output]), label, colour, 1.2))
+        width = 0.6 if colour == OTHERS else 1.2
+        last = values[-1 if output is None else output]
+        items.append(Line(*found.curve(last), every.label(label), colour, width))
     return Panel(name, title, Axis("s", "m"), Axis(word, unit, peak=peak * factor), items)
 
 
@@ -190,7 +251,10 @@ def largest_tensions(result: Result, every: AllLines) -> Panel:
     found = {name: line.tension[: every.outputs].max(axis=1) for name, line in every.lines.items()}
     peak = max(float(np.abs(x).max()) for x in found.values())
     factor, unit = prefix("N", peak)
-    items: list[Item] = [Line(every.times, found[name] * factor, name, c) for name, c in colours(result).items()]
+    items: list[Item] = [
+        Line(every.times, found[name] * factor, every.label(name), colour, 0.6 if colour == OTHERS else 1.3)
+        for name, colour in every.colours.items()
+    ]
     y = Axis("tension", unit, peak=peak * factor)
     caption = "The largest along each line, at outputs; the tables have those of all steps."
     return Panel("over-time", "largest tension of each line", Axis("t", "s"), y, items, caption=caption, cursor=True)
@@ -259,14 +323,18 @@ def _least(every: AllLines) -> float:
 
 
 def _over_time(key: str, title: str, y: Axis, every: AllLines, curves: dict[str, np.ndarray]) -> Panel:
-    """Curves by name over time; room is left above them for their names."""
-    items: list[Item] = [
-        Line(every.times, x, name, c)
-        for (name, x), c in zip(list(curves.items())[:MOST_NAMED], cycle(LINE_COLOURS), strict=False)
-    ]
+    """Curves by name over time, of many those that move most; room is left above them for their names."""
+    if len(curves) > MOST_NAMED:
+        largest = sorted(curves, key=lambda name: -float(np.ptp(curves[name])))
+        others = f"{len(curves) - WORST} that move less"
+        items: list[Item] = [Line(every.times, curves[name], others, OTHERS, 0.6) for name in largest[WORST:]]
+        curves = {name: curves[name] for name in largest[:WORST]}
+    else:
+        items = []
+    items += [Line(every.times, x, name, c) for (name, x), c in zip(curves.items(), cycle(LINE_COLOURS), strict=False)]
     if y.low is None:
         low, high = min(float(x.min()) for x in curves.values()), max(float(x.max()) for x in curves.values())
-        room = (0.14 + NAME_ROOM * min(len(items), 5)) * (high - low)
+        room = (0.14 + NAME_ROOM * min(len(curves), 5)) * (high - low)
         y = y._replace(low=low - 0.1 * (high - low), high=high + room)
     return Panel(key, title, Axis("t", "s"), y, items, legend=True, cursor=True)
 
@@ -289,11 +357,14 @@ def page(result: Result) -> Page:
     views = views_of_lines(every)
     names = ["s", "S"][: len(views)]
     panels = {name: shape(result, every, view) for name, view in zip(names, views, strict=True)}
-    panels["p"] = tensions(result, every)
+    many = len(every.named) < len(every.lines)
+    panels["p"] = tension_ranges(every) if many else tensions(result, every)
     if every.outputs > 1:
         panels["h"] = largest_tensions(result, every)
         moved = sorted([*_shifts(result, every), *_turns(result, every)], key=lambda x: -x[0])
         panels |= dict(zip("mn", [panel for _, panel in moved], strict=False))
+    if many:
+        return _page_of_many(result, every, views, panels)
     if (bent := moments(result, every)) is not None:
         panels["b"] = bent
     below = [name for name in "pbhmn" if name in panels][:4]
@@ -310,6 +381,19 @@ def page(result: Result) -> Page:
     )  # fmt: skip
 
 
+def _page_of_many(result: Result, every: AllLines, views: list[View], panels: dict[str, Panel]) -> Page:
+    """The page of more lines than a legend names: a large plan with their names beside a list of the worst."""
+    plan = next((name for name, view in zip(("s", "S"), views, strict=False) if not view.upright), "s")
+    others = [name for name in ("s", "S", "h", "m", "n") if name in panels and name != plan]
+    rows = [[plan, plan, "p"]] + [[name] * 3 for name in others[:1]]
+    rows += [[name, name, name] for name in others[1:3]]
+    shown = {x for row in rows for x in row}
+    return page_of(
+        result, facts_line(result, every), panels={x: panel for x, panel in panels.items() if x in shown},
+        mosaic=rows, heights=[3.2, *[1.0] * (len(rows) - 1)], size=(8.0, 10.0), legend=["s"],
+    )  # fmt: skip
+
+
 Moving = Any
 
 
@@ -318,7 +402,7 @@ def film_page(result: Result, factor: float) -> tuple[Page, Moving]:
     every = AllLines(result)
     views = dict(zip(("shape", "second"), views_of_lines(every), strict=False))
     none = np.zeros(0)
-    legend: list[Item] = [Line(none, none, x, c, 1.8) for x, c in list(colours(result).items())[:MOST_NAMED]]
+    legend: list[Item] = [Line(none, none, every.label(x), c, 1.8) for x, c in every.colours.items()]
     panels: dict[str, Panel] = {}
     for name, view in views.items():
         first: list[Item] = [

@@ -20,6 +20,7 @@ from hybrid.view.figure import Area, Axis, Band, Line, Panel, Text
 from hybrid.view.matplotlib_backend import draw_panel, new_axes
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.svg_backend import draw
+from hybrid.view.svg_graph import draw_graph
 
 EVENTS = [(5.5, 40.0, 60.0, "split", "bend <b>1.05</b> > 1"), (7.0, 0.0, 100.0, "snap", "a blow")]
 
@@ -128,10 +129,21 @@ def test_a_name_at_the_edge_of_a_small_drawing_is_not_cut(at: float, up: str) ->
 
 def test_a_back_end_says_what_it_cannot_draw() -> None:
     unit = Axis("", "", 0.0, 1.0)
-    with pytest.raises(TypeError, match="Area"):
-        figure_of(Panel("p", "p", unit, unit, [Area(np.zeros((1, 3, 2)), "red")]), Store())
+    with pytest.raises(TypeError, match="str"):
+        figure_of(Panel("p", "p", unit, unit, ["no item"]), Store())  # type: ignore[list-item]
     with pytest.raises(TypeError, match="Band"):
         draw([Panel("p", "p", unit, unit, [Band(np.zeros(2), np.zeros(2), np.ones(2))])])
+
+
+def test_a_plan_on_a_page_has_one_scale_and_what_is_around() -> None:
+    """An obstacle is an area, and a circle of lines stays one: 100 m by 10 m in a drawing of three to two."""
+    shape = Area(np.array([[[0.0, 0.0], [10.0, 0.0], [10.0, 5.0]]]), "#D9D4CF", "obstacle")
+    panel = Panel("plan", "plan", Axis("x", "m", 0.0, 100.0), Axis("y", "m", 0.0, 10.0), [shape], aspect=1.0)
+    (trace,) = figure_of(panel, Store())["data"]
+    assert trace["fill"] == "toself" and trace["fillcolor"] == "#D9D4CF"
+    (points,) = re.findall(r'<path d="M([^"]*)Z" fill="#D9D4CF"', draw_graph(panel))
+    (x0, y0), (x1, y1), (x2, y2) = (map(float, at.split()) for at in points.split("L"))
+    assert y0 == y1 and x1 == x2 and (x1 - x0) / (y1 - y2) == pytest.approx(2.0, rel=0.15)
 
 
 def test_libraries_that_draw_are_known_to_their_back_end_only() -> None:

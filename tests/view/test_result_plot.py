@@ -25,7 +25,9 @@ from hybrid.view import panels
 from hybrid.view import plots as plot
 from hybrid.view import projections as views
 from hybrid.view import style as look
-from hybrid.view.matplotlib_backend import draw_panel
+from hybrid.view.decimate import stretches_of
+from hybrid.view.figure import Axis, Line, Panel
+from hybrid.view.matplotlib_backend import draw_panel, new_axes
 
 MIXED = [("catenary", 0.0, 75.0), ("rod", 75.0, 100.0)]
 
@@ -676,3 +678,25 @@ def test_a_picture_that_is_not_to_scale_says_whether_a_line_crosses_itself() -> 
         said = views.not_to_scale(view, Drawn(x, z))  # type: ignore[arg-type]
         assert text in said and bool(said) is bool(text), (text, said)
     assert "turns back" not in views.not_to_scale(view, Drawn(100.0 * s, -3000.0 * s))  # type: ignore[arg-type]
+
+
+def test_a_history_of_hours_is_drawn_as_its_mean_and_range() -> None:
+    """10 800 outputs of a wave of 10 s are a block of ink: curves below it were hidden."""
+    t = np.arange(10_800.0)
+    found = stretches_of(t, 5.0 + 2.0 * np.sin(2.0 * np.pi * t / 10.0))
+    assert found is not None and len(found.x) == 150
+    assert np.abs(found.mean - 5.0).max() < 0.1 and found.low.max() < 3.2 and found.high.min() > 6.8
+    assert stretches_of(t, np.sin(2.0 * np.pi * t / 500.0)) is None  # as many outputs, and few swings
+    assert stretches_of(t[:500], np.sin(t[:500])) is None
+    axes = new_axes()
+    draw_panel(
+        Panel("h", "h", Axis("t", "s"), Axis("T", "N"), [Line(t, 5.0 + np.sin(t), "s = 0 m")]), axes, legend=True
+    )
+    (line,) = axes.lines
+    assert len(np.asarray(line.get_xdata())) == 151 and line.get_label() == "s = 0 m"
+    assert [x.get_text() for x in axes.texts] == ["mean and range of each 72 s"]
+
+
+def test_times_of_earlier_shapes_look_different() -> None:
+    assert look.distinct_texts([0.0, 4949.6, 4952.0, 10_800.0]) == ["0", "4950", "4952", "10800"]
+    assert look.distinct_texts([1.0, 2.5]) == ["1", "2.5"] and look.distinct_texts([]) == []

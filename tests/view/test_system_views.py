@@ -17,11 +17,13 @@ import hybrid
 import hybrid.cli.commands  # registers them
 from hybrid.cli.app import app
 from hybrid.cli.console import Console
+from hybrid.cli.plan_tables import system_plan_lines
 from hybrid.cli.system_commands import ended
 from hybrid.errors import ResultError
+from hybrid.scene.read import as_scene_or_system
 from hybrid.store.records import Zone
 from hybrid.view.animation import animate
-from hybrid.view.figure import Line, Marks
+from hybrid.view.figure import Line, Marks, Text
 from hybrid.view.system_report import _extreme_text, html
 from hybrid.view.system_views import (
     AllLines,
@@ -160,9 +162,9 @@ class Extremes(dict[str, Any]):
 def test_a_line_that_was_catenary_throughout_has_no_moment() -> None:
     """0 N m beside a curvature would say that it does not bend; a rod without moment, or with one, shows its number."""
     ask = "bending_moment", "max", "N m"
-    assert "a catenary, which has none" in _extreme_text(Extremes("catenary", 0.0), *ask)  # type: ignore[arg-type]
-    assert _extreme_text(Extremes("rod", 0.0), *ask).startswith("0 N m at s")  # type: ignore[arg-type]
-    assert _extreme_text(Extremes("catenary", 2.0), *ask).startswith("2 N m at s")  # type: ignore[arg-type]
+    assert _extreme_text(Extremes("catenary", 0.0), *ask) == "–"  # type: ignore[arg-type]
+    assert _extreme_text(Extremes("rod", 0.0), *ask).startswith("0 N m\ns")  # type: ignore[arg-type]
+    assert _extreme_text(Extremes("catenary", 2.0), *ask).startswith("2 N m\ns")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -314,3 +316,72 @@ def test_a_page_of_an_equilibrium_of_catenaries_can_be_drawn() -> None:
     with hybrid.static({"points": points, "lines": lines}) as result:
         made = page(result)
     assert made.mosaic[0] == ["s", "S"] and {len(row) for row in made.mosaic} == {2}
+
+
+# ---- many lines -----------------------------------------------------------------------------------
+
+
+def fan() -> dict[str, Any]:
+    """Fourteen legs, longer from one to the next, of which the last but one breaks its limit."""
+    points: dict[str, Any] = {"top": {"position": [0, 0, 0]}}
+    lines: dict[str, Any] = {}
+    for k in range(14):
+        a, far = 0.4 * k, 50.0 + 5.0 * k
+        points[f"a{k}"] = {"position": [far * np.cos(a), far * np.sin(a), -20]}
+        section = {"length": 1.12 * far, "mass": 5, "diameter": 0.05, "axial_stiffness": 1e7, "max_tension": 1e4}
+        section |= {"max_tension": 700.0} if k == 12 else {}
+        lines[f"leg{k}"] = {"start": "top", "end": f"a{k}", "sections": [section], "mesh": {"cells": 8}}
+        lines[f"leg{k}"]["model"] = "catenary"
+    return {"points": points, "lines": lines, "time": {"duration": 0.2, "step": 0.1}}
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    target = tmp_path_factory.mktemp("many") / "fan.h5"
+    hybrid.run(fan(), target).close()
+    return target
+
+
+def test_of_many_lines_the_worst_come_first_and_all_are_named_in_the_plan(many: Path) -> None:
+    drawn = page(hybrid.open(many))
+    plan = drawn.panels["S"]
+    assert plan.x.name == "x" and {x.text for x in plan.items if isinstance(x, Text)} == set(fan()["lines"])
+    assert drawn.panels["p"].y.names[:3] == ("leg12", "leg13", "leg11")  # a broken limit, then the largest tensions
+    for name in "Sh":
+        labels = [x.label for x in drawn.panels[name].items if isinstance(x, Line) and "shapes" not in x.label]
+        assert list(dict.fromkeys(labels)) == ["8 other lines", "leg12", "leg13", "leg11", "leg10", "leg9", "leg8"]
+
+
+def test_a_report_of_many_lines_folds_all_but_the_worst(many: Path) -> None:
+    text = html(hybrid.open(many))
+    table = text.split("<h3>Lines: extremes of all steps, the worst first</h3>")[1].split("<h3>")[0]
+    shown, folded = table.split("<summary>4 other lines</summary>")
+    assert re.findall(r"<tr><td>(leg\d+)</td>", shown)[:2] == ["leg12", "leg13"] and "<td>leg1</td>" in folded
+    limits = text.split("<h3>Limits of the lines</h3>")[1].split("<h3>")[0]
+    assert re.findall(r"<td>(leg\d+)</td><td>max_tension</td>", limits)[0] == "leg12" and len(limits.split("leg1")) > 2
+    assert text.count("<h3>Line leg12: tension</h3>") == 1 and "<h3>Line leg1: tension</h3>" not in text
+    assert "has the others" in text
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+def test_the_table_of_many_lines_fits(
+    many: Path, columns: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    ended(Console(False, False), hybrid.open(many), many, None, "ended")
+    said = capsys.readouterr().out.splitlines()
+    rows = [x.split() for x in said if x.startswith("leg")]
+    assert [row[0] for row in rows] == ["leg12", "leg13", "leg11", "leg10", "leg9", "leg8", "leg7", "leg6"]
+    assert "max_tension BROKEN" in " ".join(rows[0]) and all(len(x) <= columns for x in said[:-1])
+    assert any("6 other lines: tension from" in x for x in said) and any("11 others with smaller" in x for x in said)
+
+
+def test_a_plan_of_many_lines_has_a_row_for_those_that_are_alike() -> None:
+    scene = fan()
+    for line in scene["lines"].values():
+        line["sections"] = [SECTION]
+    system = as_scene_or_system(scene)
+    rows = system_plan_lines(system, hybrid.plan(system, measure=False))  # type: ignore[arg-type]
+    assert any(x.startswith("14 lines ") and "120 m" in x for x in rows) and not any(
+        x.startswith("line ") for x in rows
+    )
