@@ -31,6 +31,7 @@ from hybrid.accuracy.error_statistics import (
     statistics_of,
 )
 from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.extreme_errors import ExtremeErrors
 from hybrid.accuracy.finer_result import NOT_KEPT, Judged, is_no_better, not_kept_text
 from hybrid.accuracy.refinement import (
     COSTLY_ACCURACY,
@@ -142,6 +143,7 @@ class ErrorController:
     compared: Tree | None = None  # checkpoint of the first result with its comparisons, as long as that stands
     estimate: Estimate | None = None  # of the result as it is
     scattered: list[str] = field(default_factory=list)  # end forces whose largest values are by chance: not judged
+    extremes: ExtremeErrors | None = None  # of what limits are held against, of a run with limits
     excess: np.ndarray = field(default_factory=lambda: np.zeros(2))  # N, by which snaps may exceed the largest forces
     _ratio: float = np.inf  # of the error of the result to what is asked
     _judged: int = 0  # results
@@ -310,7 +312,7 @@ class ErrorController:
             self.next_estimate(estimate, resolution, result)
             self._judge(resolution)
         except KeyboardInterrupt:  # in a run to compare with: the finer result stays beside, until it is resumed
-            self.estimate, self.statistics = before.estimate, dict(before.statistics)
+            self.estimate, self.statistics, self.extremes = before.estimate, dict(before.statistics), before.extremes
             self.excess, self._notes[:] = excess, notes
             raise
         if self.asked is None or self.next is not None:
@@ -338,7 +340,8 @@ class ErrorController:
     def judged(self, of_statistics: bool) -> Judged:
         """The errors of the result; of_statistics: with those of extremes and standard deviations."""
         assert self.estimate is not None
-        return Judged(self.estimate, self.statistics if of_statistics else {}, tuple(self._left_out))
+        statistics = self.statistics if of_statistics else {}
+        return Judged(self.estimate, statistics, tuple(self._left_out), self.extremes)
 
     @property
     def _left_out(self) -> list[str]:
@@ -354,7 +357,9 @@ class ErrorController:
     def keep(self, before: Judged, finer: Judged) -> None:
         """Go back to the result before a finer one that is no better."""
         before.set_apart(finer)
-        self.estimate, self.statistics = before.estimate, dict(before.statistics)
+        self.estimate, self.statistics, self.extremes = before.estimate, dict(before.statistics), before.extremes
+        if self.extremes is not None and finer.extremes is not None:
+            self.extremes = self.extremes.set_apart(finer.extremes)
 
     def verdict(self, asked: RequestedAccuracy) -> Verdict:
         """How the errors compare with what is asked: at every instant, or of extremes and standard deviations."""
@@ -433,6 +438,7 @@ class ErrorController:
         self.excess = snap_excess(result.forces, self.comparisons[0].forces)
         if not self.irregular:  # else statistics count all steps
             estimate.between = errors_between(self.times, result, self.comparisons[0], self.comparisons[2])
+        self.extremes = ExtremeErrors.of(result, *self.comparisons) if result.extremes and self.moves else None
         self._set_statistics(result, *self.comparisons)
         if not estimate.has_mesh:
             few = f"{result.cells} cells are so few that there is nothing coarser to compare with"
@@ -463,6 +469,7 @@ class ErrorController:
         self.excess = snap_excess(result.forces, estimate.run.forces)
         estimate.between = finer_between(self.times, estimate.between, result, estimate.run)
         estimate.update(result)
+        self.extremes = self.extremes and self.extremes.after(result)
         if self.statistics:
             found = statistics_of(result, self._every)
             for name, of_statistic in self.statistics.items():
@@ -498,10 +505,12 @@ class ErrorController:
         assert self.estimate is not None
         if self.asked is None:
             return None
-        run, before = self.estimate.run, self._ratio
-        verdict = self.verdict(self.asked)
+        run, before, asked = self.estimate.run, self._ratio, self._asked_further(self.asked)
+        verdict = self.verdict(asked)
+        if verdict.limit or asked.limits != self.asked.limits:  # what is asked of a limit, and judged, has changed
+            before = np.inf
         while verdict.ratio > 1.0 and self._leaves_out(verdict, verdict.ratio / before):
-            verdict, before = self.verdict(self.asked), np.inf
+            verdict, before = self.verdict(asked), np.inf
         if not self.irregular and self._slow_from is None:
             self.statistics = {}  # it is judged at every instant from now on
         before *= 1.0 if self.irregular else self.estimate.revised.get(RAW.get(verdict.name, ""), 1.0)
@@ -524,14 +533,21 @@ class ErrorController:
         if self.estimate.share_unknown or RAW.get(verdict.name, verdict.name) in self.estimate.shares_mixed:
             verdict = replace(verdict, time=max(verdict.time, verdict.mesh))  # either may be to blame
         found = refined(run.resolution, verdict, self.free)
-        if found is None or self.moves or found.fineness == run.resolution.fineness:
+        if found is None or (self.moves and not verdict.limit) or found.fineness == run.resolution.fineness:
             return found
-        # cells that are hardly shorter lie otherwise beside edges of contact: their change says little of what is left
+        # cells that are hardly shorter lie otherwise beside edges of contact: their change says little of what is left;
+        # and what is used of a limit grows by about its error, so that less is left
         return replace(found, fineness=max(found.fineness, COARSER * run.resolution.fineness))
+
+    def _asked_further(self, asked: RequestedAccuracy) -> RequestedAccuracy:
+        """What a finer result may still bring: not what limits ask for whose extremes a finer one showed no better."""
+        if self.extremes is None:
+            return asked
+        return replace(asked, limits=tuple(x for x in asked.limits if not self.extremes.stalls(x.limit)))
 
     def _leaves_out(self, verdict: Verdict, falls: float) -> bool:
         """Whether what misses does not converge, and is not judged from now on: every instant, then a largest force."""
-        if self.asked is None or self.asked.instant:
+        if self.asked is None or self.asked.instant or verdict.limit:
             return False
         name = RAW.get(verdict.name, verdict.name)
         if not self.irregular:
@@ -593,6 +609,7 @@ class ErrorController:
             "scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice),
             "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self._notes),
             "budget": self.budget.checkpoint() if self.budget is not None else [],
+            "extremes": self.extremes and self.extremes.checkpoint(),
             "slow": list(self._slow_from or ()), "places": self.places if self.places is not None else ALL,
         }  # fmt: skip
 
@@ -610,10 +627,11 @@ class ErrorController:
             "every": 1,
             "irregular": False,
         }
-        template["excess"], template["places"] = np.zeros(2), ALL
+        template |= {"excess": np.zeros(2), "places": ALL, "extremes": None}
         names = ("next", "first", "coarse", "estimate", "statistics", "scattered", "notes", "choice", "budget")
         # not in every checkpoint of 0.6
         older = {"choice": ["", ""], "first": None, "excess": np.zeros(2), "budget": [], "slow": [], "places": ALL}
+        older |= {"extremes": None}  # nor in 1.0
         saved = matched(older | dict(tree), template | dict.fromkeys(names), "error control")
         places = saved["places"]
         if places.size and not np.array_equal(places, compared_places(points)):
@@ -639,6 +657,8 @@ class ErrorController:
         if saved["estimate"] is not None:
             self.estimate = Estimate.restored(saved["estimate"], scene, shape)
             self.estimate.run = replace(self.estimate.run, places=places)
+            if saved["extremes"]:
+                self.extremes = ExtremeErrors.restored(saved["extremes"], self.estimate.run)
         if saved["statistics"]:
             trees = matched(saved["statistics"], dict.fromkeys(STATISTICS), "statistics")
             self.statistics = {name: StatisticEstimate.restored(x, scene, (1, *shape[1:])) for name, x in trees.items()}

@@ -13,6 +13,7 @@ import numpy as np
 
 from hybrid.accuracy.error_control import ErrorController
 from hybrid.accuracy.errors_by_cause import Errors, summary
+from hybrid.accuracy.extreme_errors import figures as extreme_figures
 from hybrid.accuracy.refinement import END_FORCE, asked_quantities, asked_text, figures, not_asked_text, sizes_of
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.plan import output_times
@@ -23,6 +24,7 @@ from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, i
 from hybrid.store.amend import NOTHING_MORE, Happened, amend
 from hybrid.store.format import Field
 from hybrid.store.late_file import LateFile
+from hybrid.store.limits import EXTREME_ERRORS
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import not_converged_attribute
 
@@ -73,7 +75,8 @@ def accuracy_figures(control: ErrorController, result: RunSample, errors: Errors
     """What is asked of each quantity and its error, as the attribute of a result; errors: None: they are not known."""
     assert control.asked is not None
     of = [x.errors for x in control.statistics.values()] if control.irregular else [errors]
-    return json.dumps(figures(control.asked, [x for x in of if x is not None], result, control.scattered))
+    known = [x for x in of if x is not None]
+    return json.dumps(figures(control.asked, known, result, control.scattered, control.extremes))
 
 
 def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float) -> dict[str, str | float | int]:
@@ -115,6 +118,8 @@ def known(
             bounds = None if control.asked is None else sizes_of(control.asked, result)
             undersampled += uncertain_by_vibrations(vibrations(), result, largest, bounds)
     found: dict[str, float | str] = {**summary(errors)} if errors is not None else {}
+    if control.extremes is not None:
+        found[EXTREME_ERRORS] = extreme_figures(control.extremes.run.extremes, control.extremes.errors)
     found |= not_converged_attribute([control.diverging])
     if errors is not None and control.asked is not None:
         beside = not_asked_text(control.asked, errors, result)

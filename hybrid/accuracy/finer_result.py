@@ -15,6 +15,7 @@ import numpy as np
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.accuracy.error_order import magnitude
 from hybrid.accuracy.error_statistics import LARGEST, STATISTICS, StatisticEstimate
+from hybrid.accuracy.extreme_errors import ExtremeErrors
 from hybrid.accuracy.refinement import RAW, Verdict, bounds_of, judge
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.simulation.run_sample import RunSample
@@ -33,25 +34,28 @@ class Judged(NamedTuple):
     estimate: Estimate
     statistics: Mapping[str, StatisticEstimate] = {}  # of an irregular motion; empty: every instant is judged
     scattered: tuple[str, ...] = ()  # end forces whose largest values are by chance: not judged
+    extremes: ExtremeErrors | None = None  # of what limits are held against; None: nothing is, or not estimated
 
     def copied(self) -> Judged:
         """A copy that a finer result leaves as it is."""
-        return Judged(_copied(self.estimate), {k: _copied(x) for k, x in self.statistics.items()}, self.scattered)
+        statistics = {k: _copied(x) for k, x in self.statistics.items()}
+        return self._replace(estimate=_copied(self.estimate), statistics=statistics)
 
     def judged_as(self, other: Judged) -> Judged:
         """The same result, of which that counts which counts of another one."""
         found = self.statistics if other.statistics else {}
-        return Judged(self.estimate, found, other.scattered)
+        return self._replace(statistics=found, scattered=other.scattered)
 
     def verdict(self, asked: RequestedAccuracy) -> Verdict:
         """How the errors compare with what is asked: at every instant, or of extremes and standard deviations."""
         if not self.statistics:
-            return judge(asked, self.estimate.errors, self.estimate.run)
+            return judge(asked, self.estimate.errors, self.estimate.run, extremes=self.extremes)
         verdicts = []
         if asked.of_motion is not None:
             asked = asked.sized(self.estimate.run.reach)
         for statistic, estimate in self.statistics.items():
-            found = judge(asked, estimate.errors, self.statistics[LARGEST].run, self._skipped(statistic))
+            of_largest = self.statistics[LARGEST].run
+            found = judge(asked, estimate.errors, of_largest, self._skipped(statistic), self.extremes)
             text = found.text.replace(": error", f", {STATISTICS[statistic]}: error")
             verdicts.append(replace(found, text=text, statistic=statistic))
         return max(verdicts, key=lambda found: found.ratio)
@@ -68,6 +72,8 @@ class Judged(NamedTuple):
 
     def changes_no_less(self, verdict: Verdict) -> bool:
         """Whether the last refinement has changed what decides by no less than the one before did."""
+        if self.extremes is not None and verdict.limit in self.extremes.errors:
+            return self.extremes.changes_no_less(verdict.limit)
         estimate = self.statistics[verdict.statistic] if verdict.statistic else self.estimate
         last, before = estimate.changes.get(RAW.get(verdict.name, verdict.name), (np.nan, np.nan))
         return bool(last >= before)
@@ -89,7 +95,8 @@ def is_no_better(
 
     All by the names of lines.  Its largest error, over what is asked, is larger, and either the two differ by no more
     than the errors of the one before, so that the smaller figures stand; or what decides has changed by no less than in
-    the refinement before: one of the two is wrong, and nothing shows that it is the one before.
+    the refinement before: one of the two is wrong, and nothing shows that it is the one before.  Of extremes that
+    limits are held against it is: cells that are too long make them too mild.
     """
     both = [name for name in asked if name in before and name in finer]
     if not both:
@@ -98,7 +105,7 @@ def is_no_better(
     verdicts = {name: finer[name].verdict(asked[name]) for name in both}
     worst = max(both, key=lambda name: verdicts[name].ratio)
     found = verdicts[worst]
-    if found.ratio <= max(least[name].verdict(asked[name]).ratio for name in both):
+    if found.limit or found.ratio <= max(least[name].verdict(asked[name]).ratio for name in both):
         return None
     if finer[worst].changes_no_less(found) or all(least[name].holds(asked[name], finer[name]) for name in both):
         return found

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.extreme_errors import ExtremeErrors
 from hybrid.model.resolution import Limited, RequestedAccuracy, Resolution
 from hybrid.outputs.probes import SIDED_ERRORS as RIGHT_OF
 from hybrid.scene.accuracy import ALONG, NOT_ASKED, ROUGHEST
@@ -53,19 +54,26 @@ class Verdict:
     reached: str = ""  # what of it is missed, as this run meets it: an accuracy as a scene writes it
     name: str = ""  # of the quantity
     statistic: str = ""  # of it, that is judged; empty: every output
+    limit: str = ""  # that it is held against, with its extremes over all steps
 
 
-def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample, skip: Collection[str] = ()) -> Verdict:
+def judge(
+    asked: RequestedAccuracy,
+    errors: Errors,
+    run: RunSample,
+    skip: Collection[str] = (),
+    extremes: ExtremeErrors | None = None,
+) -> Verdict:
     """How the errors of a run compare with what is asked: at a ratio of 1 or less they are met.
 
-    skip: quantities that are not judged.
+    skip: quantities that are not judged; extremes: errors over all steps, by which limits are.
     """
     worst, reached = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked"), dict[str, tuple[float, str]]()
     for bound in bounds_of(asked, run):
-        name, size = bound.name, bound.size
-        if size <= 0.0 or name in skip:
+        name = bound.name
+        if bound.size <= 0.0 or name in skip:
             continue
-        total = _largest(errors, "total", bound)
+        total, size, over_steps = _decisive(errors, bound, extremes)
         key = "tension" if name in END_FORCES.values() else "line_tension" if name == "tension" else name
         if total > max(size, reached.get(key, (0.0, ""))[0]) and bound.limit is None:
             reached[key] = total, _reached(key, bound.unit, total, bound.of)
@@ -74,10 +82,20 @@ def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample, skip: Collec
             mesh, time = (_largest(errors, cause, bound) / size for cause in ("mesh", "time"))
             share = (total - model) / size / (mesh + time) if mesh + time > 0.0 else 0.0
             mesh, time = mesh * share, time * share  # of what they make together, where they cancel
+            limit = bound.limit.limit if bound.limit is not None else ""
+            if extremes is not None and over_steps:
+                by_steps = extremes.of_steps[limit]
+                shares = (total / size * x for x in (1.0 - by_steps, by_steps))
+                mesh, time = (_as_second_order(x, extremes.orders[limit]) for x in shares)
             text = f"{bound.words}: error {total:.3g} {bound.unit}, asked {size:.3g} {bound.unit}"
-            worst = Verdict(total / size, mesh, time, model / size, text, name=name)
+            worst = Verdict(total / size, mesh, time, model / size, text, name=name, limit=limit)
     every = [f"all: {100.0 * asked.every:.3g}%"] if asked.every is not None and reached else []
     return replace(worst, reached=", ".join([*every, *(text for _, text in reached.values())]))
+
+
+def _as_second_order(part: float, p: float) -> float:
+    """Part of what is asked, of an error of order p, that by order 2 asks for as much finer cells or steps."""
+    return AIM * (part / AIM) ** (2.0 / p) if part > AIM else part
 
 
 class Bound(NamedTuple):
@@ -134,7 +152,9 @@ def sizes_of(asked: RequestedAccuracy, run: RunSample) -> dict[str, float]:
 
 
 def _used(limit: Limited, run: RunSample) -> float:
-    """How much of a limit a run uses, 1: all of it."""
+    """How much of a limit a run uses over all steps, of an equilibrium at its output points; 1: all of it."""
+    if limit.limit in run.extremes:
+        return float(run.extremes[limit.limit].max())
     sides = (limit.quantity, limit.allowed), (f"right/{limit.quantity}", limit.allowed_right)
     each = [np.nanmax(run.most(name) / allowed, initial=0.0) for name, allowed in sides if name in run.values]
     return float(max(each))
@@ -165,18 +185,20 @@ def not_asked_text(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> 
 
 
 def figures(
-    asked: RequestedAccuracy, errors: Sequence[Errors], run: RunSample, by_chance: Collection[str] = ()
+    asked: RequestedAccuracy, errors: Sequence[Errors], run: RunSample, by_chance: Collection[str] = (),
+    extremes: ExtremeErrors | None = None,
 ) -> list[dict[str, str | float | None]]:  # fmt: skip
     """What is asked of each quantity, and its error, the largest of several; errors: empty where they are not known.
 
-    by_chance: end forces whose largest values are, so that their error misses nothing.
+    by_chance: end forces whose largest values are, so that their error misses nothing; extremes: as of `judge`.
     """
     out: list[dict[str, str | float | None]] = []
     for bound in bounds_of(asked, run):
         known = bool(errors) and all(bound.name in x.fields.get("total", {}) for x in errors)
-        error = max(_largest(x, "total", bound) for x in errors) if known else None
+        found = [_decisive(x, bound, extremes)[:2] for x in errors]
+        error, size = max(found, key=lambda x: x[0] / max(x[1], 1e-300)) if known else (None, bound.size)
         name = bound.name if bound.limit is None else bound.words
-        out.append({"quantity": name, "of": bound.name, "unit": bound.unit, "asked": bound.size, "error": error})
+        out.append({"quantity": name, "of": bound.name, "unit": bound.unit, "asked": size, "error": error})
         if bound.name in by_chance:
             out[-1]["by_chance"] = 1.0
     return out
@@ -243,6 +265,19 @@ def missed(verdict: Verdict, free: Free, runs: int, chance: bool, stopped: str =
     if not verdict.reached:  # a verdict on a limit, which no other accuracy settles
         try_ = "mesh.cells and time.step finer than these"
     return f"{verdict.text}; {whose}, {runs} runs; try: {try_}"
+
+
+def _decisive(errors: Errors, bound: Bound, extremes: ExtremeErrors | None) -> tuple[float, float, bool]:
+    """Largest error of what a bound is for, what is asked of it, in its unit, and whether it is that over all steps.
+
+    Over all steps, where it is for a limit, no more is asked than the verdict needs, which is all that is left.
+    """
+    found, limit = _largest(errors, "total", bound), bound.limit
+    if extremes is None or limit is None or limit.limit not in extremes.errors:
+        return found, bound.size, False
+    over_steps, left = 100.0 * extremes.largest(limit.limit), max(bound.size, 100.0 * (1.0 - bound.used))
+    steps = over_steps / left >= found / bound.size
+    return (over_steps, left, True) if steps else (found, bound.size, False)
 
 
 def _largest(errors: Errors, cause: str, bound: Bound) -> float:

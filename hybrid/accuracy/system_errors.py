@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from hybrid.accuracy.error_report import CAUSES, UNITS
-from hybrid.accuracy.system_samples import touch_unasked
+from hybrid.accuracy.extreme_errors import errors_by_cause, figures
+from hybrid.accuracy.system_samples import extremes_of, touch_unasked
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.lines_contact import passing_each_other
@@ -29,6 +30,7 @@ from hybrid.scene.system import System
 from hybrid.store.amend import amend_lines
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.format import Field
+from hybrid.store.limits import EXTREME_ERRORS
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import not_converged_attribute
 
@@ -110,17 +112,21 @@ def write_system_errors(
         failed = TOO_COARSE[cause].format(*error.errors()[0]["loc"])
     except SceneError as error:  # nor are few cells enough for a line that is paid out
         failed = TOO_COARSE["mesh"].format(*error.complaints[0].where.split("."))
-    errors, doubts = {}, dict[str, list[str]]()
+    errors, doubts, extremes = {}, dict[str, list[str]](), dict[str, str]()
     if not failed:
         with open_result(target) as result:
             for name, line in result.lines.items():
-                errors[name], doubts[name] = _errors_of(line, {cause: x.lines[name] for cause, x in found.items()})
+                others = {cause: x.lines[name] for cause, x in found.items()}
+                errors[name], doubts[name] = _errors_of(line, others)
+                extremes[name] = _errors_of_extremes(line, others)
     fields = {name: [_field(full, x) for full, x in each.items()] for name, each in errors.items()}
     sizes = {name: _summary(each) for name, each in errors.items()}
     largest = {key: max(x[key] for x in sizes.values()) for key in next(iter(sizes.values()), {})}
     attributes: dict[str, dict[str, str | float | int]] = {
         name: {**each, **not_converged_attribute([doubts[name]])} for name, each in sizes.items()
     }
+    for name, found_extremes in extremes.items():
+        attributes[name][EXTREME_ERRORS] = found_extremes
     of_all: dict[str, str | float | int] = {**largest, **not_converged_attribute(doubts.values())}
     notes = [(FAILED, failed)] if failed else []
     doubtful = [f"{x.replace('_', ' ')} of line {name}" for name, each in doubts.items() for x in each]
@@ -158,6 +164,13 @@ def _errors_of(line: Result, others: Mapping[str, Result]) -> tuple[dict[str, Fl
             for full in (f"errors/mesh/{called}", f"errors/total/{called}"):
                 out[full] = np.maximum(out[full], line[EDGE_ERRORS + name])
     return out, doubts
+
+
+def _errors_of_extremes(line: Result, others: Mapping[str, Result]) -> str:
+    """Errors of what limits of a line are held against, as its attribute."""
+    found = {"": extremes_of(line)} | {cause: extremes_of(x) for cause, x in others.items()}
+    errors = errors_by_cause(found[""], [(found[x], found.get(f"{x} again")) for x in ("mesh", "time")])
+    return figures(found[""], errors)
 
 
 def _change(fine: Result, coarse: Result, name: str) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.model.build import Model
-from hybrid.model.resolution import Resolution, follows_curvature
+from hybrid.model.resolution import Resolution, follows_curvature, has_limits
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.scene.system import System
@@ -13,6 +13,8 @@ from hybrid.simulation.run_sample import COMPARED, RunSample, catenary_share, co
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_run import SystemRun
 from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.envelope import GROUP as ENVELOPE
+from hybrid.store.limits import EXTREMES, extremes_about
 from hybrid.store.reader import Result
 from hybrid.store.records import THERE
 
@@ -24,9 +26,11 @@ def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
     values, _ = split_outputs({name: found[name] for name in found.names})
     catenary = found.catenary if isinstance(line.scene.model, AdaptiveModel) else np.zeros(0)
     fineness = resolution.fineness if follows_curvature(line.scene) else 0.0
+    held = {x.name: y for x, y in line.envelope.fixed()} if has_limits(line.scene) else {}
+    held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t)
     return RunSample(
         resolution, values, compared_cells(line.model, fineness), max(run.steps, 1), cpu, resolution.every,
-        forces=found.steps, catenary=catenary,
+        forces=found.steps, catenary=catenary, extremes=extremes_about(held, line.observer.s),
     )  # fmt: skip
 
 
@@ -36,6 +40,11 @@ def touch_unasked(system: System, result: Result) -> bool:
         system.lines[name].contact.self is None and any(event.kind == "line touches itself" for event in line.events)
         for name, line in result.lines.items()
     )
+
+
+def extremes_of(line: Result) -> dict[str, np.ndarray]:
+    """What limits of a line are held against."""
+    return extremes_about({x: line[x] for x in line.names if x.startswith((ENVELOPE, EXTREMES))}, line.s)
 
 
 def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) -> RunSample:
@@ -52,6 +61,6 @@ def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) ->
         cells = compared_cells(model, resolution.fineness, usual_cells(line[THERE]))
     return RunSample(
         resolution, values, cells, max(len(forces), 1), cpu, resolution.every, unresolved,
-        forces=forces, catenary=catenary,
+        forces=forces, catenary=catenary, extremes=extremes_of(line) if len(line.times) > 1 else {},
         at_edges={x: np.asarray(line[EDGE_ERRORS + x]) for x in MISSED if EDGE_ERRORS + x in line},
     )  # fmt: skip

@@ -351,6 +351,18 @@ def _limits(scene: Scene, finest: float) -> tuple[Limited, ...]:
     return tuple(found)
 
 
+def has_limits(scene: Scene) -> bool:
+    """Whether anything of a scene is held against a limit: of a section, a code, a pipe, a named quantity."""
+    names = ("min_bend_radius", "max_tension", "min_tension", "capacity", "code")
+    sections = scene.cable.sections
+    quantities = scene.output.quantities.values()
+    return (
+        any(getattr(x, name) is not None for x in sections for name in names)
+        or any(x.pipe is not None and x.pipe.max_stress is not None for x in sections)
+        or any(x.smallest is not None or x.largest is not None for x in quantities)
+    )
+
+
 def is_irregular(scene: Scene) -> bool:
     """Whether a scene moves irregularly: its extremes and standard deviations matter, not what is at an instant.
 

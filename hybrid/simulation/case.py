@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +29,7 @@ from hybrid.model.resolution import (
     Resolution,
     first_resolution,
     follows_curvature,
+    has_limits,
     judges_bends,
     requested_accuracy,
     wants_errors,
@@ -76,8 +77,10 @@ from hybrid.solve.statics import Equilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import digest_of, read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.envelope import GROUP as ENVELOPE
 from hybrid.store.hdf5_file import is_result, open_file, opened
 from hybrid.store.late_file import LateFile
+from hybrid.store.limits import EXTREMES, extremes_about
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE, PENDING, RODS_AT_START, THERE
@@ -284,6 +287,11 @@ class Case:
         return self.scene.require_time().duration
 
     @property
+    def _judges(self) -> bool:
+        """Whether limits are held against extremes, whose errors are estimated."""
+        return wants_errors(self.scene) and has_limits(self.scene)
+
+    @property
     def _exact(self) -> bool:
         """Whether steps end at outputs."""
         return self.scene.output.exact
@@ -329,6 +337,7 @@ class Case:
             if follows_curvature(self.scene):
                 cells = compared_cells(run.model, resolution.fineness, usual_cells(data[THERE][()]))
             forces = np.column_stack([data[f"steps/{name}"][()] for name in FORCES])
+            held = {x: data[x][()] for x in _datasets(data, ENVELOPE, EXTREMES)} if self._judges else {}
         self.touches_itself |= touches
         values, model_error = split_outputs(found)
         notes: Notes = ()
@@ -345,6 +354,7 @@ class Case:
         return RunSample(
             resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, bound, notes, forces=forces,
             catenary=catenary, doubt=doubt_of(run), touches=touches, places=self.places, at_edges=missed,
+            extremes=extremes_about(held, self.points.s),
         )  # fmt: skip
 
     def _places_of(self, name: str) -> np.ndarray | None:
@@ -380,7 +390,8 @@ class Case:
         self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)
         model, equilibrium, switching = self._start(resolution)
         s = points if points is not None else self.points.s[self.places] if self.places.size else self.points.s
-        loop = self._loop(self.scene, model, resolution, switching, None, points=s, until=until)
+        ranges = points is None and self._judges
+        loop = self._loop(self.scene, model, resolution, switching, None, points=s, until=until, ranges=ranges)
         numbers = len(loop.run.run.books.outputs) * sum(math.prod(field.shape) for field in loop.observer.fields)
         if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
             loop.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)), FORCE_COLUMNS)
@@ -399,10 +410,13 @@ class Case:
         notes = tuple((NOT_ESTIMATED, text) for text in unknown[:1])
         fineness = resolution.fineness if follows_curvature(self.scene) else 0.0
         rows = found.reference() if isinstance(found, RowsRecorder) else {}
+        envelope = loop.run.envelope
+        held = {x.name: y for x, y in envelope.fixed()} | loop.run.envelope_values() if envelope is not None else {}
         catenary = found.catenary if switching is not None else np.zeros(0)
         return RunSample(
             resolution, values, compared_cells(model, fineness), loop.run.steps, cpu, resolution.every, False, errors,
             bound, notes, rows, found.steps, catenary, doubt_of(loop.run), loop.run.touches, self.places,
+            extremes=extremes_about(held, self.points.s),
         )  # fmt: skip
 
     def survey(self, resolution: Resolution, coarse: Resolution) -> Survey | None:
@@ -457,8 +471,9 @@ class Case:
         correction: Correction | None = None,
         points: Floats | None = None,
         until: float | None = None,
+        ranges: bool = False,
     ) -> TimeLoop:
-        """The loop of a run, as yet without a state; scene: the one that holds at present."""
+        """The loop of a run, as yet without a state; scene: the one that holds now; ranges: as of `Transient`."""
         if correction is None and model.follows_error:
             correction = Correction(model, switching.torque if switching is not None else None)
         times = output_times(self.scene)
@@ -469,7 +484,7 @@ class Case:
         of_result = target is not None
         run = Transient(
             scene, model, resolution, switching, correction, EventLog(), [0.0, *times], of_result,
-            of_result or self.touches_itself,
+            of_result or self.touches_itself, ranges,
         )  # fmt: skip
         if points is None:
             points = self.points.s
@@ -516,6 +531,12 @@ class Case:
         if self.progress.heard:
             touches = bool(run.model.line.bits & SELF_CONTACT)
             self.progress(run.t, run.steps, run.iterations, run.model.zones, finished, touches)
+
+
+def _datasets(data: Mapping[str, Any], *groups: str) -> list[str]:
+    """Names of what stands in groups of a file, or of a result in memory, itself."""
+    names = [f"{x}/{name}" for x in groups for name in data.get(x, ())] or [x for x in data if x.startswith(groups)]
+    return [x for x in names if x.count("/") == 1 and hasattr(data[x], "shape")]
 
 
 def doubt_of(run: Transient) -> Floats:

@@ -72,6 +72,8 @@ class RunSample:
     # of a result: errors (nt, ns) by its cells beside edges of contact (outputs.edge_errors), of an equilibrium beside
     # its ends, joints and loads as well (outputs.layer_errors)
     at_edges: Mapping[str, np.ndarray] = field(default_factory=dict)
+    # what limits are held against, of all steps (store.limits.extremes_about); {}: the scene has no limits
+    extremes: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def some(self, name: str, numbers: np.ndarray) -> np.ndarray:
         """The values of an output with these numbers, which increase."""
@@ -201,15 +203,17 @@ def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result
     outputs are not beside it.
     """
     blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
-    free = dict.fromkeys(("resolution", "values", "model_error", "at_edges", "notes", "rows"))
+    free = dict.fromkeys(("resolution", "values", "model_error", "at_edges", "extremes", "notes", "rows"))
     older = {"rows": {}, "catenary": np.zeros(0), "doubt": np.array(NO_DOUBT), "touches": False}  # not in 0.6
-    older["at_edges"] = {}  # not in 1.0
+    older |= {"at_edges": {}, "extremes": {}}  # not in 1.0
     saved = matched(older | tree, blank | free, "run")
     if saved["forces"].ndim != 2 or saved["forces"].shape[1] != 3 or not np.isfinite(saved["forces"]).all():
         raise ValueError("forces of steps that no run has")
     if not (saved["catenary"].ndim == 1 and (abs(saved["catenary"] - 0.5) <= 0.5).all()):
         raise ValueError("a part of a line that no run has")
     resolution = resolution_from(saved["resolution"], scene)
+    if not all(isinstance(x, np.ndarray) and x.ndim == 1 and np.isfinite(x).all() for x in saved["extremes"].values()):
+        raise ValueError("extremes that no run has")
     if saved["rows"] and result is not None:
         found = rows_from(saved["rows"], rows_path(result, rows_key(resolution)))
         saved["values"], saved["model_error"] = split_outputs(found)

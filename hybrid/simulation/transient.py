@@ -87,21 +87,24 @@ class Transient:
         outputs: Sequence[float] = (),
         extremes: bool = False,
         touches: bool = True,
+        ranges: bool = False,
     ) -> None:
         """It has no state before `begin` or `restore`.  outputs: s, increasing, times of samples; extremes: whether
 
-        lowest and highest values of all accepted steps are kept; touches: whether contact with itself begins by itself
-        where the line comes near itself, else that is only noticed.
+        lowest and highest values of all accepted steps are kept, as of a result; touches: whether contact with itself
+        begins by itself where the line comes near itself, else that is only noticed; ranges: whether those values are
+        kept of a run that is only compared.
         """
         assert scene.time is not None
         self.scene, self.model, self.resolution, self.events = scene, model, resolution, events
         self.switching, self.correction, self.beyond = switching, correction, -np.inf
-        self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes, switching is not None)
-        self.envelope = Envelope(scene, model, moves=True) if extremes else None
+        kept = extremes or ranges
+        self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), kept, switching is not None)
+        self.envelope = Envelope(scene, model, moves=True) if kept else None
         if self.envelope is not None and self.envelope.quantities:
             self.run.keep_ranges(self.envelope.quantities.given_to(self.run.books))
         self.itself: SelfWatch | None = None
-        if self.envelope is not None:
+        if self.envelope is not None and extremes:
             self.itself = self.envelope.itself
         elif model.line.bits & MAY_TOUCH:
             self.itself = SelfWatch(model, "")
@@ -278,7 +281,7 @@ class Transient:
             with_friction = equilibrium is not None and equilibrium.with_friction
             self.correction.begin(begun.ends.at(0.0), state, equilibrium is not None, with_friction)
         self.run.place(state.r[model.always].copy())
-        if self.envelope is not None and self.itself is not None:
+        if self.envelope is not None and self.itself is self.envelope.itself:
             self.itself.look_at_start(self.run, self.events.event)
 
     def _find_accelerations(self, new_leg: bool = True) -> None:

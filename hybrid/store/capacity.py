@@ -53,10 +53,11 @@ def used(corners: Floats, T: Floats, k: Floats) -> Floats:
 def most_used(corners: Floats, low: Floats, high: Floats, k: Floats) -> Floats:
     """The largest part that any tension from low to high (N) with any curvature up to k (1/m) uses.
 
-    It is at a corner of that rectangle, or where the way to a corner of the polygon leaves it.
+    It is at a corner of that rectangle, or where the way to a corner of the polygon leaves it: to the first, without
+    bending.
     """
     corners = np.asarray(corners, float)
-    found = np.maximum.reduce([used(corners, T, x) for T in (low, high) for x in (k, np.zeros_like(k))])
+    found = np.maximum(used(corners, low, k), used(corners, high, k))
     for T_i, k_i in corners:
         if k_i > 0.0:
             found = np.maximum(found, used(corners, np.clip(k * T_i / k_i, low, high), k))
@@ -93,13 +94,13 @@ def _inside(x: Stretch, s: Floats) -> np.ndarray:
     )  # fmt: skip
 
 
-def bound_of_steps(result: Result) -> float | None:
+def bound_of_steps(result: Result, errors: tuple[float, float] = (0.0, 0.0)) -> float | None:
     """The part of the capacity that no step and node exceeds, by the ranges of tension and curvature over all of them,
-    as if they came at once; None: the result has no envelope."""
+    as if they came at once; None: the result has no envelope.  errors: of these ranges, N and 1/m."""
     names = [f"{GROUP}/{x}" for x in ("tension_min", "tension_max", "curvature_max")]
     if not has_envelope(result) or any(name not in result for name in names):
         return None
-    low, high, k = (np.asarray(result[name]) for name in names)
+    low, high, k = (np.asarray(result[x]) + e for x, e in zip(names, (-errors[0], *errors), strict=True))
     s = np.asarray(result[SCALE])
     return _largest(result, lambda x, at: most_used(x.corners, low[at], high[at], k[at]), s)
 

@@ -16,7 +16,7 @@ u = g^2 ((M/M_k + (T/T_k)^2)^2 + (dp/p_c)^2); the root is 0 where dp alone burst
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -160,14 +160,22 @@ def mooring_of_steps(result: Result) -> tuple[float, float, float] | None:
     return most
 
 
-def code_of_steps(result: Result) -> float | None:
+def code_of_steps(result: Result, errors: Mapping[str, float] | None = None) -> float | None:
     """The part that no step and node exceeds, by the ranges of tension and moment over all of them, as if they came at
-    once, at the heights of the outputs; None: the result has not all of them."""
+    once, at the heights of the outputs; None: the result has not all of them.  errors: of these ranges, by quantity, N,
+    N m and 1/m; one that is not there is not known.
+    """
     names = [f"{GROUP}/{x}" for x in ("tension_min", "tension_max")]
-    moment = _moments(result, f"{GROUP}/%s_max", lambda name: np.asarray(result[name]))
+
+    def error(quantity: str) -> float:
+        return 0.0 if errors is None else errors.get(quantity, np.nan)
+
+    moment = _moments(
+        result, f"{GROUP}/%s_max", lambda x: result[x] + error(x.removeprefix(f"{GROUP}/").removesuffix("_max"))
+    )
     if moment is None or not has_envelope(result) or any(name not in result for name in names):
         return None
-    s, low, high = np.asarray(result[SCALE]), np.asarray(result[names[0]]), np.asarray(result[names[1]])
+    s, low, high = np.asarray(result[SCALE]), result[names[0]] - error("tension"), result[names[1]] + error("tension")
     z = result.position[:, :, 2]
     each = [(T, np.interp(s, result.s, h)) for T in (low, high) for h in (z.min(axis=0), z.max(axis=0))]
     return _largest(result, s, lambda x, at: np.max([use(x, T[at], moment(x)[at], h[at]) for T, h in each], axis=0))

@@ -233,10 +233,8 @@ def judged(values: Arrays) -> list[Judged]:
         x = np.where(np.isfinite(x), x, np.nan)
         if np.isnan(allowed + x).all():
             continue
-        if limit == "min_tension":
-            worse, most = allowed - x, NOTHING * float(np.nanmax(np.abs(x)))
-        else:
-            worse, most = x * allowed if limit == "min_bend_radius" else x / allowed, 1.0
+        worse = part_used(limit, x, allowed)
+        most = NOTHING * float(np.nanmax(np.abs(x))) if limit == "min_tension" else 1.0
         k = int(np.nanargmax(worse))
         value, used = float(x[k]), None if limit == "min_tension" else float(worse[k])
         if limit == "min_bend_radius":
@@ -248,6 +246,13 @@ def judged(values: Arrays) -> list[Judged]:
         if known is None or new.margin < known.margin:
             found[limit] = new
     return list(found.values())
+
+
+def part_used(limit: str, x: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+    """Part of a limit that extremes x use; of a smallest tension, N, by how much it is below."""
+    if limit == "min_tension":
+        return np.asarray(allowed - x)
+    return np.asarray(x * allowed if limit == "min_bend_radius" else x / allowed)
 
 
 def with_partner(result: Result, x: Judged) -> Judged:

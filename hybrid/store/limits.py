@@ -3,7 +3,8 @@ over the outputs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,7 +13,16 @@ from hybrid.store.capacity import NAME, bound_of_steps
 from hybrid.store.code_checks import F201, code_of_steps, mooring_of_steps, rows_of
 from hybrid.store.code_checks import NAME as CODE_USED
 from hybrid.store.envelope import GROUP as GROUP_OF_NODES
-from hybrid.store.envelope import NOT_VERIFIED, SAME, Arrays, extremes_of_outputs, has_envelope, not_verified
+from hybrid.store.envelope import (
+    NOT_VERIFIED,
+    SAME,
+    SCALE,
+    Arrays,
+    extremes_of_outputs,
+    has_envelope,
+    not_verified,
+    part_used,
+)
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -20,6 +30,69 @@ if TYPE_CHECKING:
 GROUP = "limits"
 # Group of the smallest and the largest value of a quantity at any accepted step; t/ in it has times, s/ arc lengths.
 EXTREMES = "extremes"
+
+
+# Limits of sections, with what is held against them of the envelope; and quantities whose extremes are compared.
+OF_SECTIONS = {
+    "min_bend_radius": "curvature_max",
+    "max_tension": "tension_max",
+    "min_tension": "tension_min",
+    "max_stress": "von_mises_max",
+}
+RANGES = {
+    "tension": ("tension_min", "tension_max"),
+    "curvature": ("curvature_max",),
+    "bending_moment": ("bending_moment_max",),
+}
+
+
+def extremes_about(values: Mapping[str, np.ndarray], s: np.ndarray) -> dict[str, np.ndarray]:
+    """What limits are held against, of all steps, in arrays that do not depend on the mesh.
+
+    values: the envelope of a run and its named quantities, by their names in a file.  Of limits of sections the part
+    that is used about places s (ns,) m, each from the one before to the one behind; of a smallest tension by how much
+    it is below its limit, N.  Of `RANGES` the extremes about these places; of named quantities both extremes.
+    """
+    found, nodes = dict[str, np.ndarray](), values.get(SCALE)
+    if nodes is None:
+        return found
+    for limit, name in OF_SECTIONS.items():
+        full, allowed = f"{GROUP_OF_NODES}/{name}", values.get(f"{GROUP_OF_NODES}/{limit}")
+        if full in values and allowed is not None and np.isfinite(allowed).any():
+            found[limit] = _about(nodes, part_used(limit, values[full], allowed), s)
+    for quantity, names in RANGES.items():
+        full_names = [f"{GROUP_OF_NODES}/{x}" for x in names]
+        if all(x in values for x in full_names):
+            found[quantity] = np.concatenate(
+                [_about(nodes, -values[x] if x.endswith("_min") else values[x], s) for x in full_names]
+            )
+    for full, x in values.items():
+        if full.startswith(f"{EXTREMES}/") and full.count("/") == 1 and np.isfinite(x).all():
+            found[full] = np.array(x)
+    return found
+
+
+def _about(nodes: np.ndarray, x: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """The largest of values x (n,) at nodes (m, increasing), straight between them, about places s (ns,) m."""
+    known = np.isfinite(x)
+    if not known.any():
+        return np.zeros(s.size)
+    at = np.concatenate([nodes[known], s])
+    order = np.argsort(at, kind="stable")
+    values = np.concatenate([x[known], np.interp(s, nodes[known], x[known])])[order]
+    first, last = (np.searchsorted(at[order], s, side) for side in ("left", "right"))
+    between = np.array([values[a:b].max() for a, b in zip(first[:-1], last[1:], strict=True)])
+    return np.maximum(np.append(between, -np.inf), np.insert(between, 0, -np.inf)) if between.size else values[:1]
+
+
+# Attribute of a result: errors of its extremes over all steps, by name: of a limit of sections, as `part_used`; of
+# `RANGES`, in their units; of a named quantity with its limit, "NAME smallest" or "NAME largest", in its unit.
+EXTREME_ERRORS = "accuracy_extremes"
+
+
+def extreme_errors(result: Result) -> dict[str, float]:
+    """Those errors; empty: nobody estimated them."""
+    return dict(json.loads(str(result.attributes.get(EXTREME_ERRORS, "{}"))))
 
 
 class Held(NamedTuple):

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, IN_SPACE, KINK_COUNTS, OF_AN_END
-from hybrid.store.capacity import bound_with_errors
-from hybrid.store.code_checks import code_with_errors
+from hybrid.store.capacity import bound_of_steps, bound_with_errors
+from hybrid.store.code_checks import code_of_steps, code_with_errors
 from hybrid.store.envelope import (
     BROKEN,
     GROUP,
@@ -33,7 +33,7 @@ from hybrid.store.envelope import (
     not_verified,
     with_partner,
 )
-from hybrid.store.limits import Held, held_of, needs_moments
+from hybrid.store.limits import Held, extreme_errors, held_of, needs_moments
 from hybrid.store.records import Event, not_converged_in
 
 if TYPE_CHECKING:
@@ -332,12 +332,18 @@ def _too_sharp(result: Result, names: AbstractSet[str], t: float) -> Doubt | Non
 
 
 def _reached(result: Result, name: str, x: Judged) -> Doubt | None:
-    """That values are so near to their limit that their errors may take them beyond."""
+    """That values are so near to their limit that their errors may take them beyond, at outputs or over all steps."""
     s, errors = result.both_sides(f"errors/total/{name}")
     _, values = result.both_sides(name)
     allowed = _along(result, x.limit, s)
     at = int(np.abs(result.times - x.t).argmin()), int(np.abs(s - x.s).argmin())
-    here = _size(x, x.allowed, 1.0 / x.value if name == "curvature" and x.value > 0.0 else x.value, errors[at])
+    value = 1.0 / x.value if name == "curvature" and x.value > 0.0 else x.value
+    here = _size(x, x.allowed, value, errors[at])
+    if len(result.times) > 1:
+        over_steps = extreme_errors(result).get(x.limit)
+        if over_steps is None:
+            return Doubt(f"the error of {_words(name)} over all steps is not estimated", ESTIMATE)
+        here = np.maximum(here, _size(x, x.allowed, value, 0.0) + over_steps)
     most = float(np.nanmax(np.append(_size(x, allowed, values, errors), here)))
     if most <= 1.0:
         return None
@@ -389,23 +395,45 @@ def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
     if x.by_outputs or x.bound is not None:
         most = "not known" if x.bound is None else f"known to be at most {x.bound:.4g} {x.unit} alone"
         return Doubt(f"its values between outputs are {most}", "a shorter output.every")
-    if x.unit == "Pa":
-        return _stress_reached(result, x)
     if x.unit == "%":
-        bound = code_with_errors(result) if x.limit == "code" else bound_with_errors(result)
+        bound = _part_with_errors(result, x)
         if bound is None:
             return Doubt(f"the error of {x.name} is not estimated", FINER)
         why = f"with the errors of tension and {'moment' if x.limit == 'code' else 'curvature'} it may pass the limit"
         return None if bound <= 1.0 else Doubt(why, "a smaller accuracy")
-    error = _error_of_held(result, x, clearance)
-    if error is None:
+    over_steps = extreme_errors(result).get(x.limit if x.unit == "Pa" else f"{x.name} {x.limit}")
+    if over_steps is None and len(result.times) > 1:
+        return Doubt(f"the error of {x.name} over all steps is not estimated", ESTIMATE)
+    if x.unit == "Pa":
+        return _stress_reached(result, x, over_steps or 0.0)
+    at_outputs = _error_of_held(result, x, clearance)
+    if over_steps is None and at_outputs is None:
         return Doubt(f"the error of {x.name} is not estimated", FINER)
+    error = max(over_steps or 0.0, at_outputs or 0.0)
     left = x.value - x.allowed if x.limit == "smallest" else x.allowed - x.value
     return None if error <= left else Doubt(f"its error may be {error:.2g} {x.unit}", "a smaller accuracy")
 
 
-def _stress_reached(result: Result, x: Held) -> Doubt | None:
-    """That the errors of tension and curvature may take the stress of a pipe beyond its limit."""
+def _part_with_errors(result: Result, x: Held) -> float | None:
+    """The part of a capacity or code that nothing exceeds, whatever its errors are, at outputs and over all steps."""
+    bound = code_with_errors(result) if x.limit == "code" else bound_with_errors(result)
+    if bound is None or len(result.times) == 1:
+        return bound
+    errors = extreme_errors(result)
+    if x.limit == "code":
+        steps = code_of_steps(result, errors)
+    elif "tension" in errors and "curvature" in errors:
+        steps = bound_of_steps(result, (errors["tension"], errors["curvature"]))
+    else:
+        steps = None
+    return None if steps is None else max(bound, steps)
+
+
+def _stress_reached(result: Result, x: Held, over_steps: float) -> Doubt | None:
+    """That the errors of tension and curvature may take the stress of a pipe beyond its limit.
+
+    over_steps: error of its largest value over all steps, as a part of the limit.
+    """
     if "stress_per_tension" not in result:
         return Doubt("the error of the stress is not estimated", FINER)
     s, stress = result.both_sides("von_mises")
@@ -414,7 +442,7 @@ def _stress_reached(result: Result, x: Held) -> Doubt | None:
         error += result.both_sides(f"errors/total/{name}")[1] * _along(result, f"stress_per_{name}", s)
     used = (stress + error) / _along(result, "max_stress", s)
     at = int(np.abs(result.times - x.t).argmin()), int(np.abs(s - (x.s or 0.0)).argmin())
-    if max(float(np.nanmax(used)), (x.value + error[at]) / x.allowed) <= 1.0:
+    if max(float(np.nanmax(used)), (x.value + error[at]) / x.allowed, x.value / x.allowed + over_steps) <= 1.0:
         return None
     return Doubt("with the errors of tension and curvature it may pass the limit", "a smaller accuracy")
 
