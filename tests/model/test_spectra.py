@@ -382,3 +382,27 @@ def test_a_line_in_high_waves_is_one_of_several_and_is_turned_with_them():
 def test_what_is_linear_is_refused_beside_high_waves():
     with pytest.raises(SceneError, match="a response by frequency is linear"):
         hybrid.response(scene(HIGH))
+
+
+def test_widths_of_the_peak_of_torsethaugen():
+    """Before the peak 0.07, behind it 0.09, as of JONSWAP: a spectrum of its own, integrated by quadrature."""
+    for height, period in ((5.0, 9.0), (2.5, 13.0)):
+        parts = torsethaugen_parts(height, period, G)
+        assert parts[0][4] > 1.5, "else it has no width"
+
+        def own(w, parts=parts):
+            return sum(H**2 / 16.0 * shape(w / p, n, m, g) / (p * area(n, m, g)) for H, p, n, m, g in parts)
+
+        w = parts[0][1] * np.array([0.85, 0.93, 0.97, 1.03, 1.09, 1.2])
+        np.testing.assert_allclose(torsethaugen(w, height, period, G), own(w), rtol=1e-4)
+
+
+def shape(x, n, m, gamma):
+    """x^-n exp(-(n/m) x^-m) gamma^exp(..) at frequencies over that of the peak."""
+    wide = np.where(x <= 1.0, 0.07, 0.09)
+    return x**-n * np.exp(-n / m * x**-m) * gamma ** np.exp(-((x - 1.0) ** 2) / (2.0 * wide**2))
+
+
+def area(n, m, gamma):
+    """Its integral."""
+    return sum(quad(lambda x: float(shape(x, n, m, gamma)), a, b, limit=400)[0] for a, b in ((0.1, 1.0), (1.0, 100.0)))

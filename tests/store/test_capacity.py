@@ -188,3 +188,25 @@ def test_line_that_is_paid_out_has_its_capacity():
         part = 100.0 * used(POLYGON, result.tension, result.curvature)
         np.testing.assert_allclose(result["capacity_used"], part, rtol=1e-12)
         assert np.nanmax(part) > 5.0
+
+
+def test_a_bound_knows_the_way_to_a_dent():
+    """Of a polygon that is dented at 20 N: the way there leaves a rectangle of 40 N and 0.5 1/m with 2, its corners
+
+    with 1.78, 0.4 and 0.25.  A dent towards tension likewise: by curvature.
+    """
+    dented = [[100.0, 0.0], [20.0, 0.2], [60.0, 1.5], [0.0, 2.0]]
+    assert float(used(dented, 40.0, 0.4)) == pytest.approx(2.0)
+    assert float(most_used(dented, 0.0, 40.0, 0.5)) == pytest.approx(2.0)
+    turned = [[100.0, 0.0], [75.0, 60.0], [10.0, 20.0], [0.0, 100.0]]
+    assert float(used(turned, 20.0, 40.0)) == pytest.approx(2.0)
+    assert float(most_used(turned, 0.0, 25.0, 40.0)) == pytest.approx(2.0)
+    assert float(most_used(TRIANGLE, 10.0, 50.0, 1.0)) == pytest.approx(1.0)  # a corner of the rectangle
+    assert float(most_used(BOTH_WAYS, -40.0, 10.0, 0.0)) == pytest.approx(0.8)  # without bending
+
+
+def test_a_bound_knows_that_no_bending_may_be_the_worst():
+    """A polygon that bends make stronger: 9 N of 10 N without bending, little with 0.09 1/m or more."""
+    bulging = [[10.0, 0.0], [100.0, 1.0], [0.0, 2.0]]
+    assert float(used(bulging, 9.0, 0.09)) == pytest.approx(0.09)
+    assert float(most_used(bulging, 9.0, 9.0, 1.0)) == pytest.approx(0.9)

@@ -1,0 +1,109 @@
+"""Rules of the domain manager one by one, without a run: waiting times, what is foreseen, failed steps, torque."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from adapt_cases import along, cable, even, on, state_on
+
+from hybrid.adapt.manager import Allowed, Change, DomainManager, Times
+from hybrid.kernels.mesh.criteria import BEND, GIVEN, TORSION
+from hybrid.model.layout import Layout
+
+HOLD = 2.0  # s
+
+
+def manager(rod: str, given: Any = None, **times: Any) -> DomainManager:
+    """Of ten base cells of 1 m."""
+    zones = np.zeros(len(rod), int) if given is None else np.asarray(given)
+    return DomainManager(cable(), even(len(rod), rod), zones, 1.0, Allowed(0.01), Times(HOLD, **times))
+
+
+def becomes(found: DomainManager, rod: str, t: float, urgent: bool = False) -> None:
+    """Cells become what `rod` says at t (s)."""
+    new = np.array([x == "R" for x in rod])
+    found.adopt_rods(new, Change(new, (), np.full(new.size, urgent), np.zeros_like(new)), t)
+    found.layout = Layout(found.layout.base, found.layout.parts, new)
+
+
+def test_a_rod_that_comes_back_soon_waits_longer_and_a_later_one_half_as_long_again() -> None:
+    """Let go at 0 s and back 4 s later, within four holds: eight holds; then half of it each time, one at least."""
+    found, waits = manager("RRRR"), []
+    becomes(found, "RCCR", 0.0)
+    becomes(found, "RRCR", 4.0)
+    waits.append(found.patience.tolist())
+    t = 4.0
+    for _ in range(5):
+        becomes(found, "RCCR", t)
+        t += 1000.0  # much later than four holds, eight times as long
+        becomes(found, "RRCR", t)
+        waits.append(found.patience.tolist())
+    assert [x[1] for x in waits] == [8.0, 4.0, 2.0, 1.0, 1.0, 1.0]
+    assert all(x[0] == x[2] == x[3] == 1.0 for x in waits), "of those that did not come back nothing changes"
+
+
+@pytest.mark.parametrize(("after", "wait"), [(7.9, 8.0), (8.1, 1.0)])
+def test_soon_is_within_four_holds(after: float, wait: float) -> None:
+    found = manager("RRRR")
+    becomes(found, "RCCR", 100.0)
+    becomes(found, "RRRR", 100.0 + after)
+    assert found.patience.tolist() == [1.0, wait, wait, 1.0]
+
+
+def test_what_becomes_rod_begins_without_stiffness_and_faster_where_it_is_urgent() -> None:
+    for urgent, speed in ((False, 1.0), (True, 16.0)):
+        found = manager("RCCC")
+        becomes(found, "RRCC", 1.0, urgent)
+        assert found.grown.tolist()[:2] == [1.0, 0.0] and found.zones.haste[1] == speed
+        assert np.isinf(found.calm_since[1]) and not found.leaving.any()
+
+
+def test_what_a_pre_run_foresees_begins_as_rod() -> None:
+    """Ratios are all 0: cells 4 and 5 will lack twice what is allowed; without that there are none."""
+    found = manager("CCCCCCCCCC")
+    line = on(found.cable, found.layout)
+    state = state_on(line, along(), tension=1e6)
+    assert not found.initial_rods(state).any()
+    found.foreseen[4:6] = 2.0
+    rods = found.initial_rods(state)
+    assert rods[4:6].all() and not rods[[0, 1, 8, 9]].any()
+    assert found.first[BEND].tolist() == [0.0] * 4 + [2.0] * 2 + [0.0] * 4
+
+
+def test_after_a_failed_step_its_cell_and_its_neighbours_become_rod() -> None:
+    given = [0, 0, 0, 0, 0, 0, 0, -1, 0, 0]
+    found = manager("CCCCCCCCCC", given)
+    for cell, rods in ((3, [2, 3, 4]), (0, [0, 1]), (9, [8, 9]), (6, [5, 6])):  # cell 7 is catenary, whatever happens
+        change = found.force_rods(np.array([cell]), "a step failed")
+        assert np.flatnonzero(change.rod).tolist() == rods
+        assert {x.kind for x in change.reasons} == {"retry"} and change.urgent[rods].all()
+
+
+def test_a_rod_that_is_blended_in_gets_all_of_its_stiffness_after_a_failed_step() -> None:
+    found = manager("CRRRCCCCCC")
+    found.grown[2] = 0.3
+    change = found.force_rods(np.flatnonzero(found.base_of_cell == 2)[:1], "a step failed")
+    assert np.flatnonzero(change.stiff).tolist() == [2]
+    assert any("all of its stiffness" in x.text for x in change.reasons)
+
+
+@pytest.mark.parametrize("why", ["twisted", "loaded", ""])
+def test_torque_asks_for_rods_from_end_to_end(why: str) -> None:
+    """A torsion ratio of 3 in one cell is one of all, where both ends hold the twist or a moment is given."""
+    found = manager("CCCCCCCCCC", [0, 0, 0, 0, 0, 0, 0, 0, 0, 1])
+    found.twisted = why == "twisted"
+    if why == "loaded":
+        found.load(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    found.ratios[TORSION, 2] = 3.0
+    found._add_global_ratios()
+    others = 3.0 if why else 0.0
+    assert found.ratios[TORSION].tolist() == [others] * 2 + [3.0] + [others] * 7
+    assert found.ratios[GIVEN, 9] > 1.0 and not found.ratios[GIVEN, :9].any()
+
+
+def test_only_catenaries_that_are_far_above_a_threshold_reject_a_step() -> None:
+    found = manager("RCCCCCCCCC", [0, 0, -1, 0, 0, 0, 0, 0, 0, 0])
+    found.ratios[BEND, :4] = 1e3  # a rod, a catenary, one that is given as catenary, a catenary
+    assert np.unique(found.base_of_cell[found.cells_to_reject]).tolist() == [1, 3]
