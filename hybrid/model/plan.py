@@ -24,7 +24,6 @@ from hybrid.model.payout_law import said_of_line
 from hybrid.model.resolution import first_resolution, model_is_free, predicted_runs
 from hybrid.model.run_time import foretold_steps, processor_time
 from hybrid.model.sections import limits_along, outer_diameter
-from hybrid.scene.analysis import VALUES
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 
@@ -90,7 +89,7 @@ def parts(length: float, step: float) -> int:
 
 def size_of_result(scene: Scene | System) -> float:
     """Bytes of the file of a run, roughly."""
-    return (scene.require_time().duration / scene.output_interval + 1.0) * scene.points_kept * VALUES * 8
+    return (scene.require_time().duration / scene.output_interval + 1.0) * scene.size_of_output
 
 
 def refuse_too_much(scene: Scene) -> None:

@@ -420,12 +420,17 @@ EVERY = (
 )
 
 
-def interval_of_outputs(every: float | None, time: Time, period: float, points: int) -> float:
-    """Time between two outputs, s; period: the shortest of waves and motions, s; points: of all lines."""
+def size_of_output(points: int, with_errors: bool) -> int:
+    """Bytes of an output, roughly; points: of all lines."""
+    return 8 * VALUES * points * (1 + with_errors)
+
+
+def interval_of_outputs(every: float | None, time: Time, period: float, size: int) -> float:
+    """Time between two outputs, s; period: the shortest of waves and motions, s; size: bytes of an output."""
     if every is not None:
         return every
     wanted = max(OUTPUTS, math.ceil(min(PER_PERIOD * time.duration / period, 1e9)))
-    most = max(OUTPUTS, int(UNASKED_BYTES / (8 * VALUES * points)))
+    most = max(OUTPUTS, int(UNASKED_BYTES / size))
     return max(time.duration / min(wanted, most), time.step or 0.0)
 
 

@@ -32,6 +32,7 @@ from hybrid.scene.analysis import (
     Time,
     ZonesModel,
     interval_of_outputs,
+    size_of_output,
     usual_model,
 )
 from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
@@ -213,7 +214,14 @@ class Scene(Table):
     @property
     def output_interval(self) -> float:
         """Time between two outputs [s]."""
-        return interval_of_outputs(self.output.every, self.require_time(), self.lasting_period, self.points_kept)
+        return interval_of_outputs(self.output.every, self.require_time(), self.lasting_period, self.size_of_output)
+
+    @property
+    def size_of_output(self) -> int:
+        """Bytes of an output in the file, roughly."""
+        time, asked = self.time, self.output.errors
+        wanted = self.accuracy is not None or (time is not None and time.controlled)
+        return size_of_output(self.points_kept, wanted if asked is None else asked)
 
     def require_time(self) -> Time:
         """The `time` table; SceneError if the scene has none."""

@@ -29,6 +29,7 @@ from hybrid.scene.analysis import (
     Straight,
     Time,
     interval_of_outputs,
+    size_of_output,
 )
 from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import Finding, NonNegative, Pair, Positive, Table, Text, Truth, Whole, refuse, turned
@@ -528,7 +529,14 @@ class System(Table):
     @property
     def output_interval(self) -> float:
         """Time between two outputs [s]."""
-        return interval_of_outputs(self.output.every, self.require_time(), self.lasting_period, self.points_kept)
+        return interval_of_outputs(self.output.every, self.require_time(), self.lasting_period, self.size_of_output)
+
+    @property
+    def size_of_output(self) -> int:
+        """Bytes of an output in the file, roughly."""
+        time, asked = self.time, self.output.errors
+        wanted = self.accuracy is not None or (time is not None and time.controlled)
+        return size_of_output(self.points_kept, wanted if asked is None else asked)
 
     def require_time(self) -> Time:
         """The `time` table; SceneError if there is none."""

@@ -62,7 +62,7 @@ def test_a_file_that_nobody_asked_for_has_a_bounded_size() -> None:
 
 @pytest.mark.parametrize(
     ("every", "said"),
-    [(None, "1351, every 0.6667 s, in a file of some 22 MB"), (3.0, "fewer than 6 in the period of 4 s")],
+    [(None, "1351, every 0.6667 s, in a file of some 44 MB"), (3.0, "fewer than 6 in the period of 4 s")],
 )
 def test_a_plan_says_how_many_and_how_much(every: float | None, said: str) -> None:
     scene = as_scene_or_system(cable(900.0, **({"every": every} if every else {})))
