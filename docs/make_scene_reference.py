@@ -363,7 +363,8 @@ energy that the changes of a moment put in is in the first of them.
 ## Steps and outputs
 
 `output.every` says when something is kept, `time.step` how finely it is computed.
-Steps are as long as `time.step`, cut evenly to `duration`; an output within a step is interpolated to second order from
+Steps are as long as `time.step`, cut evenly to `duration`; the one up to a release, or to where a load stops, is shorter.
+An output within a step is interpolated to second order from
 the states at both its ends.  With `output: {exact: true}` steps end at outputs: the interval from one output to the
 next is cut into the fewest equal steps that are no longer than `time.step`.
 The last output is at `duration`, also when `every` does not divide it.

@@ -80,11 +80,30 @@ class Plan:
 
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
 MOST_BYTES = 1e11  # of the largest file that still fits a disk
+SAME_STOP = 1e-6  # of a step: stops that are so near to each other are one, or a step between them would be round-off
 
 
 def parts(length: float, step: float) -> int:
     """How many equal parts, none longer than `step` but for round-off, make up `length`."""
     return max(1, ceil(min(length / step, 1e18) * (1.0 - 1e-12) - 1e-9))
+
+
+def equal_steps(
+    leg: tuple[float, int], now: float, stop: float, step: float, even: bool
+) -> tuple[float, int, int, float]:
+    """Fixed steps to a stop (s): where they are counted from (s), those done, all of them, and their length (s).
+
+    leg: where they were counted from so far, and how many are done.  even: whether they are cut evenly; else the last
+    one is shorter, and those before it are as of a run that ends before the stop.
+    """
+    first, done, count, length = now, 0, 1, step
+    for first, done in (leg, (now, 0)):
+        count = parts(stop - first, step)
+        whole = abs(count * step - (stop - first)) <= SAME_STOP * step
+        length = (stop - first) / count if even and not whole else step
+        if abs(first + done * length - now) <= SAME_STOP * step:
+            break
+    return first, done, count, length
 
 
 def size_of_result(scene: Scene | System) -> float:

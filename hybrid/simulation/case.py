@@ -22,7 +22,7 @@ from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.payout import longest_out, winch_side
-from hybrid.model.plan import output_times
+from hybrid.model.plan import SAME_STOP, output_times
 from hybrid.model.plane import as_begun
 from hybrid.model.resolution import (
     Reach,
@@ -70,7 +70,7 @@ from hybrid.simulation.run_sample import (
     split_outputs,
     usual_cells,
 )
-from hybrid.simulation.time_loop import FORCE_COLUMNS, SAME_STOP, TimeLoop
+from hybrid.simulation.time_loop import FORCE_COLUMNS, TimeLoop
 from hybrid.simulation.transient import Transient
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium

@@ -23,8 +23,7 @@ from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Moves, state_for
 from hybrid.kernels.step.accept import MANY
 from hybrid.model.ends import table_of_loads
-from hybrid.model.plan import output_times
-from hybrid.model.plan import parts as equal_parts
+from hybrid.model.plan import SAME_STOP, equal_steps, output_times
 from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.plane import OUT
 from hybrid.scene.points import Fairlead
@@ -67,7 +66,7 @@ from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauge
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, joined_lines, named
 from hybrid.simulation.system_zones import SystemZones, managers_for, start_at_rest, zones_as_placed
-from hybrid.simulation.time_loop import SAME_STOP, WORK, apart, falls_on
+from hybrid.simulation.time_loop import WORK, apart, falls_on
 from hybrid.solve.joined import SystemState, SystemTaken
 from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.solve.shared_contact import SharedContact
@@ -596,13 +595,10 @@ class SystemRun:
         loop, step = self.loop, self.resolution.one.step
         if loop.controlled and self.payout is not None:
             self.payout.limit_step()
-        first, done = self.leg
-        parts = equal_parts(stop - first, step)
-        if abs(first + done * (stop - first) / parts - self.t) > SAME_STOP * step:  # those steps end here
-            first, done, parts = self.t, 0, equal_parts(stop - self.t, step)
-        self.leg = (first, done)
-        whole = abs(stop - first - parts * step) <= SAME_STOP * step  # the same bits, wherever the next stop is
-        loop.begin_leg(stop, first, done, parts, step if whole else (stop - first) / parts)
+        even = self.system.output.exact or bool(self.resolution.one.ends) or not falls_on(stop, self._breaks, step)
+        steps = equal_steps(self.leg, self.t, stop, step, even)
+        self.leg = steps[:2]
+        loop.begin_leg(stop, *steps)
         arrived = not self.t < stop
         while not arrived:
             self._between = False

@@ -15,6 +15,7 @@ from hybrid.kernels.state.books import AT_STOP, FAILED, JUMPED, LOG, PAUSED, STE
 from hybrid.kernels.state.state import Batch, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
+from hybrid.model.plan import SAME_STOP
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
@@ -47,9 +48,6 @@ MOST_ASIDE, FEWEST_JOINED = 20_000, 4
 
 # Steps times cells from one checkpoint to the next, about 5 s of computing.
 WORK = 10_000_000
-
-# Of a step: stops that are so near to each other are one, or a step between them would be round-off.
-SAME_STOP = 1e-6
 
 # Columns of the step log that runs to compare with keep: time, forces at both ends.
 FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force_end")]

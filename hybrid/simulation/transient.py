@@ -21,7 +21,7 @@ from hybrid.kernels.state.report import SEABED_ENERGY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Batch, State, Work, state_for
 from hybrid.kernels.step.step_law import FIRST
 from hybrid.model.build import Model
-from hybrid.model.plan import parts
+from hybrid.model.plan import SAME_STOP, equal_steps
 from hybrid.model.resolution import Resolution
 from hybrid.model.scales import wave_step
 from hybrid.outputs.joined_lines import Output, outputs_in
@@ -61,7 +61,6 @@ if TYPE_CHECKING:  # a line that is not paid out does without, and starts sooner
     from hybrid.simulation.payout_nodes import NodeChanges
     from hybrid.simulation.payout_zones import PaidZones
 
-WHOLE_STEPS = 1e-6  # of a step: a time so near to a number of steps is one
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 
 
@@ -347,9 +346,12 @@ class Transient:
         if count.controlled and self.payout is not None:
             self.payout.limit_step()
         if not count.controlled and stop > clock.now:
-            step, whole = self.resolution.step, stop - float(clock.leg_begin)
-            count.leg_parts = n = parts(whole, step)
-            clock.leg_step = step if abs(n * step - whole) <= WHOLE_STEPS * step else whole / n
+            leg = float(clock.leg_begin), int(count.leg_part)
+            step, ends = self.resolution.step, self.model.ends
+            known = any(abs(t - stop) <= SAME_STOP * step for t in (*ends.breaks, *ends.release_times))
+            even = self.scene.output.exact or bool(self.resolution.ends) or not known
+            steps = equal_steps(leg, self.t, stop, step, even)
+            clock.leg_begin, count.leg_part, count.leg_parts, clock.leg_step = steps
 
     def advance(self, stop: float, begun: int | None = None) -> Iterator[int]:
         """To `stop` (s), where a step ends; yields codes of state.books: STEPPED where there is something to look at.

@@ -230,7 +230,7 @@ def test_a_twisted_catenary_is_let_go_with_its_twist(model: str, tmp_path: Path)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("when", [0.5, 0.75])
+@pytest.mark.parametrize("when", [0.5, 0.75, 0.7567])  # between two steps of 1/64 s, too
 def test_a_release_after_the_end_of_a_run_comes_when_it_is_continued(tmp_path: Path, when: float) -> None:
     """A run to 0.5 s that goes on to 1 s is, bit for bit, the run to 1 s, in which the end is let go."""
     short, whole = tmp_path / "short.h5", tmp_path / "whole.h5"
