@@ -22,8 +22,12 @@ SAME_PLACE = 1e-6
 # Lengths are sums of what people wrote; only round-off may separate them.
 SAME_LENGTH = 1e-9
 
-# A polyline drawn by hand, or an extensible cable that starts along one, may be longer or shorter by this part.
+# A search for equilibrium may start from a polyline that is longer or shorter by this part: nothing of it is left.
 POLYLINE_STRETCH = 0.2
+
+# A motion that starts along a polyline starts with the strain of that, EA times which is a tension: a polyline through
+# places of a line that turns by half a radian from each chord to the next is shorter than the line by 1 %.
+DRAWN_STRAIN = 0.01
 
 # A weight below this part of all weights and lifts is their round-off.
 WEIGHTLESS = 1e-9
@@ -125,20 +129,21 @@ def apart_in_motion(ends: Ends, time: Time | None, within: float = 0.0) -> Apart
 # --- where the cable starts --------------------------------------------------------------------
 
 
-def start_is_known(cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
+def start_is_known(environment: Environment, cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
     """An initial shape that gives the place of the cable, and agrees with its ends."""
+    loads = net_weight(environment, cable, ends)[1]
     if isinstance(initial, Equilibrium):
-        yield from _guess(cable, ends, initial)
+        yield from _guess(cable, ends, initial, loads)
     elif isinstance(initial, Straight):
         yield from _straight_start(cable, ends, initial)
     else:
-        yield from _polyline_start(cable, ends, initial, SAME_PLACE if cable.inextensible else POLYLINE_STRETCH)
+        yield from _polyline_start(cable, ends, initial, loads)
 
 
-def _guess(cable: Cable, ends: Ends, initial: Equilibrium) -> Iterator[Finding]:
+def _guess(cable: Cable, ends: Ends, initial: Equilibrium, loads: float) -> Iterator[Finding]:
     places = ends.held() | ends.initial_guesses()
     if initial.points is not None:
-        yield from _polyline_start(cable, ends, initial, POLYLINE_STRETCH)
+        yield from _polyline_start(cable, ends, initial, loads)
     elif initial.guess in ("catenary", "arc", "span") and len(places) < 2:
         expected = f"auto or straight, because a guess like {initial.guess} goes from one known place to another"
         yield Finding(("initial", "guess"), expected, "hold both ends, or say `initial_guess` where a body is")
@@ -252,23 +257,13 @@ def _straight_start(cable: Cable, ends: Ends, initial: Straight) -> Iterator[Fin
         yield Finding(("initial", "velocity"), expected, "leave velocity out, or free both ends")
 
 
-def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, allowed: float) -> Iterator[Finding]:
+def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, loads: float) -> Iterator[Finding]:
     points, length = initial.points or (), cable.length
-    total = sum(math.dist(a, b) for a, b in pairwise(points))
     s = initial.arc_lengths if isinstance(initial, Points) else None
     if s is not None:
-        yield from _pieces_fit(points, s, length, allowed)
+        yield from _pieces_fit(points, s, cable, loads)
     else:
-        borne = min(x.strain_limit for x in cable.sections) if isinstance(initial, Points) else allowed
-        if abs(total - length) > min(allowed, borne) * length:
-            exact = "the length of the inextensible cable"
-            why = exact if allowed == SAME_PLACE else "the length of the cable, within 20 %"
-            if borne < allowed:
-                why = f"the length of the cable, within the {100 * borne:.3g} % that a section bears (max_strain)"
-            expected = f"a polyline {length:.8g} m long, {why}"
-            fix = f"move the points, or make the cable {total:.8g} m long"
-            given = f"{len(points)} points, {total:.8g} m in all"
-            yield Finding(("initial", "points"), expected, fix, given)
+        yield from _drawn_as_long(points, cable, ends, loads if isinstance(initial, Points) else None)
     for name, index in (("start", 0), ("end", len(points) - 1)):
         position = ends.held().get(name)
         if position is not None and math.dist(points[index], position) > SAME_PLACE * length:
@@ -277,16 +272,47 @@ def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, all
     yield from _bodies_agree(ends, points[0], points[-1], SAME_PLACE * length)
 
 
-def _pieces_fit(points: tuple[Triple, ...], s: tuple[float, ...], length: float, allowed: float) -> Iterator[Finding]:
-    """Arc lengths of the corners of a polyline that do not end with the cable, or stretch a piece too far."""
+def _drawn_as_long(points: tuple[Triple, ...], cable: Cable, ends: Ends, loads: float | None) -> Iterator[Finding]:
+    """A polyline of another length than the line; loads: N, all that acts where a motion starts; None: a search."""
+    total, length = sum(math.dist(a, b) for a, b in pairwise(points)), cable.length
+    fits, part, why = length, POLYLINE_STRETCH, "within 20 %"
+    if loads is not None and cable.inextensible:
+        part, why = SAME_PLACE, "which is inextensible"
+    elif loads is not None:
+        held = ends.held()
+        if len(held) == 2 and all(end.is_placed for end in ends.both):  # so far apart they stretch it in any shape
+            fits = max(length, math.dist(held["start"], held["end"]))
+        part, borne = _strain_at_start(cable, loads), min(x.strain_limit for x in cable.sections)
+        why = f"within {100 * part:.3g} %"
+        if part < borne:
+            stretched = f"a start stretched within the {100 * borne:.3g} % that a section bears (max_strain)"
+            why += f"; {stretched} says so by arc_lengths"
+    if abs(total - fits) <= (part + SAME_LENGTH) * length:
+        return
+    expected = f"a polyline {fits:.8g} m long, the length of the cable, {why}"
+    fix = f"move the points, or make the cable {total:.8g} m long"
+    yield Finding(("initial", "points"), expected, fix, f"{len(points)} points, {total:.8g} m in all")
+
+
+def _strain_at_start(cable: Cable, loads: float) -> float:
+    """Strain with which a motion may start: max_strain, or what all loads (N) together make, or a drawing."""
+    each = [(x.max_strain, min(max(DRAWN_STRAIN, x.strain(loads)), x.strain_limit)) for x in cable.sections]
+    return min(by_loads if asked is None else asked for asked, by_loads in each)
+
+
+def _pieces_fit(points: tuple[Triple, ...], s: tuple[float, ...], cable: Cable, loads: float) -> Iterator[Finding]:
+    """Arc lengths of the corners of a polyline that do not end with the cable, or strain a piece too far."""
+    length, exact = cable.length, cable.inextensible
     if abs(s[-1] - length) > SAME_PLACE * length:
         fix = "the last arc length is the length of all sections"
         yield Finding(("initial", "arc_lengths", len(s) - 1), f"{length:.8g} m, the length of the cable", fix)
         return
+    less, more = (SAME_PLACE, SAME_PLACE) if exact else (_strain_at_start(cable, loads), POLYLINE_STRETCH)
     for i, (a, b) in enumerate(pairwise(zip(points, s, strict=True)), start=1):
         chord, rest = math.dist(a[0], b[0]), b[1] - a[1]
-        if abs(chord - rest) > allowed * rest + SAME_PLACE * length:
-            bound = "as long as it, of an inextensible cable" if allowed == SAME_PLACE else "as long as it within 20 %"
+        if not -less * rest - SAME_PLACE * length <= chord - rest <= more * rest + SAME_PLACE * length:
+            bound = f"at most {100 * more:.3g} % longer and {100 * less:.3g} % shorter"
+            bound = "as long as it, of an inextensible cable" if exact else bound
             expected = f"a chord from point {i - 1} to {i} that is {bound}: {chord:.6g} m over {rest:.6g} m of cable"
             yield Finding(("initial", "arc_lengths", i), expected, "move the point, or change the arc length")
             return

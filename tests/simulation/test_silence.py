@@ -157,6 +157,28 @@ def test_points_that_stretch_a_line_beyond_what_it_bears_are_refused():
     )
 
 
+@pytest.mark.parametrize(
+    ("initial", "told"),
+    [
+        ({"points": [[0, 0, 0], [249, 0, 0]]}, "249 m in all.*expected: a polyline 260 m long.*within 1 %"),
+        ({"points": [[0, 0, 0], [271, 0, 0]]}, "271 m in all.*expected: a polyline 260 m long.*within 1 %"),
+        ({"points": [[0, 0, 0], [249, 0, 0]], "arc_lengths": [0, 260]}, "1 % shorter: 249 m over 260 m of cable"),
+    ],
+)
+@pytest.mark.parametrize("several", [False, True])
+def test_a_first_shape_of_another_length_is_refused_with_both(initial, told, several):
+    """A start that is compressed by 4 % ran, to -823 kN; of a line of several as well."""
+    of_line = {"sections": [{"length": 260.0, "mass": 5.0, "axial_stiffness": 2e7}]}
+    start, time = {"initial": {"kind": "points"} | initial}, {"time": {"duration": 1, "step": 1e-3}}
+    tables = {"cable": of_line, "ends": {"start": pinned(0, 0, 0), "end": "free"}} | start | time
+    if several:
+        free = {"kind": "free", "initial_guess": initial["points"][-1]}
+        line = {"start": "a", "end": "b", "model": "catenary"} | of_line | start
+        tables = {"points": {"a": {"position": [0, 0, 0]}, "b": free}, "lines": {"one": line}} | time
+    with pytest.raises(hybrid.SceneError, match=f"(?s)initial.*{told}"):
+        hybrid.run(tables)
+
+
 def test_a_record_that_starts_with_an_acceleration(tmp_path):
     t = np.linspace(0, 2, 201)
     rows = np.column_stack([t, 0 * t, 0 * t, 1.5 * t**2])
