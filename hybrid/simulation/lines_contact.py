@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,8 +33,8 @@ def strand_in(x: Model) -> TouchingLine:
     return TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale, grows)
 
 
-def crossed(touching: Touching, first: SystemState, last: SystemState) -> tuple[int, int] | None:
-    """Numbers of two lines of which one passes through the other on the straight way between two shapes; None: none."""
+def crossed(touching: Touching, first: SystemState, last: SystemState) -> Iterator[tuple[int, int]]:
+    """Numbers of lines, two each, of which one passes through the other on the straight way between two shapes."""
     for j, a in enumerate(touching.lines):
         for k, b in enumerate(touching.lines[j + 1 :], j + 1):
             if not touching.meets[j, k]:
@@ -43,8 +44,7 @@ def crossed(touching: Touching, first: SystemState, last: SystemState) -> tuple[
             if (np.maximum(*lows) > np.minimum(*highs)).any():
                 continue
             if jumps(*ways) > JUMP:
-                return a, b
-    return None
+                yield a, b
 
 
 def pair_text(shared: SharedContact, model: SystemModel) -> str:

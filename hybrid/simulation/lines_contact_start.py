@@ -16,8 +16,9 @@ from hybrid.model.lines_contact import touching_among
 from hybrid.model.self_reach import contact_bits
 from hybrid.scene.schema import Scene
 from hybrid.simulation.lines_contact import pair_text
+from hybrid.simulation.lines_watch import PASSED
 from hybrid.simulation.self_watch import diameters
-from hybrid.simulation.system_contact_equilibrium import energy_between
+from hybrid.simulation.system_contact_equilibrium import crossings, energy_between
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun
@@ -116,3 +117,16 @@ def given_up_text(run: SystemRun, dt: float) -> str:
         f"no step leads on with contact of lines, down to {dt:.3g} s: {pair_text(run.solver.shared, run.model)}; it is "
         "computed no longer, and they pass through each other; shorter cells there would do"
     )
+
+
+def note_crossings(run: SystemRun) -> None:
+    """An event for every two lines that the search for the equilibrium has passed through each other."""
+    if run.found is None:
+        return
+    for a, b in crossings(run.system, run.model, run.found.state):
+        one, two = run.model.names[a], run.model.names[b]
+        text = (
+            f"lines {one} and {two} cross on the way from their first shapes to this equilibrium: no contact between "
+            f"them is asked for, and none is computed in it; contact: {{between: [[{one}, {two}]]}} keeps them apart"
+        )
+        run.recorder.event(0.0, 0.0, 0.0, PASSED, text)

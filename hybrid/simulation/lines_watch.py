@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 # Diameters by which ways from a joint to where lines that lie along each other meet differ at most.
 ALONG = 2.0
 
+PASSED = "lines pass through each other"  # kind of an event
+
 
 def watched_pairs(system: System, model: SystemModel) -> list[tuple[int, int]]:
     """Numbers of lines, two each, that have diameters, and between which no contact is computed."""
@@ -156,4 +158,4 @@ def tell_passages(run: SystemRun) -> None:
             f"of {one} and s = {other:.4g} m of {two} their centrelines are nearer than the mean of their diameters; "
             f"contact: {{between: [[{one}, {two}]]}} keeps them apart"
         )
-        run.recorder.event(t, 0.0, 0.0, "lines pass through each other", text)
+        run.recorder.event(t, 0.0, 0.0, PASSED, text)

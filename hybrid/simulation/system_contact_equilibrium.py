@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import chain, pairwise
 
 import numpy as np
@@ -16,9 +17,12 @@ from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.first_state import HUNG, first_state
 from hybrid.model.initial_shape import GIVEN, hung
+from hybrid.model.lines_contact import touching_among
 from hybrid.model.system import SystemModel
+from hybrid.scene.system import System
 from hybrid.simulation.contact_equilibrium import KEPT, contact_of, nearness, passes_itself
 from hybrid.simulation.lines_contact import crossed, shared_of
+from hybrid.simulation.lines_watch import watched_pairs
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.flaws import behind_obstacles, passed_obstacles
 from hybrid.solve.joined import JoinedLine, SystemState
@@ -81,7 +85,23 @@ def _passes_another(
     way = [found]
     if any(is_in_current(lines[k].line, lines[k].sea) for k in model.touching.lines):
         way += in_slower_currents(lines, len(model.free), bodies, found, SLOWER) or []
-    return any(crossed(model.touching, a, b) is not None for a, b in pairwise((first, *way[::-1])))
+    return any(True for a, b in pairwise((first, *way[::-1])) for _ in crossed(model.touching, a, b))
+
+
+def crossings(system: System, model: SystemModel, rest: SystemState) -> list[tuple[int, int]]:
+    """Numbers of lines, two each, without contact, that cross on the straight way from first shapes to an equilibrium.
+
+    A first shape says on which side of another line one lies where the scene gives it, or it hangs between held places.
+    """
+    known = [
+        x.start_shape == GIVEN or not (system.is_joined(line.start) or system.is_joined(line.end))
+        for x, line in zip(model.models, system.lines.values(), strict=True)
+    ]
+    pairs = [(a, b) for a, b in watched_pairs(system, model) if known[a] and known[b]]
+    touching = touching_among(system, model.scenes, pairs)
+    if touching is None:
+        return []
+    return [*crossed(touching, _before_current(replace(model, touching=touching)), rest)]
 
 
 def _before_current(model: SystemModel) -> SystemState:

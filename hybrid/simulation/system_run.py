@@ -35,6 +35,7 @@ from hybrid.simulation.events import energy_gains_text
 from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.lines_contact import shared_of, tell_meetings
+from hybrid.simulation.lines_contact_start import note_crossings
 from hybrid.simulation.lines_watch import LinesWatch, tell_passages
 from hybrid.simulation.pair_forces import fields_of_pairs, values_of_pairs
 from hybrid.simulation.progress import RESULT, ProgressReporter
@@ -516,6 +517,7 @@ class SystemRun:
         if self.watch is not None and self.watch.is_needed:
             self.solver.look_at(self.state)
             self.passed |= self.watch.begin(self.system)
+        note_crossings(self)
 
     def _make_room(self, solver: SystemSolver) -> None:
         """Room for samples of the lines and bodies as they are."""

@@ -14,7 +14,7 @@ import hybrid
 from hybrid.model.system import build_system
 from hybrid.simulation import system_checkpoint
 from hybrid.simulation.system_contact import gives_up_contact
-from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, lowered
+from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, crossing, lowered
 from tests.validation.test_validation_obstacles_of_lines import system_of
 
 Tables = dict[str, Any]
@@ -300,3 +300,13 @@ def test_a_file_of_before_goes_on_without_contact(monkeypatch: pytest.MonkeyPatc
         hybrid.run(unasked(0.2), tmp_path / "half.h5")
     resumed = hybrid.resume(tmp_path / "half.h5", until=0.8)
     assert BEGINS not in kinds(resumed) and PASSAGE in kinds(resumed)
+
+
+def test_an_equilibrium_in_which_lines_have_crossed_says_so() -> None:
+    """Looked for from above, the upper rope of a drop of 0.1 m hangs below the lower one where contact is not asked."""
+    tables = crossing(0.1)
+    del tables["contact"]
+    (event,) = (e for e in hybrid.static(tables).events if e.kind == PASSAGE)
+    assert "lines upper and lower cross" in event.text and "between: [[upper, lower]]" in event.text
+    tables["lines"]["upper"]["initial"] = {"points": [[-0.4, 0, -0.1], [0, 0, -0.5], [0.4, 0, -0.1]]}
+    assert PASSAGE not in kinds(hybrid.static(tables))
