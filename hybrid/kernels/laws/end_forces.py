@@ -3,37 +3,41 @@
 The resultant on an end node has in it what acts on the half cell there.  What acts on a body at the node alone (weight,
 water, bed, inertia) is known exactly, and so is the force that balances it, whatever the mesh.  At a support on the
 seabed the bed carries nearly all of the half cell: between the support and the depth w/k at which a line rests lies a
-layer of the length L, shorter than most cells,
+layer, shorter than most cells,
 
-    T p'' = k p - w,   L = sqrt(T/k)    (with bending  EI p'''' - T p'' + k p = w),
+    EI p'''' - T p'' + k max(p, 0) = w    (catenary: EI = 0, L = sqrt(T/k)),
 
-of which the force at the support follows from the depths of both nodes of the cell.
+which lies on one length of the cell and is free on either side of it.  The force from there, with both nodes of the cell
+where they are, takes the place of what the chord makes of it: T p' + w h/2 - what the bed bears of the half cell.  It
+changes with all that it depends on without jumps, and where nothing lies both are the same.  Exact of a catenary, and of
+a rod whose layer is shorter than what lies; of other rods the free parts are those of a catenary.
 
     symbol   meaning                                             unit
     p0, p1   depth of the end and of the node next to it         m
+    V        force on the bed at the edge of what lies            N
     w, k     submerged weight and stiffness of the bed           N/m, N/m2
-    rest     depth w/k at which a line rests                     m
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.cell import Rates
 from hybrid.kernels.laws.node_forces import Z3, Water, body_water
-from hybrid.kernels.laws.seabed import pressure
+from hybrid.kernels.laws.seabed import contact, pressure
 from hybrid.kernels.laws.soil import borne_length
 from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import BODIES, FLOW, SEABED, SOIL, SURFACE, WAVES
 from hybrid.kernels.state.report import CONTACT_FORCE, FORCE_A, NET_A
 
-# Halvings that find where a line leaves the bed within the last cell.
-HALVINGS = 40
-# Layers to a cell from which on the two ends of the cell do not know of each other.
-FAR = 40.0
+HALVINGS = 52  # of the last cell, which find where a line leaves the bed: to round-off, as derivatives need it
+FAR = 40.0  # layers to a cell from which on the two ends of the cell do not know of each other
+LEAST_TENSION = 0.125  # of the weight of a cell: with less it would hang deeper than it is long
+SMALL_TENSION = 1e-3  # of sqrt(k EI), below which it does not change how a rod lies
 
 
 @inner
@@ -63,63 +67,102 @@ def body_force(line, sea, i, x, state):
     return F
 
 
-@inner
-def ways(x):
-    """1/tanh(x) and 1/sinh(x)."""
-    if x > FAR:
-        return 1.0, 0.0
-    return 1.0 / math.tanh(x), 1.0 / math.sinh(x)
+class Layer(NamedTuple):
+    """What a line beside a support on the bed is like; a catenary has EI = 0."""
+
+    T: float  # tension that a line of this weight has at least within a cell, N
+    w: float
+    k: float
+    L: float  # length whose weight in the layer the support bears, where it lies at the level of the bed, m
+    EI: float  # N m2
+    P: float  # product of the two falling roots of EI r^4 - T r^2 + k = 0, 1/m2
+    S: float  # their sum, 1/m
+    held: float  # part of the slope of a clamp that reaches the line: 0 pinned, 1 clamped
 
 
 @inner
-def lift_off(p0, p1, h, L, T, rest, k):
-    """How far from the end, which lies at p0 >= 0, a line leaves the bed before the next node, m; 0: it does not lie."""
-    low, high, w = 0.0, h, k * rest
-    for _ in range(HALVINGS):
-        x = 0.5 * (low + high)
-        coth, csch = ways(x / L)
-        rise = (rest * coth + (p0 - rest) * csch) / L
-        if rise * (h - x) + 0.5 * w * (h - x) ** 2 / T > -p1:
-            low = x
-        else:
-            high = x
-    return 0.5 * (low + high)
+def layer_of(line, i, j, T, w, k, h):
+    """The layer at the support of node i, beside node j."""
+    hangs = max(T, w * h * LEAST_TENSION)
+    EI = 0.5 * (line.kb[j, 0] + line.kb[j, 1]) * line.hn[j] if line.element[j] else 0.0
+    if not EI > 0.0:
+        return Layer(hangs, w, k, math.sqrt(max(T, 0.0) / k), 0.0, 0.0, 0.0, 0.0)
+    P = math.sqrt(k / EI)
+    S = math.sqrt(max(T / EI, SMALL_TENSION * P) + 2.0 * P)
+    held = 0.0
+    if line.element[i]:
+        spring = max(2.0 / (line.kb[i, 0] + line.kb[i, 1]) - line.hn[i] / EI, 0.0)
+        held = 1.0 / (1.0 + spring * EI * S)
+    return Layer(hangs, w, k, S / P - (1.0 - held) / S, EI, P, S, held)
 
 
 @inner
-def touch_down(p0, p1, h, L, T, rest, k):
-    """How far from the end, which lies above the bed (p0 < 0), a line comes down to it before the next node, m, and
+def edge_force(layer, length, near, far):
+    """Force at an end of a length that lies, between the depths `near` of this end and `far` of the other one."""
+    x = length / layer.L
+    csch = 1.0 / math.sinh(x) if x < FAR else 0.0
+    return layer.k * layer.L * ((far - near) * csch + (layer.w / layer.k - near) * math.tanh(0.5 * x))
 
-    how steeply.
+
+@inner
+def free_length(layer, V, p):
+    """Length from a node at a depth p down to the bed, on which the line presses there with V."""
+    return (math.sqrt(V * V - 2.0 * layer.w * layer.T * p) - V) / layer.w if p < 0.0 else 0.0
+
+
+@inner
+def force_of_beam(layer, p0, slope, h):
+    """Force at a support above the bed, of a rod that comes down to it within h (m) and lies there.
+
+    phi, its slope at xi from where it lies, is (V + w xi)/T + A cosh + B sinh; the slope there, theta, follows from the
+    support, linear in A, B and V; the length y that is free from the height of the support.
     """
-    low, high, w, slope = 0.0, h, k * rest, 0.0
+    EI, P, S = layer.EI, layer.P, layer.S
+    T = EI * (S * S - 2.0 * P)
+    fade, q, V = math.sqrt(EI / T), layer.w / T, 0.0
+    V0, V1 = layer.w * S / P, -EI * P
+    A0, A1, B0, B1 = -V0 / T, 1.0 - V1 / T, -fade * (layer.w / (EI * P) + q), fade * S
+    low, high, y = 0.0, h, h
     for _ in range(HALVINGS):
         y = 0.5 * (low + high)
-        coth, csch = ways((h - y) / L)
-        slope = ((p1 - rest) * csch + rest * coth) / L
-        if p0 + slope * y + 0.5 * w * y * y / T < 0.0:
+        th, sech = math.tanh(y / fade), 1.0 / math.cosh(min(y / fade, FAR))
+        clamp, pin = S * layer.held, (1.0 - layer.held) / fade
+        rest = clamp * (((V0 / T + q * y) - slope) * sech + A0 + B0 * th)
+        rest += pin * (fade * q * sech + A0 * th + B0)
+        theta = -rest / (clamp * (V1 / T * sech + A1 + B1 * th) + pin * (A1 * th + B1))
+        V, A, B = V0 + V1 * theta, A0 + A1 * theta, B0 + B1 * theta
+        if (V / T + 0.5 * q * y) * y + fade * (A * th + B * (1.0 - sech)) / sech < -p0:
             low = y
         else:
             high = y
-    return 0.5 * (low + high), slope
+    return V + layer.w * y
 
 
 @inner
-def bending_layer(line, i, j, k, T):
-    """The length L (m) of the layer of a rod at a pinned end, for the force there, and at a clamped one; 0: of no rod.
+def force_of_layer(layer, p0, p1, slope, h):
+    """Force at a support at a depth p0, with the next node at p1, and the part of the layer that is there: from 0,
 
-    With r the two roots of  EI r^4 - T r^2 + k = 0  that fall: R = k L D at a depth D above that of rest, pinned, and
-    k (L D - slope/product), clamped.
+    where the line leaves the bed at the support, to 1.
     """
-    stiffness = 0.5 * (line.kb[j, 0] + line.kb[j, 1]) * line.hn[j] if line.element[j] else 0.0
-    if not stiffness > 0.0:
-        return 0.0, 0.0, 0.0
-    product, squares = math.sqrt(k / stiffness), T / stiffness
-    total = squares + 2.0 * product
-    if not total > 0.0:
-        return 0.0, 0.0, 0.0
-    total = math.sqrt(total)
-    return (squares + product) / (product * total), total / product, product
+    w, a0, a1 = layer.w, max(p0, 0.0), max(p1, 0.0)
+    low, high, lies, free, V = 0.0, h, h, 0.0, 0.0
+    for _ in range(HALVINGS):
+        lies = 0.5 * (low + high)
+        V = edge_force(layer, lies, a0, a1)
+        free = free_length(layer, V, p0)
+        if lies + free + free_length(layer, edge_force(layer, lies, a1, a0), p1) < h:
+            low = lies
+        else:
+            high = lies
+    part, force = math.tanh(2.0 * lies / layer.L) ** 2, V + w * free
+    if layer.EI > 0.0:
+        turn = layer.EI * layer.P * layer.held
+        force -= part * turn * slope
+        if p0 < 0.0:
+            V, down = w * layer.L, max(slope, 0.0)
+            more = force_of_beam(layer, p0, down, h) - V - w * free_length(layer, V, p0) + turn * down
+            force += part / math.tanh(lies / layer.L) * more
+    return force, part
 
 
 @inner
@@ -130,43 +173,42 @@ def force_at_support(line, sea, ends, state, k, x, found):
     """
     count = line.h.shape[0]
     c, i, inward = k * (count - 1), k * count, 1 - 2 * k
+    j = i + inward
     n, p0 = bed_under(sea, x)
     e = scale(1.0 * inward, get3(state.e, c))
     _, p1 = bed_under(sea, add(x, e))
-    p0, p1 = p0 - 0.5 * sea.onset, p1 - 0.5 * sea.onset
-    h, T, stiff = line.h[c], state.T[c], sea.stiffness
     weight = line.point_lift[i] - line.force[i, 2]
     if line.bits & SURFACE and x[2] < sea.surface:
         weight -= line.buoy[c]
-    rest = 2.0 * weight * n[2] / (h * stiff)
-    if not (rest > 0.0 and T > 0.0 and (p0 >= 0.0 or p1 > 0.0)):
+    h, stiff, onset = line.h[c], sea.stiffness, sea.onset
+    w = 2.0 * weight * n[2] / h
+    if not w > 0.0:
         return found
-    L, clamped, product = bending_layer(line, i, i + inward, stiff, T)
-    if not L > 0.0:
-        L = math.sqrt(T / stiff)
+    layer = layer_of(line, i, j, state.T[c] * h / math.sqrt(dot(e, e)), w, stiff, h)
+    if line.element[i] and not layer.EI > 0.0:
+        return found
+    d0, d1 = p0 - 0.5 * onset, p1 - 0.5 * onset
+    if d0 <= 0.0 and d1 <= 0.0 and free_length(layer, 0.0, d0) + free_length(layer, 0.0, d1) >= h:
+        return found
+    borne = 0.0
+    if p0 > 0.0 or p1 > 0.0:
+        v0, v1 = -dot(n, get3(state.v, i)), -dot(n, get3(state.v, j))
+        borne = contact(p0, p1, v0, v1, h, stiff, sea.damping, onset)[0]
+    at, slope = ends.frame[k], 0.0
     if line.element[i]:
-        if p0 < 0.0 or p1 <= 0.0 or not product > 0.0:
-            return found
-        at = ends.frame[k]
         slope = -inward * (n[0] * at[2] + n[1] * at[5] + n[2] * at[8])
-        L = clamped
-        force = stiff * (L * (rest - p0) - slope / product)
-    elif p0 >= 0.0 and p1 >= 0.0:
-        coth, csch = ways(h / L)
-        force = stiff * L * ((p1 - rest) * csch - (p0 - rest) * coth)
-    elif p0 >= 0.0:
-        lies = lift_off(p0, p1, h, L, T, rest, stiff)
-        if not lies > 1e-6 * h:
-            return found
-        coth, csch = ways(lies / L)
-        force = stiff * L * (-rest * csch - (p0 - rest) * coth)
-    else:
-        above, slope = touch_down(p0, p1, h, L, T, rest, stiff)
-        force = T * slope + stiff * rest * above
-    part = 1.0
-    if h / L < FAR:
-        part = 1.0 - (h / L / math.sinh(h / L)) ** 2
-    return found + part * (force - found)
+    force, part = force_of_layer(layer, d0, d1, slope, h)
+    chord = (d1 - d0) / h
+    coarse = layer.T * chord + 0.5 * w * h - borne
+    if line.element[i]:
+        coarse += part * 0.5 * (line.kb[i, 0] + line.kb[i, 1]) * (chord - slope) / h
+    if layer.EI > 0.0 and count > 1:
+        beyond = -inward * dot(n, get3(state.e, c + inward)) / line.h[c + inward]
+        coarse -= part * 0.5 * (line.kb[j, 0] + line.kb[j, 1]) * (beyond - chord) / h
+    weigh = 1.0
+    if h < FAR * layer.L:
+        weigh = 1.0 - (h / layer.L / math.sinh(h / layer.L)) ** 2
+    return found + weigh * (force - coarse)
 
 
 @kernel  # called for two nodes of a line
