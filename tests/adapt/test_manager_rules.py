@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from adapt_cases import along, cable, even, on, state_on
+from adapt_cases import along, cable, even, on, state_on, still
 
 from hybrid.adapt.manager import Allowed, Change, DomainManager, Times
-from hybrid.kernels.mesh.criteria import BEND, GIVEN, TORSION
+from hybrid.adapt.zone_rules import blank_review_job, quiet_review
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh.criteria import BEND, CRITERIA, GIVEN, TORSION
+from hybrid.kernels.state.state import no_sea
 from hybrid.model.layout import Layout
 
 HOLD = 2.0  # s
@@ -107,3 +110,44 @@ def test_only_catenaries_that_are_far_above_a_threshold_reject_a_step() -> None:
     found = manager("RCCCCCCCCC", [0, 0, -1, 0, 0, 0, 0, 0, 0, 0])
     found.ratios[BEND, :4] = 1e3  # a rod, a catenary, one that is given as catenary, a catenary
     assert np.unique(found.base_of_cell[found.cells_to_reject]).tolist() == [1, 3]
+
+
+# --- compiled reviews ---------------------------------------------------------------------------------
+
+
+def reviewed(rod: str, ratios: Any, twisted: bool, wait: float, compiled: bool) -> DomainManager:
+    """After a review at t = 0 of ratios (criteria, n) below 1, by the compiled run or by Python.
+
+    All were calm for 5 s, and are to be so for `wait` holds.
+    """
+    found = manager(rod)
+    found.calm_since[:], found.patience[:] = -5.0, wait
+    line = on(found.cable, found.layout)
+    state, sea = state_on(line, along(), tension=1e6), no_sea(line.h.size)
+    found.evaluate_criteria(line, sea, still(), state, 0.0)
+    found.twisted = twisted
+    found.loudest = 0.0
+    found.ratios[:] = ratios
+    if compiled:
+        table = Table(blank_review_job)
+        found._table.bind(old=state, new=state, zones=found.zones)
+        found.bind_review(table, found._table.numbers)
+        assert quiet_review(table.numbers) == 1
+    else:
+        assert found.review(0.0, state) is None
+    return found
+
+
+@pytest.mark.parametrize("wait", [1.0, 8.0])
+@pytest.mark.parametrize("twisted", [True, False])
+def test_a_compiled_review_decides_as_one_in_python(twisted: bool, wait: float) -> None:
+    """Rods at both ends and in the middle, of which some are loud; with a torque none is calm, however far it is."""
+    ratios = np.random.default_rng(1).uniform(0.0, 0.05, (len(CRITERIA), 10))
+    ratios[BEND, 1], ratios[TORSION] = 0.95, 0.0
+    ratios[TORSION, 4] = 0.95
+    both = [reviewed("RRCCRRCCRR", ratios, twisted, wait, compiled) for compiled in (True, False)]
+    for name in ("calm_since", "leaving", "calmed", "next_review", "seen", "going"):
+        one, other = (np.asarray(getattr(x, name), float) for x in both)
+        np.testing.assert_allclose(one, other, rtol=1e-12, err_msg=name)
+    assert np.isinf(both[0].calm_since[8:]).all() == twisted
+    assert both[0].leaving[8:].all() == (not twisted and wait == 1.0)
