@@ -50,6 +50,7 @@ def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     yield run
 
 
+@pytest.mark.needs("zarr")
 def test_a_folder_that_is_no_study_is_refused(call: Call) -> None:
     code, _, err = call("report", ".")
     assert code == 1 and "is no study" in err

@@ -14,6 +14,8 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 
+pytestmark = pytest.mark.needs("simpleeval")
+
 G = 9.81
 HANGING = {
     "environment": {"gravity": G},

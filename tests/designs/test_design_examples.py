@@ -49,6 +49,7 @@ def test_the_lazy_wave_is_held_by_as_many_limits_as_there_are_unknowns() -> None
         assert result.tension[-1][-1] == pytest.approx(30e3, rel=1e-5)
 
 
+@pytest.mark.needs("simpleeval")
 def test_a_price_is_what_a_wider_limit_is_worth() -> None:
     found = designed("lazy_wave")
     (top,) = (x for x in found.kept if x.name == "top" and x.active)

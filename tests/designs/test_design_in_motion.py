@@ -36,6 +36,7 @@ def test_a_mass_for_a_largest_pull():
     assert found.equilibria == 0 and found.before[""][""][0] == pytest.approx([0, 0, 0], abs=1e-9)
 
 
+@pytest.mark.needs("simpleeval")
 def test_a_limit_over_two_seas_and_its_price():
     """As heavy as can be where the largest pull is limited: the higher sea holds, with 1 / dT/dm as its price."""
     found = hybrid.design(
@@ -50,6 +51,7 @@ def test_a_limit_over_two_seas_and_its_price():
     assert found.moving == 2 and found.runs / 2 <= 20
 
 
+@pytest.mark.needs("simpleeval")
 def test_a_sea_that_is_far_from_its_limits_is_run_where_the_search_begins_and_ends(monkeypatch):
     """As a low swell beside a high one: what it comes to is of a run all the same."""
     ran, run = [], Motions.run
@@ -174,6 +176,7 @@ def test_slopes_of_a_motion_are_those_of_central_differences():
     assert motions.count == 1 + 2 * TANGENT + 4
 
 
+@pytest.mark.needs("simpleeval")
 def test_written_as_a_system_it_is_the_same():
     """A line that hangs from a point that is heaved, with a body below: of several lines."""
     system = as_lines(heaved())

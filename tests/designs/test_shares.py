@@ -14,6 +14,8 @@ from hybrid.errors import ResultError, SceneError
 from hybrid.store.study_file import StudyFile
 from hybrid.view.study_report import html
 
+pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "SALib")
+
 G = 9.81
 LENGTH, MASS = "cable.sections[0].length", "cable.sections[0].mass"
 CHAIN = """

@@ -473,6 +473,7 @@ def test_outputs_too_far_apart_are_said_and_how_much_they_lose(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.needs("xarray", "h5netcdf", "rainflow")
 def test_an_interrupted_result_says_so_everywhere(
     tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -533,6 +534,7 @@ def test_the_command_in_json_and_quietly(result: Result, tmp_path: Path, capsys:
         ({"format": "fatigue", "times": (0.0, 0.1)}, "2 outputs have no cycles"),
     ],
 )
+@pytest.mark.needs("xarray", "h5netcdf", "rainflow")
 def test_nonsense_is_refused_and_nothing_is_left(
     result: Result, tmp_path: Path, more: dict[str, Any], message: str
 ) -> None:
@@ -564,6 +566,7 @@ def test_only_older_exports_are_replaced(result: Result, tmp_path: Path, kind: s
     assert folder_of(tmp_path) == {"run.h5", *(other.name for other in again)}
 
 
+@pytest.mark.needs("xarray", "h5netcdf", "rainflow")
 def test_places_where_nothing_can_be_written(result: Result, tmp_path: Path) -> None:
     with pytest.raises(ResultError, match=r"there is no folder .*\n    try:      mkdir -p"):
         export(result, tmp_path / "no" / "run.nc")
@@ -578,6 +581,7 @@ def test_places_where_nothing_can_be_written(result: Result, tmp_path: Path) -> 
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes there")
 @pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.needs("xarray", "h5netcdf", "rainflow")
 def test_a_full_disk_leaves_what_was_there(tmp_path: Path, kind: str) -> None:
     """A limit of the size of a file stands in for a full disk: the write fails in the same call."""
     made(tmp_path / "run.h5").close()
@@ -602,6 +606,7 @@ except ResultError as error:
 
 
 @pytest.mark.parametrize(("kind", "package"), [("nc", "xarray"), ("nc", "h5netcdf"), ("fatigue", "rainflow")])
+@pytest.mark.needs("xarray", "h5netcdf", "rainflow")
 def test_a_missing_package_is_named_with_its_command(
     result: Result, tmp_path: Path, kind: str, package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -139,6 +139,7 @@ def test_one_component_is_one_wave():
     np.testing.assert_allclose(one.deviation("curvature")[1:-1], size.std(axis=0)[1:-1], rtol=2e-3)
 
 
+@pytest.mark.needs("rainflow")
 def test_few_components_as_in_time():
     """Two components: drag and fatigue of their sum, which is no sea (by a normal law 7 % less tension)."""
     tables = leg(STORM | {"significant_height": 2.0, "peak_period": 8.0, "components": 2})

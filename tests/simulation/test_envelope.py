@@ -173,6 +173,7 @@ def test_it_is_in_a_file_that_was_stopped(tmp_path: Path) -> None:
             assert result[f"envelope/{name}"].tobytes() == whole[f"envelope/{name}"].tobytes(), name
 
 
+@pytest.mark.needs("xarray", "h5netcdf")
 def test_it_is_exported(tmp_path: Path) -> None:
     result = hybrid.run(scene("output={every: 2}", "time.duration=0.5"))
     hybrid.export(result, tmp_path / "e.csv", names=["envelope"])

@@ -238,6 +238,7 @@ def test_curves_are_consistent() -> None:
     assert by_name["studlink chain T-N"].cycles(0.1) == pytest.approx(1e6, rel=1e-5)
 
 
+@pytest.mark.needs("rainflow")
 def test_damage_of_constant_cycles() -> None:
     """1000 cycles of a range of 120 MPa, and a plate twice as thick as the reference."""
     x = 60.0 * np.sin(2.0 * np.pi * np.arange(0.0, 1000.0, 0.01))
@@ -261,6 +262,7 @@ def test_damage_is_that_of_another_library() -> None:
     assert fatigue.damage(x, curve, scale=30.0) == pytest.approx((1.0 / curve.cycles(ranges)).sum(), rel=0.01)
 
 
+@pytest.mark.needs("rainflow")
 def test_damage_of_a_gaussian_process() -> None:
     """Dirlik within 5 % where it holds (this broad record), narrow-band above it, both of the exact spectrum."""
     curve = fatigue.curve_of({"kind": "S-N", "log_a": 12.0, "m": 3.0})
@@ -272,6 +274,7 @@ def test_damage_of_a_gaussian_process() -> None:
 
 
 @pytest.mark.parametrize("stress", [8.0, 30.0, 120.0])
+@pytest.mark.needs("rainflow")
 def test_damage_of_a_gaussian_process_over_two_slopes(stress: float) -> None:
     """Most of it on the second slope, on both, on the first, as of cycles that are counted.
 

@@ -139,6 +139,7 @@ def test_a_catenary_bends_like_the_rod_in_its_place():
 
 
 @pytest.mark.long
+@pytest.mark.needs("dask", "zarr", "xarray")
 def test_codes_are_shown(moved, tmp_path):
     """In `hybrid stats`, in the report with pictures along s and over time, and kept by a study."""
     out = CliRunner().invoke(app, ["stats", str(moved)])

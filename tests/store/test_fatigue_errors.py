@@ -49,6 +49,7 @@ def within(error: float, monkeypatch: pytest.MonkeyPatch) -> tuple[dict[str, Any
     return fatigue_errors.life_within(seen, facts, CURVE, None, SECTION, None), done
 
 
+@pytest.mark.needs("rainflow")
 def test_ranges_that_are_off_change_the_life_by_their_third_power(monkeypatch: pytest.MonkeyPatch) -> None:
     part = 0.1
     found, done = within(part * 1e-3 / np.sqrt(2.0), monkeypatch)
@@ -57,6 +58,7 @@ def test_ranges_that_are_off_change_the_life_by_their_third_power(monkeypatch: p
     assert found["life_most"] == pytest.approx(2.0 / (1.0 - part) ** 3, rel=1e-3)
 
 
+@pytest.mark.needs("rainflow")
 def test_an_error_as_large_as_what_varies_leaves_no_life(monkeypatch: pytest.MonkeyPatch) -> None:
     found, _ = within(1e-3, monkeypatch)
     assert found["life"] is None and "smaller accuracy of curvature" in found["life_not_verified"]

@@ -95,6 +95,7 @@ def test_spectrum_has_its_peak_where_the_motion_is(result: hybrid.Result) -> Non
     assert found.significant == pytest.approx(4.0 * deviation, rel=0.02)
 
 
+@pytest.mark.needs("rainflow")
 def test_damage_along_the_line(result: hybrid.Result) -> None:
     """By tension it is that of the history; by stress it is at least that of tension alone, and of one plane in one."""
     s, damage = result.damage("studless chain T-N", strength=1e6, times=(30.0, None))
@@ -153,6 +154,7 @@ def test_a_run_that_was_stopped_before_its_first_output_has_no_history(outputs: 
         reported(outputs=1).statistics(["tension"])
 
 
+@pytest.mark.needs("rainflow")
 def test_both_sides_of_a_jump_are_counted() -> None:
     """EI changes a hundredfold at s = 30 m: curvature behind it is that of the softer side, and damage is done there."""
     first = SCENE["cable"]["sections"][0] | {"length": 30.0, "bending_stiffness": 5e4}
@@ -212,6 +214,7 @@ def wide(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "200")
 
 
+@pytest.mark.needs("rainflow")
 def test_the_command_prints_rows(result: hybrid.Result, wide: None, capsys: pytest.CaptureFixture[str]) -> None:
     """Every figure of the table is in the JSON; a run that is too short for extremes says so once."""
     with pytest.raises(SystemExit) as ended:
@@ -242,6 +245,7 @@ def test_the_command_prints_rows(result: hybrid.Result, wide: None, capsys: pyte
     assert head == ("standard MPM P90", "s (m) mean deviation skewness smallest largest period (s) in 3 h in 3 h")
 
 
+@pytest.mark.needs("rainflow")
 def test_damage_and_fatigue_life_at_chosen_places(
     result: hybrid.Result, wide: None, capsys: pytest.CaptureFixture[str]
 ) -> None:

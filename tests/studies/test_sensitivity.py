@@ -14,6 +14,8 @@ from hybrid.store.study_file import DONE, FAILED, Column, StudyFile
 from hybrid.studies.cases import scaled
 from hybrid.studies.sensitivity import design
 
+pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
+
 PI = float(np.pi)
 BOUNDS = {"a": (-PI, PI), "b": (-PI, PI), "c": (-PI, PI)}
 

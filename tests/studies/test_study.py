@@ -22,6 +22,8 @@ from hybrid.studies.cases import cases_of, short_names
 from hybrid.studies.cluster import client_of
 from hybrid.studies.collect import collected
 
+pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
+
 SCENE = """
 environment: {fluid: {density: 1025}}
 cable:

@@ -18,6 +18,8 @@ from hybrid.studies.study import _created
 from hybrid.studies.workers import Job, compute_batch
 from hybrid.view.study_report import html
 
+pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
+
 SCENE = """
 environment: {fluid: {density: 1025}, seabed: {z: -41, stiffness: 1.0e+4, friction: 0.0}}
 cable: {sections: [{length: 60, mass: 8, diameter: 0.04, axial_stiffness: 1.0e+7, drag: {normal: 1.2}}]}

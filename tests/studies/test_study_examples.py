@@ -12,6 +12,8 @@ from hybrid.scene.study import read_study
 from hybrid.statistics.fatigue import YEAR, life_in_years
 from hybrid.studies.cases import cases_of
 
+pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
+
 STUDIES = Path(__file__).parents[2] / "examples" / "studies"
 CASES = {"heave": 14, "launch_window": 42, "touchdown_fatigue": 6, "storm_seeds": 20, "fatigue_sensitivity": 192}
 

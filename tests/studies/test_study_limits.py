@@ -19,6 +19,8 @@ from hybrid.studies.cases import Cases, cases_of
 from hybrid.studies.study import _refuse_limits_not_there, _remove_cases
 from hybrid.studies.workers import Job, compute_batch
 
+pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
+
 SECTION = "{length: 30, mass: 2, axial_stiffness: 1.0e+6, bending_stiffness: 50, max_tension: 600, min_bend_radius: 2}"
 SCENE = f"""
 cable: {{sections: [{SECTION}]}}

@@ -6,8 +6,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+import extras
 import numpy as np
 import pytest
+
+pytestmark = extras.of_file("playwright", "dask", "zarr", "xarray")
+
 from test_report_browser import Visit, browser  # noqa: F401
 
 from hybrid.store.study_file import DONE, FAILED, Column, StudyFile
