@@ -159,6 +159,7 @@ def test_criteria_are_fields():
 # --- twist is remembered -----------------------------------------------------------------------------------
 
 
+@pytest.mark.long  # kernels of its own: 8 s
 def test_a_cable_that_becomes_rod_again_has_its_twist():
     """One end is rolled by a whole turn while the cable is a catenary; as a rod it has the torque of that turn.
 

@@ -31,6 +31,7 @@ def far(a: Result, b: Result) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", [pytest.param("bending", marks=pytest.mark.slow), "sagging"])
+@pytest.mark.long  # 0.9 s
 def test_error_goes_on_across_changes_of_zones(name: str) -> None:
     """Estimated over true distance to the rod: 0.6 to 1.8 nine times in ten, through every change of zones.
 

@@ -169,6 +169,7 @@ def test_a_run_whose_cells_follow_is_continued_to_the_last_bit(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("friction", ["", "environment.seabed.friction=0.4"])
+@pytest.mark.long  # a kernel of its own: 4 s
 def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Cells and zones change alike to the last bit, whether the run's arrays are made once or anew at every change.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from adapt_cases import cable, layout, on
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -23,6 +24,7 @@ def layouts(draw):
 
 @given(layouts())
 @settings(max_examples=100, deadline=None, derandomize=True)
+@pytest.mark.long  # 1.4 s
 def test_everything_fits(zones):
     n, s = zones.rod.size, zones.nodes
     cells = int(zones.counts.sum())

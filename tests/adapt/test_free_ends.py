@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 import hybrid
 
@@ -35,6 +36,7 @@ def hanging(random: np.random.Generator) -> dict[str, Any]:
     }  # fmt: skip
 
 
+@pytest.mark.long  # 1.8 s
 def test_forty_one_lines_with_free_ends_take_no_more_steps_than_asked() -> None:
     random = np.random.default_rng(41)
     for number in range(41):

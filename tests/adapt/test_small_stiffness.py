@@ -73,6 +73,7 @@ def truth() -> Iterator[np.ndarray]:
 
 
 @pytest.mark.parametrize(("share", "base"), [(0.05, 24), (0.02, 60)])
+@pytest.mark.long  # 4 s of 2 cases
 def test_the_share_is_the_error_of_a_bend_that_wanders(share: float, base: int, truth: np.ndarray) -> None:
     """A tether of 3000 m with EI 1 N m2 and a bend that travels through compressed line.
 

@@ -472,6 +472,7 @@ def test_a_closed_pipe_ends_a_command_quietly(call: Call, command: list[str]) ->
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="has no such pipes")
+@pytest.mark.long  # 0.9 s
 def test_a_closed_pipe_of_errors_changes_no_exit_code(call: Call) -> None:
     script = "import sys; from hybrid.cli.commands import main; main(sys.argv[1:])"
     soft = "cable.sections[0].axial_stiffness=1.0"  # stretched beyond what a section bears

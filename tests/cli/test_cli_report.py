@@ -81,6 +81,7 @@ def test_report_gives_facts_to_programs(call: Call) -> None:
     assert limit["limit"] == "min_bend_radius" and limit["broken"] and facts["limits"]["weight"] == "plain"
 
 
+@pytest.mark.long  # 0.9 s
 def test_report_gives_facts_of_every_line_to_programs(call: Call) -> None:
     """Those of several lines together, and of each those that one cable has."""
     rope = {"length": 12, "mass": 2, "diameter": 0.02, "axial_stiffness": 1e5, "max_tension": 20}

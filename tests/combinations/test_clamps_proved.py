@@ -57,6 +57,7 @@ def turned(r: NDArray[np.float64], about: NDArray[np.float64]) -> NDArray[np.flo
 
 @pytest.mark.parametrize("moments", [ALONG, ROUND], ids=["along", "round"])
 @pytest.mark.parametrize("case", list(CASES))
+@pytest.mark.long  # 4 s of 6 cases
 def test_a_spring_turns_a_bent_line_by_its_moment_and_leaves_it_its_curvature(case: str, moments: Any) -> None:
     """Against the line on a rigid clamp, turned by M/k: places, curvature at the clamp, what layers lose, energy M^2/2k.
 

@@ -43,6 +43,7 @@ def test_rods_of_zones_that_move_have_the_inertia_of_rods_that_stay(rods: list[l
     assert apart(one, without) > 1e-4
 
 
+@pytest.mark.long  # 1.1 s
 def test_a_taut_line_whose_rods_come_and_go_is_as_slow_as_that_of_rayleigh() -> None:
     """omega^2 = (T k^2 + EI k^4)/(m + J k^2), k = n pi/L, of a line with hinged ends."""
     pull, EI, EA, J, mass, length = 400.0, 200.0, 1e7, 3.0, 2.0, 10.0

@@ -72,6 +72,7 @@ def test_steps_that_are_repeated_are_of_order_two_and_staggered_ones_of_order_on
     assert np.log2(abs(coarse - middle).max() / abs(middle - fine).max()) == pytest.approx(order, abs=0.25)
 
 
+@pytest.mark.long  # 0.9 s
 def test_the_energy_of_body_and_cable_is_balanced() -> None:
     assert abs(couple(0.05, 30.0, agreed=True).imbalance) < 1e-4
 

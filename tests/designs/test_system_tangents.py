@@ -149,6 +149,7 @@ def test_lines_at_a_body(model: str, waves: bool, monkeypatch: pytest.MonkeyPatc
     agree(at_a_body(model, waves), RESULTS, [*NUMBERS, *of_body, "points.f0.place[0]"], monkeypatch)
 
 
+@pytest.mark.long  # two kernels of its own: 55 s
 def test_what_is_not_followed_is_left_to_differences_and_said() -> None:
     tables, key, of = at_a_point(), "points.mid.mass", ["last a/tension@30"]
     tables["time"]["duration"] = 0.5

@@ -169,6 +169,7 @@ def test_fast_bends_across_hide_nothing_of_a_quiet_bend() -> None:
     assert not line.resolved("curvature")[nodes].any() and not found.valid_for("curvature")
 
 
+@pytest.mark.long  # 1.2 s
 def test_curvature_that_is_known_hardly_anywhere_is_not_valid() -> None:
     """A chain on the bed, moved at its end: it bends to and fro at the touchdown, and known is only that."""
     chain = {"length": 200.0, "mass": 30.0, "diameter": 0.07, "axial_stiffness": 5e6, "drag": {"normal": 1.4}}

@@ -222,6 +222,7 @@ def test_all_modes_have_all_the_mass():
     assert first.energy[first.what] > 0.9
 
 
+@pytest.mark.long  # 2.6 s
 def test_nearest_to_a_period():
     whole = hybrid.modes(sag(60), 10)
     some = hybrid.modes(sag(60), 3, near=whole.modes[5].period)
@@ -231,6 +232,7 @@ def test_nearest_to_a_period():
     assert not some.notes
 
 
+@pytest.mark.long  # 3.5 s
 def test_turned_scenes_have_the_same_periods():
     """About the vertical; and written as one line between two points."""
     c, s = math.cos(0.7), math.sin(0.7)
@@ -341,6 +343,7 @@ PIPE = {
 }  # fmt: skip
 
 
+@pytest.mark.long  # 2.7 s
 def test_friction_holds_what_lies_on_the_bed():
     section = {"length": 60.0, "mass": 5.0, "axial_stiffness": 1e7}
     bed = {"seabed": {"z": 0.0, "stiffness": 1e5, "friction": 0.6}}
@@ -368,6 +371,7 @@ def test_what_is_refused():
         hybrid.modes(string(10), 3, near=-1.0)
 
 
+@pytest.mark.long  # 1.9 s
 def test_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sag.yaml").write_text(hybrid.scene_text(sag(40)))

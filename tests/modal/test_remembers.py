@@ -29,6 +29,7 @@ def periods(tables: dict[str, Any]) -> np.ndarray:
     return np.array([x.period for x in hybrid.modes(tables, 6).modes])
 
 
+@pytest.mark.long  # 2.9 s
 def test_layers_that_stick_are_stiffness():
     stiff = periods(tables_with(CLAMPED, {S + "bending_stiffness": 500.0}))
     stuck = periods(tables_with(CLAMPED, {S + "bending_slip": [{"stiffness": 300.0, "moment": 1e6}]}))

@@ -203,6 +203,7 @@ def at_a_point(made):
     ],
     ids=["drag of members", "linear damping", "drag of a point"],
 )
+@pytest.mark.long  # 7 s of 3 cases
 def test_tension_near_a_resonance_that_drag_alone_damps(tables, least, most):
     """Too small by more than 3 %, which is told; and right where what damps it is linear, of which nothing is told.
 
@@ -222,6 +223,7 @@ def test_tension_near_a_resonance_that_drag_alone_damps(tables, least, most):
     assert all("of quadratic drag, of points, floats and bodies too," in x and "run it in time" in x for x in notes)
 
 
+@pytest.mark.long  # 0.9 s
 def test_tension_of_a_line_with_a_heavy_float_near_its_resonance():
     """As that of ropes at a free point."""
     rope = {"length": 183.0, "mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "added_mass": {"normal": 1.0}}

@@ -50,6 +50,7 @@ def same(law: str) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 @pytest.mark.parametrize("law", ["table", "rope"])
+@pytest.mark.long  # 3 s of 2 cases
 def test_modes_are_those_of_its_piece(law: str) -> None:
     one, other = (hybrid.modes(x, 12).modes for x in same(law))
     found, expected = (np.array([m.frequency for m in x]) for x in (one, other))

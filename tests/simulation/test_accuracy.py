@@ -390,6 +390,7 @@ def test_what_finer_runs_change_as_much_does_not_converge():
     assert estimate.not_converged == {}
 
 
+@pytest.mark.long  # 1.0 s
 def test_what_does_not_converge_is_written_and_printed_as_not_known(capsys, monkeypatch):
     """Curvature on cells that were chosen for positions: no figure beside it, in the tile and in the terminal."""
     monkeypatch.setenv("COLUMNS", "120")

@@ -77,6 +77,7 @@ def test_a_pull_that_falls_leads_to_the_rest_under_it_and_its_energy_is_booked()
     assert left[1] < 1e-2 * abs(booked) and left[1] < 0.6 * left[0]
 
 
+@pytest.mark.long  # 1.1 s
 def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     resumed(falling(0.02, 2.0), tmp_path, 1.0)
 

@@ -38,6 +38,7 @@ def rod() -> hybrid.Result:
     return hybrid.run(crossing())
 
 
+@pytest.mark.long  # a kernel of its own: 7 s
 def test_strands_stay_apart_while_line_comes(rod: hybrid.Result) -> None:
     assert {event.kind for event in rod.events} == {"line touches itself"}
     assert float(rod["self_distance/distance"]) > 0.85 * WIDTH

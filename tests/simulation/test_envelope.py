@@ -45,6 +45,7 @@ def scene(*settings: str) -> hybrid.Scene:
         ("model={zones: [{rod: 12}, {catenary: 28}]}", "ends.end={kind: free, force: [500, 0, 900]}"),
     ],
 )
+@pytest.mark.long  # 3 s of 4 cases
 def test_it_is_what_outputs_at_every_step_and_node_show(settings: tuple[str, ...]) -> None:
     """Interpolation of tension, one-sided values at loads and sections, chords of catenaries: the rules of outputs."""
     result = hybrid.run(scene(*settings))

@@ -52,6 +52,7 @@ def tether(model, accuracy):
     }  # fmt: skip
 
 
+@pytest.mark.long  # 1.1 s
 def test_zones_of_a_coarser_run_do_not_hide_what_those_of_the_result_leave_out():
     """The runs to compare with are all rod, the result is not: 0.26 where their model error was believed."""
     truth = hybrid.run(tether("rod", "0.1%"))
@@ -63,6 +64,7 @@ def test_zones_of_a_coarser_run_do_not_hide_what_those_of_the_result_leave_out()
     assert result.errors["model/position"].max() > 0.5 * result.errors["total/position"].max()
 
 
+@pytest.mark.long  # 0.9 s
 def test_the_figure_of_a_tether_whose_model_is_left_open_is_sharp_at_every_output():
     """0.30 of the truth was estimated, once, with an accuracy of 1 %."""
     scene = tether("rod", "1%")

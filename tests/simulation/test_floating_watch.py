@@ -7,6 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 import hybrid
 from hybrid import Result
 
@@ -54,6 +56,7 @@ def test_what_is_to_stay_in_the_depth_is_not_told() -> None:
     assert not pulled(hybrid.static(scene))
 
 
+@pytest.mark.long  # 1.0 s
 def test_a_buoy_is_told_once_in_waves_that_pass_over_it_and_again_where_it_is_much_deeper(tmp_path: Path) -> None:
     """A crest of 1 m stands over a buoy that its taut chains hold; the run that goes on does not tell it again."""
     scene = two_chains(4.0)

@@ -272,6 +272,7 @@ def test_contact_begins_in_lines_whose_cells_come_and_go(change: Callable[[Table
             assert (line[quantity][-2:] == resumed.lines[name][quantity][-2:]).all()
 
 
+@pytest.mark.long  # 1.1 s
 def test_other_loads_change_nothing_of_what_touches(begun: Any, tmp_path: Path) -> None:
     tables = unasked(0.5)
     hybrid.run(tables, tmp_path / "half.h5")
@@ -294,6 +295,7 @@ def write_as_before(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("hybrid.simulation.system_run.content", as_before)
 
 
+@pytest.mark.long  # 1.0 s
 def test_a_file_of_before_goes_on_without_contact(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with monkeypatch.context() as before:
         write_as_before(before)

@@ -98,6 +98,7 @@ def test_a_file_is_relative_to_its_scene(tmp_path: Path) -> None:
     assert found.at(0.6) == pytest.approx((0.5, 0.0, -0.5))
 
 
+@pytest.mark.long  # 0.8 s
 def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch) -> None:
     made = scene({"file": table(tmp_path / "f.csv")}, time={"duration": 2.0, "tolerance": 1e-4})
     stopping = Stopping(monkeypatch)

@@ -245,6 +245,7 @@ def forces(
     [("catenary", None, None), ("catenary", 2e6, None), ("rod", 2e6, 2e4), ("rod", None, 500.0), ("rod", None, 2e4)],
 )
 @pytest.mark.parametrize("rate", [0.8, -0.8])
+@pytest.mark.long  # 3 s of 10 cases
 def test_a_cell_that_enters_or_leaves_does_not_kick(
     model: str, EA: float | None, EI: float | None, rate: float
 ) -> None:

@@ -44,6 +44,7 @@ LONG = ("accuracy by a second result",)  # several runs for each part
 
 
 @pytest.mark.parametrize("name", [pytest.param(x, marks=pytest.mark.slow) if x in LONG else x for x in CASES])
+@pytest.mark.long  # 22 s of 12 cases
 def test_a_stopped_run_goes_on_bit_for_bit(name, tmp_path, monkeypatch):
     file, settings = CASES[name]
     scene = hybrid.load_scene(EXAMPLES / f"{file}.yaml", settings)

@@ -63,6 +63,7 @@ def verdicts(line: hybrid.Result) -> dict[str, dict[str, Any]]:
     return {x.quantity: x._asdict() | {"met": met[x.verdict]} for x in line.verdicts().accuracy}
 
 
+@pytest.mark.long  # 1.0 s
 def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> None:
     scene = bridle(time={"duration": 4.0, "step": 0.0125}, accuracy=None)  # all that bends is rod
     for line in scene["lines"].values():

@@ -82,6 +82,7 @@ def test_a_line_that_is_paid_out_has_the_cells_of_the_cable(rate: float) -> None
         assert np.abs(line[name] - cable[name]).max() < off * np.abs(cable[name]).max(), name
 
 
+@pytest.mark.long  # 1.5 s
 def test_against_rods(three: hybrid.Result) -> None:
     """The curvature within the share of its largest that is asked for, with a quarter of the cells."""
     scene = mooring()

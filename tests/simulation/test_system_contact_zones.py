@@ -54,6 +54,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
     return hybrid.open(path)
 
 
+@pytest.mark.long  # 0.9 s
 def test_lines_have_the_zones_and_the_contact_of_the_cable(whole: hybrid.Result) -> None:
     cable = hybrid.run(alone(), progress=False)
     touches = cable["energy/self_contact"] > 0.0

@@ -224,6 +224,7 @@ def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path, mon
         assert differences(whole, path) == []
 
 
+@pytest.mark.long  # 0.9 s
 def test_twist_beside_ends_goes_by_the_cells_of_each_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lengths of cells blend, and outputs that wait are looked at together: by those of the last, twist was off."""
     scene: Any = as_system(scene_of("cells that follow", "torque of tension"))
@@ -233,6 +234,7 @@ def test_twist_beside_ends_goes_by_the_cells_of_each_output(tmp_path: Path, monk
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
+@pytest.mark.long  # 0.9 s
 def test_slack_bends_at_a_winch_are_those_of_the_cells_of_each_output(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

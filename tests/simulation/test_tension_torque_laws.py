@@ -78,6 +78,7 @@ def pulled(law: dict[str, Any], model: Any, end: str, force: Any, turns: float =
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("name", LAWS)
+@pytest.mark.long  # 5 s of 15 cases
 def test_a_straight_line_that_is_pulled_and_twisted(name: str, model: str) -> None:
     """Held: tau = 2 pi turns/L, Q = GJ tau + c T, eps = s(T) - c tau.  Free: tau = -c T/GJ, eps = s(T) + c^2 T/GJ."""
     for T, turns in ((150.0, 1.0), (220.0, -2.0), (700.0, 3.0)):

@@ -196,6 +196,7 @@ def test_the_use_of_a_mooring_line_does_not_hang_by_its_bending():
     assert riser.limit == "code" and riser.verdict == "not verified" and "bend" in riser.why
 
 
+@pytest.mark.long  # 1.2 s
 def test_steps_of_a_riser_between_outputs_have_a_bound():
     """It is above what outputs at every step have, and says so where the limit stands between."""
     code = CODE | {"yield_strength": 2.1e8, "tensile_strength": 2.6e8}

@@ -42,6 +42,7 @@ except ResultError as error:
 
 # bytes: before the file is made, while it is made, at its first outputs, later ones
 @pytest.mark.parametrize("limit", [0, 20_000, 60_000, 240_000, 300_000, 412_345, 777_777])
+@pytest.mark.long  # 3 s of 7 cases
 def test_what_was_written_stays(limit: int, tmp_path: Path) -> None:
     path, here = tmp_path / "run.h5", Path(__file__).parent
     code = WRITER.format(here=str(here), limit=limit, path=str(path))

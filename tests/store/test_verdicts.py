@@ -181,6 +181,7 @@ def test_thirty_results_say_the_same_everywhere(
     assert min(seen[x] for x in ("within", "broken", "not verified")) > 10, seen
 
 
+@pytest.mark.long  # 13.0 s
 def test_verdicts_of_thirty_results(results: dict[tuple[str, str], Path]) -> None:
     """What each of them may be."""
 

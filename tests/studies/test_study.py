@@ -92,6 +92,7 @@ def test_grid_zip_and_ranges(folder: Path) -> None:
     assert [r["step"] for r in rows(folder, vary={STEP: {"from": 0.1, "to": 0.3, "count": 3}})] == [0.1, 0.2, 0.3]
 
 
+@pytest.mark.long  # 1.0 s
 def test_conditions_and_derived_columns(folder: Path) -> None:
     study = study_from(
         {

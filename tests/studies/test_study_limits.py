@@ -59,6 +59,7 @@ def test_the_part_of_the_time_above_a_value() -> None:
     assert exceedance([0.0, 1.0, 3.0], [[0.0, 5.0], [2.0, 5.0], [0.0, 5.0]], 1.0) == pytest.approx([0.5, 1.0])
 
 
+@pytest.mark.long  # 1.2 s
 def test_limits_and_whole_results_of_cases(scene: Path, tmp_path: Path) -> None:
     cases = cases_of(study_of(scene))
     wanted = {name: Kept.model_validate(kept) for name, kept in COLLECT.items()}
@@ -127,6 +128,7 @@ def test_what_makes_no_sense_is_refused(scene: Path, kept: dict[str, Any], where
     assert refused.value.complaints[0].where.endswith(where)
 
 
+@pytest.mark.long  # 1.3 s
 def test_without_a_limit_nothing_is_kept(scene: Path) -> None:
     scene.write_text(SCENE.replace(", max_tension: 600", ""))
     cases = cases_of(study_of(scene))

@@ -157,6 +157,7 @@ def test_curvature_asked_alone_decides_cells_and_zones() -> None:
 
 
 @pytest.mark.parametrize("seed", [pytest.param(12, marks=pytest.mark.slow), 122])
+@pytest.mark.long  # 1.4 s
 def test_the_error_that_is_said_is_that_to_a_finer_rod(seed: int) -> None:
     name = f"error_figure_{seed}"
     zones = ran(name, "model={kind: adaptive, always_move: true}")  # as the program chose once
