@@ -10,10 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from bits import Stopping, differences
+from test_bare_accuracy import run as made_run
+from test_bare_accuracy import scene as bare
+from test_result_first import stopped_in
 
 import hybrid
+from hybrid.accuracy.errors_by_cause import Errors
 from hybrid.accuracy.extreme_errors import ExtremeErrors, errors_by_cause, figures, order_of
-from hybrid.model.resolution import Resolution
+from hybrid.accuracy.refinement import figures as told_of
+from hybrid.accuracy.refinement import judge
+from hybrid.model.resolution import Resolution, has_limits, requested_accuracy
+from hybrid.simulation.progress import ESTIMATION, REFINEMENT
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.limits import EXTREME_ERRORS, extremes_about
 
@@ -113,6 +121,43 @@ def test_a_checkpoint_brings_it_back() -> None:
     )
 
 
+@pytest.mark.parametrize(("used", "over_steps", "asked", "ratio"), [
+    (0.97, 0.02, 3.0, 2 / 3), (0.97, 0.06, 3.0, 2.0), (0.4, 0.5, 60.0, 5 / 6), (0.4, 0.9, 60.0, 1.5), (0.8, 0.0, 10.0, 0.1),
+])  # fmt: skip
+def test_what_is_asked_over_all_steps_is_what_is_left(
+    used: float, over_steps: float, asked: float, ratio: float
+) -> None:
+    """At outputs 40 % at most are used, known to 1 % of the limit, and a tenth is asked of them."""
+    wanted = requested_accuracy(bare({"position": "1 m"}, model="rod", min_bend_radius=4.0))
+    assert wanted is not None
+    wanted = replace(wanted, limits=tuple(x._replace(finest=0.01) for x in wanted.limits))
+    found = replace(made_run(5.0, curvature=0.1), extremes={"min_bend_radius": np.array([0.1, used])})
+    coarse = replace(found, extremes={"min_bend_radius": np.array([0.1, used - over_steps])})
+    errors = {"curvature": np.full((3, 11), 0.0025), "position": np.zeros((3, 11))}
+    known, extremes = (
+        Errors.of(dict.fromkeys(("mesh", "time", "total"), errors)),
+        ExtremeErrors.of(found, coarse, None, None),
+    )
+    verdict = judge(wanted, known, found, extremes=extremes)
+    assert verdict.ratio == pytest.approx(ratio) and verdict.limit == "min_bend_radius"
+    (told,) = (x for x in told_of(wanted, [known], found, extremes=extremes) if x["unit"] == "%")
+    assert told["asked"] == pytest.approx(asked) and told["error"] == pytest.approx(ratio * asked)
+
+
+@pytest.mark.parametrize(("limit", "there"), [
+    ({}, False), ({"max_tension": 100.0}, True), ({"min_tension": 1.0}, True), ({"min_bend_radius": 1.0}, True),
+    ({"capacity": [[100.0, 0.0], [0.0, 1.0]]}, True), ({"pipe": {"wall": 0.001, "modulus": 2e11}}, False),
+    ({"pipe": {"wall": 0.001, "modulus": 2e11, "max_stress": 1e8}}, True),
+])  # fmt: skip
+def test_what_has_limits(limit: dict[str, Any], there: bool) -> None:
+    """Of these, and of named quantities, runs to compare with keep their extremes."""
+    assert has_limits(bare(**limit)) is there
+    data = bare().model_dump(mode="json", exclude_none=True)
+    for bounds, judged in (({}, False), ({"smallest": 1.0}, True), ({"largest": 9.0}, True)):
+        data["output"]["quantities"] = {"gap": {"kind": "clearance", "point": [40, 0, -9]} | bounds}
+        assert has_limits(hybrid.validate_scene(data)) is judged
+
+
 # --- runs -------------------------------------------------------------------------------------------
 
 
@@ -179,3 +224,17 @@ def test_limits_of_a_network_are_judged_by_errors_over_all_steps(tmp_path: Path)
         del line.attributes[EXTREME_ERRORS]
         for x in (x for x in line.verdicts().limits if "tension" in x.limit):
             assert x.verdict == "not verified" and "over all steps is not estimated" in x.why and x.remedy
+
+
+@pytest.mark.long  # 2 s: ten runs
+@pytest.mark.parametrize("name", [ESTIMATION, REFINEMENT])
+def test_errors_of_extremes_are_resumed(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped in a run to compare with, and in a finer result: it is what it would have been."""
+    Stopping(monkeypatch)
+    limited = scene("bend_at_moving_end", 6.1)
+    hybrid.run(limited, tmp_path / "whole.h5").close()
+    stopped_in(name, limited, tmp_path / "run.h5")
+    hybrid.resume(tmp_path / "run.h5").close()
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+    with hybrid.open(tmp_path / "whole.h5") as whole, hybrid.open(tmp_path / "run.h5") as again:
+        assert whole.attributes[EXTREME_ERRORS] == again.attributes[EXTREME_ERRORS]
