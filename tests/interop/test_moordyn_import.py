@@ -436,3 +436,8 @@ def test_the_row_that_moordyn_does_not_read_is_told_of(tmp_path: Path) -> None:
 def test_polyester_that_cannot_be(given: dict[str, str], message: str, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=message):
         assert polyester(tmp_path, **given).scenes
+
+
+def test_a_chain_names_no_model_so_that_no_run_stops_where_it_goes_slack() -> None:
+    (made,) = imported("chain").scenes.values()
+    assert made.scene.model.kind == "catenary" and "model" not in made.scene.model_fields_set

@@ -140,10 +140,9 @@ class _Maker(Tables):
         return body | water | ({"thrust": force} if force else {}), line
 
     def _model(self, bends: Sequence[bool]) -> list[str]:
-        if all(bends):
+        if all(bends) or not any(bends):
             return []
-        if any(bends):
-            why = "a line without EI is part of the cable, so all of it is computed without bending"
-            instead = "give bending_stiffness to every section, and leave model out"
-            self.notes.append(Note(TAKEN, None, "", why, instead))
+        why = "a line without EI is part of the cable, so all of it is computed without bending"
+        instead = "give bending_stiffness to every section, and leave model out"
+        self.notes.append(Note(TAKEN, None, "", why, instead))
         return ["model: catenary"]

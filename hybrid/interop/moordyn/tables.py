@@ -207,7 +207,10 @@ class Tables:
             )
         ]
         if not all(bends):
-            why = "without EI the cable is a catenary, which stops where tension vanishes; MoorDyn's goes on, crumpled"
+            why = (
+                "without EI the cable is a catenary; where tension vanishes MoorDyn's goes on, crumpled, and hybrid's "
+            )
+            why += "stops in a scene with `model: catenary`" if any(bends) else "run begins anew with rods"
             found.append((why, "if it does, give bending_stiffness (small for a chain), and leave model out"))
         if any(bends):
             why = "MoorDyn has no torsion; hybrid's rods have GJ = EI/1.3 where torsional_stiffness is left out"
