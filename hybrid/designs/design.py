@@ -212,8 +212,8 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
 def _ran_off(space: Space, k: int, point: Point) -> str:
     side = "high" if abs(point.x[k]) > abs(space.start[k]) else "low"
     return (
-        f"{space.names[k]} ran off from {space.start[k]:.6g} to {point.x[k]:.6g} without an optimum, and "
-        f"could go on; give a {side} that can be built, or a limit that holds it"
+        f"{space.names[k]} ran off from {space.start[k]:.6g} to {point.x[k]:.6g} and could go on: this "
+        f"is no optimum; give a {side} that can be built, or a limit that holds it"
     )
 
 
