@@ -19,7 +19,7 @@ import numpy as np
 
 from hybrid.accuracy.error_order import COARSER
 from hybrid.kernels.state.state import Floats
-from hybrid.simulation.result_checks import PART, beyond_outputs
+from hybrid.simulation.result_checks import PART, beyond_outputs, cubic_spline
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 
 # Part of its largest force to which the force at an end comes back where a line snaps.
@@ -137,12 +137,24 @@ def finer_between(
 
 
 def _changes(times: Floats, after: RunSample, before: RunSample, column: int) -> Floats:
-    """Largest change (nt,) N of a force of steps between the outputs beside each output."""
-    t = after.forces[:, 0]
-    change = np.abs(after.forces[:, column] - np.interp(t, before.forces[:, 0], before.forces[:, column]))
+    """Largest change (nt,) N of a force of steps between the outputs beside each output.
+
+    Of the curve and the straight line through longer steps that which is nearer: the one overshoots where a force turns
+    at once, the other cuts off smooth peaks.
+    """
+    t, (known, first) = after.forces[:, 0], np.unique(before.forces[:, 0], return_index=True)
+    if known.size < 4:
+        return np.zeros(times.size)
+    force, then = after.forces[:, column], before.forces[first, column]
+    change = np.minimum(*(np.abs(force - curve(known, then, t)) for curve in (cubic_spline, _straight)))
     most = np.zeros(times.size)
     np.maximum.at(most, np.clip(np.searchsorted(times, t), 1, times.size - 1), change)  # since the output before
     return np.asarray(np.maximum(most, np.append(most[1:], 0.0)))
+
+
+def _straight(x: Floats, y: Floats, at: Floats) -> Floats:
+    """Straight lines through points, as of `cubic_spline`."""
+    return np.interp(at, x, y)
 
 
 def _finer(result: RunSample, before: RunSample) -> tuple[float, float]:
