@@ -150,6 +150,12 @@ class JoinedLine(Table):
         return self
 
 
+def _placed(initial: Initial, start: Triple) -> Initial:
+    """A first shape that begins where its first point is, whether an end is held or not."""
+    begins = isinstance(initial, Straight) and initial.origin is None
+    return initial.model_copy(update={"origin": start}) if begins else initial
+
+
 def _between(initial: Initial, ends: Mapping[str, End]) -> Initial:
     """A first shape whose ends are where the points are first, the rest in between shifted along."""
     if isinstance(initial, Straight) or initial.points is None:
@@ -457,7 +463,7 @@ class System(Table):
                     turns=0.0 if carrying else clamp.turns,  # a first shape is that of the line with no point
                     bend_stiffness=clamp.bend_stiffness, motion=motion, payout=payout,
                 )  # fmt: skip
-        initial = line.initial if self.starts_as_placed else _between(line.initial, ends)
+        initial = _placed(line.initial, first["start"]) if self.starts_as_placed else _between(line.initial, ends)
         tables: dict[str, Any] = {"ends": Ends(**ends), "initial": initial}
         if places is not None:
             return (scene or self.scene_of(name)).model_copy(update=tables)

@@ -45,6 +45,23 @@ def test_a_weight_let_go_between_two_springs_oscillates_about_its_rest() -> None
     assert not {"static_path", "static_residual"} & {*result.attributes}
 
 
+FLOOR = {"obstacles": {"floor": {"kind": "plane", "at": [0, 0, -9], "normal": [0, 0, 1]}}}
+BALL = {"mass": 1.0, "inertia": [1, 1, 1], "shape": {"kind": "sphere", "radius": 0.3}}
+
+
+@pytest.mark.parametrize("more", [FLOOR, {"bodies": {"ball": BALL | {"initial_guess": [0, 0, -5]}}}, {"dimension": 2}])
+def test_a_straight_line_that_nothing_holds_begins_where_its_first_point_is(more: dict[str, Any]) -> None:
+    """Beside an obstacle, a body with a shape and in a plane: pydantic missed the origin of s = 0, with a traceback."""
+    line = {"start": "a", "end": "b", "sections": [SECTION], "initial": DOWN, "mesh": {"cells": 4}, "model": "rod"}
+    result = hybrid.run({
+        "points": {"a": {"initial_guess": [0.5, 0, 1]}, "b": {"initial_guess": [0.5, 0, 1 - LENGTH]}},
+        "lines": {"one": line}, "time": {"duration": 0.2, "step": 0.02},
+    } | more)  # fmt: skip
+    fallen = result.lines["one"]["position"][-1] - result.lines["one"]["position"][0]
+    np.testing.assert_allclose(result.lines["one"]["position"][0, 0], [0.5, 0, 1])
+    np.testing.assert_allclose(fallen, np.tile([0, 0, -0.5 * GRAVITY * 0.2**2], (len(fallen), 1)), rtol=1e-6, atol=1e-9)
+
+
 def test_an_inextensible_rope_let_go_level_falls_and_swings_as_one_cable() -> None:
     """The end is a free point with a mass: the same motion as of one cable with a body."""
     section = {"length": LENGTH, "mass": 0.5, "diameter": 0.02}
