@@ -22,6 +22,7 @@ from hybrid.kernels.state.obstacle_rows import (
     PLACE,
     RADIUS,
     RIDES,
+    RING,
     ROUND,
     SHEAVE,
     STRAND,
@@ -146,9 +147,11 @@ def behind_obstacles(line: Line, sea: Sea, state: State) -> Iterator[tuple[int, 
     """
     rows, way, touched = sea.obstacles, state.r[-1] - state.r[0], on_obstacles(line, sea, state)
     for which, (row, nodes) in enumerate(zip(rows, touched, strict=True)):
-        if row[KIND] in (FLAT, TORUS, MESH) or not nodes.any():  # through a ring a line passes on any side
-            continue
         axis, place, r = row[AXIS : AXIS + 3], row[PLACE : PLACE + 3], state.r[nodes]
+        if row[KIND] == TORUS:  # in the hole of a ring a line lies on any side
+            r = r[np.linalg.norm(np.cross(r - place, axis), axis=1) > row[RING]]
+        if row[KIND] in (FLAT, MESH) or not r.size:
+            continue
         half = row[HALF_LENGTH] if row[KIND] == ROUND else 0.0
         along = np.clip((r - place) @ axis, -half, half)
         middle = place + along.mean() * axis

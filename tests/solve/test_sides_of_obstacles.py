@@ -7,7 +7,7 @@ import pytest
 
 from hybrid.model.build import build
 from hybrid.scene.read import as_scene
-from hybrid.solve.flaws import obstacles_left
+from hybrid.solve.flaws import behind_obstacles, obstacles_left
 from tests.validation.obstacle_scenes import over_pipe
 
 RADIUS, AT = 0.5, np.array([5.0, 0.0, -1.0])
@@ -35,3 +35,24 @@ def test_a_shape_on_the_other_side_of_an_obstacle_is_told_from_the_same_side(kin
     assert which == 0 and behind and abs(x[node]) < RADIUS
     ((_, near, behind),) = obstacles_left(line, sea, above, away)
     assert not behind and abs(near - middle) <= RADIUS / (x[1] - x[0])
+
+
+@pytest.mark.parametrize(("axis", "height", "behind"), [("y", 0.71, False), ("y", -0.71, True), ("x", -0.49, False)])
+def test_a_line_below_a_ring_is_behind_it_and_one_through_its_hole_is_not(
+    axis: str, height: float, behind: bool
+) -> None:
+    """A line that was hung through a ring lay above or below it, by rounding, without an event."""
+    ring = {
+        "kind": "torus",
+        "at": AT.tolist(),
+        "axis": {"x": [1, 0, 0], "y": [0, 1, 0]}[axis],
+        "ring": 0.6,
+        "radius": 0.1,
+    }
+    model = build(as_scene(over_pipe(obstacles={"ring": ring})))
+    state = model.start.copy()
+    width = float(np.sign(height) * 0.5 * model.cable.outer_diameter.max() * (1 if axis == "y" else -1))
+    state.r[:] = AT + np.stack([np.linspace(-4.0, 4.0, model.line.s.size), *np.zeros((2, model.line.s.size))], axis=1)
+    state.r[:, 2] += height + width - 0.01 * np.sign(width)
+    state.r[[0, -1]] = [[0, 0, 0], [10, 0, 3]]
+    assert bool([*behind_obstacles(model.line, model.sea.at(0.0), state)]) == behind
