@@ -351,6 +351,7 @@ def test_a_law_of_pieces_is_told_where_its_stiffness_changes(law, quantity):
         lambda x: x.deviation("moment"),
     ],
 )
+@pytest.mark.needs("rainflow")
 def test_what_makes_no_sense_is_no_number(asked):
     """Damage of no strength, or of none of stress, was 0."""
     ones = np.ones((2, 3), complex)
