@@ -106,8 +106,10 @@ def curve_of(given: str | Mapping[str, float | str] | Curve) -> Curve:
 
 def rainflow_cycles(x: ArrayLike) -> Floats:
     """Cycles (n, 3) of a history (nt,): range, mean, and count, 1 or a half."""
-    package = optional_package("rainflow", "counting cycles", "export")
-    return np.array([c[:3] for c in package.extract_cycles(turning_points(x).tolist())]).reshape(-1, 3)
+    package, turns = optional_package("rainflow", "counting cycles", "export"), turning_points(x)
+    if turns.size == 2:  # a half cycle, which the package leaves out
+        return np.array([[abs(turns[1] - turns[0]), turns.mean(), 0.5]])
+    return np.array([c[:3] for c in package.extract_cycles(turns.tolist())]).reshape(-1, 3)
 
 
 def turning_points(x: ArrayLike) -> Floats:

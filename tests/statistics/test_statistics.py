@@ -312,6 +312,11 @@ def test_turning_points_keep_all_cycles() -> None:
     assert np.array_equal(np.array(sorted(map(tuple, fatigue.rainflow_cycles(x)))), whole)
 
 
+def test_a_history_that_only_rises_is_a_half_cycle() -> None:
+    assert fatigue.rainflow_cycles([1.0, 2.0, 4.0]).tolist() == [[3.0, 2.5, 0.5]]
+    assert fatigue.rainflow_cycles([1.0, 1.0]).shape == (0, 3)
+
+
 @pytest.mark.parametrize(
     "wrong", ["D", {"kind": "S-N", "log_a": 12.0, "m": -3.0}, {"kind": "x", "log_a": 1.0, "m": 3.0}, {"a": 1}]
 )
