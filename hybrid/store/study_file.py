@@ -157,9 +157,17 @@ class StudyFile:
     def add(self, batch: int, columns: Mapping[str, Column], coordinates: Mapping[str, Column]) -> None:
         """Write what a batch has found: its collected columns (m, ...), those of OWN, and coordinates of dimensions.
 
-        Columns have the shapes of those of the study, and coordinates are new.
+        Columns have the shapes of those of the study, and coordinates are new.  ResultError if the disk takes no more.
         """
-        where = self.slice_of(batch)
+        try:
+            self._add(self.slice_of(batch), columns, coordinates)
+        except OSError as error:
+            raise ResultError(
+                f"{self.path} cannot be written\n    detail:   {error}\n"
+                "    try:      free space on its disk; then the same command goes on"
+            ) from None
+
+    def _add(self, where: slice, columns: Mapping[str, Column], coordinates: Mapping[str, Column]) -> None:
         for name, column in coordinates.items():
             array = self._arrays[name] = self._group.create_array(
                 name, shape=column.values.shape, chunks=column.values.shape, dtype=column.values.dtype, overwrite=True,

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import extras
 import numpy as np
@@ -115,6 +119,23 @@ def test_a_scheduler_that_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     pool = Pool(lambda job: [outcome(row["x"]) for row in job.rows], [0, 1, 2, 3], lost="cancelled")
     with pytest.raises(ResultError, match="the same command goes on"):
         computed(tmp_path / "x.zarr", pool, monkeypatch)
+
+
+def test_a_disk_that_is_full_is_no_scheduler_that_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The study says so, in place of "the scheduler of the study is gone"."""
+    file = StudyFile.create(tmp_path / "x.zarr", {"x": Column("", "x", (), np.arange(CASES))}, CASES, BATCH, {})
+    pool = Pool(lambda job: [outcome(row["x"]) for row in job.rows], [0, 1, 2, 3])
+    monkeypatch.setattr(distributed, "as_completed", lambda loop: pool)
+    monkeypatch.setattr(dispatch, "client_of", lambda *_: nullcontext(pool))
+
+    class Full:
+        def __setitem__(self, where: object, values: object) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    file._arrays["status"] = Full()
+    cases: Any = SimpleNamespace(base={}, keys={}, rows=[{"x": x} for x in range(CASES)], static=False)
+    with pytest.raises(ResultError, match=r"cannot be written\n.*No space"):
+        dispatch.compute_open_batches(file, cases, {}, None, None, None)
 
 
 @pytest.mark.parametrize("deadly", [0, 5])
