@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, dot, scale
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.state.state import Floats, Sea
 
 HEIGHTS = 4  # numbers of a point of the grid: z, zx, zy, zxy
@@ -61,7 +61,7 @@ def weigh(heights, a, b, k, rows):
     )  # fmt: skip
 
 
-@inner
+@called
 def height_on_grid(sea, x, y):
     """z, zx, zy of a bed of depths."""
     i, j = interval(sea.bed_x, x), interval(sea.bed_y, y)

@@ -31,7 +31,7 @@ from hybrid.kernels.algebra.rotations import (
 from hybrid.kernels.laws.axial_law import piece_of
 from hybrid.kernels.laws.bending_slip import beside_spring, give_of_spring, slip_moment, slips
 from hybrid.kernels.laws.element import bending, damped_bending, relative_rotation, turns_freely
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.state.forces import BENDING_LAW, BENDING_SLIP
 
 # Columns of Line.bend_law: of the half cells before and after a node, their first row in Line.bend_table, the row
@@ -174,6 +174,12 @@ def bending_by_table(line, i, Ra, Rb, kb, k0):
     """As `element.bending`, of the element at node i, by its table if it has one."""
     if not has_bend_law(line, i):
         return bending(Ra, Rb, kb, k0)
+    return bending_of_law(line, i, Ra, Rb, kb, k0)
+
+
+@called
+def bending_of_law(line, i, Ra, Rb, kb, k0):
+    """The same of an element that has a table."""
     size, q = direction_of_bend(Ra, Rb, kb, k0)
     secant, more, _ = shares_of_stiffness(line, i, size)
     M, C = bending(Ra, Rb, (secant * kb[0], secant * kb[1], kb[2]), k0)
@@ -196,6 +202,12 @@ def damped_bending_by_table(line, i, Ra, Rb, kb, k0, tau, wa, wb):
     kd = scale(tau, kb)
     if not has_bend_law(line, i):
         return damped_bending(Ra, Rb, kb, kd, k0, wa, wb)
+    return damped_bending_of_law(line, i, Ra, Rb, kb, kd, k0, wa, wb)
+
+
+@called
+def damped_bending_of_law(line, i, Ra, Rb, kb, kd, k0, wa, wb):
+    """The same of an element that has a table."""
     size, q = direction_of_bend(Ra, Rb, kb, k0)
     secant, more, _ = shares_of_stiffness(line, i, size)
     M, C, Cd, loss = damped_bending(Ra, Rb, (secant * kb[0], secant * kb[1], kb[2]), kd, k0, wa, wb)

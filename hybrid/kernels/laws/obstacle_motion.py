@@ -22,7 +22,7 @@ from hybrid.kernels.laws.end_motion import (
     rise_integral,
     turn_by_vector,
 )
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
     BEGAN,
@@ -80,7 +80,7 @@ def transposed(R):
     return R[0], R[3], R[6], R[1], R[4], R[7], R[2], R[5], R[8]
 
 
-@inner
+@called
 def pose_at(t, k, sea, rolled):
     """c, v, R without spin, R, w of obstacle k at t (s); rolled: angle (rad) of one that turns freely."""
     moves = sea.courses
