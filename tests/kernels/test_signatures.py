@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
+import operator
 import subprocess
 import sys
 from importlib import import_module
 from inspect import signature
+from typing import Any
 
 import numba
 import pytest
+from numba import types
+from numba.core.errors import NumbaError
+from numba.core.registry import cpu_target
 
+from hybrid.kernels.machine import compiler
 from hybrid.kernels.machine.compile import inner
 
 # No other process compiles beside it, of which this one would read nothing.
@@ -96,3 +104,20 @@ def test_what_kernels_inline_cannot_be_called_from_python() -> None:
     assert numba.njit(lambda x: half(half(x)))(3.0) == 0.75
     with pytest.raises(TypeError, match=r"half.*@kernel"):
         half(3.0)
+
+
+@pytest.mark.parametrize("called", [operator.add, operator.truediv, operator.lt, operator.and_, math.sqrt, max])
+def test_a_rule_of_numba_that_is_kept_is_the_one_it_finds(called: Any) -> None:
+    """For whole numbers, numbers and truth values, in either order, twice: also what it refuses."""
+    context = cpu_target.typing_context
+    context.refresh()
+    function = context.resolve_value_type(called)
+    kinds = [types.int64, types.float64, types.boolean, types.IntegerLiteral(2)]
+    for args in itertools.product(kinds, repeat=1 if called is math.sqrt else 2):
+        answers = []
+        for find in (compiler._rule_of, compiler._rule_of, compiler._find_rule):
+            try:
+                answers.append(str(find(function, context, args, {})))
+            except NumbaError:
+                answers.append("refused")
+        assert len(set(answers)) == 1, answers
