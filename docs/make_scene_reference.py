@@ -82,8 +82,8 @@ an initial shape that misses a held end; a normal along its tangent; waves witho
 break (height / length ≥ 0.142 tanh(k depth)); an end in the ground, or carried out of the reach of the cable; a float
 that sinks; an attachment beyond the end of the cable; a cable that nothing holds, unless it lies on a seabed or floats
 at a surface; a time step that cannot follow a period, a ramp or a move; a section whose mass and diameter make a mean
-density below 15 or above 300 000 kg/m³; a fluid of 1.02 to 1.03 kg/m³ (sea water in t/m³), below 0.0005 or above 14 000;
-over a seabed one that is neither air (0.5 to 2 kg/m³) nor a liquid (400 to 3000), with a surface one that is no
+density below 15 or above 300 000 kg/m³; a fluid of 1.02 to 1.03 kg/m³ (sea water in t/m³), below 0.0005 or above
+14 000; over a seabed one that is neither air (0.5 to 2 kg/m³) nor a liquid (400 to 3000), with a surface one that is no
 liquid.
 
 A computation stops, with time and place, where a section is stretched, or compressed, beyond its `max_strain`.
@@ -363,7 +363,8 @@ energy that the changes of a moment put in is in the first of them.
 ## Steps and outputs
 
 `output.every` says when something is kept, `time.step` how finely it is computed.
-Steps are as long as `time.step`, cut evenly to `duration`; the one up to a release, or to where a load stops, is shorter.
+Steps are as long as `time.step`, cut evenly to `duration`; the one up to a release, or to where a load stops, is
+shorter.
 An output within a step is interpolated to second order from
 the states at both its ends.  With `output: {exact: true}` steps end at outputs: the interval from one output to the
 next is cut into the fewest equal steps that are no longer than `time.step`.

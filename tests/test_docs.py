@@ -84,7 +84,7 @@ def test_readme_says_what_the_first_command_says(
             assert re.match(steps, line) and re.search(steps, out.out, re.M)
             assert line.split("->")[1].split() == out.out.split("->")[1].split()
         if line.startswith(("rod", "largest", "smallest")):
-            assert line.split() in [x.split() for x in out.out.splitlines()]
+            assert " ".join(line.split()) in " ".join(out.out.split())  # a narrow terminal breaks the longest
 
 
 @pytest.mark.long

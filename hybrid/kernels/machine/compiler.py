@@ -41,7 +41,8 @@ def _rule_of(function: Any, context: Any, args: Any, named: Any) -> Any:
     return _rules[key]
 
 
-BaseFunction.get_call_type = _rule_of
+_base: Any = BaseFunction  # whose types know of no other rule
+_base.get_call_type = _rule_of
 
 
 class _Kernel(CPUDispatcher):
