@@ -35,8 +35,13 @@ def hide(monkeypatch: pytest.MonkeyPatch, package: str) -> None:
     ("package", "extra", "command"),
     [
         ("starlette", "view", ["view"]),
-        ("websockets", "view", ["view", "--json"]),
-        ("zarr", "studies", ["study", str(EXAMPLES / "studies" / "heave.yaml"), "-o", "study"]),
+        pytest.param("websockets", "view", ["view", "--json"], marks=pytest.mark.needs("starlette", "uvicorn")),
+        pytest.param(
+            "zarr",
+            "studies",
+            ["study", str(EXAMPLES / "studies" / "heave.yaml"), "-o", "study"],
+            marks=pytest.mark.needs("simpleeval", "xarray"),
+        ),
         ("pythonfmu3", "fmu", ["export", str(EXAMPLES / "touchdown.yaml"), "-o", "line.fmu"]),
     ],
 )

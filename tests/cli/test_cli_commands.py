@@ -189,8 +189,9 @@ def test_plan_of_lines_has_their_forces_their_time_and_no_text_that_is_cut(call:
     assert rows["line tow"].startswith("60 m, ring to fish, rod, 100 cells; end clamped")
     assert rows["free points"] == "ring" and rows["mesh"].startswith("300 cells, ")
     assert all(name in said.out for name in ("gravity", "buoyancy", "drag", "added mass", "current", "bodies"))
-    told, slack = " ".join(said.out.split()), r"\(up to [\d.]+ m?s if a line goes slack and becomes a rod\)"
-    assert re.search(rf"time 10 s in 100 steps of 0.1 s; about [\d.]+ m?s of CPU for all runs {slack}", told), told
+    told, slack = " ".join(said.out.split()), r"up to [\d.]+ m?s if a line goes slack and becomes a rod"
+    notes = rf"\(({slack}|estimated from tables: no step was tried)\)"  # the second where kernels are not compiled
+    assert re.search(rf"time 10 s in 100 steps of 0.1 s; about [\d.]+ m?s of CPU for all runs {notes}", told), told
 
 
 @pytest.mark.long

@@ -50,7 +50,8 @@ def test_the_pull_of_a_slack_line_is_the_weight_that_hangs(depth: float) -> None
     assert abs(z - W * depth) <= 0.5 * W * 10.0 and math.hypot(x, y) < 1e-6 * z
     (event,) = [x for x in result.events if x.kind == "slack"]
     assert f"known to {0.5 * W * 10.0:.3g} N" in event.text and event.s_a == 0.0
-    lies = result.tension[-1][result.s < 300.0 - depth - 10.0]
+    # In the cell at the anchor the force on the support has a part along the line, which sinks a little from there.
+    lies = result.tension[-1][(result.s >= 10.0) & (result.s < 300.0 - depth - 10.0)]
     assert np.abs(lies).max() < 1e-9 * z, "what lies carries nothing"
 
 

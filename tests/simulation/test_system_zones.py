@@ -210,7 +210,8 @@ def test_lines_go_slack_in_turn(three: hybrid.Result) -> None:
 def test_ranges_of_named_quantities_go_on_through_changes(three: hybrid.Result) -> None:
     for name in ("angle", "carrying"):  # the second at an end that carries the float
         (low, high), angle = three[f"extremes/{name}"], three[name]
-        assert low <= angle.min() and angle.max() <= high, (name, low, high, angle)
+        apart = 1e-14 * high  # outputs and steps are computed by two kernels
+        assert low <= angle.min() + apart and angle.max() <= high + apart, (name, low, high, angle)
         assert high < 1.2 * angle.max() and low > 0.5 * angle.min(), name  # steps see what outputs miss
 
 

@@ -153,5 +153,6 @@ def test_a_leg_that_lies_slack_hangs_down_from_its_buoy() -> None:
     result = hybrid.static(scene)
     w, long = 9.80665 * (8.0 - 1025.0 * 0.25 * math.pi * 0.05**2), result.lines["long"]
     assert abs(long.tension[-1][-1] - 20.0 * w) <= 0.5 * 2.5 * w, "half a cell"
-    assert np.abs(long.tension[-1][long.s < 27.0]).max() < 1e-9 * long.tension.max()
+    lies = (long.s > 2.5) & (long.s < 27.0)  # at the anchor the force on the support has a part along the line
+    assert np.abs(long.tension[-1][lies]).max() < 1e-9 * long.tension.max()
     assert [x.s_b for x in long.events if x.kind == "slack"] == [30.0]

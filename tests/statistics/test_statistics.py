@@ -312,6 +312,7 @@ def test_turning_points_keep_all_cycles() -> None:
     assert np.array_equal(np.array(sorted(map(tuple, fatigue.rainflow_cycles(x)))), whole)
 
 
+@pytest.mark.needs("rainflow")
 def test_a_history_that_only_rises_is_a_half_cycle() -> None:
     assert fatigue.rainflow_cycles([1.0, 2.0, 4.0]).tolist() == [[3.0, 2.5, 0.5]]
     assert fatigue.rainflow_cycles([1.0, 1.0]).shape == (0, 3)
