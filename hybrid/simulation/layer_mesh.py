@@ -25,15 +25,14 @@ from hybrid.model.mesh_grading import GROWTH, SAMPLES, Grading, layers
 from hybrid.model.model_costs import with_model
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free, shows_bends, wants_survey
-from hybrid.model.system import SystemResolution, build_system
-from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.scene.system import System
+from hybrid.scene.schema import AdaptiveModel, Equilibrium, Scene
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.mesh_survey import Survey, survey_resolution
 from hybrid.simulation.section_layers import MORE
-from hybrid.simulation.system_start import equilibrium_of_system
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # of several lines, which most scenes do not have
+    from hybrid.model.system import SystemResolution
+    from hybrid.scene.system import System
     from hybrid.simulation.case import Case
     from hybrid.simulation.static_case import StaticCase
 
@@ -91,11 +90,14 @@ def layered_lines(system: System, resolution: SystemResolution, moves: bool) -> 
     for name in wanted:
         if (grading := grading_of(scenes[name], *rest[name])) is not None:
             lines[name] = replace(lines[name], grading=grading)
-    return SystemResolution(lines)
+    return replace(resolution, lines=lines)
 
 
 def _rest_of(system: System, resolution: SystemResolution, moves: bool) -> dict[str, tuple[Model, State]]:
     """Models of several lines with their first states, by name; moves: as of `layered_lines`.  ComputationError."""
+    from hybrid.model.system import build_system
+    from hybrid.simulation.system_start import equilibrium_of_system
+
     with at_once():
         model = build_system(system, resolution=resolution)
         states: Sequence[State] = [x.start for x in model.models]
@@ -106,6 +108,8 @@ def _rest_of(system: System, resolution: SystemResolution, moves: bool) -> dict[
 
 def shown_lines(system: System, resolution: SystemResolution, moves: bool) -> SystemResolution:
     """As `shown`, of several lines that have a pre-run; moves: as of `layered_lines`."""
+    if moves and system.starts_as_placed:
+        return resolution
     scenes = {name: system.scene_of(name) for name in system.lines}
     wanted = [x for x, scene in scenes.items() if _is_open(scene, resolution.lines[x]) and wants_survey(scene)]
     wanted = [name for name in wanted if shows_bends(scenes[name])]
@@ -115,13 +119,14 @@ def shown_lines(system: System, resolution: SystemResolution, moves: bool) -> Sy
         try:
             rest = _rest_of(system, tried, moves)
         except ComputationError:
-            tried = SystemResolution({k: x.coarser(cells=0.5) if k in wanted else x for k, x in lines.items()})
+            finer = {k: x.coarser(cells=0.5) if k in wanted else x for k, x in lines.items()}
+            tried = replace(tried, lines=finer)
             continue
         found, gradings = tried, {name: _unfolded(scenes[name], *rest[name]) for name in wanted}
         lines |= {name: replace(lines[name], grading=x) for name, x in gradings.items() if x is not None}
         if not any(x is not None for x in gradings.values()):
             return tried
-        tried = SystemResolution(lines)
+        tried = replace(tried, lines=lines)
     return found
 
 
@@ -134,9 +139,10 @@ def survey_of(case: Case | StaticCase, resolution: Resolution) -> tuple[Survey |
 def shown(case: Case | StaticCase, resolution: Resolution) -> Resolution:
     """With cells on which the equilibrium is found, and bends no rod by more than MOST_FOLD from one cell to the next.
 
-    A slack bend is often shorter than the cells of a pre-run by far, and on such cells it may be anywhere.
+    A slack bend is often shorter than the cells of a pre-run by far, and on such cells it may be anywhere.  A shape
+    that the scene gives has the bends that it has.
     """
-    if not _is_open(case.scene, resolution):
+    if not (_is_open(case.scene, resolution) and isinstance(case.scene.initial, Equilibrium)):
         return resolution
     tried, found = resolution, resolution
     for _ in range(ROUNDS):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching
 from hybrid.model.system import SystemModel
@@ -39,12 +40,23 @@ def crossed(touching: Touching, first: SystemState, last: SystemState) -> Iterat
         for k, b in enumerate(touching.lines[j + 1 :], j + 1):
             if not touching.meets[j, k]:
                 continue
-            ways = [np.stack([x.lines[m].r for x in (first, last)]) for m in (a, b)]
+            ways = [np.stack(_of_as_many_nodes(first.lines[m].r, last.lines[m].r)) for m in (a, b)]
             lows, highs = ([f(w, axis=(0, 1)) for w in ways] for f in (np.min, np.max))
             if (np.maximum(*lows) > np.minimum(*highs)).any():
                 continue
             if jumps(*ways) > JUMP:
                 yield a, b
+
+
+def _of_as_many_nodes(a: Floats, b: Floats) -> list[Floats]:
+    """Two shapes of a line, (n, 3) m; where its cells have changed between them at equal parts of their lengths."""
+    if a.shape == b.shape:
+        return [a, b]
+    parts, shapes = np.linspace(0.0, 1.0, max(len(a), len(b))), []
+    for r in (a, b):
+        s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
+        shapes.append(np.column_stack([np.interp(parts * s[-1], s, x) for x in r.T]))
+    return shapes
 
 
 def pair_text(shared: SharedContact, model: SystemModel) -> str:
