@@ -32,7 +32,7 @@ from hybrid.accuracy.refinement import (
     times_the_cost,
 )
 from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
-from hybrid.accuracy.system_samples import compared, sample_of, touch_unasked
+from hybrid.accuracy.system_samples import compared, extremes_of, sample_of, touch_unasked
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.mesh_grading import SAMPLES
@@ -220,7 +220,10 @@ class SystemPasses:
         with open_result(target) as result:
             self._result_rods = {name: rods_of(line) for name, line in result.lines.items()}
             self._touches |= touch_unasked(self.system, result)
-            return {n: sample_of(line, resolution.lines[n], models[n], cpu) for n, line in result.lines.items()}
+            return {
+                n: sample_of(line, resolution.lines[n], models[n], cpu, extremes_of(self.system, result, n))
+                for n, line in result.lines.items()
+            }
 
     def surveyed(self, first: SystemResolution) -> SystemResolution:
         """With cells where a coarse run shows that they should be; where nothing is asked, the equilibrium."""

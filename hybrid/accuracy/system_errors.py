@@ -118,7 +118,8 @@ def write_system_errors(
             for name, line in result.lines.items():
                 others = {cause: x.lines[name] for cause, x in found.items()}
                 errors[name], doubts[name] = _errors_of(line, others)
-                extremes[name] = _errors_of_extremes(line, others)
+                runs = {"": result} | found
+                extremes[name] = _errors_of_extremes({x: extremes_of(system, run, name) for x, run in runs.items()})
     fields = {name: [_field(full, x) for full, x in each.items()] for name, each in errors.items()}
     sizes = {name: _summary(each) for name, each in errors.items()}
     largest = {key: max(x[key] for x in sizes.values()) for key in next(iter(sizes.values()), {})}
@@ -166,9 +167,8 @@ def _errors_of(line: Result, others: Mapping[str, Result]) -> tuple[dict[str, Fl
     return out, doubts
 
 
-def _errors_of_extremes(line: Result, others: Mapping[str, Result]) -> str:
-    """Errors of what limits of a line are held against, as its attribute."""
-    found = {"": extremes_of(line)} | {cause: extremes_of(x) for cause, x in others.items()}
+def _errors_of_extremes(found: Mapping[str, Mapping[str, Floats]]) -> str:
+    """Errors of what limits of a line are held against in runs by their cause, "" the result, as its attribute."""
     errors = errors_by_cause(found[""], [(found[x], found.get(f"{x} again")) for x in ("mesh", "time")])
     return figures(found[""], errors)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hybrid.model.build import Model
@@ -26,8 +28,9 @@ def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
     values, _ = split_outputs({name: found[name] for name in found.names})
     catenary = found.catenary if isinstance(line.scene.model, AdaptiveModel) else np.zeros(0)
     fineness = resolution.fineness if follows_curvature(line.scene) else 0.0
-    held = {x.name: y for x, y in line.envelope.fixed()} if has_limits(line.scene) else {}
-    held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t)
+    asked = run.quantities.ranges_of(line.name)
+    held = {x.name: y for x, y in line.envelope.fixed()} if asked or has_limits(line.scene) else {}
+    held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t) | asked
     return RunSample(
         resolution, values, compared_cells(line.model, fineness), max(run.steps, 1), cpu, resolution.every,
         forces=found.steps, catenary=catenary, extremes=extremes_about(held, line.observer.s),
@@ -42,13 +45,17 @@ def touch_unasked(system: System, result: Result) -> bool:
     )
 
 
-def extremes_of(line: Result) -> dict[str, np.ndarray]:
-    """What limits of a line are held against."""
-    return extremes_about({x: line[x] for x in line.names if x.startswith((ENVELOPE, EXTREMES))}, line.s)
+def extremes_of(system: System, result: Result, name: str) -> dict[str, np.ndarray]:
+    """What limits of a line, and of quantities that are asked of it, are held against."""
+    line, asked = result.lines[name], (f"{EXTREMES}/{x}" for x, q in system.output.quantities.items() if q.line == name)
+    held = {x: line[x] for x in line.names if x.startswith((ENVELOPE, EXTREMES))}
+    return extremes_about(held | {x: result[x] for x in asked if x in result}, line.s)
 
 
-def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) -> RunSample:
-    """What is compared of a line in a complete result; model: as it began; cpu: s, of all lines."""
+def sample_of(
+    line: Result, resolution: Resolution, model: Model, cpu: float, extremes: Mapping[str, np.ndarray]
+) -> RunSample:
+    """What is compared of a line in a complete result; model: as it began; cpu: s, of all lines; extremes: of it."""
     values = {name: np.asarray(line[name]) for name in COMPARED if name in line}
     columns = [f"steps/{name}" for name in ("t", "end_force_start", "end_force_end")]
     forces = np.zeros((0, 3))
@@ -61,6 +68,6 @@ def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) ->
         cells = compared_cells(model, resolution.fineness, usual_cells(line[THERE]))
     return RunSample(
         resolution, values, cells, max(len(forces), 1), cpu, resolution.every, unresolved,
-        forces=forces, catenary=catenary, extremes=extremes_of(line) if len(line.times) > 1 else {},
+        forces=forces, catenary=catenary, extremes=extremes if len(line.times) > 1 else {},
         at_edges={x: np.asarray(line[EDGE_ERRORS + x]) for x in MISSED if EDGE_ERRORS + x in line},
     )  # fmt: skip

@@ -70,7 +70,11 @@ class SystemQuantities:
 
     def range_values(self) -> dict[str, np.ndarray]:
         """Values of those fields up to now."""
-        return {name: x for each in self._steps.values() for name, x in each.values().items()}
+        return {name: x for line in self._steps for name, x in self.ranges_of(line).items()}
+
+    def ranges_of(self, line: str) -> dict[str, np.ndarray]:
+        """Those of a line."""
+        return self._steps[line].values() if line in self._steps else {}
 
     def checkpoint(self) -> dict[str, np.ndarray]:
         """Ranges by line, and from what excursions and azimuths count."""

@@ -188,7 +188,7 @@ class SystemRun:
         self.let_pass: set[tuple[int, int]] = set()  # of lines that may meet, those between which it is not computed
         self.rotations = Rotations(system, self.model)
         self.quantities = SystemQuantities(system, scenes)
-        if moves and target is not None:
+        if moves:
             self.quantities.keep_ranges(self.lines)
         self.cpu = 0.0  # s, of the processor, in earlier parts of the run
         self._logged = 0.0  # s, likewise, when steps were logged last

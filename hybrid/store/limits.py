@@ -91,8 +91,9 @@ EXTREME_ERRORS = "accuracy_extremes"
 
 
 def extreme_errors(result: Result) -> dict[str, float]:
-    """Those errors; empty: nobody estimated them."""
-    return dict(json.loads(str(result.attributes.get(EXTREME_ERRORS, "{}"))))
+    """Those errors, of several lines those of all; empty: nobody estimated them."""
+    runs = (result, *result.lines.values())
+    return {name: x for run in runs for name, x in json.loads(str(run.attributes.get(EXTREME_ERRORS, "{}"))).items()}
 
 
 class Held(NamedTuple):

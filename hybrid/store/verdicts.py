@@ -401,9 +401,10 @@ def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
             return Doubt(f"the error of {x.name} is not estimated", FINER)
         why = f"with the errors of tension and {'moment' if x.limit == 'code' else 'curvature'} it may pass the limit"
         return None if bound <= 1.0 else Doubt(why, "a smaller accuracy")
-    over_steps = extreme_errors(result).get(x.limit if x.unit == "Pa" else f"{x.name} {x.limit}")
+    errors = extreme_errors(result)
+    over_steps = errors.get(x.limit if x.unit == "Pa" else f"{x.name} {x.limit}")
     if over_steps is None and len(result.times) > 1:
-        return Doubt(f"the error of {x.name} over all steps is not estimated", ESTIMATE)
+        return Doubt(f"the error of {x.name} over all steps is not estimated", FINER if errors else ESTIMATE)
     if x.unit == "Pa":
         return _stress_reached(result, x, over_steps or 0.0)
     at_outputs = _error_of_held(result, x, clearance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import hybrid
 from hybrid.accuracy import system_errors
 from hybrid.errors import ComputationError
+from hybrid.store.limits import extreme_errors
 
 LEG = {"length": 140, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
 HOSE = {"length": 100, "mass": 6, "diameter": 0.08, "axial_stiffness": 5e6, "bending_stiffness": 3000}
@@ -58,6 +60,23 @@ def test_figures_are_near_the_truth(result: hybrid.Result) -> None:
     largest = max(x.attributes["error_total_end_force"] for x in result.lines.values())
     assert result.attributes["error_total_end_force"] == largest
     assert result.lines["hose"].dims("errors/mesh/bending_moment") == ("t", "s")
+
+
+@pytest.mark.parametrize("more", [{}, {"accuracy": {"tension": "10%"}}])
+def test_quantities_of_lines_have_errors_of_all_steps(more: dict[str, Any]) -> None:
+    """By fixed steps and cells, and by an accuracy: the pull on an anchor is within what it is far below."""
+    asked = {"kind": "vertical_force", "line": "west", "end": "start", "largest": 1e6}
+    scene = mooring(10, errors=True, quantities={"lift": asked}) | more
+    scene["time"] = {"duration": 2.0, "step": 0.1}
+    scene["lines"]["hose"] = {"start": "float", "end": "vessel", "sections": [LEG], "mesh": {"cells": 20}}
+    truth = copy.deepcopy(scene) | {"accuracy": None, "time": {"duration": 2.0, "step": 0.025}}
+    for line in truth["lines"].values():
+        line["mesh"] = {"cells": 60}
+    result, fine = hybrid.run(scene), hybrid.run(truth)
+    (lift,) = result.verdicts().quantities
+    assert (lift.verdict, lift.why) == ("within", "")
+    off = abs(result["extremes/lift"][1] - fine["extremes/lift"][1])
+    assert off < extreme_errors(result)["lift largest"] < 0.1 * lift.value
 
 
 def test_coarser_cells_keep_what_is_fixed() -> None:

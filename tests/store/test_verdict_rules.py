@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -112,9 +113,11 @@ def test_no_limit_is_kept_by_extremes_that_nobody_estimated(extremes: dict[str, 
 class Made(dict[str, Any]):
     """A result with one named quantity or a pipe, as verdicts read it."""
 
-    def __init__(self, values: dict[str, Any], lines: Any = (), moves: bool = False, **attributes: Any) -> None:
+    def __init__(
+        self, values: dict[str, Any], lines: Iterable[str] = (), moves: bool = False, **attributes: Any
+    ) -> None:
         super().__init__(values)
-        self.attributes, self.lines, self.line_name = attributes, lines, ""
+        self.attributes, self.lines, self.line_name = attributes, {x: Made({}) for x in lines}, ""
         self.times, self.s = np.arange(3.0 if moves else 1.0), np.array([0.0, 10.0])
         self.events: list[Event] = []
         self.status, self.pending, self.zones = "complete", "", []
@@ -154,6 +157,17 @@ def test_a_quantity_has_the_error_of_its_own_extreme(
     """0.3 m are left; the error of positions at outputs, 0.05 m, is not that of steps between."""
     made = Made({"gap_at": 1}, moves=True, error_total_position=0.05, accuracy_extremes=json.dumps(figures))
     assert judged(monkeypatch, gap(1.3), made).verdict == verdict
+
+
+def test_the_remedy_of_an_error_that_is_lacking_is_none_that_the_scene_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Errors of all lines count; where some extremes have theirs, an accuracy was asked, and another run shows more."""
+    made = Made({"gap_at": 1}, ["a"], moves=True, error_total_position=0.05)
+    assert "accuracy: 5%" in judged(monkeypatch, gap(1.3), made).remedy
+    made.lines["a"].attributes["accuracy_extremes"] = json.dumps({"drift largest": 0.1})
+    found = judged(monkeypatch, gap(1.3), made)
+    assert found.verdict == OPEN and "half the time.step" in found.remedy
+    made.lines["a"].attributes["accuracy_extremes"] = json.dumps({"gap smallest": 0.1})
+    assert judged(monkeypatch, gap(1.3), made).verdict == WITHIN
 
 
 @pytest.mark.parametrize(("tension", "curvature", "verdict"), [
