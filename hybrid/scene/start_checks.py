@@ -25,8 +25,8 @@ SAME_LENGTH = 1e-9
 # A search for equilibrium may start from a polyline that is longer or shorter by this part: nothing of it is left.
 POLYLINE_STRETCH = 0.2
 
-# A motion that starts along a polyline starts with the strain of that, EA times which is a tension: a polyline through
-# places of a line that turns by half a radian from each chord to the next is shorter than the line by 1 %.
+# A motion that starts along a shorter polyline starts compressed, EA times which is a force: a polyline through places
+# of a line that turns by half a radian from each chord to the next is shorter than the line by 1 %.
 DRAWN_STRAIN = 0.01
 
 # A weight below this part of all weights and lifts is their round-off.
@@ -275,19 +275,18 @@ def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, loa
 def _drawn_as_long(points: tuple[Triple, ...], cable: Cable, ends: Ends, loads: float | None) -> Iterator[Finding]:
     """A polyline of another length than the line; loads: N, all that acts where a motion starts; None: a search."""
     total, length = sum(math.dist(a, b) for a, b in pairwise(points)), cable.length
-    fits, part, why = length, POLYLINE_STRETCH, "within 20 %"
+    fits, less, more, why = length, POLYLINE_STRETCH, POLYLINE_STRETCH, "within 20 %"
     if loads is not None and cable.inextensible:
-        part, why = SAME_PLACE, "which is inextensible"
+        less, more, why = SAME_PLACE, SAME_PLACE, "which is inextensible"
     elif loads is not None:
         held = ends.held()
         if len(held) == 2 and all(end.is_placed for end in ends.both):  # so far apart they stretch it in any shape
             fits = max(length, math.dist(held["start"], held["end"]))
-        part, borne = _strain_at_start(cable, loads), min(x.strain_limit for x in cable.sections)
-        why = f"within {100 * part:.3g} %"
-        if part < borne:
-            stretched = f"a start stretched within the {100 * borne:.3g} % that a section bears (max_strain)"
-            why += f"; {stretched} says so by arc_lengths"
-    if abs(total - fits) <= (part + SAME_LENGTH) * length:
+        less = _strain_at_start(cable, loads)
+        more = max(less, min(POLYLINE_STRETCH, *(x.strain_limit for x in cable.sections)))
+        longer = f"within the {100 * more:.3g} % that a section bears (max_strain)"
+        why = longer if total > fits else f"within {100 * less:.3g} %"
+    if -(less + SAME_LENGTH) * length <= total - fits <= (more + SAME_LENGTH) * length:
         return
     expected = f"a polyline {fits:.8g} m long, the length of the cable, {why}"
     fix = f"move the points, or make the cable {total:.8g} m long"
@@ -295,7 +294,7 @@ def _drawn_as_long(points: tuple[Triple, ...], cable: Cable, ends: Ends, loads: 
 
 
 def _strain_at_start(cable: Cable, loads: float) -> float:
-    """Strain with which a motion may start: max_strain, or what all loads (N) together make, or a drawing."""
+    """Compression with which a motion may start: max_strain, or what all loads (N) together make, or a drawing."""
     each = [(x.max_strain, min(max(DRAWN_STRAIN, x.strain(loads)), x.strain_limit)) for x in cable.sections]
     return min(by_loads if asked is None else asked for asked, by_loads in each)
 

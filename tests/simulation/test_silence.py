@@ -136,7 +136,7 @@ def test_a_line_that_its_points_stretch_says_so(long, told):
     points = {"initial": {"kind": "points", "points": [[0, 0, 0], [0.9 * long, 0, 0], [long, 0, 0]]}}
     rope = section(length=100.0, mass=5.0, diameter=0.05, axial_stiffness=1e6, bending_stiffness=10.0)
     held = {"ends": {"start": pinned(0, 0, 0), "end": "free"}, "model": "rod", "mesh": {"cells": 20}}
-    more = held | {"time": {"duration": 2e-3, "step": 1e-3}}
+    more = held | {"time": {"duration": 2e-4, "step": 1e-4}}
     events = [x for x in run(rope, more, points).events if x.kind == "implausible"]
     assert [told in x.text and "expected 100 m in all" in x.text for x in events] == [True] * bool(told)
     points["initial"]["arc_lengths"] = [0, 90, 100]
@@ -161,22 +161,35 @@ def test_points_that_stretch_a_line_beyond_what_it_bears_are_refused():
     ("initial", "told"),
     [
         ({"points": [[0, 0, 0], [249, 0, 0]]}, "249 m in all.*expected: a polyline 260 m long.*within 1 %"),
-        ({"points": [[0, 0, 0], [271, 0, 0]]}, "271 m in all.*expected: a polyline 260 m long.*within 1 %"),
+        ({"points": [[0, 0, 0], [274, 0, 0]]}, "274 m in all.*expected: a polyline 260 m long.*within the 5 %"),
         ({"points": [[0, 0, 0], [249, 0, 0]], "arc_lengths": [0, 260]}, "1 % shorter: 249 m over 260 m of cable"),
     ],
 )
 @pytest.mark.parametrize("several", [False, True])
 def test_a_first_shape_of_another_length_is_refused_with_both(initial, told, several):
     """A start that is compressed by 4 % ran, to -823 kN; of a line of several as well."""
-    of_line = {"sections": [{"length": 260.0, "mass": 5.0, "axial_stiffness": 2e7}]}
-    start, time = {"initial": {"kind": "points"} | initial}, {"time": {"duration": 1, "step": 1e-3}}
-    tables = {"cable": of_line, "ends": {"start": pinned(0, 0, 0), "end": "free"}} | start | time
-    if several:
-        free = {"kind": "free", "initial_guess": initial["points"][-1]}
-        line = {"start": "a", "end": "b", "model": "catenary"} | of_line | start
-        tables = {"points": {"a": {"position": [0, 0, 0]}, "b": free}, "lines": {"one": line}} | time
     with pytest.raises(hybrid.SceneError, match=f"(?s)initial.*{told}"):
-        hybrid.run(tables)
+        hybrid.run(first_shape(initial, several))
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_a_first_shape_that_is_stretched_within_what_is_borne_runs_and_says_so(several):
+    """By 1 to 5 %: the first version of this major one accepts it."""
+    scene = first_shape({"points": [[0, 0, 0], [271, 0, 0]]}, several)
+    events = [x.text for x in hybrid.run(scene).events if x.kind == "implausible"]
+    assert ["260 m that starts along 271 m of points, stretched by 4.23%" in x for x in events].count(True) == 1
+
+
+def first_shape(initial, several):
+    """Tables of a line of 260 m that starts along points, alone or as one of several."""
+    of_line = {"sections": [{"length": 260.0, "mass": 5.0, "axial_stiffness": 2e7}]}
+    start, time = {"initial": {"kind": "points"} | initial}, {"time": {"duration": 2e-4, "step": 1e-4}}
+    ends = {"ends": {"start": pinned(0, 0, 0), "end": "free"}, "model": "catenary"}
+    if not several:
+        return {"cable": of_line} | ends | start | time
+    free = {"kind": "free", "initial_guess": initial["points"][-1]}
+    line = {"start": "a", "end": "b", "model": "catenary"} | of_line | start
+    return {"points": {"a": {"position": [0, 0, 0]}, "b": free}, "lines": {"one": line}} | time
 
 
 def test_a_record_that_starts_with_an_acceleration(tmp_path):
