@@ -17,7 +17,7 @@ import typer
 import typer.core
 
 import hybrid
-from hybrid.cli.pipe import OUTPUT
+from hybrid.cli.pipe import OUTPUT, raise_lost_output
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -136,6 +136,7 @@ def session(as_json: bool, quiet: bool) -> Iterator[Console]:
     with _stops() as heard, _cache_warnings(console):
         try:
             yield console
+            raise_lost_output()
         except typer.Exit:
             raise
         except (Exception, KeyboardInterrupt) as error:
@@ -221,7 +222,8 @@ def tell(console: Console, error: BaseException) -> int:
         case OSError() if error.errno in DISK_ERRORS and error.filename:
             name = os.fspath(error.filename)
             name = name if len(name) <= 200 else f"{name[:100]} ... {name[-40:]}"
-            console.error("result", f"{name}: {error.strerror}\n    try:      {DISK_ERRORS[error.errno]}")
+            kept = f"; the result is kept in {console.written}" if name == OUTPUT and console.written else ""
+            console.error("result", f"{name}: {error.strerror}{kept}\n    try:      {DISK_ERRORS[error.errno]}")
             return FAILED if console.written or name == OUTPUT else REFUSED
         case RuntimeError() if str(error).startswith(LOOP):  # of Path.resolve
             name = str(error).removeprefix(LOOP).strip(" '")

@@ -48,7 +48,7 @@ from hybrid.cli.app import (
     tell,
     words,
 )  # fmt: skip
-from hybrid.cli.pipe import guard_output
+from hybrid.cli.pipe import guard_output, raise_lost_output
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -364,7 +364,7 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         program = typer.main.get_command(_with_command(arguments))
         code = program.main(arguments, prog_name="hybrid", standalone_mode=False, obj=arguments)
-        sys.stdout.flush()
+        raise_lost_output()
     except UsageError as error:
         from hybrid.cli.console import Console
 

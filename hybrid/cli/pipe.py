@@ -11,22 +11,21 @@ OUTPUT = "the output"  # name of the stream, for messages
 
 
 class _Stream(io.FileIO):
-    """A stream to a pipe or file: what cannot be written is dropped, of a full disk with an error that names it.
+    """A stream to a pipe or file: what cannot be written is dropped, and a computation goes on.
 
-    What nobody reads any more, as behind `| head`, is no error.
+    What nobody reads any more, as behind `| head`, is no error; that a disk is full is one, at the end of the command.
     """
 
-    dropped = False
-    name_told = ""  # in errors; "": there are none
+    dropped = False  # as nobody reads it
+    error: OSError | None = None
 
     def write(self, data: Any) -> int:
         try:
             return super().write(data) or 0
         except OSError as error:
-            self.dropped = True
+            self.dropped = isinstance(error, BrokenPipeError)
+            self.error = None if self.dropped else OSError(error.errno, error.strerror, OUTPUT)
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
-            if self.name_told and not isinstance(error, BrokenPipeError):
-                raise OSError(error.errno, error.strerror, self.name_told) from None
             return memoryview(data).nbytes
 
 
@@ -40,7 +39,6 @@ def guard_output() -> None:
             continue
         if piped and isinstance(stream, io.TextIOWrapper):
             raw = _Stream(stream.fileno(), "w", closefd=False)
-            raw.name_told = OUTPUT if name == "stdout" else ""
             to = io.BufferedWriter(raw)
             setattr(
                 sys, name, io.TextIOWrapper(to, stream.encoding, stream.errors, line_buffering=stream.line_buffering)
@@ -49,4 +47,19 @@ def guard_output() -> None:
 
 def reader_has_gone() -> bool:
     """Whether output was dropped because its reader has closed the pipe."""
-    return bool(getattr(getattr(getattr(sys.stdout, "buffer", None), "raw", None), "dropped", False))
+    stream = _output_stream()
+    return stream is not None and stream.dropped
+
+
+def raise_lost_output() -> None:
+    """Raise, once, that output could not be written."""
+    sys.stdout.flush()
+    stream = _output_stream()
+    if stream is not None and (error := stream.error) is not None:
+        stream.error = None
+        raise error
+
+
+def _output_stream() -> _Stream | None:
+    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    return raw if isinstance(raw, _Stream) else None
