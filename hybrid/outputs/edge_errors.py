@@ -8,30 +8,31 @@ so that runs on other cells, whose nodes lie otherwise beside it, may agree by c
 
     (T w')' - (EI w'')'' + q + P(-w, -dw/dt) = 0
 
-is therefore solved anew over some cells about the edge, each cut into parts.  Loads q, weight, drag and inertia among
-them, are those that balance the nodes; beyond these cells the line stays.  An end stays where it is, with its moment
-or, where it is clamped, its direction.
-
-    symbol  meaning                                             shape               unit
-    w       height above where contact begins, at nodes         (windows, nodes)    m
-    sinks   -dw/dt                                              (windows, nodes)    m/s
-    k       w'', its curvature across the bed                   (windows, nodes)    1/m
-    T, h    tension, length of cells                            (windows, cells)    N, m
-    EI      bending stiffness, 0 of catenaries                  (windows, nodes)    N m2
-    q       load per length that is not of the bed              (windows, nodes)    N/m
-    band    of d(balance)/dw: diagonals 2 above to 2 below      (5, windows, nodes) N/m
+is therefore solved anew over some cells about the edge, each cut into parts (kernels.watch.contact_edges has the
+symbols).  Loads q, weight, drag and inertia among them, are those that balance the nodes; beyond these cells the line
+stays.  An end stays where it is, with its moment or, where it is clamped, its direction.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.state.state import Floats, Sea
-from hybrid.outputs.touchdown import contact_pressure, sinking
+from hybrid.kernels.watch.contact_edges import (
+    WORK,
+    Bed,
+    Cuts,
+    LineEnd,
+    Refined,
+    Windows,
+    put_largest,
+    refine_windows,
+)
+from hybrid.outputs.touchdown import sinking
 
 if TYPE_CHECKING:
     from hybrid.outputs.observation import Observation
@@ -47,48 +48,28 @@ END_PARTS, LONGER = 24, 1.2
 # An edge is looked at with another one where it has so many cells on either side in that window; in stretches of fewer
 # cells it is not.
 WITHIN, FEWEST = 4, 4
-# Newton's method ends where w changes by less than this part of its range, which shows in no curvature; every so many
-# rounds it goes half the way, since beside a hard bed it may swing between two answers; at most so many.
-CHANGE, HALF, ROUNDS = 1e-9, 6, 40
 # Part of the largest tension that counts as the least: in compression catenaries have no shape, and parts of cells of a
 # rod would buckle where cells that are long for it do not; of short ones bending alone decides.
 TAUT = 1e-6
-
-
-class Windows(NamedTuple):
-    """Some cells of outputs, as in the table above."""
-
-    s: Floats  # m
-    w: Floats
-    sinks: Floats
-    T: Floats
-    EI: Floats
-
-
-class LineEnd(NamedTuple):
-    """What an end of the line is, at the first nodes of windows."""
-
-    k: Floats  # (windows,) 1/m, curvature across the bed of the moment there; of catenaries as of `_beyond`
-    hn: Floats  # (windows,) m, of the element at a clamp; infinite where the moment is given
-    EI: Floats  # (windows,) N m2, of catenaries without moment, whose curvature results take away there; else 0
+NO_END = LineEnd(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 def edge_errors(view: Observation) -> dict[str, Floats]:
     """Errors (ns, nb) of curvature, 1/m, and bending moment, N m, at output points; none where nothing touches down."""
-    out = {name: np.zeros((len(view.grid.points), view.columns)) for name in MISSED}
+    out = np.zeros((len(MISSED), len(view.grid.points), view.columns))
     for (cells, k), found in _places(view).items():
-        first, output = np.array(found, np.int64).T
+        first, output = np.ascontiguousarray(np.transpose(found))
         _add(out, view, first, output, cells, k)
-    return out
+    return dict(zip(MISSED, out, strict=True))
 
 
 def _add(
-    out: dict[str, Floats], view: Observation, first: NDArray[np.int64], output: NDArray[np.int64], cells: int, k: int
+    out: Floats, view: Observation, first: NDArray[np.int64], output: NDArray[np.int64], cells: int, k: int
 ) -> None:
     """Of windows of so many cells; k: the end of the line, 0 or 1, that they reach to, else -1."""
     nodes = first[:, None] + np.arange(cells + 1)
     way, nodes = (-1.0, nodes[:, ::-1]) if k == 1 else (1.0, nodes)  # an end is always at first nodes
-    coarse, points, end = _windows(view, nodes, output, way), view.grid.points, None
+    coarse, end = _windows(view, nodes, output, way), None
     bends, cuts = curvature(coarse), cuts_of(cells, k >= 0)
     if k >= 0:
         coarse, end = _line_end(view, coarse, nodes, output, k)
@@ -99,13 +80,10 @@ def _add(
     missed[:, -PARTS:] = 0.0  # the line was kept there
     if end is None:
         missed[:, :PARTS] = 0.0
-    of_moment = missed * between(coarse.EI, cuts)
-    for n, (node, j) in enumerate(zip(first.tolist(), output.tolist(), strict=True)):
-        at = way * points[:, j if points.shape[1] > 1 else 0]
-        inside = np.flatnonzero((at >= s[n, 0]) & (at <= s[n, -1]) & view.grid.of_line_of(node))
-        for name, x in zip(MISSED, (missed, of_moment), strict=True):
-            found = np.abs(np.interp(at[inside], s[n], x[n]))
-            out[name][inside, j] = np.maximum(out[name][inside, j], found)
+    rows = {node: np.flatnonzero(view.grid.of_line_of(node))[[0, -1]] + [0, 1] for node in set(first.tolist())}
+    both = np.stack([missed, missed * between(coarse.EI, cuts)])
+    points = np.ascontiguousarray(way * view.grid.points)
+    put_largest(s, both, points, np.array([rows[node] for node in first.tolist()]), output, out)
 
 
 def _places(view: Observation) -> dict[tuple[int, int], list[tuple[int, int]]]:
@@ -193,13 +171,6 @@ def _shown(x: Windows, k: Floats, end: LineEnd | None, cuts: Cuts) -> Floats:
     return np.asarray(found - np.where(hinged, end.k, 0.0)[:, None] * fades)
 
 
-class Cuts(NamedTuple):
-    """Parts of the cells of a window: their ends."""
-
-    cell: NDArray[np.int64]
-    part: Floats  # of that cell, from its first node on
-
-
 def cuts_of(cells: int, end: bool) -> Cuts:
     """Each cell in PARTS; end: the first one in END_PARTS, the shortest at the end of the line."""
     cell, part = np.repeat(np.arange(cells), PARTS), np.tile(np.arange(PARTS) / PARTS, cells)
@@ -223,121 +194,15 @@ def between(x: Floats, cuts: Cuts) -> Floats:
     return np.asarray(x[:, cuts.cell] + (x[:, cuts.cell + 1] - x[:, cuts.cell]) * cuts.part)
 
 
-def _along_cells(T: Floats, cuts: Cuts) -> Floats:
-    """Tension of parts of cells: what changes it is spread over them, not in the nodes, where it would be a load."""
-    beyond = np.concatenate([2.0 * T[:, :1] - T[:, 1:2], T, 2.0 * T[:, -1:] - T[:, -2:-1]], axis=1)
-    at_nodes = between(0.5 * (beyond[:, 1:] + beyond[:, :-1]), cuts)
-    return np.asarray(0.5 * (at_nodes[:, 1:] + at_nodes[:, :-1]))
-
-
-def _across(x: Windows, k: Floats) -> Floats:
-    """(T w')' - (EI w'')'' of the inner nodes, N, over their half cells; k: w''."""
-    h = np.diff(x.s, axis=1)
-    return np.diff(x.T * np.diff(x.w, axis=1) / h - np.diff(x.EI * k, axis=1) / h, axis=1)
-
-
 def refined(x: Windows, k: Floats, sea: Sea, end: LineEnd | None = None) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Nodes of parts of cells, m, their curvature, and of which windows (n,) it is known; k: `curvature` of cells.
 
     end: what first nodes are, if they are ends of the line.
     """
-    h, cuts = np.diff(x.s, axis=1), cuts_of(x.w.shape[1] - 1, end is not None)
-    part = (np.arange(2 * PARTS) + 0.5) / (2 * PARTS)
-    w, sinks = (y[:, :-1, None] + np.diff(y, axis=1)[:, :, None] * part for y in (x.w, x.sinks))
-    presses = contact_pressure(sea, -w, sinks) * h[:, :, None]
-    bed = (presses * (1.0 - part)).mean(axis=2)[:, 1:] + (presses * part).mean(axis=2)[:, :-1]
-    q = np.zeros_like(x.w)
-    q[:, 1:-1] = -(_across(x, k) + bed) / (0.5 * (h[:, 1:] + h[:, :-1]))
-    q[:, 0], q[:, -1] = q[:, 1], q[:, -2]
-    stiff = x.EI if end is None else np.where(end.EI[:, None] > 0.0, end.EI[:, None], x.EI)
-    s, heights, sinking_at = (between(y, cuts) for y in (x.s, x.w, x.sinks))
-    parts = Windows(s, heights, sinking_at, _along_cells(x.T, cuts), between(stiff, cuts))
-    clamp = None if end is None else _clamped(x, parts, end)
-    ends = k[:, [0, -1]]
-    if end is not None:
-        ends[end.EI > 0.0, 0] = 0.0
-    w, settled = _solved(parts, ends, between(q, cuts), sea, clamp)
-    bends = _ended(parts._replace(w=w), ends, clamp)
-    if end is not None:
-        bends[:, 0] = np.where(parts.EI[:, 0] > 0.0, bends[:, 0], _beyond(bends, parts.s))
-    return parts.s, bends, settled
-
-
-class Clamp(NamedTuple):
-    """Curvature at first nodes over the slope of the first part of a cell: k + (slope - `slope`) * `per`."""
-
-    slope: Floats  # (windows,) 1
-    per: Floats  # (windows,) 1/m; 0 where the moment is given
-
-
-def _clamped(x: Windows, parts: Windows, end: LineEnd) -> Clamp:
-    """At a clamp the first part of a cell turns against the direction that is held, as the cell does."""
-    h, part = x.s[:, 1] - x.s[:, 0], parts.s[:, 1] - parts.s[:, 0]
-    held = np.isfinite(end.hn)
-    length = np.where(held, end.hn, h) - 0.5 * h + 0.5 * part
-    slope = (x.w[:, 1] - x.w[:, 0]) / h
-    turned = np.where(held, end.k * (length - np.where(held, end.hn, 0.0)), 0.0)
-    return Clamp(slope + turned, np.where(held, 1.0 / length, 0.0))
-
-
-def _ended(x: Windows, k: Floats, clamp: Clamp | None) -> Floats:
-    """`curvature`, with that (n, 2) at first and last nodes; clamp: of first nodes that are ends of the line."""
-    bends = curvature(x)
-    bends[:, [0, -1]] = k
-    if clamp is not None:
-        bends[:, 0] += ((x.w[:, 1] - x.w[:, 0]) / (x.s[:, 1] - x.s[:, 0]) - clamp.slope) * clamp.per
-    return bends
-
-
-def _solved(x: Windows, k: Floats, q: Floats, sea: Sea, clamp: Clamp | None) -> tuple[Floats, NDArray[np.bool_]]:
-    """Heights of nodes in balance, and of which windows they are; k: (n, 2) as of `_ended`."""
-    from scipy.linalg import solve_banded  # slow to import
-
-    h = np.diff(x.s, axis=1)
-    half, band, w = 0.5 * (h[:, 1:] + h[:, :-1]), _band(x), x.w.copy()
-    if clamp is not None:
-        band[2, :, 1] -= x.EI[:, 0] * clamp.per / h[:, 0] ** 2
-    left, near = np.arange(len(w)), CHANGE * np.ptp(w, axis=1)
-    for count in range(ROUNDS):
-        now = Windows(x.s[left], w[left], x.sinks[left], x.T[left], x.EI[left])
-        bends = _ended(now, k[left], None if clamp is None else Clamp(clamp.slope[left], clamp.per[left]))
-        press, stiff = (f(sea, -now.w[:, 1:-1], now.sinks[:, 1:-1]) for f in (contact_pressure, _slope))
-        lacks = np.zeros_like(now.w)
-        lacks[:, 1:-1] = _across(now, bends) + half[left] * (q[left, 1:-1] + press)
-        matrix = band[:, left].copy()
-        matrix[2, :, 1:-1] -= half[left] * stiff
-        change = solve_banded((2, 2), matrix.reshape(5, -1), -lacks.ravel(), check_finite=False).reshape(now.w.shape)
-        w[left] += change * (0.5 if count % HALF == HALF - 1 else 1.0)
-        left = left[~(np.abs(change).max(axis=1) <= near[left])]
-        if not left.size:
-            break
-    return w, ~np.isin(np.arange(len(w)), left)
-
-
-def _slope(sea: Sea, p: Floats, v: Floats) -> Floats:
-    """Derivative of `contact_pressure` by p, N/m2."""
-    found = np.where(p < sea.onset, (sea.stiffness * p + sea.damping * v) / sea.onset, sea.stiffness)
-    return np.where(contact_pressure(sea, p, v) > 0.0, found, 0.0)
-
-
-def _band(x: Windows) -> Floats:
-    """Derivatives of `_across` by w, as `scipy.linalg.solve_banded` has them; first and last nodes stay."""
-    p = 1.0 / np.diff(x.s, axis=1)
-    bends = np.zeros((3, *x.w.shape))  # EI w'' of inner nodes by w before, at and after them
-    each = x.EI[:, 1:-1] * 2.0 / (1.0 / p[:, 1:] + 1.0 / p[:, :-1])
-    bends[0, :, 1:-1], bends[2, :, 1:-1] = each * p[:, :-1], each * p[:, 1:]
-    bends[1] = -bends[0] - bends[2]
-    before, after = p[:, :-1], p[:, 1:]  # of the cells beside inner nodes
-    pull, at = x.T * p, slice(1, -1)
-    rows = np.zeros((5, *x.w.shape))  # derivatives of row i by w[i-2] to w[i+2]
-    rows[0, :, at] = -bends[0, :, :-2] * before
-    rows[1, :, at] = pull[:, :-1] + bends[0, :, at] * (before + after) - bends[1, :, :-2] * before
-    rows[3, :, at] = pull[:, 1:] + bends[2, :, at] * (before + after) - bends[1, :, 2:] * after
-    rows[4, :, at] = -bends[2, :, 2:] * after
-    rows[2, :, at] = -rows[0, :, at] - rows[1, :, at] - rows[3, :, at] - rows[4, :, at]
-    rows[2, :, [0, -1]] = 1.0
-    band = np.zeros((5, *x.w.shape))
-    for d in range(5):  # rows that reach beyond the first or last node have nothing there
-        shift = d - 2
-        band[2 - shift] = np.roll(rows[d], shift, axis=1)
-    return band
+    cuts = cuts_of(x.w.shape[1] - 1, end is not None)
+    size = len(k), cuts.cell.size
+    out = Refined(np.zeros(size), np.zeros(size), np.zeros(len(k), bool))
+    windows, ends = Windows(*map(np.ascontiguousarray, x)), LineEnd(*map(np.ascontiguousarray, end or NO_END))
+    bed = Bed(float(sea.stiffness), float(sea.damping), float(sea.onset))
+    refine_windows(windows, np.ascontiguousarray(k), ends, bed, cuts, np.zeros((WORK, size[1])), out)
+    return out
