@@ -77,8 +77,9 @@ class LinesWatch:
         width = [diameters(x) for x in model.models]
         begins = np.concatenate([[0], np.cumsum([x.size for x in width])[:-1]]).astype(np.int64)
         widest = max((float(x.max()) for x in width), default=0.0)
+        self.joined = _joined_by_place(system, widest)
         self._bound = {
-            "joined": _joined_by_place(system, widest), "begins": begins, "width": np.concatenate(width),
+            "joined": self.joined, "begins": begins, "width": np.concatenate(width),
             "clock": clock, "pairs": self._pairs, "room": self._room, "moved": np.zeros((len(width), MOVED)),
         }  # fmt: skip
         self._jobs = Table(blank_lines_job), Table(blank_lines_job)
@@ -122,14 +123,13 @@ class LinesWatch:
         ]
 
 
-def _side_by_side(run: SystemRun, a: int, b: int, s: float, other: float) -> bool:
+def _side_by_side(run: SystemRun, joined: NDArray[np.int64], a: int, b: int, s: float, other: float) -> bool:
     """Whether two lines that met at s and other (m) of them lay along each other all the way from a common joint.
 
     They did where both places are as far from it along the lines, and one of the lines is straight up to there.
     """
-    joined = joined_ends_of(run.system)
     width = max(float(diameters(run.model.models[k]).max()) for k in (a, b))
-    for m, k in ((m, k) for m in (0, -1) for k in (0, -1) if joined[a, m] == joined[b, k] > 0):
+    for m, k in ((m, k) for m in (0, -1) for k in (0, -1) if joined[a, m] == joined[b, k]):
         ways, bows = [], []
         for line, at, tip in ((a, s, m), (b, other, k)):
             nodes, r = run.model.models[line].line.s, run.state.lines[line].r
@@ -146,11 +146,13 @@ def tell_passages(run: SystemRun) -> None:
 
     Of lines that lie along each other from what both are joined to there is nothing to tell, as at the start.
     """
-    for a, b, t, s, other in sorted(run.watch.met() if run.watch is not None else (), key=lambda x: x[2]):
+    if (watch := run.watch) is None:
+        return
+    for a, b, t, s, other in sorted(watch.met(), key=lambda x: x[2]):
         if (a, b) in run.passed:
             continue
         run.passed.add((a, b))
-        if _side_by_side(run, a, b, s, other):
+        if _side_by_side(run, watch.joined, a, b, s, other):
             continue
         one, two = run.model.names[a], run.model.names[b]
         text = (

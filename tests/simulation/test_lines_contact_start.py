@@ -153,6 +153,20 @@ def test_what_lies_against_the_joint_of_another_line_is_no_contact(away: float, 
     assert (BEGINS in kinds(hybrid.run(bight(away)))) == begins
 
 
+@pytest.mark.parametrize(("begin", "told"), [("knot", False), ("own", True)])
+def test_lines_that_come_to_lie_along_each_other_from_a_joint_pass_through_nothing(begin: str, told: bool) -> None:
+    """Two taut ropes, of which one is drawn to the end of the other: without a joint in common they meet there."""
+    rope = {"mesh": {"cells": 20}, "sections": [ROPE | {"length": 0.8}], "model": "rod"}
+    aside = {"travel": {"by": [0, -0.1, 0], "over": 0.2}}
+    points = {"knot": {"position": [0, 0, 0]}, "e": {"position": [0.8, 0, 0]}, "own": {"position": [0, 0.1, 0]}}
+    points["f"] = {"position": [0.8, 0.1, 0], "motion": aside}
+    lines = {"rest": rope | {"start": "knot", "end": "e"}, "drawn": rope | {"start": begin, "end": "f"}}
+    tables: Tables = {"environment": {"gravity": 0}, "contact": NOT_ASKED, "time": {"duration": 0.2, "step": 0.005}}
+    used = {name: x for name, x in points.items() if any(name in (y["start"], y["end"]) for y in lines.values())}
+    found = hybrid.run(tables | {"points": used, "lines": lines, "output": {"points": 5}})
+    assert (PASSAGE in kinds(found)) == told
+
+
 def hung_apart(part: float = 1.0, **more: Any) -> Tables:
     """Ropes held at points of their own cross slowly, 8 diameters, or a part, from two that are 6 diameters apart."""
     tables = unasked(0.3, **more)

@@ -192,17 +192,18 @@ def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch: pytest.M
 
 
 @pytest.mark.long
-def test_a_line_breaks_after_the_end_of_a_run_that_is_continued(tmp_path: Path) -> None:
+@pytest.mark.parametrize("times", [(0.625, 0.75), (0.6267, 0.7567)])  # between two steps of 1/64 s, too
+def test_a_line_breaks_after_the_end_of_a_run_that_is_continued(tmp_path: Path, times: tuple[float, float]) -> None:
     """Lines and points that break at times behind the end of a run, which goes on as the longer run, bit for bit."""
     short, whole = tmp_path / "short.h5", tmp_path / "whole.h5"
-    breaks = {"b": {"break_at": {"time": 0.625}}}, {"left": {"break_at": {"time": 0.75}}}
+    breaks = {"b": {"break_at": {"time": times[0]}}}, {"left": {"break_at": {"time": times[1]}}}
     more: dict[str, Any] = {"output": {"every": 0.25}}
     hybrid.run(scene(*breaks, time={"duration": 1.0, "step": 1 / 64}, **more), whole).close()
     hybrid.run(scene(*breaks, time={"duration": 0.5, "step": 1 / 64}, **more), short).close()
     hybrid.resume(short, until=1.0).close()
     assert [x for x in differences(whole, short) if not x.endswith("/scene")] == []  # each says its duration
     with hybrid.open(short) as result:
-        assert [x.t for x in result.events if x.kind == "end released"] == [0.625, 0.75]
+        assert [x.t for x in result.events if x.kind == "end released"] == [*times]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 import hybrid
 from hybrid.cli.tables import extremes_facts
 from hybrid.scene.study import Kept
-from hybrid.store.envelope import extremes_of_outputs, farthest, judged
+from hybrid.store.envelope import extreme, extremes_of_outputs, farthest, judged
 from hybrid.store.table import _PIECE
 from hybrid.studies.collect import collected
 from hybrid.view.along import extent
@@ -33,6 +33,20 @@ def test_what_stays_on_a_reel_does_not_hide_a_broken_limit() -> None:
 
 def test_a_limit_without_a_value_is_not_judged() -> None:
     assert judged(envelope([120.0, 110.0, np.nan, np.nan, np.nan])) == []
+
+
+@pytest.mark.parametrize(("least", "over"), [
+    ([5.0, 2.0, 2.0 + 1e-7, 2.0, 4.0, 9.0], (1.0, 3.0)), ([2.0, 2.0, 2.0, 2.0, 2.0, 2.0], (0.0, 5.0)),
+    ([2.0, 2.0, 3.0, 4.0, 4.0, 9.0], (0.0, 1.0)), ([5.0, 2.0, 2.0 + 1e-4, 3.0, 2.0, 9.0], None),
+    ([np.nan, 3.0, 2.0, 2.0, np.nan, 9.0], (2.0, 3.0)),
+])  # fmt: skip
+def test_an_extreme_that_is_the_same_over_a_part_of_the_line_has_that_range_as_its_place(
+    least: list[float], over: tuple[float, float] | None
+) -> None:
+    """As the tension of what lies on a flat bed, to round-off: a millionth of the largest."""
+    values = {"s": np.arange(6.0), "tension_min": np.array(least), "tension_t_min": np.zeros(6)}
+    found = extreme({f"envelope/{name}": x for name, x in values.items()}, "tension", "min")
+    assert found is not None and found.value == 2.0 and found.over == over
 
 
 # --- outputs beyond the envelope --------------------------------------------------------------------

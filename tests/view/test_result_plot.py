@@ -598,6 +598,7 @@ def test_parts_draw_on_axes_of_the_user() -> None:
         ("N", 999.0, "N", 1.0),
         ("N/m", 2.5e4, "kN/m", 1e-3),
         ("N m", 3e-5, "µN m", 1e6),
+        ("N m", 0.02, "N m", 1.0),  # "mN m" may be read as metres
         ("N m", 0.0, "N m", 1.0),
         ("N m", 1e-15, "N m", 1.0),
         ("m", 250.0, "m", 1.0),
