@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 
 FORMAT = "hybrid-cable study 1"
 OPEN, DONE, FAILED = 0, 1, 2
+# Reasons of cases that failed by what is around them, as they begin: the next call computes these again.
+KILLED = "its worker died at every try (out of memory?)"
+NOT_WRITTEN = "its result: "
 # Attribute of a coordinate whose values are written: an array and its values are two files.
 COMPLETE = "complete"
 # What is known of every case, with unit and description.
@@ -196,6 +199,13 @@ class StudyFile:
                 return None
             self._coordinates[name] = np.asarray(self._arrays[name][:])
         return self._coordinates[name]
+
+    @property
+    def failed_around(self) -> list[int]:
+        """Cases that failed by what is around them: their workers were killed, or their files not written."""
+        failed = np.flatnonzero(self._status == FAILED)
+        reasons = np.asarray(self._arrays["reason"][:]) if failed.size else np.zeros(0)
+        return [int(k) for k in failed if str(reasons[k]).startswith((KILLED, NOT_WRITTEN))]
 
     def reopen(self, cases: Iterable[int]) -> None:
         """Make cases open again, to be computed anew."""

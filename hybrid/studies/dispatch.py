@@ -18,7 +18,7 @@ import numpy as np
 
 from hybrid.errors import ResultError, optional_package
 from hybrid.scene.study import Kept
-from hybrid.store.study_file import FAILED, OPEN, StudyFile, counts_of
+from hybrid.store.study_file import FAILED, KILLED, OPEN, StudyFile, counts_of
 from hybrid.studies.cases import Cases
 from hybrid.studies.cluster import client_of
 from hybrid.studies.outcomes import has_something_new, write_outcomes
@@ -132,7 +132,7 @@ class _Batches:
             try:
                 outcomes += future.result()
             except self._distributed.KilledWorker:
-                outcomes.append(Outcome(FAILED, "its worker died at every try (out of memory?)", "", np.nan, -1, {}))
+                outcomes.append(Outcome(FAILED, KILLED, "", np.nan, -1, {}))
             future.release()
         return outcomes
 

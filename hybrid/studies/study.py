@@ -84,6 +84,8 @@ def study(
         if target.exists():
             file = StudyFile(target)
             _refuse_other(file, identity)
+            if around := file.failed_around:
+                file.reopen(around)
         else:
             _refuse_cases(whole)
             count = workers or os.cpu_count() or 1

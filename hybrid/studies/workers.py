@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.accuracy.api import run, static
-from hybrid.errors import EVENTS_BY_WEIGHT, HybridError, SceneError
+from hybrid.errors import EVENTS_BY_WEIGHT, HybridError, ResultError, SceneError
 from hybrid.scene.study import Kept
 from hybrid.store.study_accuracy import accuracy_of_case
-from hybrid.store.study_file import DONE, FAILED
+from hybrid.store.study_file import DONE, FAILED, NOT_WRITTEN
 from hybrid.studies.cases import scene_of
 from hybrid.studies.collect import Variable, collected
 
@@ -69,7 +69,8 @@ def _computed(job: Job, row: dict[str, Any], case: int) -> Outcome:
         reason = f"refused: {first.where}: given {first.value}, expected {first.expected}"
         return Outcome(FAILED, reason, "", clock.process_time() - begin, -1, {})
     except HybridError as error:
-        return Outcome(FAILED, str(error).splitlines()[0], "", clock.process_time() - begin, -1, {})
+        around = NOT_WRITTEN if isinstance(error, ResultError) else ""
+        return Outcome(FAILED, around + str(error).splitlines()[0], "", clock.process_time() - begin, -1, {})
     except (ArithmeticError, ValueError, LookupError, TypeError, AssertionError) as error:
         return Outcome(FAILED, f"a bug: {type(error).__name__}: {error}", "", clock.process_time() - begin, -1, {})
     spent = clock.process_time() - begin

@@ -17,7 +17,7 @@ import hybrid
 from hybrid.cli.commands import main
 from hybrid.errors import ResultError, SceneError
 from hybrid.scene.study import Kept, read_study, study_from
-from hybrid.store.study_file import DONE, FAILED, OPEN, StudyFile
+from hybrid.store.study_file import DONE, FAILED, KILLED, NOT_WRITTEN, OPEN, StudyFile
 from hybrid.studies.cases import cases_of, short_names
 from hybrid.studies.cluster import client_of
 from hybrid.studies.collect import collected
@@ -238,6 +238,25 @@ def test_open_batches_are_computed_again(folder: Path, found: object, tmp_path: 
     assert after["force_max"].equals(found["force_max"])
     changed = np.flatnonzero(after["cpu"].values != before)
     assert set(changed.tolist()) <= {2, 3} and changed.size
+
+
+@pytest.mark.parametrize("reason", [KILLED, NOT_WRITTEN + "case.h5: No space left on device"])
+def test_cases_that_failed_by_what_is_around_them_are_computed_by_the_next_call(
+    folder: Path, found: object, tmp_path: Path, scheduler: str, reason: str
+) -> None:
+    """A killed worker, a full disk: not so a case that failed by itself."""
+    import shutil
+
+    copy = tmp_path / "copy.zarr"
+    shutil.copytree(folder / "heave.zarr", copy)
+    file = StudyFile(copy)
+    batch = file.batch
+    for case, why in ((0, reason), (batch, "the line goes into compression")):
+        file._group["status"][case], file._group["reason"][case] = FAILED, why
+    assert StudyFile(copy).failed_around == [0]
+    after = hybrid.study(folder / "heave.yaml", copy, scheduler=scheduler)
+    assert np.flatnonzero(after["status"].values == FAILED).tolist() == [batch, 8]
+    assert after["force_max"].equals(found["force_max"]) and after["reason"].values[0] == ""
 
 
 def test_another_study_is_not_mixed_in(folder: Path, found: object, tmp_path: Path) -> None:
