@@ -272,7 +272,7 @@ class ComputationError(HybridError):
         first: str = "", line_name: str = "",
     ) -> None:  # fmt: skip
         """first: to try before the remedy of the outcome."""
-        self.line_name = line_name
+        self.line_name, self.first = line_name, first
         self.outcome, self.t, self.s, self.detail, self.snapshot = outcome, t, s, detail, snapshot
         place = [f"{name} = {x:.6g} {unit}" for name, x, unit in (("t", t, "s"), ("s", s, "m")) if x is not None]
         lines = [f"{outcome.cause} ({', '.join(place)})" if place else outcome.cause]

@@ -436,9 +436,10 @@ class FirstLines:
         return None if row is None else self.bodies[row, FRAME:V].reshape(3, 3)
 
     def _shape(self, name: str, directions: Mapping[str, Any] | None) -> Model:
-        scene, mesh = self.scene(name, (), directions), self.meshes.get(name)
+        scene, mesh, line = self.scene(name, (), directions), self.meshes.get(name), self._system.lines[name]
+        alone = not any(self._system.is_joined(point) for point in (line.start, line.end))
         with said_of_line(name):
-            return build(scene, self._resolution[name], mesh, spare=bool(scene.obstacles))
+            return build(scene, self._resolution[name], mesh, spare=alone or bool(scene.obstacles))
 
     def scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""

@@ -21,7 +21,7 @@ from hybrid.model.plane import leaves_plane, planar, untwist
 from hybrid.model.self_reach import touching
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
-from hybrid.simulation.contact_equilibrium import with_contact
+from hybrid.simulation.contact_equilibrium import settled_from, with_contact
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.solve.flaws import behind_obstacles, overstretched_cell, passed_obstacles
@@ -136,6 +136,13 @@ def solve_model(model: Model, t: float, start: State, search: Search) -> Equilib
         except ComputationError:  # there are more ways in space
             pass
     return solve_statics(model.line, sea, ends, start, *rest, model.start_shape, search)
+
+
+def solve_like(model: Model, t: float, start: State, like: Equilibrium) -> Equilibrium:
+    """The equilibrium near a start, found as another one was: with friction on the bed, or in contact with itself."""
+    if like.touch.size:
+        return settled_from(model, t, start, near=True)
+    return solve_model(model, t, start, Search("start" if like.with_friction else ""))
 
 
 def _untwisted(model: Model, line: Line, start: State) -> State:

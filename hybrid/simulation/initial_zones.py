@@ -26,10 +26,10 @@ from hybrid.model.resolution import Resolution, follows_curvature, requested_acc
 from hybrid.scene.accuracy import ROUGHEST
 from hybrid.scene.motion_checks import longest_period
 from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.simulation.contact_equilibrium import nearness, settled_from
-from hybrid.simulation.equilibrium import MANY, equilibrium_of, solve_model
+from hybrid.simulation.contact_equilibrium import nearness
+from hybrid.simulation.equilibrium import MANY, equilibrium_of, solve_like
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
-from hybrid.solve.statics import Equilibrium, Search
+from hybrid.solve.statics import Equilibrium
 
 # Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps;
 # and of a line that moves to and fro so many periods, lest what is let go comes back, up to so many ramp times.
@@ -99,7 +99,7 @@ def _with_followed_cells(scene: Scene, model: Model, manager: DomainManager, t: 
     found = equilibrium_of(scene, model, t)
     if not free.all():
         fewer = on_layout(model, model.layout._replace(rod=free))
-        found = _equilibrium(fewer, t, on_fewer(found.state, model.line, fewer.line, model.ends.at(t)), found)
+        found = solve_like(fewer, t, on_fewer(found.state, model.line, fewer.line, model.ends.at(t)), found)
         assert fewer.layout is not None
         manager.set_layout(fewer.layout)
         return fewer, found
@@ -126,7 +126,7 @@ def _on_planned_cells(model: Model, found: Equilibrium, manager: DomainManager, 
             return model, found
         before = here if before is None else here | before
         new = on_layout(model, model.layout._replace(here=before))
-        answer = _equilibrium(new, t, refined(found.state, model.line, new.line), found)
+        answer = solve_like(new, t, refined(found.state, model.line, new.line), found)
         model, found = new, answer
     raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "cells become shorter and shorter")
 
@@ -213,7 +213,7 @@ def equilibrium_zones(model: Model, manager: DomainManager, t: float, found: Equ
     free = manager.given >= 0
     if not free.all():  # the most rod that the scene lets it have
         most = on_layout(model, model.layout._replace(rod=free))
-        equilibrium = _equilibrium(most, t, on_fewer(found.state, model.line, most.line, model.ends.at(t)), found)
+        equilibrium = solve_like(most, t, on_fewer(found.state, model.line, most.line, model.ends.at(t)), found)
     assert most.layout is not None
     allowed = manager.tolerance
     try:
@@ -258,7 +258,7 @@ def _zones_within(
             return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
-        answer = _equilibrium(new, t, on_fewer(full, model.line, new.line, model.ends.at(t)), found)
+        answer = solve_like(new, t, on_fewer(full, model.line, new.line, model.ends.at(t)), found)
         manager.set_layout(layout)
         more = rod | _rods(new, manager, answer.state, t)
         if (more == rod).all():
@@ -279,13 +279,6 @@ def _difference(full: State, layout: Layout, answer: tuple[Model, Equilibrium], 
     model, found = answer
     assert model.layout is not None
     return float(np.linalg.norm(full.r[layout.first] - found.state.r[model.layout.first], axis=1).max())
-
-
-def _equilibrium(model: Model, t: float, start: State, like: Equilibrium) -> Equilibrium:
-    """like: what it is compared with, and is found as: with friction on the bed, or in contact with itself."""
-    if like.touch.size:
-        return settled_from(model, t, start, near=True)
-    return solve_model(model, t, start, Search("start" if like.with_friction else ""))
 
 
 def on_fewer(state: State, full: Line, line: Line, ends: Ends) -> State:

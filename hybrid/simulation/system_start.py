@@ -11,7 +11,7 @@ from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.base import dotted
@@ -23,12 +23,14 @@ from hybrid.scene.system_checks import floating_groups
 from hybrid.simulation.blended import blended_text, note_drawn, rotate_ends_in
 from hybrid.simulation.contact_start import refuse_start_in_obstacles
 from hybrid.simulation.diagnostics import borne_strain
-from hybrid.simulation.equilibrium import count_turns, settling
+from hybrid.simulation.equilibrium import count_turns, equilibrium_of, settling, solve_like
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
 from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
+from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
+from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import (
     LineFailed,
     Start,
@@ -54,6 +56,8 @@ def equilibrium_of_system(system: System, model: SystemModel, t: float, friction
         raise SceneError(floating)
     try:
         numbers = model.body_numbers(t)
+        if _are_alone(model, friction):
+            return _keep_turns(model, t, _each_alone(system, model, t))
         found = solve_with_contact(model, joined_lines(model, t), numbers, lambda: _starts(system, model))
         _keep_turns(model, t, found)
         if friction:
@@ -101,12 +105,55 @@ def solve_from(
 ) -> SystemEquilibrium:
     """The equilibrium with the loads of time t from a start next to another one, with contact if that has it."""
     lines = joined_lines(model, t)
+    if found.alone:
+        each = zip(model.models, start.lines, found.alone, strict=True)
+        return _keep_turns(model, t, _together(model, t, [solve_like(x, t, state, like) for x, state, like in each]))
     if found.settled:
         return _keep_turns(model, t, settle(model, lines, bodies, start, near=True))
     if found.with_friction:
         ways = dict.fromkeys(found.with_friction, "start")
         return _keep_turns(model, t, settled_with_friction(lines, len(model.free), bodies, ways, found, start))
     return _keep_turns(model, t, solve_system_statics(lines, len(model.free), bodies, iter([(name, start)])))
+
+
+def _are_alone(model: SystemModel, friction: bool) -> bool:
+    """Whether each line is joined to nothing that moves and asks for no contact: what it finds, no other line knows."""
+    joined = bool(model.free or len(model.body_places)) or model.touching is not None
+    touches = any(x.line.bits & SELF_CONTACT for x in model.models)
+    settles = not friction and any(settling(model.scenes[name]) for name in model.names)
+    return not (joined or touches or settles)
+
+
+def _each_alone(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
+    """The equilibria of lines that are joined to nothing that moves, found one by one, as of one cable."""
+    found = []
+    for k, (name, x) in enumerate(zip(model.names, model.models, strict=True)):
+        try:
+            found.append(equilibrium_of(model.scenes[name], x, t))
+        except ComputationError as failed:
+            detail = failed.detail.replace("ends.", f"lines.{name}.connections.")
+            raise LineFailed(k, failed.outcome, None, failed.s, detail, first=failed.first) from None
+    return _together(model, t, found)
+
+
+def _together(model: SystemModel, t: float, found: Sequence[Equilibrium]) -> SystemEquilibrium:
+    """Equilibria of all lines as one."""
+    rubs = frozenset(k for k, x in enumerate(found) if x.with_friction)
+    lines = [
+        x._replace(line=x.line._replace(bits=x.line.bits & ~WAVES & ~(0 if k in rubs else FRICTION)))
+        for k, x in enumerate(joined_lines(model, t))
+    ]
+    solver = SystemSolver(lines, 0, model.body_numbers(t))
+    solver.blurred = {k for k, x in enumerate(found) if x.blurred}
+    states = SystemState([x.state for x in found], model.body_places)
+    solver.evaluate_forces(states, solver.anchor)
+    path = max(found, key=lambda x: len(x.path)).path  # of the line that took most ways
+    touches = any(x.touch.size for x in found)
+    why = "a damped motion with contact, without friction, led there" if touches else ""
+    return SystemEquilibrium(
+        states, path, sum(x.iterations for x in found), max(x.residual for x in found), solver, touches, why, rubs,
+        tuple(found),
+    )  # fmt: skip
 
 
 def _with_friction(model: SystemModel, t: float, found: SystemEquilibrium, bodies: Floats) -> SystemEquilibrium:

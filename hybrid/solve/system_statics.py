@@ -20,7 +20,17 @@ from hybrid.solve.laid import laid_without_tension
 from hybrid.solve.settling import CALM, GROWN, RELAXING_STEPS, along, damped, growth_time, gyration, nudged
 from hybrid.solve.softened import is_in_current, softened, softest, with_current
 from hybrid.solve.stability import Stability
-from hybrid.solve.statics import GROWING, HARDENING, LIMP, MOST_FALLS, NEARLY_STIFF, PUSHED, SAME, STILLED
+from hybrid.solve.statics import (
+    GROWING,
+    HARDENING,
+    LIMP,
+    MOST_FALLS,
+    NEARLY_STIFF,
+    PUSHED,
+    SAME,
+    STILLED,
+    Equilibrium,
+)
 from hybrid.solve.stepper import Stepper
 from hybrid.solve.system import SystemSolver
 
@@ -38,11 +48,12 @@ class SystemEquilibrium:
     settled: bool = False  # True where a damped motion with contact led there
     unjudged: str = ""  # where settled: why it is not known that it would stay
     with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction on the bed took part
+    alone: tuple[Equilibrium, ...] = ()  # of each line where all are joined to nothing that moves: found one by one
 
     @property
     def pushed(self) -> bool:
         """Whether it is beside an equilibrium that is not stable."""
-        return self.path[-1].startswith(PUSHED)
+        return PUSHED in self.path[-1]
 
     @property
     def summary(self) -> str:
