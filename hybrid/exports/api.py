@@ -32,11 +32,11 @@ from hybrid.store.selection import (
     error_name,
     head_lines,
     missing_parts,
+    netcdf,
     part_of,
     scene_lines,
     write_atomically,
 )
-from hybrid.store.xarray_dataset import image as netcdf
 
 SUFFIXES = {"nc": ".nc", "csv": ".csv", "vtkhdf": ".vtkhdf", "fatigue": ".cycles.csv"}
 # Decimals of an arc length in the name of a column: micrometres of a kilometre.

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import ResultError, optional_package
-from hybrid.store.bends import Bends, bends_of
+from hybrid.store.histories import Bends, bends_of
 from hybrid.store.selection import Part, error_name, head_lines
 
 # A sine read n times a period shows 1 - cos(pi/n) less than its range at worst: 5 % for 10.

@@ -14,15 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.envelope import GROUP, SCALE, has_envelope
-
-if TYPE_CHECKING:
-    from hybrid.store.reader import Result
+from hybrid.store.stored_result import StoredResult
 
 Floats = np.ndarray
 # The field of a result, in percent; its sections with their corners, rows (K, 4) of s from, s to (m), T (N), k (1/m).
@@ -75,7 +73,7 @@ class Stretch(NamedTuple):
     corners: Floats
 
 
-def stretches_of(result: Result) -> list[Stretch]:
+def stretches_of(result: StoredResult) -> list[Stretch]:
     """The sections of a result that have a capacity."""
     if CORNERS not in result:
         return []
@@ -94,7 +92,7 @@ def _inside(x: Stretch, s: Floats) -> np.ndarray:
     )  # fmt: skip
 
 
-def bound_of_steps(result: Result, errors: tuple[float, float] = (0.0, 0.0)) -> float | None:
+def bound_of_steps(result: StoredResult, errors: tuple[float, float] = (0.0, 0.0)) -> float | None:
     """The part of the capacity that no step and node exceeds, by the ranges of tension and curvature over all of them,
     as if they came at once; None: the result has no envelope.  errors: of these ranges, N and 1/m."""
     names = [f"{GROUP}/{x}" for x in ("tension_min", "tension_max", "curvature_max")]
@@ -105,7 +103,7 @@ def bound_of_steps(result: Result, errors: tuple[float, float] = (0.0, 0.0)) -> 
     return _largest(result, lambda x, at: most_used(x.corners, low[at], high[at], k[at]), s)
 
 
-def bound_with_errors(result: Result) -> float | None:
+def bound_with_errors(result: StoredResult) -> float | None:
     """The part that no output exceeds, whatever the errors of tension and curvature; None: they are not known."""
     names = ("tension", "curvature", "errors/total/tension", "errors/total/curvature")
     if any(name not in result for name in names):
@@ -115,7 +113,7 @@ def bound_with_errors(result: Result) -> float | None:
     return _largest(result, lambda x, at: most_used(x.corners, (T - dT)[:, at], (T + dT)[:, at], (k + dk)[:, at]), s)
 
 
-def _largest(result: Result, part: Callable[[Stretch, np.ndarray], Floats], s: Floats) -> float | None:
+def _largest(result: StoredResult, part: Callable[[Stretch, np.ndarray], Floats], s: Floats) -> float | None:
     values = [v for x in stretches_of(result) if (v := part(x, _inside(x, s))).size and np.isfinite(v).any()]
     return max((float(np.nanmax(v)) for v in values), default=None)
 
@@ -124,7 +122,7 @@ def _largest(result: Result, part: Callable[[Stretch, np.ndarray], Floats], s: F
 
 
 def mooring_use(
-    result: Result, strength: float, factors: tuple[float, ...], pretension: float | Result
+    result: StoredResult, strength: float, factors: tuple[float, ...], pretension: float | StoredResult
 ) -> tuple[Floats, Floats, Floats]:
     """Arc lengths (n,) m, and u = (T_pre g_pre + (T - T_pre) g_env)/S at the outputs (nt, n) and of the largest tension
     of all steps and outputs (n,).

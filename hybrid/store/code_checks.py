@@ -17,14 +17,12 @@ u = g^2 ((M/M_k + (T/T_k)^2)^2 + (dp/p_c)^2); the root is 0 where dp alone burst
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybrid.store.envelope import GROUP, SCALE, has_envelope
-
-if TYPE_CHECKING:
-    from hybrid.store.reader import Result
+from hybrid.store.stored_result import StoredResult
 
 Floats = np.ndarray
 # The field of a result, in percent; its sections with the numbers of their codes, rows of `Row`.
@@ -121,12 +119,12 @@ def collapse(row: Row) -> float:
     return float(real[real > 0.0].min())
 
 
-def rows_of(result: Result) -> list[Row]:
+def rows_of(result: StoredResult) -> list[Row]:
     """Sections of a result that have a code."""
     return [Row(*x) for x in np.asarray(result[ROWS])] if ROWS in result else []
 
 
-def clauses_of(result: Result) -> str:
+def clauses_of(result: StoredResult) -> str:
     """The codes of a result, with clause and edition."""
     kinds = {row.kind for row in rows_of(result)}
     return "; ".join(text for kind, text in zip((E301, F201), CLAUSES.values(), strict=True) if kind in kinds)
@@ -141,7 +139,7 @@ def inside_of(row: Row, s: Floats) -> np.ndarray:
     return (s >= row.first - near) & (s <= row.last + near) & ~late & ~early
 
 
-def mooring_of_steps(result: Result) -> tuple[float, float, float] | None:
+def mooring_of_steps(result: StoredResult) -> tuple[float, float, float] | None:
     """The largest part that E301 lets a line use at any step and node, its time (s) and arc length (m).
 
     It goes by tension alone, of which each node has its largest.  None: there is no such section, or no step is known.
@@ -160,7 +158,7 @@ def mooring_of_steps(result: Result) -> tuple[float, float, float] | None:
     return most
 
 
-def code_of_steps(result: Result, errors: Mapping[str, float] | None = None) -> float | None:
+def code_of_steps(result: StoredResult, errors: Mapping[str, float] | None = None) -> float | None:
     """The part that no step and node exceeds, by the ranges of tension and moment over all of them, as if they came at
     once, at the heights of the outputs; None: the result has not all of them.  errors: of these ranges, by quantity, N,
     N m and 1/m; one that is not there is not known.
@@ -181,7 +179,7 @@ def code_of_steps(result: Result, errors: Mapping[str, float] | None = None) -> 
     return _largest(result, s, lambda x, at: np.max([use(x, T[at], moment(x)[at], h[at]) for T, h in each], axis=0))
 
 
-def code_with_errors(result: Result) -> float | None:
+def code_with_errors(result: StoredResult) -> float | None:
     """The part that no output exceeds, whatever the errors of tension and moment; None: they are not known."""
     group = "errors/total/"
     moment = _moments(
@@ -199,7 +197,7 @@ def code_with_errors(result: Result) -> float | None:
     )
 
 
-def _moments(result: Result, name: str, read: Callable[[str], Floats]) -> Callable[[Row], Floats] | None:
+def _moments(result: StoredResult, name: str, read: Callable[[str], Floats]) -> Callable[[Row], Floats] | None:
     """What has the moments (N m) of a row, from `name` of moment and curvature; None: the result has not all of them.
 
     A line that is a catenary somewhere, at some time, may have those of its curvature; a mooring line needs none.
@@ -215,6 +213,6 @@ def _moments(result: Result, name: str, read: Callable[[str], Floats]) -> Callab
     return lambda row: rods if curvature is None else np.maximum(rods, moment_of(row, curvature))
 
 
-def _largest(result: Result, s: Floats, part: Callable[[Row, np.ndarray], Floats]) -> float | None:
+def _largest(result: StoredResult, s: Floats, part: Callable[[Row, np.ndarray], Floats]) -> float | None:
     values = [v for x in rows_of(result) if (v := part(x, inside_of(x, s))).size]
     return None if not values or any(np.isnan(v).any() for v in values) else max(float(v.max()) for v in values)

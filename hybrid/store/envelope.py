@@ -7,14 +7,12 @@ load, may lie beyond it.  Limits are held against both.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from hybrid.store.partners import partner_of
-
-if TYPE_CHECKING:
-    from hybrid.store.reader import Result
+from hybrid.store.stored_result import StoredResult
 
 # Names in the file: the group, its places (m), and the times (s) between which all accepted steps count.
 GROUP = "envelope"
@@ -135,12 +133,12 @@ def not_verified(why: str, remedy: str) -> str:
     return f"{NOT_VERIFIED}: {why}; try: {remedy}"
 
 
-def has_envelope(result: Result) -> bool:
+def has_envelope(result: StoredResult) -> bool:
     """Whether a result has its envelope: files of 0.6 and runs killed early have none."""
     return END in result and bool(np.isfinite(result[END]))
 
 
-def stored_window(result: Result) -> str:
+def stored_window(result: StoredResult) -> str:
     """Over which time a result was stored: outputs and steps, and extremes of nodes and steps if that differs."""
     t = result.times
     if not len(t):
@@ -255,14 +253,14 @@ def part_used(limit: str, x: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     return np.asarray(x * allowed if limit == "min_bend_radius" else x / allowed)
 
 
-def with_partner(result: Result, x: Judged) -> Judged:
+def with_partner(result: StoredResult, x: Judged) -> Judged:
     """A limit of contact force with the name of what presses, where the result has it."""
     kinds = [name for name, partner in PARTNERS.items() if partner == x.partner]
     named = partner_of(result, kinds[0], x.t) if kinds else None
     return x._replace(partner=named) if named else x
 
 
-def largest_contact(result: Result) -> tuple[str, Extreme] | None:
+def largest_contact(result: StoredResult) -> tuple[str, Extreme] | None:
     """What presses on the line most, and with what force per length (N/m); None: nothing is known to touch it."""
     each = {name: (farthest if name in result else extreme)(result, name, "max") for name in PARTNERS}
     known = [(name, x) for name, x in each.items() if x is not None and x.value > 0.0]

@@ -1,27 +1,23 @@
 """Histories of a result, and what they amount to: statistics, spectra, extremes, fatigue damage.
 
 An end force is known at every step, and its statistics are those of the steps; all else is known at the outputs.
+Extremes of a time longer than a result are those of a law of its peaks: not of round-off, nor beyond a bound.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.statistics import extremes, fatigue, moments, spectrum
-from hybrid.store.bends import bends_of
-from hybrid.store.capacity import mooring_use
-from hybrid.store.envelope import Judged
-from hybrid.store.extrapolation import extreme_of
+from hybrid.statistics import extremes, moments
+from hybrid.statistics.moments import STEADY, mean_over_time
 from hybrid.store.names import ALIASES
-from hybrid.store.partners import Pressed, contacts_of
-from hybrid.store.verdicts import Verdicts, section_limits, verdicts_of
-
-if TYPE_CHECKING:
-    from hybrid.store.reader import Result
+from hybrid.store.stored_result import StoredResult
 
 Floats = np.ndarray
 Window = tuple[float | None, float | None]
@@ -37,6 +33,16 @@ NOT_ASKED_FOR = ("t", "contact_force", "grounded_length")
 AXES = ("x", "y", "z")
 # Fibres around a section at which its stress is counted.
 FIBRES = 8
+# Forces F and lengths L of a line are computed with 1e-16 of themselves in each of some thousand operations: what
+# ranges over less than this part of them is round-off.
+ROUND_OFF = 1e-12
+# What an angle between two directions cannot exceed, by its unit.
+HALF_TURN = {"deg": 180.0, "rad": math.pi}
+# Largest peaks are alike where their median exceeds the least of them by less than this part of its height over the
+# mean: of a regular motion by some 0.001, of the largest tenth of the peaks of a random sea by 0.14.
+ALIKE = 0.02
+# Angles that are counted on through full turns.
+COUNTED_ON = "rotation"
 
 
 class History(NamedTuple):
@@ -58,13 +64,13 @@ class Section(NamedTuple):
     modulus: float
 
 
-def usual_names(result: Result) -> list[str]:
+def usual_names(result: StoredResult) -> list[str]:
     """The quantities of USUAL that a result has, and those that its scene asks for."""
     asked = [x for x in result.names if "/" not in x and x not in NOT_ASKED_FOR and result.dims(x) == ("t",)]
     return [name for name in USUAL if name in result or f"steps/{name}" in result] + asked
 
 
-def history_of(result: Result, name: str, times: Window | None = None, at: Any = None) -> History:
+def history_of(result: StoredResult, name: str, times: Window | None = None, at: Any = None) -> History:
     """A history of a result.  times: from and to (s); at: arc lengths (m), None: all output points.
 
     name: of a quantity, a vector included; NAME.x, NAME.y, NAME.z of one of its components; x, y, z of the position.
@@ -101,7 +107,7 @@ def history_of(result: Result, name: str, times: Window | None = None, at: Any =
     return History(name, result.units[stored], t[inside], values, s, basis)
 
 
-def component_of(result: Result, name: str) -> tuple[str, int | None]:
+def component_of(result: StoredResult, name: str) -> tuple[str, int | None]:
     """The quantity that a name is of, and which component of it; None: all of it, or it is no vector."""
     whole, _, axis = ("position", ".", name) if name in AXES and name not in result else name.rpartition(".")
     if whole and axis in AXES and name not in result and whole in result and result.dims(whole)[-1:] == ("xyz",):
@@ -109,7 +115,7 @@ def component_of(result: Result, name: str) -> tuple[str, int | None]:
     return name, None
 
 
-def components_of(result: Result, name: str) -> list[str]:
+def components_of(result: StoredResult, name: str) -> list[str]:
     """The names of the components of a vector; of what is none its own."""
     whole, component = component_of(result, name)
     if component is None and whole in result and result.dims(whole)[-1:] == ("xyz",):
@@ -117,7 +123,7 @@ def components_of(result: Result, name: str) -> list[str]:
     return [name]
 
 
-def _nothing_yet(result: Result) -> str:
+def _nothing_yet(result: StoredResult) -> str:
     """That a run was stopped before there was a history, and what to do."""
     name = result.file.name if result.file else "the file"
     fix = f"`hybrid resume {name}` goes on" if len(result.times) else "`hybrid run` of its scene, from its start"
@@ -145,7 +151,7 @@ def _window(times: Window | None) -> tuple[float, float]:
     return -np.inf if first is None else float(first), np.inf if last is None else float(last)
 
 
-def _at_places(result: Result, name: str, s: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
+def _at_places(result: StoredResult, name: str, s: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
     """Arc lengths and values (nt, n, ...) at places, of which those where the quantity jumps come twice."""
     columns, places = [], []
     for x in at:
@@ -156,154 +162,21 @@ def _at_places(result: Result, name: str, s: Floats, values: Floats, at: Floats)
     return np.array(places), np.concatenate(columns, axis=1)
 
 
-class Histories:
-    """What a result can tell of its histories."""
-
-    def contacts(self: Any) -> list[Pressed]:
-        """What presses on the line by name, or which of several lines press on each other: largest forces at outputs.
-
-        Of each its `partner`, `force` (N, over all places) at `t_force` (s), `contact` (N/m) at `t_contact` (s), and
-        the `group` in which the result has these over time.
-        """
-        return contacts_of(self)
-
-    def statistics(
-        self: Any, names: Sequence[str] | None = None, *, times: Window | None = None, at: Any = None
-    ) -> dict[str, moments.Summary]:
-        """Summaries of histories, each of the shape of the quantity at one time: mean, standard deviation, skewness,
-        extremes with their times, period between up-crossings of the mean, significant range, number of cycles.
-
-        names: None for end forces, tension, curvature, bending moment, torque, contact force, and what the scene asks
-        for, where the result has them at all outputs; times: from and to, s; at: arc lengths, m, None: all output
-        points.  A quantity along the line has a value
-        at each place of `both_sides(name)[0]`: where it jumps, one before and one after.
-        """
-        found = {}
-        asked = usual_names(self) if names is None else [names] if isinstance(names, str) else names
-        for name in asked:
-            history = history_of(self, name, times, at if lies_along(self, name) else None)
-            if names is None and not np.isfinite(history.values).all():
-                continue
-            found[name] = summary_of(history)
-        return found
-
-    def extreme(
-        self: Any, name: str, *, at: float | None = None, duration: float = extremes.THREE_HOURS,
-        threshold: float | None = None, times: Window | None = None, smallest: bool = False,
-        probability: float = extremes.FRACTILE,
-    ) -> extremes.Extreme:  # fmt: skip
-        """The largest (or smallest) value that a time of `duration` (s) brings, by peaks over a threshold of a history.
-
-        at: arc length (m), of a quantity along the line; threshold: in the unit of the quantity, None: nine tenths of
-        the peaks are below it.  ResultError with too few peaks, of what is round-off, and where the law leads beyond
-        what an angle can be.
-        """
-        history = _one(history_of(self, name, times, at))
-        return extreme_of(
-            self, name, history.unit, history.t, history.values, duration,
-            threshold=threshold, smallest=smallest, probability=probability,
-        )  # fmt: skip
-
-    def exceedance(
-        self: Any, name: str, above: float | None = None, *, below: float | None = None, at: Any = None,
-        times: Window | None = None,
-    ) -> Floats:  # fmt: skip
-        """The part of the time for which a history is above a value, or below one, in the unit of its quantity; of the
-        shape of the quantity at one time; at, times: as of `statistics`.  ResultError: not one number of the two."""
-        if (above is None) is (below is None):
-            raise ResultError("exceedance\n    expected: one of above and below, in the unit of the quantity")
-        value = above if below is None else below
-        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-            key = "above" if below is None else "below"
-            raise ResultError(f"{key}: expected a number in the unit of {name!r}, found {value!r:.60}")
-        history = history_of(self, name, times, at)
-        return moments.exceedance(history.t, history.values, above, below)
-
-    def utilisation(self: Any) -> dict[str, Judged]:
-        """How near the line came to each limit of its sections over all steps and outputs, by the key of the limit:
-        `used` is the part of max_tension or min_bend_radius that was used, None of min_tension and of what is not
-        verified; `verdict` is within, broken or not verified, with `why` and `remedy`; at s (m) and t (s).
-
-        ResultError of a result of several lines: each has its own."""
-        if self.lines:
-            first = next(iter(self.lines))
-            raise ResultError(
-                f"utilisation of a result with the lines {', '.join(self.lines)}\n"
-                f"    expected: that of one line\n    try:      result.lines[{first!r}].utilisation()"
-            )
-        return {found.limit: found for found in section_limits(self)}
-
-    def mooring(
-        self: Any, strength: float, factors: tuple[float, ...], pretension: Any
-    ) -> tuple[Floats, Floats, Floats]:
-        """Utilisation of a mooring line by DNV-OS-E301 (July 2021), (T_pre g_pre + (T - T_pre) g_env)/S: arc lengths
-        (n,) m, at the outputs (nt, n), and of the largest tension over all steps and outputs (n,).
-
-        strength: S, N; factors: g_pre, g_env, by class and limit state, without default; pretension: T_pre, N, or the
-        result of an equilibrium under it, `hybrid.static` without current.  ResultError: of another line."""
-        return mooring_use(self, strength, factors, pretension)
-
-    def verdicts(self: Any) -> Verdicts:
-        """What may be said of the result: limits of sections and of quantities are within or broken, an accuracy that
-        was asked for is met or missed, or it is not verified, with the reason and the one thing to do.
-
-        Of several lines each has its own, and the result those of quantities of all."""
-        return verdicts_of(self)
-
-    def spectrum(
-        self: Any, name: str, *, at: Any = None, times: Window | None = None, segment: float | None = None
-    ) -> spectrum.Spectrum:
-        """The spectrum of a history by Welch's method; segment: s, None: an eighth of the record."""
-        history = history_of(self, name, times, at)
-        return spectrum.welch(history.t, history.values, segment)
-
-    def damage(
-        self: Any, curve: str | Mapping[str, Any] | fatigue.Curve, *, strength: float | None = None,
-        section: Section | Sequence[float] | None = None, concentration: float = 1.0, times: Window | None = None,
-        at: Any = None,
-    ) -> tuple[Floats, Floats]:  # fmt: skip
-        """Arc lengths (n,) m and the damage (n,) that the outputs of the run do there, by a curve of fatigue.
-
-        curve: a name of hybrid/statistics/fatigue_curves.csv, or kind, log_a, m (log_a2, m2, knee) of one's own.
-        strength: N, reference strength, for a T-N curve.  section: (area m2, outer diameter m, Young's modulus Pa) for
-        an S-N curve; the stress is that of tension and bending at the worst of FIBRES fibres, times `concentration`.
-        The damage is that of the time of the outputs; divide by it for a rate.
-        """
-        law = fatigue.curve_of(curve)
-        tension = history_of(self, "tension", times, at)
-        if law.kind == "T-N":
-            if strength is None or section is not None or not 0.0 < strength < np.inf:
-                expected = "strength=... (--strength N), in N, above 0, and no section"
-                raise ResultError(f"the curve '{law.name}' is of ranges of tension\n    expected: {expected}")
-            return np.asarray(tension.s), fatigue.damage(tension.values, law, concentration / strength)
-        if section is None or strength is not None or len(section) != 3 or not all(0.0 < x < np.inf for x in section):
-            fix = "section=(area m2, outer diameter m, Young's modulus Pa), --section A,D,E, and no strength"
-            raise ResultError(f"the curve '{law.name}' is of ranges of stress\n    try:      {fix}")
-        bends = _bends(self, times, at)
-        found = []
-        for k in range(FIBRES):
-            angle = 2.0 * np.pi * k / FIBRES
-            about = np.cos(angle) * bends[..., 0] + np.sin(angle) * bends[..., 1]
-            stress = fatigue.stress_of(tension.values, about, *Section(*section))
-            found.append(fatigue.damage(stress, law, concentration))
-        return np.asarray(tension.s), np.max(found, axis=0)
-
-
-def _bends(result: Result, times: Window | None, at: Any) -> Floats:
+def bends_at(result: StoredResult, times: Window | None, at: Any) -> Floats:
     """Curvature (nt, n, 2) 1/m about two axes across the mean tangent at the places of `history_of`."""
     a, b = _window(times)
     found = bends_of(result, (result["t"] >= a) & (result["t"] <= b))
     return (found if at is None else found.at(at)).across()
 
 
-def lies_along(result: Result, name: str) -> bool:
+def lies_along(result: StoredResult, name: str) -> bool:
     """Whether a quantity has a value at every arc length."""
     whole, _ = component_of(result, name)
     known = ALIASES.get(whole, whole)
     return known in result and result.dims(known)[1:2] == ("s",)
 
 
-def _one(history: History) -> History:
+def one_history(history: History) -> History:
     """The same as one history, of two values at one place the one that ranges more; ResultError if it is several."""
     values = history.values.reshape(history.values.shape[0], -1)
     if history.s is not None and values.shape[1] == 2 and history.s[0] == history.s[1]:
@@ -313,3 +186,133 @@ def _one(history: History) -> History:
         fix = f"{history.name}.x, a component" if values.shape[1] == len(AXES) else fix
         raise ResultError(f"'{history.name}' has {values.shape[1]} values at a time\n    try:      {fix}")
     return history._replace(values=values[:, 0])
+
+
+# --- bends ---------------------------------------------------------------------------------------
+
+
+class Bends(NamedTuple):
+    """Bends (nt, n, 3) 1/m, inertial, and mean tangents (n, 3), at s (n,) m; twice where it jumps."""
+
+    s: Floats
+    vectors: Floats
+    tangents: Floats
+
+    def at(self, places: Floats) -> Bends:
+        """The same at arc lengths (m), those where curvature jumps twice; between output points linear."""
+        s, vectors, tangents = [], [], []
+        for x in np.atleast_1d(np.asarray(places, float)).tolist():
+            exact = np.flatnonzero(np.abs(self.s - x) <= 1e-9 * np.ptp(self.s))
+            if not exact.size:
+                k = int(np.clip(np.searchsorted(self.s, x) - 1, 0, len(self.s) - 2))
+                w = (x - self.s[k]) / (self.s[k + 1] - self.s[k])
+                vectors.append((1.0 - w) * self.vectors[:, [k]] + w * self.vectors[:, [k + 1]])
+                tangents.append((1.0 - w) * self.tangents[[k]] + w * self.tangents[[k + 1]])
+            else:
+                vectors.append(self.vectors[:, exact])
+                tangents.append(self.tangents[exact])
+            s += [x] * tangents[-1].shape[0]
+        return Bends(np.array(s), np.concatenate(vectors, axis=1), np.concatenate(tangents))
+
+    def across(self) -> Floats:
+        """Components (nt, n, 2) 1/m about two axes across the mean tangents."""
+        mean = self.tangents
+        one = np.cross(mean, np.eye(3)[np.abs(mean).argmin(axis=1)])
+        one /= np.linalg.norm(one, axis=1, keepdims=True)
+        two = np.cross(mean, one)
+        two /= np.linalg.norm(two, axis=1, keepdims=True)
+        return np.stack([(self.vectors * one).sum(axis=2), (self.vectors * two).sum(axis=2)], axis=2)
+
+
+def bends_of(result: StoredResult, rows: slice | Floats) -> Bends:
+    """The bends of outputs: `curvature` about the axis t x dt/ds of the tangents."""
+    s, size = result.both_sides("curvature")
+    theta, phi = (result.both_sides(name)[1][rows] for name in ("theta", "phi"))
+    t = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=2)
+    axes = np.cross(t, slopes(s, t))
+    length = np.linalg.norm(axes, axis=2, keepdims=True)
+    axes = np.divide(axes, length, out=np.zeros_like(axes), where=length > 0.0)
+    return Bends(s, size[rows][..., None] * axes, t.mean(axis=0))
+
+
+def slopes(s: Floats, x: Floats) -> Floats:
+    """Derivatives of x (nt, n, 3) along s (n,), second order, at ends too; nothing is taken across a place that comes
+    twice."""
+    out = np.zeros_like(x)
+    edges = [0, *(np.flatnonzero(np.diff(s) <= 0.0) + 1).tolist(), s.size]
+    for a, b in pairwise(edges):
+        if b - a > 1:
+            out[:, a:b] = np.gradient(x[:, a:b], s[a:b], axis=1, edge_order=2 if b - a > 2 else 1)
+    return out
+
+
+# --- extremes of a longer time -------------------------------------------------------------------
+
+
+def extreme_of(
+    result: StoredResult, name: str, unit: str, t: Floats, x: Floats, duration: float = extremes.THREE_HOURS, *,
+    threshold: float | None = None, smallest: bool = False, probability: float = extremes.FRACTILE,
+) -> extremes.Extreme:  # fmt: skip
+    """The largest (or smallest) value that a time of `duration` (s) brings of a history x (nt,) at times t (nt,) s.
+
+    threshold: in the unit of x.  ResultError where there are too few peaks, where the history is round-off, where the
+    largest peaks are alike, as of a regular motion, and where the law leads beyond what an angle can be.
+    """
+    sign = -1.0 if smallest else 1.0
+    extremes.check(duration, probability)
+    _refuse_round_off(result, name, unit, x)
+    _refuse_regular(t, sign * x)
+    found = extremes.of_record(t, sign * x, duration, None if threshold is None else sign * threshold, probability)
+    most = HALF_TURN.get(unit)
+    if most is not None and not name.endswith(COUNTED_ON):
+        bound = most if not smallest else 0.0 if x.min() >= 0.0 else -most
+        reached = sign * found.fractile_interval[1]
+        if sign * reached > sign * bound:
+            raise ResultError(
+                f"the law of its peaks leads to {reached:.4g} {unit}, and the angle is bounded by {bound:.4g} {unit}\n"
+                "    try:      the force whose direction it is, or a longer run"
+            )
+    return found if not smallest else _negated(found)
+
+
+def _refuse_round_off(result: StoredResult, name: str, unit: str, x: Floats) -> None:
+    """ResultError for a history that ranges over no more than round-off of its own size, or of forces and lengths."""
+    spread, size = float(np.ptp(x)), float(np.abs(x).max())
+    least, of = STEADY * size, f"{size:.3g} {unit}, its size"
+    scale = _scale(result, unit)
+    if scale is not None and ROUND_OFF * scale > least:
+        least, of = ROUND_OFF * scale, f"{scale:.3g} {unit}, the scale of the line"
+    if spread <= least:
+        raise ResultError(f"it ranges over {spread:.2g} {unit}: round-off of {of}\n    try:      another quantity")
+
+
+def _refuse_regular(t: Floats, x: Floats) -> None:
+    """ResultError for a motion whose largest peaks are alike: a longer time brings no larger ones."""
+    peaks = np.sort(extremes.peaks_of(t, x))
+    most = max(extremes.LEAST_PEAKS, math.ceil((1.0 - extremes.USUAL_THRESHOLD) * peaks.size))
+    largest, mean = peaks[-most:], float(mean_over_time(t, x))
+    if peaks.size >= extremes.LEAST_PEAKS and np.median(largest) - largest[0] < ALIKE * (largest[0] - mean):
+        raise ResultError("its largest peaks are alike, as of a regular motion: no longer time brings larger ones")
+
+
+def _scale(result: StoredResult, unit: str) -> float | None:
+    """Of a unit, what the largest force F (N) and the length L (m) of a line make of it; None: not known."""
+    length = float(np.ptp(result.s)) if not result.lines and "tension" in result and len(result.s) else 0.0
+    if not length:
+        return None
+    force = float(np.nanmax(np.abs(result["tension"]), initial=0.0))
+    scales = {"N": force, "N m": force * length, "1/m": 1.0 / length, "m": length, "N/m": force / length}
+    return scales.get(unit)
+
+
+def _negated(found: extremes.Extreme) -> extremes.Extreme:
+    """What was found of the negative values, of the values."""
+
+    def turned(interval: tuple[float, float]) -> tuple[float, float]:
+        return -interval[1], -interval[0]
+
+    return found._replace(
+        most_probable=-found.most_probable, median=-found.median, fractile=-found.fractile,
+        most_probable_interval=turned(found.most_probable_interval), median_interval=turned(found.median_interval),
+        fractile_interval=turned(found.fractile_interval), fitted=f"of the negative values: {found.fitted}",
+    )  # fmt: skip

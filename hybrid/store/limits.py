@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,9 +23,7 @@ from hybrid.store.envelope import (
     not_verified,
     part_used,
 )
-
-if TYPE_CHECKING:
-    from hybrid.store.reader import Result
+from hybrid.store.stored_result import StoredResult
 
 GROUP = "limits"
 # Group of the smallest and the largest value of a quantity at any accepted step; t/ in it has times, s/ arc lengths.
@@ -90,7 +88,7 @@ def _about(nodes: np.ndarray, x: np.ndarray, s: np.ndarray) -> np.ndarray:
 EXTREME_ERRORS = "accuracy_extremes"
 
 
-def extreme_errors(result: Result) -> dict[str, float]:
+def extreme_errors(result: StoredResult) -> dict[str, float]:
     """Those errors, of several lines those of all; empty: nobody estimated them."""
     runs = (result, *result.lines.values())
     return {name: x for run in runs for name, x in json.loads(str(run.attributes.get(EXTREME_ERRORS, "{}"))).items()}
@@ -147,7 +145,7 @@ class Held(NamedTuple):
         return f", t = {self.t:.5g} s" + (f", s = {self.s:.5g} m" if self.s is not None else "")
 
 
-def at_every_step(result: Result, name: str, bound: str) -> tuple[float, float, float | None] | None:
+def at_every_step(result: StoredResult, name: str, bound: str) -> tuple[float, float, float | None] | None:
     """The "smallest" or "largest" value of a quantity at any accepted step, its time (s), and arc length (m) if any.
 
     None: the file does not have it.
@@ -163,7 +161,7 @@ def at_every_step(result: Result, name: str, bound: str) -> tuple[float, float, 
     return float(result[full][k]), float(result[f"{EXTREMES}/t/{name}"][k]), s
 
 
-def stress_of(result: Result) -> Held | None:
+def stress_of(result: StoredResult) -> Held | None:
     """The largest stress as a part of what is allowed, over every accepted step and node and over the outputs, which
     may lie between nodes; None: there is no limit, or no stress."""
     known = _most_stressed(result, False) if has_envelope(result) else None
@@ -189,7 +187,7 @@ def _most_stressed(values: Arrays, by_outputs: bool) -> Held | None:
     return Held("von_mises", "max_stress", "Pa", value, most, value > most, float(t[k]), float(s[k]), by_outputs)
 
 
-def held_of(result: Result) -> list[Held]:
+def held_of(result: StoredResult) -> list[Held]:
     """Every limit of a quantity, at the step or output where it is nearest to be broken, or most broken."""
     found, moves = [], len(result.times) > 1
     for full in (name for name in result.names if name.startswith(f"{GROUP}/")):
@@ -215,7 +213,7 @@ def held_of(result: Result) -> list[Held]:
     return found + [x for x in (stress_of(result), capacity_of(result), code_of(result)) if x is not None]
 
 
-def capacity_of(result: Result) -> Held | None:
+def capacity_of(result: StoredResult) -> Held | None:
     """The largest part of the capacity of sections that tension and curvature use, over the outputs; None: none given.
 
     Between outputs it is known to stay within where their ranges over all steps do, as if they came at once.
@@ -223,7 +221,7 @@ def capacity_of(result: Result) -> Held | None:
     return _part_of(result, NAME, "capacity", bound_of_steps)
 
 
-def code_of(result: Result) -> Held | None:
+def code_of(result: StoredResult) -> Held | None:
     """The largest part that codes of sections let it use, likewise; of mooring lines over every step."""
     found, steps = _part_of(result, CODE_USED, "code", code_of_steps), mooring_of_steps(result)
     if found is None or steps is None:
@@ -237,12 +235,14 @@ def code_of(result: Result) -> Held | None:
     return found
 
 
-def needs_moments(result: Result) -> bool:
+def needs_moments(result: StoredResult) -> bool:
     """Whether a code takes tension and moment at once, which no step but those of outputs is known by."""
     return any(row.kind == F201 for row in rows_of(result))
 
 
-def _part_of(result: Result, name: str, limit: str, bound_of: Callable[[Result], float | None]) -> Held | None:
+def _part_of(
+    result: StoredResult, name: str, limit: str, bound_of: Callable[[StoredResult], float | None]
+) -> Held | None:
     if name not in result:
         return None
     most = extremes_of_outputs(result, name)

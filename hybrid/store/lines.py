@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TypeVar
 
 import h5py
 
@@ -11,13 +11,11 @@ from hybrid.store.copying import attach_anew
 from hybrid.store.hdf5_file import in_memory
 from hybrid.store.table import Table
 
-if TYPE_CHECKING:
-    from hybrid.store.reader import Result
-
 GROUP = "lines"
 # Lines, or tables of lines, that are written between two flushes of a file: the time of a flush grows with more than
 # the square of what is new (32 s for 36 000 datasets at once).
 TOGETHER = 20
+R = TypeVar("R")  # what a line is opened as
 
 
 def add_parts(file: h5py.File, parts: Mapping[str, Callable[[], bytes]]) -> None:
@@ -52,18 +50,19 @@ def of_all(counts: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
     }
 
 
-class Lines(Mapping[str, "Result"]):
+class Lines(Mapping[str, R]):
     """The lines of a result by name, each a result of its own; opened when first asked for."""
 
-    def __init__(self, result: Result, names: tuple[str, ...]) -> None:
-        self._result, self._names = result, names
-        self._opened: dict[str, Result] = {}
+    def __init__(self, line: Callable[[str], R], names: tuple[str, ...]) -> None:
+        """line: opens the result of a line of that name."""
+        self._line, self._names = line, names
+        self._opened: dict[str, R] = {}
 
-    def __getitem__(self, name: str) -> Result:
+    def __getitem__(self, name: str) -> R:
         if name not in self._names:
             raise KeyError(f"there is no line '{name}'; there are {', '.join(self._names)}")
         if name not in self._opened:
-            self._opened[name] = self._result.line(name)
+            self._opened[name] = self._line(name)
         return self._opened[name]
 
     def __iter__(self) -> Iterator[str]:

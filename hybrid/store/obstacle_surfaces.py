@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.store.reader import Result
+from hybrid.store.stored_result import StoredResult
 
 # Points around a round obstacle and along its half spheres.
 AROUND, OVER = 32, 7
@@ -28,7 +28,7 @@ class Body(NamedTuple):
     triangles: np.ndarray = np.zeros((0, 3), np.int64)  # (m, 3) of them, counter-clockwise from outside
 
 
-def obstacles_at(result: Result, output: int, moving: bool | None = None) -> list[Body]:
+def obstacles_at(result: StoredResult, output: int, moving: bool | None = None) -> list[Body]:
     """The obstacles of a result at an output; moving: those that move, or those that do not; None: all."""
     found = []
     for name in names_of(result):
@@ -50,14 +50,14 @@ def obstacles_at(result: Result, output: int, moving: bool | None = None) -> lis
     return found
 
 
-def moves_ever(result: Result, name: str) -> bool:
+def moves_ever(result: StoredResult, name: str) -> bool:
     """Whether an obstacle is ever elsewhere than at first."""
     if f"obstacles/{name}/position" not in result:  # none of the scene moves
         return False
     return any(bool(np.ptp(result[f"obstacles/{name}/{x}"], axis=0).any()) for x in ("position", "rotation"))
 
 
-def names_of(result: Result) -> list[str]:
+def names_of(result: StoredResult) -> list[str]:
     """Names of the obstacles of a result."""
     return [x.split("/")[1] for x in result.names if x.startswith("obstacles/") and x.endswith("/shape")]
 

@@ -7,12 +7,11 @@ Where contact began by itself, outputs have no such forces, and partners are tho
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from hybrid.store.reader import Result
+from hybrid.store.stored_result import StoredResult
 
 OBSTACLES, LINES, ITSELF = "obstacles", "contacts", "the line itself"
 # Kinds of events, of the first contact of two lines and of a line with itself.
@@ -36,7 +35,7 @@ class Pressed(NamedTuple):
         return f"at most {self.force:.5g} N in all, {self.contact:.5g} N/m"
 
 
-def contacts_of(result: Result) -> list[Pressed]:
+def contacts_of(result: StoredResult) -> list[Pressed]:
     """What presses on a line at its outputs, or of all lines which press on each other; the largest force first."""
     found = []
     for group, partner in _groups(result).items():
@@ -47,7 +46,7 @@ def contacts_of(result: Result) -> list[Pressed]:
     return sorted(found, key=lambda x: -x.force)
 
 
-def partner_of(result: Result, quantity: str, t: float) -> str | None:
+def partner_of(result: StoredResult, quantity: str, t: float) -> str | None:
     """What presses most on a line about the time t (s), by a quantity of the envelope; None: not known by name."""
     if quantity == "obstacle_contact":
         return _most({x: y for x, y in _groups(result).items() if x.startswith(OBSTACLES)}, result, t)
@@ -68,7 +67,7 @@ def meeting_text(a: str, b: str, s: float, other: float) -> str:
     return f"line {a} touches line {b}: at s = {s:.4g} m of {a}, s = {other:.4g} m of {b}"
 
 
-def _touched(whole: Result, name: str, t: float) -> str:
+def _touched(whole: StoredResult, name: str, t: float) -> str:
     """The lines that a line has touched up to the time t (s), in words; itself, where there is none."""
     soon = float(np.diff(whole.times).max(initial=0.0))  # an event is of the end of a step
     texts = [x.text for x in whole.events if x.kind == TOUCH and x.t <= t + soon]
@@ -82,7 +81,7 @@ def _touched(whole: Result, name: str, t: float) -> str:
     return " or ".join(found)
 
 
-def _most(groups: dict[str, str], result: Result, t: float) -> str | None:
+def _most(groups: dict[str, str], result: StoredResult, t: float) -> str | None:
     """Of partners in words, by where their values are, the one that presses most at the outputs about t (s)."""
     if len(groups) == 1:
         return next(iter(groups.values()))
@@ -92,7 +91,7 @@ def _most(groups: dict[str, str], result: Result, t: float) -> str | None:
     return groups[best] if best and most[best] > 0.0 else None
 
 
-def _groups(result: Result) -> dict[str, str]:
+def _groups(result: StoredResult) -> dict[str, str]:
     """Partners in words, by where their values are."""
     found = {}
     for full in result.names:

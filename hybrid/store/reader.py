@@ -1,38 +1,13 @@
 """Read what a run has written: `open_result("run.h5")` gives a `Result`.
 
-The file is HDF5 and every dataset says its own unit, frame and dimensions, so the reader is generic: whatever
-was recorded is there under its name, as an attribute (``result.tension``) or an item
-(``result["energy/kinetic"]``).  Arrays are read when they are asked for, once.
-
-Layout, format 1 (`record` writes it)::
-
-    /t (nt)  /s (ns)  /xyz (3)      dimension scales: s, m, and the inertial axes
-    /tension (t, s)  /energy/kinetic (t)  ...    one dataset per field
-    /steps/*                        one row per time step; its first column is the scale
-    /zones/{t,output,kind,s_a,s_b}  one row per zone, written only when the zones change;
-                                    they hold from output number `output` on
-    /events/{t,s_a,s_b,kind,text}   one row per event; of a change of zones also
-    /events/{criterion,value,threshold,energy}
-    /envelope/{s,<field>_min,<field>_max,<field>_t_min,<field>_t_max,begin,end}
-                                    extremes of all accepted steps from begin to end, over nodes (`envelope`)
-    /extremes/{<name>,t/<name>}     of named quantities: smallest and largest of all accepted steps, and when
-    /mesh/{s,always}                nodes that there may be, and whether they are there outside of rod zones as well
-    /scene                          the scene, as YAML text
-    /changes                        scenes that held from some time on, as JSON; only where there are any
-    /lines/<name>/*                 of several lines, each with this layout (`lines`)
-    /checkpoint                     from which a run goes on (`checkpoint`); for the program alone
-
-A table grows by whole rows and its dimension scale grows last, so the length of the
-scale says how many rows are complete; a reader beside a running writer, or after a
-kill, looks at no row beyond it.
+Arrays are those of `StoredResult`, read when they are asked for, once; what follows from them is computed here.
 """
 
 from __future__ import annotations
 
-import difflib
 import html
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,245 +15,167 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.statistics import extremes, fatigue, moments, spectrum
 from hybrid.store.array_recorder import MemoryTarget
-from hybrid.store.contents import Contents, FileContents
-from hybrid.store.histories import Histories
-from hybrid.store.integrity import readable
-from hybrid.store.late_file import LateFile
-from hybrid.store.lines import Lines
-from hybrid.store.lock import is_held
-from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
-from hybrid.store.records import (
-    FINER_RESULT,
-    PENDING,
-    THERE,
-    Attributes,
-    Columns,
-    Event,
-    Looked,
-    MeshHistory,
-    UnknownName,
-    Zone,
-    ZoneHistory,
-    joined,
+from hybrid.store.capacity import mooring_use
+from hybrid.store.envelope import Judged
+from hybrid.store.histories import (
+    FIBRES,
+    Section,
+    Window,
+    bends_at,
+    extreme_of,
+    history_of,
+    lies_along,
+    one_history,
+    summary_of,
+    usual_names,
 )
+from hybrid.store.late_file import LateFile
+from hybrid.store.lock import is_held
+from hybrid.store.partners import Pressed, contacts_of
+from hybrid.store.stored_result import StoredResult
+from hybrid.store.verdicts import Verdicts, section_limits, verdicts_of
 
 if TYPE_CHECKING:
     import xarray
 
-# Of a time: a step so near to an output ends there.
-SAME_TIME = 1e-9
+Floats = np.ndarray
 
 
-class Result(Histories):
+class Result(StoredResult):
     """The recorded answer of one run.
 
     Arrays have the output times first: `position` is (nt, ns, 3).  `units`, `describe` and `dims` say what each
     is.  Use `refresh` to see what a running computation has added since.
     """
 
-    def __init__(
-        self, source: str | Path | io.BytesIO | MemoryTarget, summed: bool = True, line: str = "",
-        contents: Contents | None = None,
-    ) -> None:  # fmt: skip
-        """summed: as of `open_file`; line: name of a line of a result of several lines, of which alone it is then.
+    def contacts(self) -> list[Pressed]:
+        """What presses on the line by name, or which of several lines press on each other: largest forces at outputs.
 
-        contents: of the file, where they are in memory already.
+        Of each its `partner`, `force` (N, over all places) at `t_force` (s), `contact` (N/m) at `t_contact` (s), and
+        the `group` in which the result has these over time.
         """
-        self._source, self._line = Path(source) if isinstance(source, str) else source, line
-        self._open(summed, contents)
+        return contacts_of(self)
 
-    def _open(self, summed: bool = True, contents: Contents | None = None) -> None:
-        source = self._source
-        if contents is not None:
-            self._contents: Contents = contents
-        elif isinstance(source, MemoryTarget):
-            assert source.contents is not None, "nothing was recorded"
-            self._contents = source.contents.part(self._line) if self._line else source.contents
-        else:
-            self._contents = FileContents(source, summed, self._line)
-        try:
-            with readable(source):
-                self._look()
-        except BaseException:
-            self._contents.close()
-            raise
+    def statistics(
+        self, names: Sequence[str] | None = None, *, times: Window | None = None, at: Any = None
+    ) -> dict[str, moments.Summary]:
+        """Summaries of histories, each of the shape of the quantity at one time: mean, standard deviation, skewness,
+        extremes with their times, period between up-crossings of the mean, significant range, number of cycles.
 
-    def _look(self) -> None:
-        contents = self._contents
-        self._cache: dict[str, np.ndarray] = {}
-        data = contents.data
-        self.names, self._groups = tuple(data), contents.groups
-        self._dims, self.units = Looked(data, contents.dims_of), Looked(data, contents.units_of, ALIASES)
-        # Taken once, so that everything read later shows the same moment of a file that grows.
-        # t first: the zones of an output are complete before its time is.
-        self._rows = {n: contents.length(n) for n in sorted(contents.scales(), key=lambda n: n != "t")}
-        self.attributes: dict[str, Any] = Attributes(
-            {OLD_ATTRIBUTES.get(k, k): v for k, v in contents.attributes.items()}
-        )
-        if self.status != "complete" and self._rows.get("t", 0) > 1 and self._rows.get("steps/t"):
-            # steps are written as they are made, outputs when the file is brought up to date
-            steps, last = contents.values("steps/t", self._rows["steps/t"]), float(self.times[-1])
-            self._rows["steps/t"] = int(np.searchsorted(steps, last * (1.0 + SAME_TIME), side="right"))
-        table = self["zones"]
-        rows = zip(*(table[k].tolist() for k in Zone._fields), strict=True)
-        self.zones = ZoneHistory(table["output"], [Zone(*row) for row in rows], len(self.times))
-
-    def close(self) -> None:
-        """Let go of the file; what was read already stays."""
-        self._contents.close()
-
-    def refresh(self) -> Result:
-        """Look at the file again, for what was added since it was opened; returns itself."""
-        if isinstance(self._source, Path):
-            self._contents.close()
-            self._open()
-        return self
-
-    def __enter__(self) -> Result:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
-    # ---- arrays -------------------------------------------------------------------------------
-
-    def _known(self, name: str) -> str:
-        name = _current(name)
-        if name in self._dims:
-            return name
-        if name in self._groups:
-            raise UnknownName(f"'{name}' is a group; ask for {' or '.join(f'{name}/{key}' for key in self[name])}")
-        if self.lines and name.split("/")[0] not in (*self._groups, "bodies", "contacts"):
-            ask = f"ask one of them, as in result.lines['{next(iter(self.lines))}']"
-            raise UnknownName(f"the result is of several lines, and has no '{name}' itself; {ask}")
-        known = [*(n for n in self.names if "/" not in n), *self._groups, "scene_text"]
-        known += [a for a, n in ALIASES.items() if n in self._dims]
-        near = [n for n in self.names if "/" in n and n.split("/")[1] == name.split("/")[-1]]
-        near = near or difflib.get_close_matches(name, dict.fromkeys([*known, *self.names]), 3)
-        hint = f"did you mean {' or '.join(near)}?" if near else "it has " + ", ".join(known)
-        raise UnknownName(f"the result has no '{name}'; {hint}")
-
-    def __getitem__(self, name: str) -> Any:
-        if name in self._groups:
-            return Columns(self, name)  # made anew: a cycle would keep all arrays until garbage is searched for
-        name = self._known(name)
-        if name not in self._cache:
-            if not self._contents.is_open:
-                raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
-            dims, _ = self._dims[name], self.units[name]  # which stay with it when the file is closed
-            with readable(self._source):
-                rows = self._rows.get(dims[0]) if dims else None
-                array = self._contents.values(name, rows)
-                if name.startswith("events/"):  # in the order of time: those of outputs are written some steps later
-                    array = array[np.argsort(self._contents.values("events/t", rows), kind="stable")]
-            if array.dtype.kind == "S":
-                array = np.char.decode(array, "utf-8", "replace")
-            array.setflags(write=False)  # it is shared by everyone who asks again
-            self._cache[name] = array
-        return self._cache[name]
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        return self[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._groups or _current(str(name)) in self._dims
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._groups, *ALIASES, *(n for n in self.names if "/" not in n)]
-
-    def dims(self, name: str) -> tuple[str, ...]:
-        """Names of the dimensions of an array, such as ("t", "s", "xyz")."""
-        return self._dims[self._known(name)]
-
-    def label(self, name: str) -> dict[str, str]:
-        """`units`, `description` and `frame` of an array, as the file has them; empty where it has none."""
-        if not self._contents.is_open:
-            raise ResultError("the result is closed; open the file again")
-        return self._contents.label(self._known(name))
-
-    def describe(self, name: str) -> str:
-        """What an array is: dimensions, unit, frame, in a sentence; of a group, what is in it."""
-        if name in self._groups:
-            units: dict[str, list[str]] = {}
-            for key in self[name]:
-                units.setdefault(self.units[f"{name}/{key}"], []).append(key)
-            return f"{name}: " + "; ".join(", ".join(keys) + f" ({u})" * bool(u) for u, keys in units.items())
-        name = self._known(name)
-        with readable(self._source):
-            unit, description, frame = self.label(name).values()
-        head = f"{name}({', '.join(self._dims[name])})" + (f" in {unit}" if unit else "")
-        return f"{head}: {description}" + (f" ({frame} frame)" if frame else "")
-
-    def at(
-        self, *, t: Any = None, s: Any = None, names: Sequence[str] | None = None, side: str | None = None
-    ) -> dict[str, Any]:
-        """Every field at the times t (s) and arc lengths s (m), linear between outputs and grid points.
-
-        t and s are a number, an array, or None for all; a number takes its dimension away.
-        `names` limits the answer to some fields.  Nothing is interpolated across places where a quantity jumps.
-        Exactly there its value is the one just before, and `right/<name>` in the answer is the one just after; side:
-        "left" or "right" to have that one alone, under the name itself.
+        names: None for end forces, tension, curvature, bending moment, torque, contact force, and what the scene asks
+        for, where the result has them at all outputs; times: from and to, s; at: arc lengths, m, None: all output
+        points.  A quantity along the line has a value
+        at each place of `both_sides(name)[0]`: where it jumps, one before and one after.
         """
-        if side not in (None, "left", "right"):
-            raise ResultError(f"side = {side!r} is no side\n    expected: 'left' or 'right'")
-        answer = {}
-        listed = (n for n in self.names if self._dims[n][:1] == ("t",) and n != "t")
-        wanted = [n for n in listed if s is None or "right/s" not in self._dims[n]] if names is None else names
-        for name in wanted:
-            found = {name: self[name]}
-            dims = self.dims(name)
-            if s is not None and "s" in dims:  # s first: it comes later, so the axis of t stays put
-                found = self._at_places(name, dims.index("s"), s, side)
-            for key, array in found.items():
-                along = t is not None and "t" in dims
-                answer[key] = _interpolate(array, dims.index("t"), self["t"], t, "t", "s") if along else array
-        return answer
+        found = {}
+        asked = usual_names(self) if names is None else [names] if isinstance(names, str) else names
+        for name in asked:
+            history = history_of(self, name, times, at if lies_along(self, name) else None)
+            if names is None and not np.isfinite(history.values).all():
+                continue
+            found[name] = summary_of(history)
+        return found
 
-    def _at_places(self, name: str, axis: int, s: Any, side: str | None) -> dict[str, np.ndarray]:
-        """A field at arc lengths s, m, from values on the same side of every jump; of two values both, as of `at`."""
-        right, grid = right_of(self._known(name)), self["s"]
-        if right not in self._dims or name == "s":
-            return {name: _interpolate(self[name], axis, grid, s, "s", "m")}
-        x, jumps = np.asarray(s, dtype=float), self["right/s"]
-        which = np.abs(x[..., None] - jumps).argmin(axis=-1)
-        exact = np.abs(x - jumps[which]) <= 1e-9 * (grid[-1] - grid[0])
-        behind = np.nextafter(jumps, np.inf)
-        doubled, values = self.both_sides(name)
-        doubled[np.searchsorted(doubled, jumps, side="right") - 1] = behind
-        found = {
-            key: _interpolate(values, axis, doubled, np.where(exact, at[which], x), "s", "m")
-            for key, at in (("left", jumps), ("right", behind))
-        }
-        if side is None and exact.any():
-            return {name: found["left"], right: found["right"]}
-        return {name: found[side or "left"]}
+    def extreme(
+        self, name: str, *, at: float | None = None, duration: float = extremes.THREE_HOURS,
+        threshold: float | None = None, times: Window | None = None, smallest: bool = False,
+        probability: float = extremes.FRACTILE,
+    ) -> extremes.Extreme:  # fmt: skip
+        """The largest (or smallest) value that a time of `duration` (s) brings, by peaks over a threshold of a history.
 
-    def uplift(self, end: str) -> tuple[np.ndarray, np.ndarray]:
-        """Force (nt,) N with which the line lifts what holds its `start` or `end` off the seabed, along the normal of
-        the bed, and the angle (nt,) deg of the pull to the bed; both 0 where the line lies on the bed there.
+        at: arc length (m), of a quantity along the line; threshold: in the unit of the quantity, None: nine tenths of
+        the peaks are below it.  ResultError with too few peaks, of what is round-off, and where the law leads beyond
+        what an angle can be.
         """
-        pull, normal = -self[f"reaction_{end}"], self["seabed"][:3]
-        if "seabed_ends" in self:
-            normal = self["seabed_ends"][0 if end == "start" else 1]
-        up = np.maximum(pull @ normal, 0.0)
-        along = np.linalg.norm(pull - (pull @ normal)[:, None] * normal, axis=1)
-        return up, np.degrees(np.arctan2(up, along))
+        history = one_history(history_of(self, name, times, at))
+        return extreme_of(
+            self, name, history.unit, history.t, history.values, duration,
+            threshold=threshold, smallest=smallest, probability=probability,
+        )  # fmt: skip
 
-    def both_sides(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Arc lengths (n,), m, and a field (nt, n, ...) there; a place where it jumps comes twice, left value first."""
-        s, values, right = self["s"].copy(), self[name], right_of(self._known(name))
-        if right not in self._dims:
-            return s, values
-        jumps = self["right/s"]
-        places = np.searchsorted(s, jumps) + 1
-        return np.insert(s, places, jumps), np.insert(values, places, self[right], self.dims(name).index("s"))
+    def exceedance(
+        self, name: str, above: float | None = None, *, below: float | None = None, at: Any = None,
+        times: Window | None = None,
+    ) -> Floats:  # fmt: skip
+        """The part of the time for which a history is above a value, or below one, in the unit of its quantity; of the
+        shape of the quantity at one time; at, times: as of `statistics`.  ResultError: not one number of the two."""
+        if (above is None) is (below is None):
+            raise ResultError("exceedance\n    expected: one of above and below, in the unit of the quantity")
+        value = above if below is None else below
+        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+            key = "above" if below is None else "below"
+            raise ResultError(f"{key}: expected a number in the unit of {name!r}, found {value!r:.60}")
+        history = history_of(self, name, times, at)
+        return moments.exceedance(history.t, history.values, above, below)
 
-    def rows_of(self, *names: str) -> Iterator[tuple[np.ndarray, ...]]:
-        """Arrays over the outputs, as those of a result that is being written come: all rows at once."""
-        yield tuple(self[name] for name in names)
+    def utilisation(self) -> dict[str, Judged]:
+        """How near the line came to each limit of its sections over all steps and outputs, by the key of the limit:
+        `used` is the part of max_tension or min_bend_radius that was used, None of min_tension and of what is not
+        verified; `verdict` is within, broken or not verified, with `why` and `remedy`; at s (m) and t (s).
+
+        ResultError of a result of several lines: each has its own."""
+        if self.lines:
+            first = next(iter(self.lines))
+            raise ResultError(
+                f"utilisation of a result with the lines {', '.join(self.lines)}\n"
+                f"    expected: that of one line\n    try:      result.lines[{first!r}].utilisation()"
+            )
+        return {found.limit: found for found in section_limits(self)}
+
+    def mooring(self, strength: float, factors: tuple[float, ...], pretension: Any) -> tuple[Floats, Floats, Floats]:
+        """Utilisation of a mooring line by DNV-OS-E301 (July 2021), (T_pre g_pre + (T - T_pre) g_env)/S: arc lengths
+        (n,) m, at the outputs (nt, n), and of the largest tension over all steps and outputs (n,).
+
+        strength: S, N; factors: g_pre, g_env, by class and limit state, without default; pretension: T_pre, N, or the
+        result of an equilibrium under it, `hybrid.static` without current.  ResultError: of another line."""
+        return mooring_use(self, strength, factors, pretension)
+
+    def verdicts(self) -> Verdicts:
+        """What may be said of the result: limits of sections and of quantities are within or broken, an accuracy that
+        was asked for is met or missed, or it is not verified, with the reason and the one thing to do.
+
+        Of several lines each has its own, and the result those of quantities of all."""
+        return verdicts_of(self)
+
+    def spectrum(
+        self, name: str, *, at: Any = None, times: Window | None = None, segment: float | None = None
+    ) -> spectrum.Spectrum:
+        """The spectrum of a history by Welch's method; segment: s, None: an eighth of the record."""
+        history = history_of(self, name, times, at)
+        return spectrum.welch(history.t, history.values, segment)
+
+    def damage(
+        self, curve: str | Mapping[str, Any] | fatigue.Curve, *, strength: float | None = None,
+        section: Section | Sequence[float] | None = None, concentration: float = 1.0, times: Window | None = None,
+        at: Any = None,
+    ) -> tuple[Floats, Floats]:  # fmt: skip
+        """Arc lengths (n,) m and the damage (n,) that the outputs of the run do there, by a curve of fatigue.
+
+        curve: a name of hybrid/statistics/fatigue_curves.csv, or kind, log_a, m (log_a2, m2, knee) of one's own.
+        strength: N, reference strength, for a T-N curve.  section: (area m2, outer diameter m, Young's modulus Pa) for
+        an S-N curve; the stress is that of tension and bending at the worst of FIBRES fibres, times `concentration`.
+        The damage is that of the time of the outputs; divide by it for a rate.
+        """
+        law = fatigue.curve_of(curve)
+        tension = history_of(self, "tension", times, at)
+        if law.kind == "T-N":
+            if strength is None or section is not None or not 0.0 < strength < np.inf:
+                expected = "strength=... (--strength N), in N, above 0, and no section"
+                raise ResultError(f"the curve '{law.name}' is of ranges of tension\n    expected: {expected}")
+            return np.asarray(tension.s), fatigue.damage(tension.values, law, concentration / strength)
+        if section is None or strength is not None or len(section) != 3 or not all(0.0 < x < np.inf for x in section):
+            fix = "section=(area m2, outer diameter m, Young's modulus Pa), --section A,D,E, and no strength"
+            raise ResultError(f"the curve '{law.name}' is of ranges of stress\n    try:      {fix}")
+        bends = bends_at(self, times, at)
+        found = []
+        for k in range(FIBRES):
+            angle = 2.0 * np.pi * k / FIBRES
+            about = np.cos(angle) * bends[..., 0] + np.sin(angle) * bends[..., 1]
+            stress = fatigue.stress_of(tension.values, about, *Section(*section))
+            found.append(fatigue.damage(stress, law, concentration))
+        return np.asarray(tension.s), np.max(found, axis=0)
 
     def to_xarray(
         self,
@@ -291,135 +188,9 @@ class Result(Histories):
 
         names: fields or groups, None for all; times: from and to, s; at: arc lengths, m, in place of the output grid.
         """
-        from hybrid.store.selection import part_of
-        from hybrid.store.xarray_dataset import dataset
+        from hybrid.store.selection import dataset, part_of
 
         return dataset(part_of(self, names, times, at))
-
-    # ---- what else was written ----------------------------------------------------------------
-
-    @property
-    def file(self) -> Path | None:
-        """The file it was read from; None for a result in memory."""
-        return self._source if isinstance(self._source, Path) else None
-
-    @property
-    def lines(self) -> Lines:
-        """The lines of a result of several lines by name, each a result of its own; of one line there are none."""
-        return Lines(self, self._contents.order if self._contents.is_open else ())
-
-    def line(self, name: str) -> Result:
-        """A line of a result of several lines, as a result of its own; `lines` has their names."""
-        return Result(self._source, line=name)
-
-    @property
-    def line_name(self) -> str:
-        """Of a line of several its name there; of all of them, and of one cable, empty."""
-        return self._line
-
-    @property
-    def whole(self) -> tuple[Result, str] | None:
-        """Of a line of several the result of all of them, opened anew, and its name there; None: it is no part."""
-        return (Result(self._source), self._line) if self._line else None
-
-    @property
-    def events(self) -> list[Event]:
-        """What happened and why, in the order of time."""
-        with readable(self._source):
-            table = self["events"]
-            rows = zip(*(table[k].tolist() for k in Event._fields if k in table), strict=True)
-            events = [Event._make(None if x != x else x for x in row) for row in rows]  # NaN: there is none
-        return [
-            e._replace(kind=OLD_EVENTS.get(e.kind, e.kind), criterion=OLD_EVENTS.get(e.criterion, e.criterion))
-            for e in events
-        ]
-
-    @property
-    def mesh(self) -> MeshHistory:
-        """`mesh[i]`: the cells at output i, their nodes s (N+1,) m and kinds (N,); fields are on the output grid."""
-        words = self[THERE] if THERE in self.names else None
-        return MeshHistory(self["mesh/s"], self["mesh/always"], self.zones, words)
-
-    @property
-    def scene_text(self) -> str:
-        """The scene that was run, as YAML text."""
-        with readable(self._source):
-            if not (text := self._contents.text("scene")):
-                raise KeyError("it has no scene")
-            return text
-
-    @property
-    def changes_text(self) -> str:
-        """Scenes that held from some time on, as JSON [{"t": s, "scene": YAML}, ...]; empty if there were none."""
-        return self._contents.text("changes")
-
-    @property
-    def title(self) -> str:
-        return str(self.attributes.get("title", ""))
-
-    @property
-    def status(self) -> str:
-        """running, complete, interrupted or failed; a killed run never came to change "running"."""
-        return str(self.attributes["status"])
-
-    @property
-    def message(self) -> str:
-        return str(self.attributes["message"])
-
-    @property
-    def pending(self) -> str:
-        """What is still to come of a result, and the one thing to do, in words; empty: nothing is.
-
-        The result comes first, and its errors and finer results after it, unless the run is stopped in between, or
-        before.
-        """
-        pending = str(self.attributes.get(PENDING, ""))
-        if not pending:
-            return ""
-        what = "its errors are not estimated yet"
-        if pending == FINER_RESULT:
-            what = "the finer result that its accuracy asks for is not computed yet"
-        if self.status == "failed":  # what to do stands in the message
-            return what
-        name = self._source.name if isinstance(self._source, Path) else "the file"
-        fix = f"`hybrid resume {name}` {'makes' if self.status == 'complete' else 'goes on, and makes'} up for it"
-        if self.status == "complete" and len(self.times) < 2:
-            fix = "`hybrid static` of its scene, which is computed anew, makes up for it"
-        return f"{what}; {fix}"
-
-    @property
-    def done(self) -> bool:
-        """Whether the run has come to its end, and nothing is to come."""
-        return self.status == "complete" and not self.pending
-
-    @property
-    def status_text(self) -> str:
-        """The status in words, with its message, and with what is still to come."""
-        status = "interrupted or still running" if self.status == "running" else self.status
-        return "; ".join(filter(None, (f"{status}: {self.message}" if self.message else status, self.pending)))
-
-    @property
-    def versions(self) -> dict[str, str]:
-        """Versions of the programs that computed and wrote the result."""
-        return {k.removeprefix("version_"): v for k, v in self.attributes.items() if k.startswith("version_")}
-
-    def __repr__(self) -> str:
-        t, s = self.times, self.s
-        name = self._source.name if isinstance(self._source, Path) else "in memory"
-        span = f"t = {t[0]:.6g} ... {t[-1]:.6g} s" if len(t) > 1 else (f"t = {t[0]:.6g} s" if len(t) else "none yet")
-        text = f"Result of '{self.title}' ({name}): {len(t)} output{'s' * (len(t) != 1)}, {span}; "
-        if self._contents.order:
-            named = {"lines": self._contents.order, **{x: self._within(x) for x in ("points", "bodies")}}
-            text += "".join(f"{kind} {joined(list(names))}; " for kind, names in named.items() if names)
-            return f"<{text}{self.status_text}>"
-        text += f"{len(s)} points on s = {s[0]:.6g} ... {s[-1]:.6g} m; "
-        if len(t) and self.zones[-1]:
-            text += f"last zones {joined(list(map(str, self.zones[-1])))}; "
-        return f"<{text}{self.status_text}>"
-
-    def _within(self, group: str) -> dict[str, None]:
-        """Names of what has a group of its own in one of the result, such as the points in `points`."""
-        return dict.fromkeys(n.split("/")[1] for n in self.names if n.startswith(f"{group}/"))
 
     def _ipython_display_(self) -> None:
         """Show the card and the cable in space in a notebook; elsewhere IPython takes one of the other ways."""
@@ -458,30 +229,3 @@ def written_result(source: Path | io.BytesIO | MemoryTarget, late: LateFile | No
     if late is None or late.path != source or not late.may_stay():
         return Result(source, summed=False)
     return Result(source, contents=late.contents)
-
-
-def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str) -> Any:
-    x = np.asarray(where, dtype=float)
-    if len(grid) == 0:
-        raise ResultError(f"the result holds no output yet, so nothing at {dim} = {where} {unit}")
-    low, high = grid[0], grid[-1]
-    slack = 1e-9 * (high - low)  # what adding up steps loses: 0.1 * 3 is still inside 0 ... 0.3
-    bad = ~((x >= low - slack) & (x <= high + slack))
-    if bad.any():
-        raise ResultError(
-            f"{dim} = {np.atleast_1d(x)[np.atleast_1d(bad)][0]:.9g} {unit} is outside the result\n"
-            f"    expected: {low:.9g} <= {dim} <= {high:.9g} {unit}"
-        )
-    if array.dtype.kind not in "fiu":
-        raise ResultError(f"text cannot be interpolated along {dim}")
-    right = np.clip(np.searchsorted(grid, x), min(1, len(grid) - 1), len(grid) - 1)
-    left = np.maximum(right - 1, 0)
-    width = grid[right] - grid[left]
-    weight = np.clip((x - grid[left]) / np.where(width > 0, width, 1.0), 0.0, 1.0)
-    weight = weight.reshape(weight.shape + (1,) * (array.ndim - axis - 1))
-    return np.take(array, left, axis) * (1.0 - weight) + np.take(array, right, axis) * weight
-
-
-def _current(name: str) -> str:
-    """The name a dataset has now, from an alias or from the name an older version gave it."""
-    return ALIASES.get(name) or OLD_NAMES.get(name, name)

@@ -13,7 +13,6 @@ import h5py
 import numpy as np
 
 from hybrid.errors import OMITTED, ResultError
-from hybrid.store.envelope import Recorded
 from hybrid.store.format import Field, unsound
 from hybrid.store.table import Table
 
@@ -156,7 +155,7 @@ class BaseRecorder:
 
     # --- what is recorded so far ----------------------------------------------------------------------
 
-    def recorded(self) -> Recorded | None:
+    def recorded(self) -> Self | None:
         """What is recorded so far; None: nobody keeps it."""
         return self
 

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.names import NOT_CONVERGED, OLD_ATTRIBUTES
-
-if TYPE_CHECKING:
-    from hybrid.store.reader import Result
-
 
 # Attribute of a result that is complete and to which more will be added, and what that is.
 PENDING, ERROR_ESTIMATE, FINER_RESULT = "pending", "error estimate", "finer result"
@@ -117,37 +113,6 @@ class Looked(Mapping[str, Any]):
 
     def __len__(self) -> int:
         return len(self._data) + len(self._aliases)
-
-
-class Columns(Mapping[str, np.ndarray]):
-    """The datasets of one group, by name: ``result.energy["kinetic"]`` or ``result.energy.kinetic``."""
-
-    def __init__(self, result: Result, group: str) -> None:
-        self._result, self._group = result, group
-        self._keys = [n.removeprefix(group + "/") for n in result.names if n.startswith(group + "/")]
-
-    def __getitem__(self, key: str) -> np.ndarray:
-        return self._result[f"{self._group}/{key}"]
-
-    def __getattr__(self, key: str) -> np.ndarray:
-        if key.startswith("_"):
-            raise AttributeError(key)
-        return self[key]
-
-    def __contains__(self, key: object) -> bool:
-        return f"{self._group}/{key}" in self._result
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._keys)
-
-    def __len__(self) -> int:
-        return len(self._keys)
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._keys]
-
-    def __repr__(self) -> str:
-        return f"<{self._result.describe(self._group)}>"
 
 
 class ZoneHistory(Sequence[list[Zone]]):

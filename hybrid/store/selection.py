@@ -19,12 +19,13 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, ResultError
+from hybrid.errors import EVENTS_BY_WEIGHT, ResultError, optional_package
 from hybrid.store.envelope import stored_window
 from hybrid.store.names import ALIASES, right_of
+from hybrid.store.stored_result import StoredResult
 
 if TYPE_CHECKING:
-    from hybrid.store.reader import Result
+    import xarray
 
 Numbers = Sequence[float] | np.ndarray
 Window = tuple[float | None, float | None]
@@ -43,7 +44,7 @@ class Part:
     Where a quantity jumps, fields have the value before; `after` has the other.
     """
 
-    result: Result
+    result: StoredResult
     names: tuple[str, ...]
     rows: slice
     at: np.ndarray | None
@@ -118,7 +119,7 @@ class Part:
 
 
 def part_of(
-    result: Result, names: Sequence[str] | None = None, times: Window | None = None, at: Numbers | None = None
+    result: StoredResult, names: Sequence[str] | None = None, times: Window | None = None, at: Numbers | None = None
 ) -> Part:
     """Choose: names of fields or groups (None: all), times from and to (s, both included), arc lengths (m).
 
@@ -155,7 +156,7 @@ def part_of(
     return Part(result, tuple(chosen), slice(int(rows[0]), int(rows[-1]) + 1), places)
 
 
-def _exportable(result: Result) -> list[str]:
+def _exportable(result: StoredResult) -> list[str]:
     """Names of all arrays whose dimensions have names, and of single numbers and texts."""
     scales = {name for name in result.names if result.dims(name) == (name,)}
     named = (name for name in result.names if set(result.dims(name)) <= scales)
@@ -222,6 +223,48 @@ def _version() -> str:
         return version("hybrid-cable")
     except PackageNotFoundError:  # run from a checkout that was not installed
         return "unknown"
+
+
+# ---- a Dataset of xarray, and that as netCDF ------------------------------------------------------
+
+
+def dataset(part: Part) -> xarray.Dataset:
+    """What was chosen, with units, descriptions, `zone_kind` over t and s, the scene, and versions as attributes.
+
+    One flat Dataset: groups of a result cannot be a tree of xarray, because their ``t`` would be that of the outputs.
+    """
+    xr = optional_package("xarray", "a Dataset", "export")
+    result = part.result
+    used = {dim for name in part.names for dim in result.dims(name)} | {"t", "s"}
+    coordinates = {_flat(dim): _variable(part, dim) for dim in sorted(used)}
+    variables: dict[str, Any] = {}
+    for name in (name for name in part.names if name not in used):
+        if _flat(name) in variables or _flat(name) in coordinates:
+            raise ResultError(f"two fields would both be called '{_flat(name)}' in a Dataset; one is '{name}'")
+        variables[_flat(name)] = _variable(part, name)
+    kinds, meanings = part.zone_kinds(part.s)
+    flags = np.arange(len(meanings), dtype=kinds.dtype)
+    about = {"long_name": "kind of the zone", "flag_values": flags, "flag_meanings": " ".join(meanings)}
+    variables["zone_kind"] = (("t", "s"), kinds, about)
+    variables["scene"] = ((), result.scene_text, {"long_name": "the scene that was run, as YAML"})
+    return xr.Dataset(variables, coordinates, facts(part))
+
+
+def netcdf(part: Part) -> memoryview:
+    """The same as a netCDF 4 file."""
+    optional_package("h5netcdf", "netCDF", "export")
+    return memoryview(dataset(part).to_netcdf(engine="h5netcdf"))
+
+
+def _flat(name: str) -> str:
+    """The name in a Dataset: a slash becomes an underscore, as in ``energy_kinetic``."""
+    return name.replace("/", "_")
+
+
+def _variable(part: Part, name: str) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
+    unit, description, frame = part.result.label(name).values()
+    about = {"units": unit, "long_name": description} | ({"frame": frame} if frame else {})
+    return tuple(_flat(dim) for dim in part.result.dims(name)), part.array(name), about
 
 
 # ---- whole or not at all --------------------------------------------------------------------------

@@ -13,8 +13,15 @@ from hybrid.statistics.moments import exceedance
 from hybrid.store.capacity import NAME as CAPACITY_USED
 from hybrid.store.code_checks import NAME as CODE_USED
 from hybrid.store.envelope import extreme
-from hybrid.store.extrapolation import extreme_of
-from hybrid.store.histories import Window, components_of, history_of, lies_along, summary_of, usual_names
+from hybrid.store.histories import (
+    Window,
+    components_of,
+    extreme_of,
+    history_of,
+    lies_along,
+    summary_of,
+    usual_names,
+)
 from hybrid.store.limits import at_every_step, capacity_of, code_of
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,9 +35,7 @@ from hybrid.store.envelope import (
 )
 from hybrid.store.limits import Held, extreme_errors, held_of, needs_moments
 from hybrid.store.records import Event, not_converged_in
-
-if TYPE_CHECKING:
-    from hybrid.store.reader import Result
+from hybrid.store.stored_result import StoredResult
 
 Floats = np.ndarray
 MET, MISSED = "met", "missed"
@@ -147,12 +145,12 @@ class Verdicts(NamedTuple):
         return found | {f"accuracy of {x.quantity}": x.verdict for x in self.accuracy}
 
 
-def verdicts_of(result: Result) -> Verdicts:
+def verdicts_of(result: StoredResult) -> Verdicts:
     """What may be said of a result: of its limits, and of the accuracy that was asked for."""
     return Verdicts(section_limits(result), quantity_limits(result), asked_accuracy(result))
 
 
-def section_limits(result: Result) -> list[Judged]:
+def section_limits(result: StoredResult) -> list[Judged]:
     """Every limit of bend radius and tension of the sections, where it was broken most or nearly, with its verdict."""
     found = [_verified(result, x) for x in map(partial(with_partner, result), limits_of(result, result))]
     named = {x.limit for x in found}
@@ -169,12 +167,12 @@ def section_limits(result: Result) -> list[Judged]:
     return found
 
 
-def quantity_limits(result: Result) -> list[Held]:
+def quantity_limits(result: StoredResult) -> list[Held]:
     """Every limit of a named quantity and of the stress of pipes, likewise."""
     return [_held(result, x) for x in held_of(result)]
 
 
-def asked_accuracy(result: Result) -> list[Asked]:
+def asked_accuracy(result: StoredResult) -> list[Asked]:
     """The accuracy that was asked for, by quantity; empty where none was.  Files before 1.0 have one for all."""
     each = json.loads(str(result.attributes.get("accuracy_verdicts", "[]")))
     beside = str(result.attributes.get("accuracy_not_asked", ""))
@@ -215,7 +213,7 @@ def accuracy_text(each: Sequence[Asked]) -> str:
     return "; ".join([*parts, *([each[-1].beside] if each[-1].beside else [])])
 
 
-def doubt_of(result: Result, *names: str, s: Iterable[float] = ()) -> Doubt | None:
+def doubt_of(result: StoredResult, *names: str, s: Iterable[float] = ()) -> Doubt | None:
     """Why quantities of a result are not verified; None: they are resolved, estimated and not neglected.
 
     s: m, the only places that count; none: all of them.
@@ -223,7 +221,7 @@ def doubt_of(result: Result, *names: str, s: Iterable[float] = ()) -> Doubt | No
     return unfinished(result) or next(_doubts(result, frozenset(names), np.array([*s])), None)
 
 
-def unfinished(result: Result) -> Doubt | None:
+def unfinished(result: StoredResult) -> Doubt | None:
     """That a run has not come to its end."""
     if result.status == "complete":
         return None
@@ -231,7 +229,7 @@ def unfinished(result: Result) -> Doubt | None:
     return Doubt(f"the run has not come to its end{reached}", RESUME)
 
 
-def _pending(result: Result) -> Doubt | None:
+def _pending(result: StoredResult) -> Doubt | None:
     """That the errors of a result are still to come."""
     what, _, fix = result.pending.partition("; ")
     return Doubt(what, fix.removesuffix(" makes up for it")) if what else None
@@ -240,7 +238,9 @@ def _pending(result: Result) -> Doubt | None:
 # ---- doubts ---------------------------------------------------------------------------------------
 
 
-def _doubts(result: Result, names: frozenset[str], s: Floats, more: Doubtful = MappingProxyType({})) -> Iterator[Doubt]:
+def _doubts(
+    result: StoredResult, names: frozenset[str], s: Floats, more: Doubtful = MappingProxyType({})
+) -> Iterator[Doubt]:
     """What makes quantities doubtful, the worst first: events, errors that are not known; more: kinds beside DOUBTS."""
     kinds = {**DOUBTS, **more}
     rank = {kind: k for k, kind in enumerate(EVENTS_BY_WEIGHT)}
@@ -259,7 +259,7 @@ def _doubts(result: Result, names: frozenset[str], s: Floats, more: Doubtful = M
 
 
 def _of_event(
-    result: Result, event: Event, kind: tuple[frozenset[str], str], names: frozenset[str], s: Floats
+    result: StoredResult, event: Event, kind: tuple[frozenset[str], str], names: frozenset[str], s: Floats
 ) -> Doubt | None:
     """The doubt that an event of a kind (as in DOUBTS) casts on quantities at places s (n,) m; None: none."""
     which, remedy = kind
@@ -287,7 +287,7 @@ def _is_harmless(event: Event) -> bool:
     return event.kind == "out of plane" and IN_SPACE in event.text
 
 
-def _is_catenary(result: Result, event: Event) -> bool:
+def _is_catenary(result: StoredResult, event: Event) -> bool:
     """Whether a line is a catenary where an event is, and when."""
     if not len(result.times):
         return False
@@ -302,7 +302,7 @@ def _words(name: str) -> str:
 # ---- limits ---------------------------------------------------------------------------------------
 
 
-def _verified(result: Result, x: Judged) -> Judged:
+def _verified(result: StoredResult, x: Judged) -> Judged:
     """A limit of the sections with its verdict."""
     name = next(name for name, limits in LIMITED.items() if x.limit in limits)
     if x.broken:
@@ -324,14 +324,14 @@ def _verified(result: Result, x: Judged) -> Judged:
     return x._replace(verdict=NOT_VERIFIED, why=doubt.why, remedy=doubt.remedy, used=None)
 
 
-def _too_sharp(result: Result, names: AbstractSet[str], t: float) -> Doubt | None:
+def _too_sharp(result: StoredResult, names: AbstractSet[str], t: float) -> Doubt | None:
     """That a kink of a joint, which is no bend, may be what takes quantities beyond their limit at t (s)."""
     kinks = [event for event in result.events if event.kind == "kink at joint" and KINK_COUNTS in event.text]
     counts = BENDING & names and any(event.t <= t for event in kinks)
     return Doubt("kink at joint", KINK_REMEDY) if counts else None
 
 
-def _reached(result: Result, name: str, x: Judged) -> Doubt | None:
+def _reached(result: StoredResult, name: str, x: Judged) -> Doubt | None:
     """That values are so near to their limit that their errors may take them beyond, at outputs or over all steps."""
     s, errors = result.both_sides(f"errors/total/{name}")
     _, values = result.both_sides(name)
@@ -361,7 +361,7 @@ def _size(x: Judged, allowed: Floats | float, values: Floats | float, errors: Fl
     return np.asarray((np.asarray(values) + errors) / allowed)
 
 
-def _held(result: Result, x: Held) -> Held:
+def _held(result: StoredResult, x: Held) -> Held:
     """A limit of a quantity with its verdict."""
     if x.broken:
         if (doubt := _too_sharp(result, _names_of_held(result, x), x.t)) is None:
@@ -379,7 +379,7 @@ def _no_value(x: Held) -> Doubt | None:
     return None
 
 
-def _names_of_held(result: Result, x: Held) -> frozenset[str]:
+def _names_of_held(result: StoredResult, x: Held) -> frozenset[str]:
     """The quantities that a quantity with a limit follows from."""
     name = {"N": "end_force", "deg": "end_force"}.get(x.unit, "position")
     bends = {"curvature"} if x.limit != "code" or needs_moments(result) else set()  # a mooring line goes by tension
@@ -387,7 +387,7 @@ def _names_of_held(result: Result, x: Held) -> frozenset[str]:
     return frozenset(along.get(x.unit, {name}))
 
 
-def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
+def _doubt_of_held(result: StoredResult, x: Held) -> Doubt | None:
     """Of a force at an end, an angle of it, or a clearance the error follows from those that are estimated."""
     clearance = f"{x.name}_at" in result
     if (doubt := next(_doubts(result, _names_of_held(result, x), np.zeros(0)), None)) is not None:
@@ -415,7 +415,7 @@ def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
     return None if error <= left else Doubt(f"its error may be {error:.2g} {x.unit}", "a smaller accuracy")
 
 
-def _part_with_errors(result: Result, x: Held) -> float | None:
+def _part_with_errors(result: StoredResult, x: Held) -> float | None:
     """The part of a capacity or code that nothing exceeds, whatever its errors are, at outputs and over all steps."""
     bound = code_with_errors(result) if x.limit == "code" else bound_with_errors(result)
     if bound is None or len(result.times) == 1:
@@ -430,7 +430,7 @@ def _part_with_errors(result: Result, x: Held) -> float | None:
     return None if steps is None else max(bound, steps)
 
 
-def _stress_reached(result: Result, x: Held, over_steps: float) -> Doubt | None:
+def _stress_reached(result: StoredResult, x: Held, over_steps: float) -> Doubt | None:
     """That the errors of tension and curvature may take the stress of a pipe beyond its limit.
 
     over_steps: error of its largest value over all steps, as a part of the limit.
@@ -448,13 +448,13 @@ def _stress_reached(result: Result, x: Held, over_steps: float) -> Doubt | None:
     return Doubt("with the errors of tension and curvature it may pass the limit", "a smaller accuracy")
 
 
-def _along(result: Result, name: str, s: Floats) -> Floats:
+def _along(result: StoredResult, name: str, s: Floats) -> Floats:
     """What is constant along the line at the places s (n,) m of quantities, of which one that jumps comes twice."""
     found = result.both_sides(name)[1] if f"right/{name}" in result else np.asarray(result[name])
     return found if found.size == s.size else found[np.searchsorted(result.s, s)]
 
 
-def _error_of_held(result: Result, x: Held, clearance: bool) -> float | None:
+def _error_of_held(result: StoredResult, x: Held, clearance: bool) -> float | None:
     """The error of a quantity in its unit, by those of positions or end forces; None: it is not known."""
     figures = result.attributes
     force = float(figures.get("error_total_end_force", np.nan))
@@ -472,13 +472,13 @@ def _error_of_held(result: Result, x: Held, clearance: bool) -> float | None:
 # ---- accuracy -------------------------------------------------------------------------------------
 
 
-def _missed(result: Result) -> bool:
+def _missed(result: StoredResult) -> bool:
     """Whether a run said that it misses what was asked."""
     return any(event.kind == "accuracy missed" for event in result.events)
 
 
 def _asked(
-    result: Result, names: set[str], quantity: str, unit: str, asked: float | None, error: float | None,
+    result: StoredResult, names: set[str], quantity: str, unit: str, asked: float | None, error: float | None,
     chance: bool = False,
 ) -> Asked:  # fmt: skip
     """The verdict on an accuracy; names: the quantities that it is of, none: not known, and every doubt counts.

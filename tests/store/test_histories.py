@@ -15,9 +15,7 @@ from hybrid.cli.commands import main
 from hybrid.cli.statistics_command import _fatigue_at, _fatigue_lines
 from hybrid.errors import ResultError
 from hybrid.statistics import fatigue, moments
-from hybrid.store.bends import bends_of
-from hybrid.store.extrapolation import extreme_of
-from hybrid.store.histories import history_of
+from hybrid.store.histories import bends_of, extreme_of, history_of
 from hybrid.store.statistics_table import rows_of, values_of
 
 SCENE = {
