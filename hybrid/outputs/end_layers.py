@@ -10,16 +10,14 @@ end      curvature at the end as the nodes inside lead to                       
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.hinge_layer import FADED
 from hybrid.kernels.state.state import Floats
-
-if TYPE_CHECKING:
-    from hybrid.outputs.observation import Observation
+from hybrid.outputs.observed_states import ObservedStates
 
 Integers = NDArray[np.int64]
 # Cells of less depth: between their nodes a layer is straight to 0.1 %.
@@ -40,7 +38,7 @@ class EndLayer(NamedTuple):
     of_cells: Floats  # (m, nb) what rods of these cells have of it (kernels.laws.hinge_layer.fade)
 
 
-def end_layers(view: Observation) -> list[EndLayer]:
+def end_layers(view: ObservedStates) -> list[EndLayer]:
     """The layers of an observation, each up to where it has faded in all outputs, or the rods or section end."""
     spans = np.array(view.grid.spans).reshape(-1, 3)
     catenary = np.array([zone.kind == "catenary" for zone in view.grid.parts])
@@ -68,7 +66,7 @@ def _way_in(spans: Integers, catenary: NDArray[np.bool_], first: int, way: int) 
             return np.concatenate(rows), np.concatenate(nodes)
 
 
-def _layer(view: Observation, rows: Integers, all_nodes: Integers, way: int, EI: float, reach: float) -> EndLayer:
+def _layer(view: ObservedStates, rows: Integers, all_nodes: Integers, way: int, EI: float, reach: float) -> EndLayer:
     """reach: m, from the end on, over which the line has that stiffness."""
     nodes = all_nodes[0] + way * np.arange(abs(all_nodes[-1] - all_nodes[0]) + 1)
     far = np.abs(view.of_line("s", nodes) - view.of_line("s", nodes[:1])).max(axis=1)
@@ -93,7 +91,7 @@ def _layer(view: Observation, rows: Integers, all_nodes: Integers, way: int, EI:
     return EndLayer(nodes[:kept], way, rows[use], at[use], EI, deep[: kept - 1], part[:kept], of_cells[:kept])
 
 
-def between_nodes(view: Observation, layer: EndLayer) -> Iterator[tuple[Integers, Floats]]:
+def between_nodes(view: ObservedStates, layer: EndLayer) -> Iterator[tuple[Integers, Floats]]:
     """Output points (p,) in a cell, and by how much (p, nb) the part there is less than on a line between its nodes."""
     s, points = view.of_line("s", layer.nodes), view.grid.points
     mine = view.grid.of_line_of(int(layer.nodes[0]))

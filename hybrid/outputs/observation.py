@@ -10,14 +10,11 @@ operation and one product with a sparse matrix (output_grid) serve the batch.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from copy import copy
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bending_law import RIGID
 from hybrid.kernels.laws.soil import PRESSES
@@ -33,21 +30,14 @@ from hybrid.kernels.state.report import (
     SELF_CONTACT_ENERGY,
     STRETCH_ENERGY,
 )
-from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line, Sea
-from hybrid.kernels.watch.observed_outputs import observed
+from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line
 from hybrid.outputs.end_layers import EndLayer, between_nodes
-from hybrid.outputs.local_means import means_beside, means_on_line
-from hybrid.outputs.moments import across, node_tangents, node_torques, passed_torques
-from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.strains import bend_directions, ends_of, part_without_spring, strains
+from hybrid.outputs.observed_states import ObservedStates
+from hybrid.outputs.output_grid import ends_of, means_beside, means_on_line
+from hybrid.outputs.strains import part_without_spring, strains
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
-from hybrid.outputs.vectors import cross, size
+from hybrid.outputs.vectors import across, cross, size
 from hybrid.solve.bending_corrector import Shift
-
-
-def last(x: Floats) -> Floats:
-    """A copy with the first axis, the outputs, moved to the end."""
-    return np.ascontiguousarray(x.transpose(*range(1, x.ndim), 0))
 
 
 def links(batch: Batch, line: Line) -> Floats:
@@ -58,164 +48,8 @@ def links(batch: Batch, line: Line) -> Floats:
     return np.stack([link_of(batch.line(k, line), *row) for k, row in enumerate(each)], axis=1)
 
 
-class Observation:
-    """A batch of states looked at, as computed and (`corrected`) with what leaving bending out shifts it by."""
-
-    def __init__(
-        self, line: Line, sea: Sea, grid: Grid, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})
-    ) -> None:
-        """varied: arrays (nb, ...) of the line by name, where it is another one in every output."""
-        self.line, self.sea, self.grid, self.batch, self._varied = line, sea, grid, batch, varied
-        self.shift: Shift | None = None
-        self._corrects: Observation | None = None  # the observation that this one corrects
-
-    def corrected(self, shift: Shift) -> Observation:
-        """The same states with position, tension, curvature and moment corrected; energies and contact stay."""
-        other = self.on(self.grid)
-        for name in ("r", "v", "e", "T", "length", "d"):
-            other.__dict__.pop(name, None)
-        other.shift, other._corrects = shift, self
-        return other
-
-    def on(self, grid: Grid) -> Observation:
-        """The same on other points of the same stretches."""
-        other = copy(self)
-        other.grid = grid
-        for name in ("tension", "tangent", "moment", "torque", "bending_moment", "curvature_twist"):
-            other.__dict__.pop(name, None)
-        return other
-
-    @property
-    def _plain(self) -> Observation:
-        """As computed.  (An attribute that refers to itself would keep a batch until garbage is searched for.)"""
-        return self._corrects or self
-
-    def of_line(self, name: str, at: int | slice | NDArray[np.int64]) -> Floats:
-        """Values of the line at nodes or cells, (..., nb), or (..., 1) where they are the same in all outputs."""
-        if name in self._varied:
-            return np.moveaxis(self._varied[name][:, at], 0, -1)
-        return np.asarray(getattr(self.line, name)[at][..., None])
-
-    def lines(self) -> list[Line]:
-        """The line of each output, where it is another one in every output; else none."""
-        each = range(self.batch.t.size if self._varied else 0)
-        return [self.line._replace(**{name: x[k] for name, x in self._varied.items()}) for k in each]
-
-    # ---- how its arrays are laid out ----------------------------------------------------------
-
-    @property
-    def columns(self) -> int:
-        """Length of the last axis of arrays along the line."""
-        return self.batch.t.size
-
-    @cached_property
-    def changes(self) -> list[int]:
-        """Nodes where one section ends and the next begins."""
-        return [int(np.argmin(np.abs(self.line.s - x))) for x in self.grid.changes]
-
-    @property
-    def end_nodes(self) -> tuple[int, ...] | NDArray[np.int64]:
-        """Nodes at ends of the line."""
-        return 0, self.line.h.size
-
-    @cached_property
-    def is_end(self) -> NDArray[np.bool_]:
-        """(N+1,) whether nodes are those."""
-        found = np.zeros(self.line.s.size, bool)
-        found[np.asarray(self.end_nodes)] = True
-        return found
-
-    def at_end(self, x: Floats, k: int, inward: int = 0) -> Floats:
-        """Of values (n, ..., nb) on cells or nodes that at end k, or so many inward: (..., nb)."""
-        return x[-1 - inward if k else inward]
-
-    def put_at_end(self, x: Floats, k: int, value: Floats) -> None:
-        """Set values (n, ..., nb) on cells or nodes at end k to (..., nb)."""
-        x[-1 if k else 0] = value
-
-    def with_ends(self, x: Floats, ends: Sequence[Floats]) -> Floats:
-        """Values (N, nb) of cells between those (nb,) of both ends."""
-        return np.concatenate([ends[0][None], x, ends[1][None]])
-
-    def by_output(self, x: Floats, dims: Sequence[str]) -> Floats:
-        """Values with the outputs first, of those that a probe with these dimensions has found; a new array."""
-        return np.array(x.transpose(x.ndim - 1, *range(x.ndim - 1)), order="C")
-
-    def directors(self, cells: NDArray[np.int64]) -> Floats:
-        """First directors (n, 3, nb) of cells."""
-        return np.moveaxis(self.batch.a1[:, cells], 0, -1)
-
-    def stiffness(self, nodes: slice | NDArray[np.int64]) -> Floats:
-        """Stiffness (n, 3, nb or 1) N m of the elements at nodes."""
-        return np.moveaxis(self.batch.kb[:, nodes], 0, -1) if self.batch.kb.size else self.line.kb[nodes, :, None]
-
-    def has_element(self, k: int) -> Any:
-        """Whether an element sits at end k, of all outputs or of each (nb,)."""
-        return bool(self.line.element[-k])
-
-    @property
-    def cell_lengths(self) -> Floats:
-        """(N, nb or 1) m, unstretched."""
-        return self.batch.h.T if self.batch.h.size else self.line.h[:, None]
-
-    # ---- what was computed --------------------------------------------------------------------
-
-    @cached_property
-    def r(self) -> Floats:
-        """(N+1, 3, nb) m."""
-        r = last(self.batch.r)
-        return r if self.shift is None else r + self.shift.position
-
-    @cached_property
-    def v(self) -> Floats:
-        """(N+1, 3, nb) m/s."""
-        v = last(self.batch.v)
-        return v if self.shift is None else v + self.shift.velocity
-
-    @cached_property
-    def e(self) -> Floats:
-        """(N, 3, nb) m, chords."""
-        e = last(self.batch.e)
-        return e if self.shift is None else e + np.diff(self.shift.position, axis=0)
-
-    @cached_property
-    def T(self) -> Floats:
-        """(N, nb) N."""
-        T = last(self.batch.T)
-        return T if self.shift is None else T + self.shift.tension
-
-    @cached_property
-    def length(self) -> Floats:
-        """(N, nb) m, of the chords."""
-        return size(self.e)
-
-    @cached_property
-    def d(self) -> Floats:
-        """(N, 3, nb) directions of the chords."""
-        return np.asarray(self.e / self.length[:, None])
-
-    @cached_property
-    def _observed(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Moments (N+1, 3, nb) N m, strains (N+1, 3, nb) rad, energies (5, nb) J and bends (N+1, nb) 1/m of what was
-
-        computed.
-        """
-        if self._corrects is not None:
-            return self._corrects._observed
-        M, strain, energy, bend = observed(self.line, self.batch, self._varied)
-        if len(M) < self.batch.t.size:  # a catenary has neither
-            M = strain = np.broadcast_to(np.zeros(1), (self.batch.t.size, *M.shape[1:]))
-        return last(M), last(strain), last(energy), bend.T
-
-    @property
-    def element_strains(self) -> Floats:
-        """(N+1, 3, nb) rad, of the elements at nodes, as of kernels.watch.observed_outputs."""
-        return self._observed[1]
-
-    @property
-    def bends(self) -> Floats:
-        """(N+1, nb) 1/m, from cell to cell, of what was computed, as of kernels.watch.observed_outputs."""
-        return self._observed[3]
+class Observation(ObservedStates):
+    """A batch of states looked at: quantities along the line on the points of its output grid."""
 
     # ---- along the line -----------------------------------------------------------------------
 
@@ -300,11 +134,6 @@ class Observation:
         """(ns, nb) rad, from the x axis."""
         return np.arctan2(self.tangent[:, 1], self.tangent[:, 0])
 
-    @property
-    def node_moment(self) -> Floats:
-        """(N+1, 3, nb) N m, inertial."""
-        return self._observed[0] if self.shift is None else self._observed[0] + self.shift.moment
-
     @cached_property
     def moment(self) -> Floats:
         """(ns, 3, nb) N m, inertial."""
@@ -317,27 +146,8 @@ class Observation:
         Found at the nodes, and interpolated: the tangent between nodes, off by the square of the cell length, would
         make a torque of the bending moment.
         """
-        torque = node_torques(self._plain)[self.grid.side_nodes]
-        return self.grid.sides @ (torque + passed_torques(self) if self.batch.turn.size else torque)
-
-    @cached_property
-    def node_tangent(self) -> Floats:
-        """(N+1, 3, nb) of what was computed."""
-        return node_tangents(self) if self._corrects is None else self._corrects.node_tangent
-
-    def end_moment(self, k: int) -> Floats:
-        """(3, nb) N m, inertial, at end k: moment of what is after it on what is before it."""
-        moment, torsion = self.at_end(self.node_moment, k), self.line.torsion
-        if self.batch.turn.size and (torsion[-1, 1] == self.line.h.size if k else torsion[0, 0] == 0.0):
-            tangent = self.batch.frame[:, k, 2::3]
-            moment = moment + (self.batch.turn[:, -k, TORQUE, None] * tangent).T
-        return moment
-
-    @property
-    def side_is_rod(self) -> NDArray[np.bool_]:
-        """(n sides,), whether the stretch of a side is a rod; a catenary has no moment."""
-        spans = np.array(self.grid.spans).reshape(-1, 3)
-        return np.repeat([zone.kind == "rod" for zone in self.grid.parts], spans[:, 1] - spans[:, 0] + 1)
+        torque = _node_torques(self._plain)[self.grid.side_nodes]
+        return self.grid.sides @ (torque + _passed_torques(self) if self.batch.turn.size else torque)
 
     @cached_property
     def bending_moment(self) -> Floats:
@@ -362,18 +172,13 @@ class Observation:
             strains = np.stack([self._curvature_of_moment(self.shift), strains[:, 1]], axis=1)
             for layer, end in self._plain._taken_at_ends:  # moments have that of rods of these cells
                 strains[layer.rows, 0] += end * (layer.of_cells - layer.part)[layer.at]
-        bend = self._plain._bend_directions * strains[:, :1]
+        bend = self._plain.bend_directions * strains[:, :1]
         found = self.grid.sides @ np.concatenate([bend, strains[:, 1:]], axis=1)
         for layer, end in self._plain._taken_at_ends:  # which is no straight line in cells that are long for it
-            direction = self._plain._bend_directions[layer.rows[0]]
+            direction = self._plain.bend_directions[layer.rows[0]]
             for points, less in between_nodes(self, layer):
                 found[points, :-1] += (less * end)[:, None] * direction
         return np.stack([np.sqrt((found[:, :-1] ** 2).sum(axis=1)), found[:, -1]], axis=1)
-
-    @cached_property
-    def _bend_directions(self) -> Floats:
-        """(n sides, 3 or 1, nb), of the curvature that was computed."""
-        return bend_directions(self)
 
     @property
     def curvature_on_sides(self) -> Floats:
@@ -413,6 +218,14 @@ class Observation:
         return links(self.batch, self.line)
 
     # ---- at the ends --------------------------------------------------------------------------
+
+    def end_moment(self, k: int) -> Floats:
+        """(3, nb) N m, inertial, at end k: moment of what is after it on what is before it."""
+        moment, torsion = self.at_end(self.node_moment, k), self.line.torsion
+        if self.batch.turn.size and (torsion[-1, 1] == self.line.h.size if k else torsion[0, 0] == 0.0):
+            tangent = self.batch.frame[:, k, 2::3]
+            moment = moment + (self.batch.turn[:, -k, TORQUE, None] * tangent).T
+        return moment
 
     def reaction(self, k: int) -> Floats:
         """(3, nb) N: force of the support, or of an end body, on the cable at end k; else the force applied there."""
@@ -516,3 +329,43 @@ class Observation:
             "contact": self.batch.report[:, SEABED_ENERGY],
             "self_contact": self.batch.report[:, SELF_CONTACT_ENERGY],
         }  # fmt: skip
+
+
+def _node_torques(view: ObservedStates) -> Floats:
+    """(N+1, nb) N m: of the twist of elements; at ends of the moment there."""
+    line, nodes = view.line, slice(None)
+    strain = view.element_strains[:, 2] - view.of_line("k0", nodes)[:, 2]
+    if line.tension_twist.size:
+        by_tension = view.of_line("tension_twist", nodes) * view.T
+        strain = strain + np.pad(by_tension, ((0, 1), (0, 0))) + np.pad(by_tension, ((1, 0), (0, 0)))
+    torque = np.where(line.element[:, None], view.stiffness(nodes)[:, 2] * strain, 0.0)
+    for k in (0, 1):
+        moment, tangent = view.at_end(view.node_moment, k), view.at_end(view.node_tangent, k)
+        view.put_at_end(torque, k, (moment * tangent).sum(axis=0))
+    return torque
+
+
+def _passed_torques(view: ObservedStates) -> Floats:
+    """Torque (n sides, nb) N m that catenary zones pass on, on their nodes and the joints of rods beside them."""
+    out = np.zeros((len(view.grid.side_nodes), view.batch.t.size))
+    for z, (first, last) in enumerate(view.line.torsion[:, :2].astype(int)):
+        for a, b, o in view.grid.spans:
+            low, high = max(a, first), min(b, last)
+            if low <= high:
+                out[o + low - a : o + high - a + 1] = view.batch.turn[:, z, TORQUE]
+    return out
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A quantity that can be recorded: unit, description, dimensions, how to get it, and what it `needs`, one of.
+
+    value: of an observation, with the dimensions and then the outputs of the batch.
+    """
+
+    unit: str
+    description: str
+    dims: tuple[str, ...]
+    value: Callable[[Observation], Floats]
+    needs: str = ""
+    frame: str = ""

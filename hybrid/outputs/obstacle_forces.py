@@ -1,4 +1,4 @@
-"""What a line presses on each obstacle with, and what each has stored, of a batch of outputs.
+"""Forces of a line on obstacles, energy stored in them, and where those are that move, of a batch of outputs.
 
 The law of kernels.laws.obstacles at the positions and velocities of outputs: without friction, and of obstacles that
 move without damping, whose velocities outputs do not have.  Arrays lie along the nodes of all outputs, one line behind
@@ -16,8 +16,18 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.laws.obstacles import cells_met, distances, put_obstacles, thinner_cells
 from hybrid.kernels.laws.seabed import G1, G2
-from hybrid.kernels.state.obstacle_rows import DAMPING, FIXED, ONSET_OF, STIFFNESS, STRAND
+from hybrid.kernels.state.obstacle_rows import (
+    DAMPING,
+    FIXED,
+    ONSET_OF,
+    SEEN_FORCE,
+    SEEN_MOMENT,
+    SEEN_TURN,
+    STIFFNESS,
+    STRAND,
+)
 from hybrid.kernels.state.state import Floats, Sea
+from hybrid.model.bodies import angles_of
 from hybrid.outputs.joined_lines import JoinedObservation
 from hybrid.outputs.observation import Observation
 from hybrid.store.format import Field
@@ -182,3 +192,31 @@ def half_cells(
             stored = np.where(p < o, p * p * p / (6.0 * o), 0.5 * p * (p - o) + o * o / 6.0)
             energy += w * k * np.where(p > 0.0, stored, 0.0)
     return first, second, energy
+
+
+def obstacle_fields(names: Sequence[str]) -> list[Field]:
+    """Place and rotation of all obstacles, force and moment on them."""
+    texts = {
+        "position": ("m", "place of obstacle {}"),
+        "rotation": ("deg", "rotation of obstacle {} since t = 0: roll, pitch, yaw, about x, then y, then z"),
+        "force": ("N", "force of the line on obstacle {}"),
+        "moment": ("N m", "moment of the line on obstacle {} about its place"),
+    }
+    return [
+        Field(f"obstacles/{name}/{key}", unit, text.format(name), (3,), ("xyz",), "inertial")
+        for name in names
+        for key, (unit, text) in texts.items()
+    ]
+
+
+def obstacle_values(names: Sequence[str], seen: Floats) -> dict[str, Floats]:
+    """Their values (nb, 3); seen: (nb, M, SEEN) of kernels.state.obstacle_rows."""
+    found = {}
+    for k, name in enumerate(names):
+        x = seen[:, k]
+        turned = x[:, SEEN_TURN:SEEN_FORCE].reshape(-1, 3, 3)
+        found[f"obstacles/{name}/position"] = x[:, :SEEN_TURN].copy()
+        found[f"obstacles/{name}/rotation"] = angles_of(turned)
+        found[f"obstacles/{name}/force"] = x[:, SEEN_FORCE:SEEN_MOMENT].copy()
+        found[f"obstacles/{name}/moment"] = x[:, SEEN_MOMENT:].copy()
+    return found

@@ -18,7 +18,9 @@ from hybrid.kernels.algebra.sparse_rows import add_rows, cubic_rows, linear_rows
 from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Zone
 
+Integers = NDArray[np.int64]
 NO_HINGES: Floats = np.zeros((3, 3))
+ROUND_OFF = 1e-9  # of a length: points that are nearer are the same
 
 
 class Rows(NamedTuple):
@@ -77,6 +79,24 @@ def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone,
         bounds = [zone.s_a, *kinks, zone.s_b]
         parts += [Zone(zone.kind, a, b) for a, b in pairwise(bounds)]
     return tuple(parts)
+
+
+class SpanEnds(NamedTuple):
+    """The ends of stretches, first all beginnings, then all ends."""
+
+    row: Integers  # of the sides of all nodes
+    node: Integers
+    cell: Integers  # beside it, in the stretch
+    inner: Integers  # the next node in the stretch
+    inward: Integers  # 1 or -1: from row to row, into the stretch
+
+
+def ends_of(spans: Integers) -> SpanEnds:
+    """Ends of stretches (n, 3): first node, last node, row of the first side."""
+    a, b, o = spans.T
+    one = np.ones_like(a)
+    pairs = (o, o + b - a), (a, b), (a, b - 1), (a + 1, b - 1), (one, -one)
+    return SpanEnds(*(np.concatenate(pair) for pair in pairs))
 
 
 class Grid:
@@ -218,3 +238,82 @@ class Grid:
     @cached_property
     def sides(self) -> Rows:
         return linear(self._x, self.s, self._first, self._last, self._stretch)
+
+
+class VaryingGrid(Grid):
+    """A `Grid` for each of nb outputs, on the same stretches: its matrices multiply the values of each by its own."""
+
+    def __init__(
+        self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
+        changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
+        hinges: Floats = NO_HINGES,
+    ) -> None:  # fmt: skip
+        """nodes_s: (nb, N+1) m, nodes of every output; s: (nb, ns) m, its points; zones: of the first; the rest as of
+
+        `Grid`.
+        """
+        super().__init__(nodes_s[0], zones, s[0], loads, changes, after, kept, hinges)
+        self._grids = [self.moved(x, at) for x, at in zip(nodes_s, s, strict=True)]
+
+    def _stacked(self, size: int, of: Callable[[Grid], Rows]) -> Rows:
+        """One matrix below the other; size: columns of each."""
+        parts = [of(grid) for grid in self._grids]
+        ends = np.cumsum([0, *(x.columns.size for x in parts)])
+        begin = np.concatenate([*(x.begin[:-1] + end for x, end in zip(parts, ends[:-1], strict=True)), ends[-1:]])
+        columns = np.concatenate([x.columns + k * size for k, x in enumerate(parts)])
+        return Rows(begin, columns, np.concatenate([x.weights for x in parts]), len(parts), size)
+
+    @property
+    def points(self) -> Floats:
+        return np.stack([grid.s for grid in self._grids], axis=1)
+
+    @cached_property
+    def nodes(self) -> Rows:
+        return self._stacked(self._x.size, lambda grid: grid.nodes)
+
+    @cached_property
+    def cells(self) -> Rows:
+        return self._stacked(self._x.size - 1, lambda grid: grid.cells)
+
+    @cached_property
+    def chords(self) -> Rows:
+        return self._stacked(self._x.size, lambda grid: grid.chords)
+
+    @cached_property
+    def held(self) -> Rows:
+        return self._stacked(self._x.size + 1, lambda grid: grid.held)
+
+    @cached_property
+    def sides(self) -> Rows:
+        return self._stacked(len(self.side_nodes), lambda grid: grid.sides)
+
+
+# --- means over the lengths that output points stand for, so that nothing between them is missed ---
+
+
+def means_beside(s: Floats, nodes: Floats, values: Floats) -> Floats:
+    """Means (ns, nb) of values (nb, N+1) at nodes (N+1,) m, from halfway to the point before to halfway to the next.
+
+    s: (ns,) m, increasing, two at least.  The means times those lengths add up to the integral.
+    """
+    middles = 0.5 * (s[1:] + s[:-1])
+    first, last = 2.0 * s[0] - middles[0], 2.0 * s[-1] - middles[-1]
+    edges = np.concatenate([[max(first, nodes[0])], middles, [min(last, nodes[-1])]])
+    h = np.diff(nodes)
+    total = np.zeros_like(values)
+    np.cumsum(0.5 * h * (values[:, 1:] + values[:, :-1]), axis=1, out=total[:, 1:])
+    cell = np.clip(np.searchsorted(nodes, edges, side="right") - 1, 0, h.size - 1)
+    x = edges - nodes[cell]
+    slope = (values[:, cell + 1] - values[:, cell]) / h[cell]
+    upto = total[:, cell] + values[:, cell] * x + 0.5 * slope * x * x
+    return np.asarray((np.diff(upto, axis=1) / np.diff(edges)).T)
+
+
+def means_on_line(s: Floats, nodes: Floats, values: Floats) -> Floats:
+    """The same (ns,) of one output (N+1,), whose points s (ns,) m may be the same where line is still on a reel."""
+    points, which = np.unique(s, return_inverse=True)
+    apart = np.append(True, np.diff(points) > ROUND_OFF * (nodes[-1] - nodes[0]))
+    points, which = points[apart], (np.cumsum(apart) - 1)[which]
+    if points.size == 1:
+        return np.full(s.size, np.interp(points[0], nodes, values))
+    return np.asarray(means_beside(points, nodes, values[None])[which, 0])

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,36 +18,21 @@ from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR, OutputPoints
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
-from hybrid.outputs.observation import Observation
-from hybrid.outputs.obstacle_forces import obstacle_force_fields, obstacle_force_values
-from hybrid.outputs.obstacles import obstacle_fields, obstacle_values
-from hybrid.outputs.output_grid import NO_HINGES, Grid
+from hybrid.outputs.observation import Observation, Probe
+from hybrid.outputs.obstacle_forces import (
+    obstacle_fields,
+    obstacle_force_fields,
+    obstacle_force_values,
+    obstacle_values,
+)
+from hybrid.outputs.output_grid import NO_HINGES, Grid, VaryingGrid
+from hybrid.outputs.quantities import Quantities
 from hybrid.outputs.shifted_bends import by_load
-from hybrid.outputs.varying_grid import VaryingGrid
 from hybrid.outputs.vectors import size
 from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.stepper import POWERS
 from hybrid.store.format import Field
 from hybrid.store.records import THERE, there
-
-if TYPE_CHECKING:
-    from hybrid.outputs.quantities import Quantities
-
-
-@dataclass(frozen=True)
-class Probe:
-    """A quantity that can be recorded: unit, description, dimensions, how to get it, and what it `needs`, one of.
-
-    value: of an observation, with the dimensions and then the outputs of the batch.
-    """
-
-    unit: str
-    description: str
-    dims: tuple[str, ...]
-    value: Callable[[Observation], Floats]
-    needs: str = ""
-    frame: str = ""
-
 
 _S, _SX, _X, _E, _EX = ("s",), ("s", "xyz"), ("xyz",), ("edge",), ("edge", "xyz")
 # Of a line that touches nothing; where a section without torsional stiffness becomes catenary.

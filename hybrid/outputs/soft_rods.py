@@ -9,24 +9,20 @@ M        what neighbours bear of what an element lacks                          
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch.soft_rods import EI, END, GJ, LINE, SLACK, WHOLE
+from hybrid.outputs.observed_states import ObservedStates
 from hybrid.outputs.vectors import cross, directions_of
-
-if TYPE_CHECKING:
-    from hybrid.outputs.observation import Observation
 
 FEW = 4  # outputs
 Integers = NDArray[np.int64]
 Restored = tuple[Integers, NDArray[np.bool_], Floats]
 
 
-def restored(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.bool_]) -> list[Restored]:
+def restored(view: ObservedStates, out: Floats, spans: Integers, rods: NDArray[np.bool_]) -> list[Restored]:
     """Of each rod with stiffness under way: rows of sides, outputs (nb,) in which it is, and curvature (rows, nb) 1/m.
 
     out: (n sides, 2, nb) curvature and twist without layers; spans: (n, 3) first and last node and first row of the
@@ -60,7 +56,7 @@ def restored(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.b
     return found
 
 
-def parts_of_stiffness(view: Observation, nodes: Integers, cells: Integers) -> Floats:
+def parts_of_stiffness(view: ObservedStates, nodes: Integers, cells: Integers) -> Floats:
     """(m, nb) of the elements at nodes (m,), each beside one of the cells (m,); 1 where nothing lacks or is known."""
     pieces = view.grid.hinges[LINE:]
     if pieces[0, EI] <= 0.0:
@@ -79,7 +75,7 @@ def parts_of_stiffness(view: Observation, nodes: Integers, cells: Integers) -> F
     return np.where((part > 0.0) & (part < WHOLE), part, 1.0)
 
 
-def _stiffness(view: Observation, nodes: Integers, part: Floats) -> Floats:
+def _stiffness(view: ObservedStates, nodes: Integers, part: Floats) -> Floats:
     """K of a rod's nodes; of those without an element as of the next one."""
     K, hn = view.stiffness(nodes)[:, 0] / part, view.of_line("hn", nodes)
     for end, beside in ((0, 1), (-1, -2)):
@@ -88,7 +84,7 @@ def _stiffness(view: Observation, nodes: Integers, part: Floats) -> Floats:
     return np.asarray(K)
 
 
-def _of_sides(view: Observation, spans: Integers, whole: Floats) -> Floats:
+def _of_sides(view: ObservedStates, spans: Integers, whole: Floats) -> Floats:
     """Factors (rows, nb) of the curvature of a rod's stretches: where sections meet, the moment is one."""
     (a, _, start), (_, b, _) = spans[0], spans[-1]
     found = np.ones((spans[-1, 2] + b - spans[-1, 0] + 1 - start, whole.shape[1]))
@@ -99,7 +95,7 @@ def _of_sides(view: Observation, spans: Integers, whole: Floats) -> Floats:
     return found
 
 
-def _whole(view: Observation, out: Floats, rows: Integers, nodes: Integers, part: Floats, K: Floats) -> Floats:
+def _whole(view: ObservedStates, out: Floats, rows: Integers, nodes: Integers, part: Floats, K: Floats) -> Floats:
     """Curvature (m, nb) of a rod at its nodes, negative where it is against the direction of its chords."""
     bend, direction = _bends(view, rows, nodes)
     element, hn = (view.line.element[nodes] != 0)[:, None], view.of_line("hn", nodes)
@@ -119,7 +115,7 @@ def _whole(view: Observation, out: Floats, rows: Integers, nodes: Integers, part
         elif outer not in view.end_nodes and (view.grid.side_nodes == outer).sum() == 1:
             outside = 1.0 / view.cell_lengths[cell]
             diagonal[k] += outside
-            rhs[k] += (K[k] * hn[k] * outside * out[row, 0]) * view._bend_directions[row]
+            rhs[k] += (K[k] * hn[k] * outside * out[row, 0]) * view.bend_directions[row]
     M = _solved(diagonal, upper, link, rhs)
     whole = part[:, None] * bend + M / (K * hn)[:, None]
     return np.asarray(np.copysign(np.sqrt((whole * whole).sum(axis=1)), (whole * direction).sum(axis=1)))
@@ -159,10 +155,10 @@ def _solve_output(diagonal: list[float], upper: list[float], link: list[float], 
         M[:, j] = solved
 
 
-def _bends(view: Observation, rows: Integers, nodes: Integers) -> tuple[Floats, Floats]:
+def _bends(view: ObservedStates, rows: Integers, nodes: Integers) -> tuple[Floats, Floats]:
     """Curvature vectors of the chords at nodes, and their directions."""
-    direction = np.zeros((len(nodes), *view._bend_directions.shape[1:]))
-    direction[view.grid.side_nodes[rows] - nodes[0]] = view._bend_directions[rows]
+    direction = np.zeros((len(nodes), *view.bend_directions.shape[1:]))
+    direction[view.grid.side_nodes[rows] - nodes[0]] = view.bend_directions[rows]
     strain = view.element_strains[nodes]
     size = np.hypot(strain[:, 0], strain[:, 1]) / view.of_line("hn", nodes)
     size[view.line.element[nodes] == 0] = 0.0

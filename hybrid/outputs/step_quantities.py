@@ -19,7 +19,7 @@ from hybrid.store.format import Field
 from hybrid.store.limits import EXTREMES
 
 if TYPE_CHECKING:
-    from hybrid.outputs.pipe import Pipes
+    from hybrid.outputs.section_use import Pipes
     from hybrid.scene.quantities import Quantity
     from hybrid.scene.schema import Scene
 

@@ -7,8 +7,6 @@ where a line bends to one side before a point and to the other side after it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,35 +17,15 @@ from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.kernels.watch.observed_outputs import slipped
 from hybrid.outputs.end_layers import EndLayer, end_layers
-from hybrid.outputs.moments import across
+from hybrid.outputs.observed_states import ObservedStates
+from hybrid.outputs.output_grid import SpanEnds, ends_of
 from hybrid.outputs.soft_rods import parts_of_stiffness, restored
-from hybrid.outputs.vectors import cross, directions_of, dot, size
-
-if TYPE_CHECKING:
-    from hybrid.outputs.observation import Observation
+from hybrid.outputs.vectors import cross, directions_of, dot
 
 Integers = NDArray[np.int64]
 
 
-class SpanEnds(NamedTuple):
-    """The ends of stretches, first all beginnings, then all ends."""
-
-    row: Integers  # of the sides of all nodes
-    node: Integers
-    cell: Integers  # beside it, in the stretch
-    inner: Integers  # the next node in the stretch
-    inward: Integers  # 1 or -1: from row to row, into the stretch
-
-
-def ends_of(spans: Integers) -> SpanEnds:
-    """Ends of stretches (n, 3): first node, last node, row of the first side."""
-    a, b, o = spans.T
-    one = np.ones_like(a)
-    pairs = (o, o + b - a), (a, b), (a, b - 1), (a + 1, b - 1), (one, -one)
-    return SpanEnds(*(np.concatenate(pair) for pair in pairs))
-
-
-def strains(view: Observation) -> tuple[Floats, list[tuple[EndLayer, Floats]]]:
+def strains(view: ObservedStates) -> tuple[Floats, list[tuple[EndLayer, Floats]]]:
     """Curvature and twist (n sides, 2, outputs), 1/m, of what was computed; what fades at ends, and their curvature."""
     nodes, spans = view.grid.side_nodes, np.array(view.grid.spans).reshape(-1, 3)
     rods = np.array([zone.kind == "rod" for zone in view.grid.parts])
@@ -68,27 +46,7 @@ def strains(view: Observation) -> tuple[Floats, list[tuple[EndLayer, Floats]]]:
     return out, _take_layers_at_ends(view, out)
 
 
-def bend_directions(view: Observation) -> Floats:
-    """Directions (n sides, 3, outputs) of the curvature vector, across both chords beside a node; (n sides, 1, outputs)
-
-    along the normal, 1 or -1, of a line in a plane.  At ends of the line that of the moment there; at ends of stretches
-    that no element bends across, that of the next node in the stretch, as at ends that are bent without a moment.
-    """
-    nodes, d, line = view.grid.side_nodes, view.d, view.line
-    inner = np.clip(nodes, 1, max(len(d) - 1, 1))
-    out = directions_of(line, cross(d[inner - 1], d[np.minimum(inner, len(d) - 1)]))
-    spans = np.array(view.grid.spans).reshape(-1, 3)
-    rods, at = np.tile([zone.kind == "rod" for zone in view.grid.parts], 2), ends_of(spans)
-    outer = view.is_end[at.node]
-    beside = np.flatnonzero(outer | ~rods | (line.element[at.node] == 0))
-    out[at.row[beside]] = out[at.row[beside] + at.inward[beside]]
-    bent = np.flatnonzero(outer & rods & ~line.k0[at.node].any(axis=1))
-    moment = across(view.node_moment[at.node[bent]], view.node_tangent[at.node[bent]])
-    out[at.row[bent]] = np.where(size(moment)[:, None] > 0.0, directions_of(line, moment), out[at.row[bent]])
-    return out
-
-
-def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
+def _end_rods(view: ObservedStates, out: Floats, spans: Integers) -> None:
     """At the ends of rods: where no element sits, or stiffness jumps, the strain of the moment; twist of the cell."""
     line, at = view.line, ends_of(spans)
     bare, jumps = _by_moment(view, at)
@@ -107,7 +65,7 @@ def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
         out[at.row[some], 1] -= _twist_to_node(view, at.cell[some], beside[some])
 
 
-def _by_moment(view: Observation, at: SpanEnds) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _by_moment(view: ObservedStates, at: SpanEnds) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Ends of rods (n,) without an element, whose strain is that of the moment that is given there; and those where the
 
     stiffness changes: the moment is one.
@@ -120,7 +78,7 @@ def _by_moment(view: Observation, at: SpanEnds) -> tuple[NDArray[np.bool_], NDAr
     return bare, jumps
 
 
-def bends_without_natural(view: Observation) -> tuple[Floats, NDArray[np.bool_]]:
+def bends_without_natural(view: ObservedStates, curvature: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Curvature (ns, outputs) 1/m from what has no stress, at output points; and where it is not known: in catenaries,
 
     which do not know which way their sections are curved, and where a joint takes of the curvature of a rod.
@@ -147,12 +105,12 @@ def bends_without_natural(view: Observation) -> tuple[Floats, NDArray[np.bool_]]
     plain[of_rod, 0] = np.hypot(*np.moveaxis(view.element_strains[mine, :2], 1, 0)) / view.of_line("hn", mine)
     if rods.any():
         _end_rods(view, plain, spans[rods])
-    touched = ~of_rod[:, None] | (view.curvature_on_sides != np.abs(plain[:, 0]))
+    touched = ~of_rod[:, None] | (curvature != np.abs(plain[:, 0]))
     unknown = np.asarray(view.grid.sides @ touched.astype(float)) > 0.0
     return np.hypot(*np.moveaxis(np.asarray(view.grid.sides @ bend), 1, 0)), unknown
 
 
-def _end_catenaries(view: Observation, out: Floats, spans: Integers) -> None:
+def _end_catenaries(view: ObservedStates, out: Floats, spans: Integers) -> None:
     """At the ends of catenaries: on from the nodes inside, along a straight line where there are four cells."""
     cells = np.tile(spans[:, 1] - spans[:, 0], 2)
     at = ends_of(spans)
@@ -166,7 +124,7 @@ def _end_catenaries(view: Observation, out: Floats, spans: Integers) -> None:
         out[row, 0] = np.maximum(0.0, (1 - p) * out[row + inward, 0] + p * out[row + 2 * inward, 0])
 
 
-def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.bool_]) -> None:
+def _put_layers_back(view: ObservedStates, out: Floats, spans: Integers, rods: NDArray[np.bool_]) -> None:
     """Curvature of rods beside joints with what these take of it: at the joint that of the catenary goes on.
 
     What is missing fades into the rod as the discrete layer of a hinge (kernels.laws.hinge_layer), node by node; where
@@ -179,7 +137,7 @@ def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDAr
         )
         if span[1] - span[0] < 2 or catenary[1] - catenary[0] < 2:
             continue
-        node, parts, directions = spans[k + 1, 0], _layer(view, spans[k + 1, 0], way, span), view._bend_directions
+        node, parts, directions = spans[k + 1, 0], _layer(view, spans[k + 1, 0], way, span), view.bend_directions
         before, after = _stiffness_shares(view, node, way)
         turned = directions_of(view.line, np.cross(view.d[node - 1], view.d[node], axis=0)[None])[0]
         turn, held = view.bends[node], before * out[its - way, 0]
@@ -193,12 +151,12 @@ def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDAr
         _add_layer(out, rows, there * parts, (directions[rows] * directions[its]).sum(axis=1))
 
 
-def _take_layers_at_ends(view: Observation, out: Floats) -> list[tuple[EndLayer, Floats]]:
+def _take_layers_at_ends(view: ObservedStates, out: Floats) -> list[tuple[EndLayer, Floats]]:
     """Curvature of catenaries less what of a rod's fades, at ends where that is nothing; the layers, and curvatures
 
     (outputs,) 1/m of the ends without them.
     """
-    directions, taken = view._bend_directions, []
+    directions, taken = view.bend_directions, []
     for layer in end_layers(view):
         end, rows = out[layer.rows[0], 0].copy(), layer.rows
         # all is what the layer is of: its direction is that of the next node
@@ -216,7 +174,7 @@ def _add_layer(out: Floats, rows: Integers, missing: Floats, along: Floats) -> N
     out[rows, 0] = np.copysign(np.sqrt(square), both)
 
 
-def _stiffness_shares(view: Observation, node: int, way: int) -> tuple[Floats, Floats]:
+def _stiffness_shares(view: ObservedStates, node: int, way: int) -> tuple[Floats, Floats]:
     """B (nb,) of kernels.laws.hinge_layer on the catenary's side of a joint and on the rod's, along `way`."""
     nodes, cells = np.array([node, node + way]), np.array([node - 1, node])[::way]
     hn, h, T = view.of_line("hn", nodes), view.cell_lengths[cells], view.T[cells[1]]
@@ -225,7 +183,7 @@ def _stiffness_shares(view: Observation, node: int, way: int) -> tuple[Floats, F
     return before, after
 
 
-def _layer(view: Observation, node: int, way: int, span: Integers) -> Floats:
+def _layer(view: ObservedStates, node: int, way: int, span: Integers) -> Floats:
     """Parts (m, nb) of a hinge's layer at a node and at those of the rod beside it.
 
     None is left where there is no stiffness or no tension.
@@ -239,19 +197,19 @@ def _layer(view: Observation, node: int, way: int, span: Integers) -> Floats:
     return np.concatenate([np.ones((1, T.shape[1])), found])
 
 
-def _twist_to_node(view: Observation, cell: Integers, inner: Integers) -> Floats:
+def _twist_to_node(view: ObservedStates, cell: Integers, inner: Integers) -> Floats:
     """Twist (n, outputs) 1/m by which tension turns the middle of cells more than their ends at nodes."""
     h, T = view.cell_lengths, view.T
     more = (T[cell] - T[inner]) * (h[cell] / (h[cell] + h[inner]))
     return _twist_per_tension(view, cell) * more
 
 
-def _twist_per_tension(view: Observation, cell: Integers) -> Floats:
+def _twist_per_tension(view: ObservedStates, cell: Integers) -> Floats:
     """Twist (n, outputs or 1) 1/m of cells per tension, 1/N, without torque."""
     return np.asarray(2.0 * view.of_line("tension_twist", cell) / view.cell_lengths[cell])
 
 
-def part_without_spring(view: Observation, node: int, cell: int, bend: Floats) -> Floats:
+def part_without_spring(view: ObservedStates, node: int, cell: int, bend: Floats) -> Floats:
     """Part (outputs,) of the bend (2, outputs) rad at an end that the line has, and an angular spring has not."""
     line = view.line
     if line.slip_law.size and line.slip_law[node].any():
@@ -264,7 +222,7 @@ def part_without_spring(view: Observation, node: int, cell: int, bend: Floats) -
     return np.broadcast_to(found, bend.shape[1:])
 
 
-def bend_without_spring(view: Observation, node: int, cell: int, bend: Floats) -> Floats:
+def bend_without_spring(view: ObservedStates, node: int, cell: int, bend: Floats) -> Floats:
     """Of the bend (2, outputs) rad at an end, what is not that of an angular spring there."""
     line = view.line
     if line.slip_law.size and line.slip_law[node].any() and part_without_spring(view, node, cell, bend).min() < RIGID:
@@ -273,7 +231,7 @@ def bend_without_spring(view: Observation, node: int, cell: int, bend: Floats) -
     return np.asarray(part_without_spring(view, node, cell, bend) * bend)
 
 
-def _beside_spring(view: Observation, node: int, cell: int) -> Floats:
+def _beside_spring(view: ObservedStates, node: int, cell: int) -> Floats:
     """Curvature (outputs,) of the cell beside a clamp with an angular spring."""
     natural = view.of_line("k0", node)[:2]
     bend = view.element_strains[node, :2] - natural
@@ -295,7 +253,7 @@ def _bend_by_table(line: Line, inner: Integers, side: Integers, moment: Floats, 
     return out
 
 
-def _bend_of_moment(view: Observation, node: Integers, cell: Integers) -> Floats:
+def _bend_of_moment(view: ObservedStates, node: Integers, cell: Integers) -> Floats:
     """Curvatures and twist (n, 3, outputs) 1/m from what has no stress, likewise."""
     line = view.line
     torque = np.zeros((node.size, view.columns))
@@ -312,7 +270,7 @@ def _bend_of_moment(view: Observation, node: Integers, cell: Integers) -> Floats
     return np.asarray(k)
 
 
-def _strain_of_moment(view: Observation, node: Integers, cell: Integers) -> Floats:
+def _strain_of_moment(view: ObservedStates, node: Integers, cell: Integers) -> Floats:
     """Curvature and twist (n, 2, outputs) at rods' ends that carry given moments (at a joint that of its zone)."""
     line = view.line
     inner = np.where(cell == node, cell + 1, cell)

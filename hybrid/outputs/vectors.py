@@ -30,6 +30,11 @@ def size(a: Floats) -> Floats:
     return np.asarray(np.sqrt(dot(a, a)))
 
 
+def across(moment: Floats, tangent: Floats) -> Floats:
+    """Of moments (n, 3, nb) N m what bends: the part across the tangent."""
+    return np.asarray(moment - dot(moment, tangent)[:, None] * tangent)
+
+
 def directions_of(line: Line, x: Floats) -> Floats:
     """Of vectors (n, 3, outputs), or on which side of the plane of the line they are."""
     if line.bits & PLANAR:

@@ -28,7 +28,7 @@ from hybrid.model.plane import as_begun
 from hybrid.model.sections import SECTION_LIMITS, limits_along, modules_of, section_changes
 from hybrid.model.self_reach import no_contact
 from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.pipe import Pipes
+from hybrid.outputs.section_use import Pipes
 from hybrid.outputs.step_quantities import StepQuantities
 from hybrid.scene.schema import Scene
 from hybrid.simulation.self_watch import SelfWatch

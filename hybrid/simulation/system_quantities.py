@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.kernels.state.state import Batch, Floats
 from hybrid.model.system import SystemModel
-from hybrid.outputs.probes import Probe
+from hybrid.outputs.observation import Probe
 from hybrid.outputs.quantities import Quantities
 from hybrid.outputs.step_quantities import StepQuantities
 from hybrid.scene.points import FreePoint

@@ -11,9 +11,9 @@ import pytest
 from scipy.optimize import brentq
 
 import hybrid
-from hybrid.outputs.distance import FEW, between, nearest
-from hybrid.outputs.pipe import Walls, largest_stress
 from hybrid.outputs.probes import PROBES
+from hybrid.outputs.quantities import FEW, between, nearest
+from hybrid.outputs.section_use import Walls, largest_stress
 from hybrid.scene.quantities import TAKEN
 from hybrid.scene.read import parse_either
 from hybrid.store.limits import held_of

@@ -1,4 +1,4 @@
-"""Wall tension and von Mises stress of pipes, of a batch of states: docs/theory.md, section on pipes."""
+"""What sections bear, of a batch of states: stress of pipes (docs/theory.md), parts used of capacities and codes."""
 
 from __future__ import annotations
 
@@ -9,13 +9,18 @@ import numpy as np
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch import pipes as wall_of
 from hybrid.model.payout import whole_scene
-from hybrid.outputs.probes import Probe
+from hybrid.model.sections import bending_stiffness
+from hybrid.outputs.observation import Observation, Probe
 from hybrid.outputs.strains import bends_without_natural
+from hybrid.store.capacity import NAME as CAPACITY_USED
+from hybrid.store.capacity import used as capacity_used
+from hybrid.store.code_checks import CLAUSES, E301, F201, Row, moment_of
+from hybrid.store.code_checks import NAME as CODE_USED
+from hybrid.store.code_checks import use as code_used
 
 if TYPE_CHECKING:
-    from hybrid.outputs.observation import Observation
+    from hybrid.scene.cable import Section
     from hybrid.scene.schema import Scene
-
 
 CURVED_NOWHERE: Floats = np.zeros(1)
 
@@ -120,7 +125,7 @@ class Pipes:
         force = self.wall_tension(v)
         curvature, torque = v.curvature_twist[:, 0], v.torque
         if np.any(walls.natural > 0.0):
-            bent, unknown = bends_without_natural(v)
+            bent, unknown = bends_without_natural(v, v.curvature_on_sides)
             bent = np.where(unknown, curvature + walls.natural, bent)
             curvature = np.where(walls.natural > 0.0, bent, curvature)
         return largest_stress(walls, outside, inside, force, curvature, torque)
@@ -147,3 +152,103 @@ def largest_stress(
             square = 0.5 * ((axial - hoop) ** 2 + (hoop - radial) ** 2 + (radial - axial) ** 2) + 3.0 * shear**2
             most = np.maximum(most, np.sqrt(square))
     return np.where(np.isnan(walls.modulus), np.nan, most)
+
+
+class Capacities:
+    """The capacity polygons of one line.  Only for a scene that has some."""
+
+    def __init__(self, scene: Scene) -> None:
+        whole, begin = whole_scene(scene)
+        sections = whole.cable.sections
+        ends = begin + np.cumsum([x.length for x in sections])
+        self._ends, self._near = ends[:-1], 1e-9 * sum(x.length for x in sections)
+        self._corners = [None if x.capacity is None else np.array(x.capacity, float) for x in sections]
+        self._begins = np.concatenate([[begin], ends[:-1]])
+        self._whole = ends
+
+    def probes(self) -> dict[str, Probe]:
+        """Probes by name."""
+        text = "part of the capacity that tension and curvature use together; NaN: none given"
+        return {CAPACITY_USED: Probe("%", text, ("s",), self.used)}
+
+    def used(self, v: Observation) -> Floats:
+        """(ns, nb) %."""
+        s, curvature = v.grid.points, v.curvature_twist[:, 0]
+        section = np.searchsorted(self._ends, s + (self._near if v.grid.after else -self._near))
+        found = np.full(v.tension.shape, np.nan)
+        for i, corners in enumerate(self._corners):
+            if corners is not None:
+                found = np.where(section == i, 100.0 * capacity_used(corners, v.tension, curvature), found)
+        return found
+
+    def rows(self) -> Floats:
+        """(K, 4): from and to (m), tension (N) and curvature (1/m) of each corner of each section that has any."""
+        found = [
+            np.column_stack([np.full(len(x), self._begins[i]), np.full(len(x), self._whole[i]), x])
+            for i, x in enumerate(self._corners)
+            if x is not None
+        ]
+        return np.concatenate(found)
+
+
+class Codes:
+    """The codes of one line.  Only for a scene that has some."""
+
+    def __init__(self, scene: Scene) -> None:
+        fluid, gravity = scene.environment.fluid, scene.environment.gravity
+        self._water = fluid.density * gravity if fluid is not None else 0.0
+        self._surface = 0.0 if fluid is None or fluid.surface is None else fluid.surface
+        self._gravity = gravity
+        whole, begin = whole_scene(scene)
+        sections = whole.cable.sections
+        ends = begin + np.cumsum([x.length for x in sections])
+        begins = np.concatenate([[begin], ends[:-1]])
+        self._ends, self._near = ends[:-1], 1e-9 * sum(x.length for x in sections)
+        self._rows = [self._row(*x) for x in zip(sections, begins.tolist(), ends.tolist(), strict=True)]
+        self._kinds = list(dict.fromkeys(x.code.kind for x in sections if x.code is not None))
+
+    def _row(self, section: Section, first: float, last: float) -> Row | None:
+        code, pipe = section.code, section.pipe
+        if code is None:
+            return None
+        if code.kind == "E301":
+            numbers = (code.pretension_factor, code.environment_factor, code.pretension, 0.0, code.strength)
+            return Row(first, last, E301, *numbers, *[0.0] * 13)
+        assert pipe is not None
+        numbers = (
+            code.functional_factor,
+            code.environment_factor,
+            code.functional_tension,
+            code.functional_moment,
+            0.0,
+        )
+        outer = pipe.outer_diameter or section.diameter or np.nan
+        of_wall = (code.safety, outer, pipe.wall, pipe.modulus, code.yield_strength, code.tensile_strength)
+        tube = pipe.modulus * np.pi / 64.0 * (outer**4 - (outer - 2.0 * pipe.wall) ** 4)
+        natural = float(np.hypot(*(section.intrinsic_curvature or (0.0, 0.0))[:2]))
+        of_bend = (max(bending_stiffness(section)) or tube, natural)
+        z = self._surface if pipe.pressure_z is None else pipe.pressure_z
+        pressures = (pipe.pressure, z, pipe.content_density * self._gravity, self._water, self._surface)
+        return Row(first, last, F201, *numbers, *of_wall, code.ovality, code.fabrication, *pressures, *of_bend)
+
+    def probes(self) -> dict[str, Probe]:
+        """Probes by name."""
+        which = "; ".join(CLAUSES[kind] for kind in self._kinds)
+        return {CODE_USED: Probe("%", f"part used of what codes allow: {which}; NaN: none given", ("s",), self.used)}
+
+    def used(self, v: Observation) -> Floats:
+        """(ns, nb) %."""
+        s = v.grid.points
+        section = np.searchsorted(self._ends, s + (self._near if v.grid.after else -self._near))
+        z, found = (v.grid.nodes @ v.r)[:, 2], np.full(v.tension.shape, np.nan)
+        catenary = np.asarray(v.grid.sides @ (~v.side_is_rod[:, None]).astype(float)) > 0.0
+        for i, row in enumerate(self._rows):
+            if row is not None:
+                of_curvature = moment_of(row, v.curvature_twist[:, 0]) if row.kind == F201 else 0.0
+                M = np.where(catenary, of_curvature, v.bending_moment)
+                found = np.where(section == i, 100.0 * code_used(row, v.tension, M, z), found)
+        return found
+
+    def rows(self) -> Floats:
+        """(K, columns) of `Row`."""
+        return np.array([x for x in self._rows if x is not None], float)
