@@ -139,7 +139,8 @@ def imports(file: Path, for_types: bool = False) -> list[tuple[str, int]]:
             if name == "hybrid":  # rooms may be named here
                 found += [(module, node.lineno) for module in inner]
             else:
-                found += [(module, node.lineno) for module in (name, *(x for x in inner if x in NAMES))]
+                found.append((name, node.lineno))
+                found += [(module, node.lineno) for module in inner if module in NAMES and for_types]
     return found
 
 
