@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
+from hybrid.linear.eigen import _every, _nearest
 from hybrid.linear.matrices import linear_network
 from hybrid.modal.api import _found, equilibrium_of
 from hybrid.scene.read import as_scene_or_system
@@ -392,3 +393,14 @@ def test_a_line_that_is_paid_out_has_those_of_its_first_length():
     found = hybrid.modes(made, 2)
     assert omega(found)[0] == pytest.approx(2.404826 / 2.0 * math.sqrt(G / 10.0), rel=5e-3)
     assert any("of its first length" in x for x in found.notes)
+
+
+@pytest.mark.parametrize("made", [string(12), chain(40), sag(40)], ids=["pairs of one frequency", "hangs", "sags"])
+def test_blocks_find_the_modes_of_the_whole_matrix(made) -> None:
+    """Both of two modes of one frequency among them, and all that there are of a small network."""
+    rest = equilibrium_of(made)
+    network = linear_network(rest.solver, rest.states, rest.names, True)
+    found = [
+        np.sort(by(network.stiffness, network.mass, -1e-3 * network.slow, 20)[0])[:16] for by in (_every, _nearest)
+    ]
+    assert np.abs(found[1] / found[0] - 1.0).max() < 1e-9
