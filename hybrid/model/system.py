@@ -59,8 +59,8 @@ class SystemResolution:
     def first(cls, system: System) -> SystemResolution:
         """The resolution for the accuracy of each line, before anything is known of its errors."""
         found = {name: first_resolution(system.scene_of(name)) for name in system.lines}
-        step = min(x.step for x in found.values())
-        return cls({name: replace(x, step=step, later=0.0) for name, x in found.items()})
+        step, later = min(x.step for x in found.values()), min(x.later or x.step for x in found.values())
+        return cls({name: replace(x, step=step, later=later if x.later else 0.0) for name, x in found.items()})
 
     @property
     def one(self) -> Resolution:

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
 from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.step.accept import MANY
 from hybrid.simulation.collapse import COLLAPSE, ERROR, GAIN, GIVE_UP, NEWTON, TOUCHES_ITSELF, TURN, collapse_text
 from hybrid.simulation.contact_start import comes_near
-from hybrid.simulation.events import energy_gains_text, slack_steps_text, steps_cut_text
+from hybrid.simulation.events import Sink, energy_gains_text, slack_steps_text, steps_cut_text
 from hybrid.simulation.run_sample import NOT_ESTIMATED
 
 if TYPE_CHECKING:
@@ -21,44 +22,46 @@ CUTS = {GAIN: "cut_by_gain", TURN: "cut_by_turn", NEWTON: "cut_by_newton", ERROR
 ITSELF = {MEETS: b.MEETS_ITSELF, NEARS: b.NEARS_ITSELF, PARTS: b.PARTS_ITSELF, HIDES: b.HIDES_ITSELF}
 
 
-def note_cut(moving: Transient) -> None:
-    """An end turns too far in a fixed step, which was cut: an event for the first."""
-    clock, most = moving.run.clock, moving.resolution.turn
-    if not moving.turned and not moving.controlled:
+def note_cut(clock: Clock, most: float, length: float, sink: Sink, told: bool) -> None:
+    """An end turns too far in a fixed step, which was cut: an event for the first.
+
+    most: rad in a step; length: m, of the line; told: whether nothing is to be said of it.
+    """
+    if not told:
         text = steps_cut_text(float(clock.cut_angle), float(clock.cut_step), most)
-        moving.events.event(float(clock.previous), 0.0, moving.model.length, "steps cut", text)
-    moving.turned, clock.mute_cuts = True, 1.0
+        sink.event(float(clock.previous), 0.0, length, "steps cut", text)
+    clock.mute_cuts = 1.0
 
 
-def note_slack(moving: Transient) -> None:
-    """A catenary was slack in a step too long for its waves, and is not in shorter ones: an event for the first."""
-    clock, cell = moving.run.clock, int(moving.run.count.slack_cell)
-    text = slack_steps_text(float(clock.slack_step), float(clock.last_dt), float(clock.wave_step))
-    s = float(moving.model.line.s[cell])
-    moving.events.event(moving.t, s, s, "steps cut", text)
-    moving.slackened, clock.mute_slack = True, 1.0
+def note_slack(clock: Clock, waves: float, s: float, sink: Sink) -> None:
+    """A catenary was slack at s (m) in a step too long for its waves, and not in shorter ones: an event for the first.
+
+    waves: s, in which one passes a cell.
+    """
+    text = slack_steps_text(float(clock.slack_step), float(clock.last_dt), waves)
+    sink.event(float(clock.now), s, s, "steps cut", text)
+    clock.mute_slack = 1.0
 
 
-def note_iterations(moving: Transient) -> None:
+def note_iterations(clock: Clock, count: Counts, length: float, sink: Sink) -> None:
     """A step was taken in all the Newton iterations that it may take though these had not converged: the first."""
-    clock, most = moving.run.clock, int(moving.run.count.most_iterations)
+    most = int(count.most_iterations)
     left = "though the next would still have" if most > 1 else "which"  # from one alone the next is not known
     text = (
         f"a step was taken after {most} Newton iterations, {left} changed it by {float(clock.correction):.2g} "
         f"(relative), and so are others like it: most_iterations bounds their cost; "
         f"steps/correction has what each left out; a shorter time.step or more iterations leave less"
     )
-    moving.events.event(moving.t, 0.0, moving.model.length, "iterations cut", text, threshold=float(most))
+    sink.event(float(clock.now), 0.0, length, "iterations cut", text, threshold=float(most))
 
 
-def count_iterations(moving: Transient) -> None:
+def count_iterations(clock: Clock, count: Counts, length: float, sink: Sink) -> None:
     """How many steps were taken so: an event with their number, at the end of the run."""
-    short, most = int(moving.run.count.cut_short), int(moving.run.count.most_iterations)
+    short, most = int(count.cut_short), int(count.most_iterations)
     if short:
-        text = f"{short} of {moving.steps} steps were taken after {most} Newton iterations that had not converged"
-        moving.events.event(
-            moving.t, 0.0, moving.model.length, "iterations cut", text, value=float(short), threshold=float(most)
-        )
+        text = f"{short} of {int(count.steps)} steps were taken after {most} Newton iterations that had not converged"
+        now = float(clock.now)
+        sink.event(now, 0.0, length, "iterations cut", text, value=float(short), threshold=float(most))
 
 
 def count_energy_gains(moving: Transient) -> None:

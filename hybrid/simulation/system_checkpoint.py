@@ -42,7 +42,8 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "overlaps": sorted(run.overlaps),
         "bodies": run.state.bodies, "body_work": body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
-        "control": run.loop.control(), "changes": run.changed,
+        "control": run.loop.control(), "cuts": run.loop.cuts(), "vibrations": run.vibrations.checkpoint(),
+        "changes": run.changed,
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
         "zones": run.zones.checkpoint() if run.zones is not None else {},
         "passed": sorted(list(x) for x in run.passed), "met": sorted(list(x) for x in run.met),
@@ -60,10 +61,10 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         run.failures.again(saved["broken"])
     # It took members as at the first guess, and rotations were within half a turn of 0.
     older: dict[str, Any] = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "changes": 0}
-    older |= {"rotations": run.rotations.last, "passed": [], "met": [], "let_pass": [], "between": []}
-    older["rho"] = run.system.require_time().rho_inf
+    older |= {"cuts": run.loop.cuts(), "vibrations": {}, "rotations": run.rotations.last}
+    older |= dict.fromkeys(("passed", "met", "let_pass", "between"), [])
     complete = "interval" in saved  # else steps ended at outputs
-    older |= {"interval": 0.0, "worked": run.loop.worked[1, :, :SPRING]}
+    older |= {"rho": run.system.require_time().rho_inf, "interval": 0.0, "worked": run.loop.worked[1, :, :SPRING]}
     saved = older | dict(saved)
     saved["zones"] = zones_of_today(saved["zones"])
     near = [x.number for x in run.lines if "self_contact" in _of(saved, x.name) and not x.touches]
@@ -77,10 +78,10 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         run.payout.restore(saved["payout"])
     if run.zones is not None or run.payout is not None or near or between:
         run.make_solver()
-    template = checkpoint(run) | {"dry": None, "overlaps": None, "under": None, "broken": None, "control": None}
-    template |= {
-        name: None for name in ("contact", "between", "let_pass", "met", "passed", "payout") if name in template
-    }  # as there are
+    unbounded = "dry", "overlaps", "under", "broken", "control", "vibrations"
+    template = checkpoint(run) | dict.fromkeys(unbounded)
+    as_there_are = "contact", "between", "let_pass", "met", "passed", "payout"
+    template |= dict.fromkeys(name for name in as_there_are if name in template)
     saved = {"quantities": run.quantities.unknown(), "under": {}, "overlaps": [], **saved}  # nor did it keep ranges
     saved["quantities"] = run.quantities.of_today(saved["quantities"])
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
@@ -174,7 +175,10 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
     run.overlaps = set(found["overlaps"])
     run.under = {name: float(depth) for name, depth in found["under"].items()}
-    run.loop.take_control(found["control"])
+    longest = max(max(x.step, x.later) for x in run.resolution.lines.values())
+    run.loop.take_control(found["control"], longest)
+    run.vibrations.restore(found["vibrations"], run.loop.clock)
+    run.loop.restore_cuts(found["cuts"])
     run.passed, run.met, run.let_pass = (_pairs(found[name]) for name in ("passed", "met", "let_pass"))
     run.watch_lines()  # what has met since has not
     if run.shared is not None:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hybrid.adapt.manager import Change
-from hybrid.kernels.state.books import Clock, Counts
 from hybrid.model.build import Model
 from hybrid.simulation.kind_changes import LineKinds, carries_all, copy_into
 from hybrid.simulation.zone_switching import ZoneSwitching
@@ -62,8 +61,8 @@ class SystemKinds:
         """A line of the solver that changes from now on."""
         run, (first, second) = self._run, self._turns
         line, model, ends = run.lines[number], run.model.models[number], self._solver.lines[number].ends
-        around = line.around(self._solver.work[number], Clock(), Counts())
-        kinds = LineKinds(model, switching, (first.lines[number], second.lines[number]), around, ends)
+        both, around = (first.lines[number], second.lines[number]), line.around(self._solver.work[number])
+        kinds = LineKinds(model, switching, both, around, ends)
         self._solver.take_line(number, kinds.model.line)
         switching.model = kinds.model
         return kinds

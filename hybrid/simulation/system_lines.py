@@ -39,7 +39,9 @@ from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import output_points
 from hybrid.model.resolution import follows_curvature, wants_errors
+from hybrid.model.scales import wave_step
 from hybrid.model.sections import section_changes
+from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
@@ -50,6 +52,7 @@ from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stret
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.kind_changes import Around
+from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
@@ -122,6 +125,15 @@ class LineStep(NamedTuple):
     books: Books
 
 
+class Waiting(NamedTuple):
+    """What waits to be recorded of a line."""
+
+    outputs: Sequence[Batch]
+    aside: Sequence[tuple[Model, Output]]  # outputs of other cells
+    log: Sequence[Floats]  # rows of steps
+    first_energy: float | None  # J, that the balance counts from
+
+
 class LineResult:
     """What is recorded of one line."""
 
@@ -161,6 +173,7 @@ class LineResult:
         self.manager: DomainManager | None = None  # of zones that move
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
+        self._aside = OutputsAside()  # of other cells
         self.shown: Callable[[Batch], None] | None = None  # what looks at outputs beside the recorder
         self._log: list[Floats] = []
 
@@ -180,6 +193,7 @@ class LineResult:
         books.clock.least_peak = books.clock.release_start = books.clock.release_end = np.inf
         books.counts.stiff, books.counts.varies = self.model.inextensible, self.model.layout is not None
         books.clock.rho = self.scene.time.rho_inf if self.scene.time is not None else 0.0
+        books.clock.wave_step = wave_step(line, self.model.tension_scale)
         return books._replace(
             strains=np.zeros((nodes, STRAINS)), marks=marks, right=right, start=begin.copy(), base=base,
             hinges=self.model.hinges, placed=begin[base], borne=1.0 + borne_strain(self.model),
@@ -274,11 +288,21 @@ class LineResult:
         """An event, unless there was one, where contact could not begin after the step of dt (s) to t (s)."""
         self.envelope.itself.tell_again(t, dt, self.events.event)
 
-    def follow(self, model: Model) -> None:
-        """Go on with another model of the same cells, after what waits has been recorded."""
+    @property
+    def _outputs_join(self) -> bool:
+        """Whether outputs wait though the cells that they are of change, because these follow the curvature."""
+        follows = self._moves and self.paying is None and not self.touches and follows_curvature(self.scene)
+        return follows and may_be_joined(self.observer, self.model.line)
+
+    def follow(self, model: Model, other_cells: bool = False) -> None:
+        """Go on with another model, after what waits has been recorded.
+
+        other_cells: of other cells, for which outputs that may wait all the same go on to do so.
+        """
         if model is self.model:
             return
-        self.write_down()
+        if not (other_cells and self._outputs_join):
+            self.write_down()
         self.model, first = model, self.observer.first_energy
         self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
         self.observer.first_energy = first
@@ -293,17 +317,20 @@ class LineResult:
         before = self.books
         if extremes:
             self.envelope.fold(self.model.nodes, before.extremes)
-        self.follow(model)
+        self.follow(model, other_cells=True)
         names = ("asked", "reached", "path", "radii", "walls", "clock", "counts", "worst", "placed")
-        same = {name: getattr(before, name) for name in names}
-        self.books = self._blank_books(self.envelope.start_of(model.nodes))._replace(**same)
+        same, blank = (
+            {name: getattr(before, name) for name in names},
+            self._blank_books(self.envelope.start_of(model.nodes)),
+        )
+        before.clock.wave_step = blank.clock.wave_step
+        self.books = blank._replace(**same)
         self.books.work[:], self.books.power[:] = before.work, before.power
         self.books.velocity[:] = before.velocity
 
-    def around(self, work: Work, clock: Clock, counts: Counts) -> Around:
-        """What changes of kinds have to know of the line; clock, counts: room for those of a run alone."""
-        books = self.books._replace(clock=clock, counts=counts)
-        return Around(work, books, self.envelope, self._marked, self.envelope.itself.itself.cells)
+    def around(self, work: Work) -> Around:
+        """What changes of kinds have to know of the line."""
+        return Around(work, self.books, self.envelope, self._marked, self.envelope.itself.itself.cells)
 
     def take_kinds(self, model: Model) -> None:
         """Go on with other kinds of the same cells, in the same arrays, after what waited has been recorded."""
@@ -364,8 +391,11 @@ class LineResult:
         """Record states."""
         if self.shown is not None:
             self.shown(batch)
-        self._waiting.append(batch)
-        full = sum(len(x.t) for x in self._waiting) >= WAITING
+        if self._outputs_join:
+            self._aside.put(self.model, outputs_in(batch, self.model.line, self.model.zones))
+        else:
+            self._waiting.append(batch)
+        full = sum(len(x.t) for x in self._waiting) >= WAITING or self._aside.full
         if full or not self._moves or self.observer.writes_criteria:
             self.write_down()
 
@@ -374,6 +404,13 @@ class LineResult:
         if self._log:
             self.recorder.log_rows(np.concatenate(self._log))
             self._log.clear()
+        if self._aside:
+            watch = None if isinstance(self.recorder, ComparisonRecorder) else self.diagnostics
+            t = float(self._aside.waiting[-1][1].batch.t[-1])
+            stop = self._aside.record(self.observer, self.recorder, watch)
+            self.diagnostics.follow(self.model)
+            if stop is not None:
+                raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]))
         if not self._waiting:
             return
         waiting, self._waiting = self._waiting, []
@@ -413,13 +450,14 @@ class LineResult:
         stop = watch.stretch(state) or watch.left_plane(state.r) or watch.shape(t or 0.0, sharp, state)
         self._stop_if(stop, t, state)
 
-    def waiting(self) -> tuple[list[Batch], list[Floats], float | None]:
-        """Outputs and steps that wait, and the energy that the balance counts from (J), to come back to."""
-        return [*self._waiting], [*self._log], self.observer.first_energy
+    def waiting(self) -> Waiting:
+        """Outputs and steps that wait, to come back to."""
+        return Waiting([*self._waiting], [*self._aside.waiting], [*self._log], self.observer.first_energy)
 
-    def wait_again(self, kept: tuple[Sequence[Batch], Sequence[Floats], float | None]) -> None:
+    def wait_again(self, kept: Waiting) -> None:
         """Let that wait which `waiting` has returned, and nothing else."""
-        self._waiting, self._log, self.observer.first_energy = [*kept[0]], [*kept[1]], kept[2]
+        self._waiting, self._aside, self._log = [*kept.outputs], OutputsAside(kept.aside), [*kept.log]
+        self.observer.first_energy = kept.first_energy
 
     def impose_now(self) -> None:
         """Outputs within the next step begin with what the ends impose now."""

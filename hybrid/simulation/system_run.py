@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from time import process_time as clock_now
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,13 +25,16 @@ from hybrid.kernels.step.accept import MANY
 from hybrid.model.ends import table_of_loads
 from hybrid.model.plan import SAME_STOP, equal_steps, output_times
 from hybrid.model.system import SystemResolution, build_system
+from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.plane import OUT
 from hybrid.scene.points import Fairlead
+from hybrid.scene.read import scene_text
 from hybrid.scene.system import System
 from hybrid.simulation.body_overlap import note_overlaps
 from hybrid.simulation.collapse import COLLAPSE, GIVE_UP, TOUCH_EACH_OTHER, TOUCHES_ITSELF, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import energy_gains_text
+from hybrid.simulation.failure import Stopped, explanation, first_remedy, write_snapshot
 from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.lines_contact import shared_of, tell_meetings
@@ -42,7 +45,7 @@ from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import refused, require_same
 from hybrid.simulation.result_file import places_of_elevation
-from hybrid.simulation.step_events import CUTS
+from hybrid.simulation.step_events import CUTS, count_iterations, note_cut, note_iterations, note_slack
 from hybrid.simulation.system_checkpoint import (
     content,
     files_of,
@@ -67,9 +70,10 @@ from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauge
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, joined_lines, named
 from hybrid.simulation.system_zones import SystemZones, managers_for, start_at_rest, zones_as_placed
-from hybrid.simulation.time_loop import WORK, apart, falls_on
+from hybrid.simulation.time_loop import FORCE_COLUMNS, WORK, apart, falls_on
+from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
 from hybrid.solve.joined import SystemState, SystemTaken
-from hybrid.solve.run import MOST_SAMPLED, ROWS
+from hybrid.solve.run import MOST_SAMPLED, ROWS, Tried
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
@@ -141,7 +145,7 @@ class SystemRun:
             self.model = loaded_as(self.model, self.system, 0.0)
         self.resolution = self.model.resolution
         one = self.resolution.one
-        follow = (one.step, one.shortest) if moves and one.local is not None else ()
+        follow = (one.step, one.shortest) if moves and one.local is not None else (0.0, 0.0)
         names = self.model.names
         guesses = system.guesses
         known = self.model.scenes
@@ -150,7 +154,8 @@ class SystemRun:
         if moves and one.every > 1:  # a run to compare with has as many times fewer
             self.times = [*self.times[one.every - 1 : -1 : one.every], self.times[-1]]
         rho = system.require_time().rho_inf if moves else 0.0
-        self.loop = SystemSteps(rho, [0.0, *self.times], *follow)
+        turn = min(x.turn for x in self.resolution.lines.values())
+        self.loop = SystemSteps(rho, [0.0, *self.times], *follow, turn)
         self.found: SystemEquilibrium | None = None
         managers, self._begins = _NO_ZONES, source is None  # whether there is a start, and no checkpoint
         scenes = dict(zip(names, self.scenes, strict=True))
@@ -187,6 +192,8 @@ class SystemRun:
         self.passed: set[tuple[int, int]] = set()  # and those that have been said to
         self.let_pass: set[tuple[int, int]] = set()  # of lines that may meet, those between which it is not computed
         self.rotations = Rotations(system, self.model)
+        shaken = zip(scenes.items(), self.resolution.lines.values(), strict=True)
+        self.vibrations = VibrationsOfLines({name: VibrationSteps(scene, x) for (name, scene), x in shaken})
         self.quantities = SystemQuantities(system, scenes)
         if moves:
             self.quantities.keep_ranges(self.lines)
@@ -400,6 +407,8 @@ class SystemRun:
         for line in self.lines:
             for t, s_a, s_b, kind, text in line.close(self.t, status, message):
                 self.recorder.event(t, s_a, s_b, kind, f"line {line.name}: {text}")
+        if status == "complete":
+            count_iterations(self.loop.clock, self.loop.counts, 0.0, self.recorder)
         if self.shared is not None and (tries := self.shared.given_up):
             self.recorder.event(self.t, 0.0, 0.0, "steps cut", energy_gains_text(tries))
         self.recorder.replace(self.quantities.range_values())
@@ -576,6 +585,7 @@ class SystemRun:
             self._begun(self)
         self.gather_events()
         self._between = True
+        self.vibrations.begin(self.loop.clock)
         self.keep()
         self._logged = clock_now() - self._begin
 
@@ -590,10 +600,23 @@ class SystemRun:
         outputs = [x for x in self.times if x < end] if self.system.output.exact else []
         last = self.times[-1] if until is None else until
         steps = [x for x in self.resolution.one.ends if x < end]
+        if self.loop.controlled:
+            grown = [*self.vibrations.begins, *(x for scene in self.scenes for x in ramp_ends(scene))]
+            steps += [x for x in grown if x < end]
         return apart([*outputs, *steps, last, *self._breaks], self.t, self.resolution.one.step)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
         """Steps to `stop` (s), with what is due there; look: called there, and about ten times a second."""
+        vibrations, clock = self.vibrations, self.loop.clock
+        while vibrations.due < stop - SAME_STOP * self.resolution.one.step:
+            self._go_to(vibrations.due, look)
+            self.write_log()
+            vibrations.judge(clock)
+        self._go_to(stop, look)
+        vibrations.begin(clock)
+
+    def _go_to(self, stop: float, look: Callable[[], None]) -> None:
+        """The same, whatever vibrates."""
         loop, step = self.loop, self.resolution.one.step
         if loop.controlled and self.payout is not None:
             self.payout.limit_step()
@@ -646,8 +669,6 @@ class SystemRun:
             self.zones.attach(loop)
         if self.payout is not None:
             self.payout.attach(loop)
-        if loop.counts.asks & b.ASK_BEFORE:
-            return
         moves = [model.ends.moves() for model in self.model.models]
         if len(moves) != len(self._moved) or any(x is not y for x, y in zip(moves, self._moved, strict=True)):
             self._moved = moves
@@ -697,6 +718,7 @@ class SystemRun:
         now = clock_now() - self._begin
         cpu = np.linspace(self._logged, now, len(rows) + 1)[1:]
         self._logged = now
+        self.vibrations.log(rows[:, :, FORCE_COLUMNS])
         for k, line in enumerate(self.lines):
             line.log(np.column_stack([rows[:, k], cpu]))
 
@@ -716,8 +738,7 @@ class SystemRun:
             begin_between(self)
         if parted := [line.number for line in self.lines if line.parts_itself and not line.shares]:
             end_contact(self, parted)
-        if loop.counts.notices & b.COLLAPSES:
-            self._tell_collapse()
+        self._note_cuts(int(loop.counts.notices))
         if self.zones is not None:
             self.zones.adapt()
         if self.payout is not None:
@@ -761,7 +782,9 @@ class SystemRun:
 
     def failed(self, failed: LineFailed) -> ComputationError:
         """What a failure becomes: a file with all that there is, and an error that names the line."""
-        error = named(failed, self.model)
+        error = named(failed, self.model, left=self._snapshot(failed.outcome))
+        with suppress(LineFailed):
+            self._record_last()
         for line in self.lines:
             if line.number == failed.line or failed.line < 0:
                 s = failed.s or 0.0
@@ -769,6 +792,27 @@ class SystemRun:
         with suppress(ResultError):
             self.finish("failed", str(error))
         return error
+
+    def _record_last(self) -> None:
+        """Record the last good state, in place of the output that would have come next."""
+        outputs, at, phase = self.loop.outputs, int(self.loop.counts.output), int(self.loop.counts.phase)
+        if self.moves and 0 < at < outputs.size and outputs[at - 1] < self.t and phase != b.SAMPLE:
+            for model in self.model.models:
+                model.ends.at(self.t)
+                model.sea.at(self.t)
+            outputs[at] = self.t
+            self._output()
+
+    def _snapshot(self, outcome: Outcome) -> Path | None:
+        """Leave the last good state beside the result; None: it cannot be written, or nothing moves."""
+        if self.target is None or not self.moves:
+            return None
+        content: dict[str, Any] = {"t": self.t, "dt": float(self.loop.clock.tried_dt), "outcome": outcome.name}
+        content |= {"scene": scene_text(self.system), "bodies": self.state.bodies}
+        for line, state in zip(self.lines, self.state.lines, strict=True):
+            values = {"s": line.model.line.s, **state._asdict()}
+            content |= {f"{line.name}/{name}": x for name, x in values.items()}
+        return write_snapshot(self.target, content)
 
     def _settle(self, solver: SystemSolver) -> None:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
@@ -789,11 +833,28 @@ class SystemRun:
 
     def _stopped(self, solver: SystemSolver, taken: SystemTaken, dt: float) -> LineFailed:
         """Why no step leads on."""
-        detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
-        if dt == 0.0:
-            detail = "no accelerations are consistent with the shape and the loads"
-        detail += self._touching
-        return LineFailed(taken.line, taken.outcome, self.t, self._place(solver, taken), detail)
+        if taken.line < 0:
+            detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
+            if dt == 0.0:
+                detail = "no accelerations are consistent with the shape and the loads"
+            return LineFailed(-1, taken.outcome, self.t, None, detail + self._touching)
+        k, tried = taken.line, Tried(taken.outcome, taken.iterations, taken.correction, taken.where)
+        line, model, before = self.lines[k], self.model.models[k], self.other.lines[k] if dt else self.state.lines[k]
+        x = Stopped(
+            model,
+            self.state.lines[k],
+            before,
+            self.loop.clock,
+            self.loop.counts,
+            tried,
+            dt,
+            float(line.books.clock.wave_step),
+            line.manager is not None,
+            max(solver.joints[k]) < 0,
+            self._touching,
+        )
+        s = float(model.line.s[x.node])
+        return LineFailed(k, taken.outcome, self.t, s, explanation(x), first=first_remedy(x))
 
     @property
     def _touching(self) -> str:
@@ -804,12 +865,20 @@ class SystemRun:
         own = (line.contact for line in self.lines)
         return TOUCHES_ITSELF if pairs or any(x is not None and x.touches for x in own) else ""
 
-    def _place(self, solver: SystemSolver, taken: SystemTaken) -> float | None:
-        """Where (m) a step was worst; None: of no line."""
-        if taken.line < 0:
-            return None
-        nodes = solver.lines[taken.line].line.s
-        return float(nodes[min(max(taken.where, 0), nodes.size - 1)])
+    def _note_cuts(self, flags: int) -> None:
+        """Events of steps that were cut; flags: of the last (kernels.state.books)."""
+        loop, clock = self.loop, self.loop.clock
+        if flags & b.COLLAPSES:
+            self._tell_collapse()
+        if flags & b.STEPS_CUT:
+            turned = self.lines[loop.turned_line]
+            note_cut(clock, float(clock.most_turn), turned.model.length, turned.events, loop.controlled)
+        if flags & b.STEPS_SLACK:
+            slack = self.lines[loop.slack_line]
+            s = float(slack.model.line.s[int(loop.counts.slack_cell)])
+            note_slack(clock, float(slack.books.clock.wave_step), s, slack.events)
+        if flags & b.ITERATIONS_CUT:
+            note_iterations(clock, loop.counts, 0.0, self.recorder)
 
     def _tell_collapse(self) -> None:
         """Steps have become so short that the run may not end: an event; one to be compared with stops."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -242,11 +243,12 @@ def blended_of_lines(system: System) -> Iterator[str]:
             yield blended_text(f"bodies.{name}", body.motion, body.position, True)
 
 
-def named(failed: LineFailed, model: SystemModel, first: str = "") -> ComputationError:
-    """The same with the name of the line in its detail; first: to try before the usual remedy."""
+def named(failed: LineFailed, model: SystemModel, first: str = "", left: Path | None = None) -> ComputationError:
+    """The same with the name of the line in its detail; first: to try before the usual remedy; left: a snapshot."""
     where = f"line {model.names[failed.line]}" if failed.line >= 0 else "the points"
     detail = f"{where}; {failed.detail}" if failed.detail else where
     name = model.names[failed.line] if failed.line >= 0 else ""
+    first = first or failed.first
     if not first and failed.line >= 0:
         first = slack_remedy(model.models[failed.line], failed.outcome, failed.s)
-    return ComputationError(failed.outcome, failed.t, failed.s, detail, first=first, line_name=name)
+    return ComputationError(failed.outcome, failed.t, failed.s, detail, left, first, name)

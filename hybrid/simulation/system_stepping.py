@@ -29,7 +29,16 @@ from hybrid.scene.system import System
 from hybrid.simulation.layer_mesh import layered_lines
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution, with_survey
 from hybrid.simulation.set_obstacles import ONE_STEP, SettableObstacles
-from hybrid.simulation.stepped import SLIVER, CableState, Triple, end_of_step, no_such_method, one_thread, triple
+from hybrid.simulation.stepped import (
+    SLIVER,
+    CableState,
+    Triple,
+    end_of_step,
+    iterations_allowed,
+    no_such_method,
+    one_thread,
+    triple,
+)
 from hybrid.simulation.system_run import SystemRun, static_system
 from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.system_start import named
@@ -81,8 +90,8 @@ class SystemSimulation(SettableObstacles):
 
     scene: several lines, as of `hybrid.run`; its time table gives the longest step and the duration, beyond which
     nothing is computed.  output: the HDF5 file to write; None keeps the result in memory.  Constructing it finds the
-    equilibrium that the motion starts from.  criterion: as of `hybrid.run`.  One thread at a time.  Raises SceneError,
-    ResultError and ComputationError as `hybrid.run` does.
+    equilibrium that the motion starts from.  criterion: as of `hybrid.run`; most_iterations: as of `Simulation`.  One
+    thread at a time.  Raises SceneError, ResultError and ComputationError as `hybrid.run` does.
     """
 
     def __init__(
@@ -92,8 +101,7 @@ class SystemSimulation(SettableObstacles):
         found = as_scene_or_system(scene)
         if not isinstance(found, System):
             raise TypeError("scene: expected several lines; hybrid.Simulation steps one cable")
-        if most_iterations is not None:
-            raise TypeError("most_iterations: steps of several lines are made until they have converged; leave it out")
+        most = iterations_allowed(most_iterations)
         if found.time is None:
             raise SceneError([missing_time(found)])
         lines = {
@@ -111,6 +119,7 @@ class SystemSimulation(SettableObstacles):
         try:
             cells = layers_at_rest(found)
             self._run = SystemRun(found, self._target, scene_text(found), True, cells, criterion=criterion)
+            self._run.loop.counts.most_iterations = most
             self._run.begin_motion()
         except LineFailed as failed:
             raise self._fail(failed) from None
@@ -134,6 +143,11 @@ class SystemSimulation(SettableObstacles):
     def t(self) -> float:
         """Time of the state, s."""
         return self._run.t
+
+    @property
+    def cut_short(self) -> int:
+        """As of `Simulation.cut_short`."""
+        return int(self._run.loop.counts.cut_short)
 
     def _states(self) -> list[tuple[Surroundings, State]]:
         return [(x.sea, state) for x, state in zip(self._run.model.models, self._run.state.lines, strict=True)]

@@ -10,20 +10,21 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.books import AT_STOP, FAILED, JUMPED, LOG, PAUSED, STEPPED, STRETCHED
 from hybrid.kernels.state.state import Batch, batch_of_one
-from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.plan import SAME_STOP
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
+from hybrid.scene.read import scene_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import REMEMBERED, UNWATCHED, Diagnostics, Stop
-from hybrid.simulation.failure import explanation, failed_node, first_remedy, snapshot
+from hybrid.simulation.failure import Stopped, explanation, first_remedy, touch_text, winch_text, write_snapshot
 from hybrid.simulation.load_change import change_loads
+from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
 from hybrid.simulation.releases import due
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
@@ -41,9 +42,6 @@ from hybrid.store.writer import Recorder
 
 # Rows of the log that wait for an output at most.
 LOGGED = 100
-
-# Nodes of the outputs that are put aside, at most; cells of a line whose outputs are looked at together, at least.
-MOST_ASIDE, FEWEST_JOINED = 20_000, 4
 
 
 # Steps times cells from one checkpoint to the next, about 5 s of computing.
@@ -95,8 +93,7 @@ class TimeLoop:
         self._cpu = clock.process_time()  # at the start of the run
         # whether steps and outputs wait in the buffers of the run until these are full
         self.patient = bool(run.resolution.ends)
-        self._aside: list[tuple[Model, Output]] = []  # outputs that wait, each of a line of its own
-        self._nodes_aside = 0  # of all of these
+        self._aside = OutputsAside()
         self._ratios: list[np.ndarray] = []  # (criteria, points) of outputs that wait, where criteria are written
         run.asks_samples = run.switching is not None and observer.writes_criteria
         self._vibration = VibrationSteps(run.scene, run.resolution)
@@ -163,7 +160,7 @@ class TimeLoop:
         self.diagnostics.finish(run.run.books)
         if run.envelope is not None:
             run.envelope.note_broken(run.envelope_values(), self.recorder.recorded(), run.events.event)
-        count_iterations(run)
+        count_iterations(run.run.clock, run.run.count, run.model.length, run.events)
         count_energy_gains(run)
         if run.itself is not None and self.target is not None:
             run.itself.tell_unkept(run.model, run.events.event)
@@ -288,36 +285,23 @@ class TimeLoop:
 
     @property
     def _may_be_joined(self) -> bool:
-        """Whether outputs of other cells can be looked at together: all that is written follows from their states."""
-        observer, line = self.observer, self.run.model.line
-        of_states = not observer.writes_criteria and observer.quantities is None and self.run.correction is None
-        plain = not (
-            line.law.size or line.bend_law.size or line.slip_law.size or line.torsion.size or line.tension_twist.size
-        )
-        return of_states and plain and line.h.size >= FEWEST_JOINED
+        """Whether outputs of other cells can be looked at together."""
+        return self.run.correction is None and may_be_joined(self.observer, self.run.model.line)
 
     def _put_aside(self, outputs: list[Output]) -> None:
         """Outputs of a line of the zones of now, to be recorded with others."""
-        self._aside += [(self.run.model, x) for x in outputs]
-        self._nodes_aside += sum(x.line.s.size for x in outputs)
+        self._aside.put(self.run.model, outputs)
         self._note_torque()
-        if self._nodes_aside > MOST_ASIDE:
+        if self._aside.full:
             self._log()
             self._record_aside()
 
     def _record_aside(self) -> None:
         """Record what was put aside, and look at it."""
-        if not self._aside:
-            return
-        aside, self._aside, self._nodes_aside = self._aside, [], 0
-        outputs = [x for _, x in aside]
-        observer, seen = self.observer.look_at(outputs)
-        values = observer.values_of(seen)
-        self.observer.first_energy = observer.first_energy
-        zones = [observer.rows_of(x.zones) for x in outputs]
-        self.recorder.save_batch(seen.batch.t.copy(), values, zones[0], zones[1:])
-        if self.target is not None:
-            stop = self.diagnostics.joined_outputs(seen, values, aside)
+        if self._aside:
+            stop = self._aside.record(
+                self.observer, self.recorder, self.diagnostics if self.target is not None else None
+            )
             self.run.events.write_to(self.recorder)
             self._stop_if(stop)
 
@@ -397,10 +381,12 @@ class TimeLoop:
     def fail(self, tried: Tried, dt: float) -> NoReturn:
         """The run cannot go on: leave its last good state and an output, and say where and why."""
         run = self.run
-        s = float(run.model.line.s[failed_node(run, tried)])
-        detail = explanation(run, tried, dt)
-        left = snapshot(run, self.target, tried, dt) if self.target is not None else None
-        error = ComputationError(tried.outcome, run.t, s, detail, left, first_remedy(run, tried))
+        stopped = self._stopped(tried, dt)
+        s, left = float(run.model.line.s[stopped.node]), None
+        if self.target is not None:
+            content = {"t": run.t, "dt": dt, "outcome": tried.outcome.name, "s": run.model.line.s}
+            left = write_snapshot(self.target, content | {"scene": scene_text(run.scene), **run.state._asdict()})
+        error = ComputationError(tried.outcome, run.t, s, explanation(stopped), left, first_remedy(stopped))
         self.write_down(everything=True)  # outputs that wait
         if run.t > self.recorder.last:
             self._record_now()
@@ -409,6 +395,30 @@ class TimeLoop:
         run.events.event(run.t, s, s, tried.outcome.name.lower(), str(error))
         run.events.write_to(self.recorder)
         raise error from None
+
+    def _stopped(self, tried: Tried, dt: float) -> Stopped:
+        """What the line is like where no step leads on."""
+        run, ended = self.run, ""
+        clock, touches = run.run.clock, touch_text(run.run.contact, run.model)
+        if tried.outcome == Outcome.WINCH_AT_END and run.payout is not None:
+            ended = winch_text(run.payout)
+        elif tried.outcome == Outcome.COLLAPSED:
+            ended, touches = run.collapse, ""
+        held = bool(run.model.ends.values.held.all())
+        return Stopped(
+            run.model,
+            run.state,
+            run.before,
+            clock,
+            run.run.count,
+            tried,
+            dt,
+            float(clock.wave_step),
+            run.switching is not None,
+            held,
+            touches,
+            ended,
+        )
 
     # --- checkpoints ----------------------------------------------------------------------------
 

@@ -505,11 +505,14 @@ class Transient:
         if flags & b.UNKNOWN_ERROR:
             note_unknown_error(self)
         if flags & b.STEPS_CUT:
-            note_cut(self)
+            note_cut(run.clock, self.resolution.turn, self.model.length, self.events, self.turned or self.controlled)
+            self.turned = True
         if flags & b.STEPS_SLACK:
-            note_slack(self)
+            s = float(self.model.line.s[int(run.count.slack_cell)])
+            note_slack(run.clock, float(run.clock.wave_step), s, self.events)
+            self.slackened = True
         if flags & b.ITERATIONS_CUT:
-            note_iterations(self)
+            note_iterations(run.clock, run.count, self.model.length, self.events)
         if flags & (b.IS_BENT | b.MEETS_ITSELF | b.NEARS_ITSELF | b.PARTS_ITSELF | b.HIDES_ITSELF):
             look_at_itself(self, flags)
         if flags & b.PUSH_DIED:

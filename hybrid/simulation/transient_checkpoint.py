@@ -16,15 +16,12 @@ from hybrid.kernels.step.sampling import SAME_TIME
 from hybrid.kernels.step.step_law import WARY
 from hybrid.simulation.restore import mesh_tree
 from hybrid.simulation.transient import Transient
+from hybrid.solve.run import LENGTHS
 from hybrid.store.named_arrays import matched
 
 FIRST_WORKS = 11  # works that were booked once
 FIRST_REPORT = 34  # numbers that a report had once; later ones have more behind these
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
-
-
-# Of steps that have become short: kernels.state.books.
-LENGTHS = "tiny_steps", "cut_by_gain", "cut_by_turn", "cut_by_newton", "cut_by_error", "cut_at"  # of Counts
 
 
 def checkpoint(run: Transient) -> dict[str, Any]:

@@ -72,8 +72,15 @@ class VibrationSteps:
         found = np.linalg.lstsq(fit, self._rows[:, 1:], rcond=None)[0]
         return float(np.hypot(found[-2], found[-1]).max())
 
+    @property
+    def largest(self) -> float:
+        """Longest step (s) from here on; infinity: no vibration is shown."""
+        if not self.begins:
+            return np.inf
+        return self._short if self.look < np.inf else self._long
+
     def _bound(self, clock: Clock) -> None:
-        clock.largest = self._short if self.look < np.inf else self._long
+        clock.largest = self.largest
         clock.next_dt = min(clock.next_dt, clock.largest)
 
     def checkpoint(self) -> dict[str, Any]:
@@ -99,4 +106,51 @@ class VibrationSteps:
             due = self.look == np.inf or now - 1e-9 * span <= self.look <= now + (1.0 + 1e-9) * span
             if not due or self._rows.ndim != 2 or self._rows.shape[1] != 3:
                 raise ValueError("a vibration that no run shows")
+        self._bound(clock)
+
+
+class VibrationsOfLines:
+    """The same of several lines, by name, whose steps are those of the line that asks for the shortest."""
+
+    def __init__(self, lines: Mapping[str, VibrationSteps]) -> None:
+        self._lines = lines
+        self.begins = sorted({t for x in lines.values() for t in x.begins})  # s
+
+    @property
+    def due(self) -> float:
+        """When to look next (s) whether one lasts; infinity: none is there."""
+        return min((x.look for x in self._lines.values()), default=np.inf)
+
+    def begin(self, clock: Clock) -> None:
+        """As of `VibrationSteps`."""
+        for x in self._lines.values():
+            x.begin(clock)
+        self._bound(clock)
+
+    def log(self, rows: Floats) -> None:
+        """Remember the forces (n, L, 3) at the ends of lines in steps, as of `VibrationSteps`."""
+        for k, x in enumerate(self._lines.values()):
+            x.log(rows[:, k])
+
+    def judge(self, clock: Clock) -> None:
+        """As of `VibrationSteps`, of lines at whose look the clock stands."""
+        now = self.due
+        for x in self._lines.values():
+            if x.look == now:
+                x.judge(clock)
+        self._bound(clock)
+
+    def _bound(self, clock: Clock) -> None:
+        if self.begins:
+            clock.largest = min(x.largest for x in self._lines.values())
+            clock.next_dt = min(clock.next_dt, clock.largest)
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What later steps depend on, by line."""
+        return {name: x.checkpoint() for name, x in self._lines.items() if x.begins}
+
+    def restore(self, saved: Mapping[str, Any], clock: Clock) -> None:
+        """Continue as `checkpoint` has said, as of `VibrationSteps`."""
+        for name, x in self._lines.items():
+            x.restore(saved.get(name), clock)
         self._bound(clock)

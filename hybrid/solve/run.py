@@ -57,6 +57,8 @@ CELL_STEPS = 200_000
 WAVES_OF_A_CELL = 10
 # Numbers that the buffer of samples may hold, 16 MB.
 MOST_SAMPLED = 2_000_000
+# Of steps that have become short: kernels.state.books.Counts.
+LENGTHS = "tiny_steps", "cut_by_gain", "cut_by_turn", "cut_by_newton", "cut_by_error", "cut_at"
 
 
 class Tried(NamedTuple):

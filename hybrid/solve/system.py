@@ -361,7 +361,7 @@ class SystemSolver:
         limits = task.limits
         self._asked[:] = (
             task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most,
-            task.rho_before, task.fixed, t, 1.0,
+            task.rho_before, task.fixed, t, 1.0, task.cut,
         )  # fmt: skip
         outcome, iterations, left, line, where = solve_system(self._jobs[0].numbers)
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())

@@ -66,9 +66,10 @@ class SystemEquilibrium:
 class LineFailed(ComputationError):
     """A computation of a system stopped: number of the line where it did, -1 for a point."""
 
-    def __init__(self, line: int, *error: object, **named: object) -> None:
-        super().__init__(*error, **named)  # type: ignore[arg-type]
-        self.line = line
+    def __init__(self, line: int, *error: object, first: str = "") -> None:
+        """error: as of `ComputationError`; first: likewise."""
+        super().__init__(*error, first=first)  # type: ignore[arg-type, misc]
+        self.line, self.first = line, first
 
 
 Start = tuple[str, SystemState]

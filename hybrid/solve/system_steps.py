@@ -13,7 +13,15 @@ from hybrid.kernels.junctions.members_water import stir_members
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_step import follow_zones
 from hybrid.kernels.run.system import book_system_step, solve_system
-from hybrid.kernels.run.system_run import CUT_LINE, LINE, blank_steps_job, run_system, sample_system
+from hybrid.kernels.run.system_run import (
+    CUT_LINE,
+    LINE,
+    SLACK_LINE,
+    TURNED_LINE,
+    blank_steps_job,
+    run_system,
+    sample_system,
+)
 from hybrid.kernels.run.system_sampling import BODY_SAMPLE
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats, Moves
@@ -31,15 +39,22 @@ MOST_LOGGED = 2_000_000
 class SystemSteps:
     """Steps of all lines of a system. Lengths follow errors where a largest one is given, else they are equal."""
 
-    def __init__(self, rho: float, outputs: Sequence[float] = (), largest: float = 0.0, shortest: float = 0.0) -> None:
+    def __init__(
+        self,
+        rho: float,
+        outputs: Sequence[float] = (),
+        largest: float = 0.0,
+        shortest: float = 0.0,
+        most_turn: float = np.inf,
+    ) -> None:
         """rho: spectral radius of the scheme; outputs: s, their times, which increase; largest, shortest: s, of steps
 
-        that follow their errors; 0: none do.
+        that follow their errors; 0: none do; most_turn: rad, by which an end that is moved may turn in a step.
         """
         self.outputs = np.array(outputs, float)
         self.body_samples, self.worked = np.zeros((0, 0, BODY_SAMPLE)), np.zeros((3, 0, WORK))
         self.clock, self.counts = b.Clock(), b.Counts()
-        self.lines = np.zeros(2, np.int64)
+        self.lines = np.zeros(4, np.int64)
         self._job, self._states, self._cells = Table(blank_steps_job), (SystemState([]), SystemState([])), 0
         self._log, self.seen = np.zeros((0, 0, len(b.LOG))), np.zeros(0, np.int64)
         self._solver: SystemSolver | None = None
@@ -49,7 +64,7 @@ class SystemSteps:
         clock.rho, clock.allowed, clock.tolerance, clock.error_ratio = rho, np.inf, 1.0, 1.0
         self.controlled = largest > 0.0
         self.counts.controlled, self.counts.phase = self.controlled, b.BEGIN_STEP
-        clock.largest, clock.shortest = largest, shortest
+        clock.largest, clock.shortest, clock.most_turn = largest, shortest, most_turn
         clock.next_dt = max(largest / FIRST, shortest)
 
     # --- what steps lead from and to ----------------------------------------------------------------
@@ -226,7 +241,31 @@ class SystemSteps:
         """Line (-1: a body) and cell or node of the last try that was given up."""
         return int(self.lines[CUT_LINE]), int(self.counts.cut_at)
 
+    @property
+    def turned_line(self) -> int:
+        """Line whose end would have turned too far in a step last."""
+        return int(self.lines[TURNED_LINE])
+
+    @property
+    def slack_line(self) -> int:
+        """Line that was slack last in a step too long for its waves."""
+        return int(self.lines[SLACK_LINE])
+
     # --- checkpoints ----------------------------------------------------------------------------------
+
+    def cuts(self) -> list[float]:
+        """What has been told of steps that were cut, and what is known of those that became short."""
+        clock, counts = self.clock, self.counts
+        known = clock.mute_cuts, clock.mute_slack, clock.longest, counts.cut_short
+        return [float(x) for x in (*known, *(getattr(counts, name) for name in one_line.LENGTHS))]
+
+    def restore_cuts(self, saved: Sequence[float]) -> None:
+        """Go on as `cuts` has told."""
+        clock, counts = self.clock, self.counts
+        (clock.mute_cuts, clock.mute_slack, clock.longest), counts.cut_short = saved[:3], int(saved[3])
+        clock.cut_angle = clock.slack_step = 0.0  # of steps that are undone
+        for name, number in zip(one_line.LENGTHS, saved[4:], strict=True):
+            setattr(counts, name, int(number))
 
     def control(self) -> list[float]:
         """What the lengths of the next steps depend on."""
@@ -234,11 +273,11 @@ class SystemSteps:
             return []
         return [float(self.clock.next_dt), float(self.clock.error_ratio), float(self.counts.wary)]
 
-    def take_control(self, saved: Any) -> None:
-        """Go on as `control` has told.  ValueError: that cannot be."""
+    def take_control(self, saved: Any, largest: float) -> None:
+        """Go on as `control` has told; largest: s, that a step may ever be.  ValueError: that cannot be."""
         if not self.controlled:
             return
-        shortest, largest = float(self.clock.shortest), float(self.clock.largest)
+        shortest = float(self.clock.shortest)
         numbers = isinstance(saved, list) and len(saved) == 3 and all(isinstance(x, int | float) for x in saved)
         if not numbers or not (shortest <= saved[0] <= largest and saved[1] > 0.0 and 0 <= saved[2] <= WARY):
             raise ValueError("control: length and error of the steps were expected")

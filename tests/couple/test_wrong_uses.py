@@ -49,13 +49,6 @@ def system(duration: float = 1.0) -> hybrid.SystemSimulation:
     return hybrid.SystemSimulation(data | {"time": {"duration": duration, "step": 0.05}})
 
 
-def test_what_is_of_one_cable_is_said() -> None:
-    data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene
-    data = data.model_copy(update={"time": hybrid.scene.analysis.Time(duration=1.0, step=0.05)})
-    with pytest.raises(TypeError, match="most_iterations"):
-        hybrid.Simulation(data, most_iterations=3)
-
-
 def test_several_lines_have_the_verbs_of_one_cable() -> None:
     """`step` does the same of both, up to the duration; a verb of the other kind of scene says what to use."""
     with system(0.22) as stepped, system(0.22) as advanced:

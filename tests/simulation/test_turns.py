@@ -14,6 +14,7 @@ from hybrid.model.build import build
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Motion
 from hybrid.simulation import equilibrium
+from tests.said import both_ways, line_of, said
 
 GJ, LENGTH = 0.789, 100.0
 SECTION = {"length": LENGTH, "mass": 1.0, "axial_stiffness": 1e4, "bending_stiffness": 1.345,
@@ -158,6 +159,17 @@ def test_turns_beyond_outputs(tmp_path, every, step):
     np.testing.assert_allclose(result["torque"][-1], 1.3385, rtol=1e-4)
     assert ("steps cut" in kinds(result)) == (step is not None and step > 4.0)
     assert not {"unresolved twist", "gains energy"} & kinds(result)
+
+
+@both_ways
+def test_steps_in_which_an_end_turns_far_are_cut(tmp_path, network):
+    """Two turns in 50 s, in steps of 10 s: they are cut so that none turns by more than a radian, and it is said."""
+    time = {"duration": 60.0, "step": 10.0}
+    scene = taut(second=wound(tmp_path, 2, 50, 60), time=time, output={"every": 10.0}, mesh={"cells": 8})
+    result = line_of(hybrid.run(said(scene, network)))
+    np.testing.assert_allclose(result["torque"][-1], torque_of(2.0), rtol=1e-2)
+    (cut,) = [e for e in result.events if e.kind == "steps cut"]
+    assert "an end turns by" in cut.text and 15 < len(result["steps/t"]) < 30
 
 
 @pytest.mark.parametrize(("every", "step"), [(25.0, 5.0), (25.0, 0.5), (1.0, 1.0), (25.0, None), (1.0, None)])

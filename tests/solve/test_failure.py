@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+import yaml
 
 import hybrid
 from hybrid.model.build import build
+from hybrid.scene.read import parse_either, scene_text
 from hybrid.solve.stepper import Stepper
+from tests.said import ONE, both_ways, line_of, said
 
 SECTION = {"length": 2.0, "mass": 0.5, "bending_stiffness": 0.01, "torsional_stiffness": 0.01}
 
@@ -28,9 +31,10 @@ def scene(model="catenary", **changes):
     return hybrid.validate_scene(data | changes)
 
 
-def test_a_slack_catenary_stops_the_run(tmp_path):
+@both_ways
+def test_a_slack_catenary_stops_the_run(tmp_path, network):
     with pytest.raises(hybrid.ComputationError) as stop:
-        hybrid.run(scene(), tmp_path / "run.h5")
+        hybrid.run(said(scene(), network), tmp_path / "run.h5")
     error = stop.value
     assert error.outcome is hybrid.Outcome.SLACK
     assert 0.0 < error.t < 2.0
@@ -39,13 +43,17 @@ def test_a_slack_catenary_stops_the_run(tmp_path):
     kept = hybrid.open(tmp_path / "run.h5")
     assert kept.status == "failed"
     assert "tension" in kept.message
+    kept = line_of(kept)
     assert kept.times[-1] == pytest.approx(error.t)
     assert kept.tension[:-1].min() > 0.0
     assert [e.kind for e in kept.events] == ["snap", "slack"]  # it jerks, of 110 N within a step, before it goes slack
     with np.load(error.snapshot) as snapshot:
         assert float(snapshot["t"]) == error.t
-        assert snapshot["r"].shape == (41, 3)
-        assert hybrid.parse_scene(str(snapshot["scene"])) == scene()
+        assert snapshot[f"{ONE}/r" if network else "r"].shape == (41, 3)
+        read, expected = (
+            parse_either(x, "")[0] for x in (str(snapshot["scene"]), yaml.safe_dump(said(scene(), network)))
+        )
+        assert scene_text(read) == scene_text(expected)
 
 
 def heaving(step, heave=2.0, model="catenary", **time):
@@ -67,10 +75,11 @@ def heaving(step, heave=2.0, model="catenary", **time):
     }
 
 
-def test_a_step_too_long_for_waves_is_cut():
+@both_ways
+def test_a_step_too_long_for_waves_is_cut(network):
     """In steps of 0.2 s the tether would be slack; it keeps 5.8 N as a rod in short ones."""
     fine = hybrid.run(heaving(0.005, model="rod"))
-    result = hybrid.run(heaving(0.2))
+    result = line_of(hybrid.run(said(heaving(0.2), network, [0.0, 0.0, -200.0])))
     cut = [e for e in result.events if e.kind == "steps cut"]
     assert len(cut) == 1 and 8.0 < cut[0].t < 8.5
     assert "0.2 s" in cut[0].text and "time.step: 0.1 " in cut[0].text
@@ -80,17 +89,24 @@ def test_a_step_too_long_for_waves_is_cut():
     assert float(result.envelope["tension_min"].min()) > 0.0
 
 
+@both_ways
 @pytest.mark.parametrize(("step", "blamed"), [(0.05, True), (0.005, False), (0.002, False)])
-def test_small_steps_are_tried_before_the_line_is_blamed(step, blamed):
-    """It is slack in steps of any length: shorter ones are tried first, and the message says when that proves it."""
+def test_small_steps_are_tried_before_the_line_is_blamed(step, blamed, network):
+    """It is slack in steps of any length: shorter ones are tried first, and the message says when that proves it.
+
+    None is tried that is shorter than a wave takes to pass a cell, 0.0031 s: the least is between half of that and it,
+    or the step of the scene.
+    """
     with pytest.raises(hybrid.ComputationError) as stop:
-        hybrid.run(heaving(step, heave=3.0))
+        hybrid.run(said(heaving(step, heave=3.0), network, [0.0, 0.0, -200.0]))
     error = stop.value
     assert error.outcome is hybrid.Outcome.SLACK and error.t == pytest.approx(2.76, abs=0.02)
     assert ("the line is slack" in error.detail) is not blamed
     assert ("time.step: 0.0031 from the start" in str(error)) is blamed
     assert ("tried after longer ones" in error.detail) is (step > 0.0031)
     assert "rod zone" in str(error) and "passes a cell in 0.0031 s" in error.detail
+    tried = float(error.detail.split("the step of ")[1].split()[0])
+    assert 0.5 * min(step, 0.0031) < tried <= min(step, 0.0032)
 
 
 def test_controlled_steps_are_cut_as_well():

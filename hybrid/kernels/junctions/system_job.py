@@ -71,6 +71,7 @@ class SystemTask(NamedNumbers):
     fixed: float
     time: float
     part: float
+    cut: float  # whether a step is taken as the last iteration has left it, converged or not
 
 
 def blank_system_job() -> SystemJob:
@@ -91,6 +92,6 @@ def task_of(asked):
     """The task that is asked."""
     limits = Limits(asked.reach, asked.scale, int(asked.most))
     return Task(
-        int(asked.what), asked.dt, asked.before, asked.rho_of_step, asked.cv, asked.ca, False, limits, False,
+        int(asked.what), asked.dt, asked.before, asked.rho_of_step, asked.cv, asked.ca, False, limits, asked.cut != 0.0,
         asked.rho_of_last, asked.fixed != 0.0,
     )  # fmt: skip

@@ -21,12 +21,10 @@ from hybrid.kernels.state.books import (
     ASK_TRIES,
     AT_STOP,
     BEGIN_STEP,
-    COLLAPSES,
     END_STEP,
     FAILED,
     HIDES_ITSELF,
     IS_BENT,
-    ITERATIONS_CUT,
     JUDGE,
     MEETS_ITSELF,
     NEARS_ITSELF,
@@ -37,13 +35,11 @@ from hybrid.kernels.state.books import (
     SOLVE,
     START,
     STEPPED,
-    STEPS_CUT,
-    STEPS_SLACK,
     TRIED,
     TRY,
     TRYING,
 )
-from hybrid.kernels.step.accept import accept, collapses, end_step, judge, keep_imposed, note_try, watch, watch_push
+from hybrid.kernels.step.accept import accept, end_step, judge, keep_imposed, note_cuts, note_try, watch, watch_push
 from hybrid.kernels.step.job import (
     call_follower,
     call_itself,
@@ -86,18 +82,9 @@ def conclude(table, job, old, new):
     if verdict > 0:
         accept(line, ends, old, new, books, work, clock.try_end, dt)
         count.notices = watch(line, ends, old, new, books, work.report, clock.now, dt)
-        if count.is_cut:
-            count.cut_short += 1
-            if count.cut_short == 1:
-                count.notices |= ITERATIONS_CUT
-        if collapses(clock, count, dt):
-            count.notices |= COLLAPSES
+        count.notices |= note_cuts(clock, count, dt)
         if job.was.shape[0] > 0:
             count.notices |= watch_push(clock, work.report)
-        if clock.cut_angle > 0.0 and clock.mute_cuts == 0.0:
-            count.notices |= STEPS_CUT
-        if clock.slack_step > 0.0 and clock.mute_slack == 0.0:
-            count.notices |= STEPS_SLACK
         if job.follower != 0:
             count.notices |= call_follower(job.follower, job.following)
         count.notices |= watch_itself(job, new)

@@ -65,6 +65,7 @@ from hybrid.kernels.step.newton import (
     ASSEMBLY,
     CORRECT,
     CORRECTION,
+    CUT_SHORT,
     EQUILIBRIUM,
     FINISH,
     GAIN,
@@ -438,7 +439,7 @@ def solve_system(table):
         start_here(old, work)
     forget_torques(tables)
     rubs = give_scheme(system, task, s)
-    before, left, strength = math.inf, math.inf, 1.0
+    before, left, size, strength = math.inf, math.inf, math.inf, 1.0
     outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
     while it < most and outcome == NOT_CONVERGED:
         it += 1
@@ -508,6 +509,11 @@ def solve_system(table):
         if task.what == EQUILIBRIUM:
             outcome = NOT_CONVERGED if strength > 1.0 else outcome
             strength = adapt_springs(work, strength, turned, LARGEST_TURN)
+    cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
+    if cut_short:
+        outcome = OK
+        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
+            left = size
     if task.what == STEP or task.what == EQUILIBRIUM:
         ask_bodies(system, CARRY)
         follow_laws(tables, s)
@@ -516,6 +522,8 @@ def solve_system(table):
         bad, line_of_bad, cell = end_system_step(system, task, s, outcome == OK)
         if bad != OK:
             outcome, line, where = bad, line_of_bad, cell
+        elif cut_short:
+            outcome = CUT_SHORT
     if task.what == ASSEMBLY and outcome == OK:
         begin_books(tables, joints, t)
         book_bodies(work, 0.0)

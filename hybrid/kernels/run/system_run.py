@@ -31,7 +31,6 @@ from hybrid.kernels.state.books import (
     ASK_TRIES,
     AT_STOP,
     BEGIN_STEP,
-    COLLAPSES,
     END_STEP,
     FAILED,
     JUDGE,
@@ -51,14 +50,14 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.accept import collapses
-from hybrid.kernels.step.generalized_alpha import SAME
+from hybrid.kernels.step.accept import note_cuts
 from hybrid.kernels.step.job import call_follower, call_solver, read
-from hybrid.kernels.step.newton import OK, SLACK, STEP, TURNED_TOO_FAR
-from hybrid.kernels.step.step_control import begin_step, halve, passes, take_past
+from hybrid.kernels.step.newton import CUT_SHORT, OK, SLACK, STEP, TURNED_TOO_FAR
+from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, passes, take_past
 
-# Of `lines`: the line (-1: a body) where the last try was worst, and of the last try that was given up.
-LINE, CUT_LINE = 0, 1
+# Of `lines`: the line (-1: a body) where the last try was worst, and of the last try that was given up; whose end turned
+# too far in a step last; and which was slack in one.
+LINE, CUT_LINE, TURNED_LINE, SLACK_LINE = range(4)
 # Of `limits`: the reach of Newton's method, m; its iterations at most; the arm by which moments on bodies are compared
 # with forces, m.
 OF_REACH, OF_ITERATIONS, OF_ARM = 0, 1, 2
@@ -77,7 +76,7 @@ class StepsJob(NamedTuple):
     clock: Clock  # of all lines
     counts: Counts
     limits: Floats  # (3,) above
-    lines: NDArray[np.int64]  # (2,) above
+    lines: NDArray[np.int64]  # (4,) above
     seen: NDArray[np.int64]  # (L,) bits of kernels.state.books: how near a line came to itself in the last step
     log: Floats  # (rows, L, len(LOG))
     loads: Floats  # (K, 8) as kernels.state.state.Moves.loads, of the bodies of which one grows or follows a table
@@ -126,10 +125,17 @@ call_sample, call_stir, call_watch = caller(0), caller(0), caller(0)
 
 
 @inner
-def end_of_try(clock):
-    """Time at which the present try ends."""
-    end = clock.now + clock.tried_dt
-    return clock.until if clock.until - end <= SAME * clock.tried_dt else end
+def end_of_tries(steps, system):
+    """Time at which the present try ends: of the line whose end would turn too far in the least of it."""
+    clock, end = steps.clock, math.inf
+    for l in range(system.tables.shape[0]):
+        angle, step = clock.cut_angle, clock.cut_step
+        own = end_of_try(clock, read(system.tables[l]).moves)
+        if own < end:
+            steps.lines[TURNED_LINE], end = l, own
+        else:
+            clock.cut_angle, clock.cut_step = angle, step
+    return end
 
 
 @inner
@@ -183,7 +189,10 @@ def try_lone(steps, system):
         own = job.books.clock
         own.now, own.try_end, own.rho = clock.now, clock.try_end, clock.rho
         own.step_before, own.rho_before = clock.last_dt, clock.last_rho
+        job.books.counts.most_iterations, job.books.counts.taken = steps.counts.most_iterations, steps.counts.taken
         outcome, it, left, where = call_solver(steps.marcher, steps.lone[j])
+        if outcome == CUT_SHORT:
+            outcome, steps.counts.is_cut = OK, 1
         if outcome == OK and not job.work.report[SLACKEST] > system.floors[l]:
             outcome, where = SLACK, int(job.work.report[SLACKEST_CELL])
         if outcome != OK:
@@ -201,7 +210,10 @@ def try_step(steps, system):
     asked.what, asked.dt, asked.time = STEP, clock.try_end - clock.now, clock.try_end
     asked.before, asked.rho_of_step, asked.rho_of_last = clock.last_dt, clock.rho, clock.last_rho
     asked.cv, asked.ca, asked.scale, asked.fixed = 0.0, 0.0, 1.0, 1.0 - counts.controlled
-    asked.reach, asked.most = steps.limits[OF_REACH], steps.limits[OF_ITERATIONS]
+    asked.reach, asked.most, counts.is_cut = steps.limits[OF_REACH], steps.limits[OF_ITERATIONS], 0
+    asked.cut = 1.0 if counts.most_iterations > 0 else 0.0
+    if counts.most_iterations > 0:
+        asked.most = min(asked.most, float(counts.most_iterations - counts.taken))
     for l in range(system.tables.shape[0]):
         books = read(system.tables[l]).books
         books.counts.parity, books.clock.shortest = counts.parity, clock.shortest
@@ -209,10 +221,13 @@ def try_step(steps, system):
     outcome, line, it, left, where = try_lone(steps, system)
     if outcome == OK and (steps.joined.shape[0] > 0 or system.work.shape[0] > 0):
         result, more, worse, row, place = call_step(steps.solver, table)
+        if result == CUT_SHORT:
+            result, counts.is_cut = OK, 1
         outcome, it, left, where = result, max(it, more), max(left, worse), place
         if row >= 0:
             line = steps.joined[row]
     counts.outcome, counts.tries, counts.where, clock.correction = outcome, it, where, left
+    counts.taken += it
     steps.lines[LINE] = line
 
 
@@ -265,6 +280,11 @@ def judge(steps, system):
         return 1
     if 0.5 * clock.tried_dt < clock.shortest:
         return -1
+    if outcome == SLACK:
+        # As of one line: the waves are those of the line that is slack, whatever moves its ends.
+        if dt <= read(system.tables[steps.lines[LINE]]).books.clock.wave_step:
+            return -1
+        clock.slack_step, counts.slack_cell, steps.lines[SLACK_LINE] = dt, counts.where, steps.lines[LINE]
     halve(clock, counts, dt)
     if outcome == TURNED_TOO_FAR:
         counts.cut_by_turn += 1
@@ -301,7 +321,7 @@ def accept(steps, system):
     counts.parity = 1 - counts.parity
     counts.steps += 1
     counts.iterations = counts.tries
-    flags = COLLAPSES if collapses(clock, counts, dt) else 0
+    flags = note_cuts(clock, counts, dt)
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
         report, row = job.work.report, steps.log[counts.rows, l]
@@ -359,7 +379,10 @@ def between_steps(steps, table):
     if counts.phase == TRY:
         if counts.rows == steps.log.shape[0]:  # one step may be cut into many
             return PAUSED
-        clock.try_end = end_of_try(clock)
+        own = steps.even
+        if counts.parity:
+            own = steps.odd
+        clock.try_end = end_of_tries(steps, read_system(own))
         counts.phase = SOLVE
         if counts.asks & ASK_BEFORE:
             return TRYING

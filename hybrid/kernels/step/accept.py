@@ -11,6 +11,8 @@ from hybrid.kernels.march.zone_torque import POWER
 from hybrid.kernels.state.books import (
     BEGIN_STEP,
     BENT,
+    COLLAPSES,
+    ITERATIONS_CUT,
     JUMPED,
     LEAVES_PLANE,
     LETS_GO,
@@ -18,6 +20,8 @@ from hybrid.kernels.state.books import (
     PUSH_DIED,
     SAMPLE,
     SLACKENED,
+    STEPS_CUT,
+    STEPS_SLACK,
     STRETCHED,
     TRY,
     ZONES,
@@ -105,6 +109,23 @@ def collapses(clock, count, dt):
         return False
     count.tiny_steps += 1
     return count.tiny_steps % MANY == 0
+
+
+@inner
+def note_cuts(clock, count, dt):
+    """What there is to tell of how a step of dt that is taken was cut, as bits."""
+    flags = 0
+    if count.is_cut:
+        count.cut_short += 1
+        if count.cut_short == 1:
+            flags |= ITERATIONS_CUT
+    if collapses(clock, count, dt):
+        flags |= COLLAPSES
+    if clock.cut_angle > 0.0 and clock.mute_cuts == 0.0:
+        flags |= STEPS_CUT
+    if clock.slack_step > 0.0 and clock.mute_slack == 0.0:
+        flags |= STEPS_SLACK
+    return flags
 
 
 @inner
