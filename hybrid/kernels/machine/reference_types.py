@@ -15,11 +15,11 @@ from numba import from_dtype, typeof, types
 from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic, lower_setattr_generic
 from numba.core.typing.templates import AttributeTemplate, make_intrinsic_template
-from numba.extending import NativeValue, infer_getattr, models, register_model, unbox
+from numba.extending import NativeValue, infer_getattr, models, register_model, typeof_impl, unbox
 
 from hybrid.kernels.machine.argument_types import is_array, key_of, layout_of
 from hybrid.kernels.machine.named_numbers import NamedNumbers
-from hybrid.kernels.machine.references import examples
+from hybrid.kernels.machine.references import Intrinsic, examples
 
 _WORD = ir.IntType(64)
 
@@ -127,9 +127,16 @@ def call_function_of_six(returned: Any) -> Any:
     return call
 
 
-def function_type(of: Any, told: Any) -> Any:
-    """The type of an intrinsic function; told: what numba is told of it."""
+@cache
+def _function_type(of: Intrinsic) -> Any:
+    """The type of an intrinsic function."""
+    told = globals()[of._what](of._example)
     return types.Function(make_intrinsic_template(of, told, told.__name__))
+
+
+@typeof_impl.register(Intrinsic)
+def _type_of_intrinsic(of: Intrinsic, _: Any) -> Any:
+    return _function_type(of)
 
 
 def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:

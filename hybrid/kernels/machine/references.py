@@ -7,7 +7,6 @@ reference is one number; `line.h` reads address and shape of that array where th
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,17 +27,11 @@ def _has_arrays(value: Any) -> bool:
 
 
 class Intrinsic:
-    """A function of kernels that numba is told of when a kernel that calls it is compiled."""
+    """A function of kernels of which kernels.machine.reference_types tells numba."""
 
     def __init__(self, what: str, example: Any) -> None:
-        """what: the function of kernels.machine.reference_types that says what it does with such an example."""
+        """what: the function there that says what it does with such an example."""
         self._what, self._example = what, example
-
-    @cached_property
-    def _numba_type_(self) -> Any:
-        from hybrid.kernels.machine import reference_types
-
-        return reference_types.function_type(self, getattr(reference_types, self._what)(self._example))
 
     def __deepcopy__(self, _: Any) -> Intrinsic:
         return self  # numba copies what refers to it
