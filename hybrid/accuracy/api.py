@@ -36,7 +36,7 @@ from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
-from hybrid.simulation.first_use import compile_beside, kernels_of, kernels_of_lines
+from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.progress import (
@@ -46,7 +46,7 @@ from hybrid.simulation.progress import (
     listener_of,
     tell_of_compiling,
 )
-from hybrid.simulation.restart import RemainingLines, remaining_run, remaining_system
+from hybrid.simulation.restart import RemainingLines, remaining
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
@@ -167,17 +167,16 @@ def resume(
     if target != path:
         check_target(target, True)
     with locked(path), locked(target if target != path else None):
-        lines = remaining_system(path, until, settings, start)
-        remaining = remaining_run(path, until, settings, start) if lines is None else lines
-        if remaining.anew and target == path:
+        left = remaining(path, until, settings, start)
+        if left.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
-        if isinstance(remaining, RemainingLines):
-            _move_lines(remaining.system, target, progress, path, criterion, remaining)
+        if isinstance(left, RemainingLines):
+            _move_lines(left.scene, target, progress, path, criterion, left)
             return open_result(target)
-        case = Case(remaining.scene, criterion, remaining.changes, remaining.points)
+        case = Case(left.scene, criterion, left.changes, left.points)
         with _supervised(case, progress):
-            Passes(case, target, path, remaining).compute()
+            Passes(case, target, path, left).compute()
     return written_result(target, case.late_file)
 
 
@@ -210,18 +209,18 @@ def _several_lines(
 
 def _move_lines(
     system: System, target: Target, progress: bool | Listener, source: Path | None = None,
-    criterion: UserCriterion | None = None, remaining: RemainingLines | None = None,
+    criterion: UserCriterion | None = None, left: RemainingLines | None = None,
 ) -> None:  # fmt: skip
-    """Compute the motion of several lines; source: the result to go on with; remaining: what is to be done with it."""
-    changes = remaining.changes if remaining is not None else ()
-    source = None if remaining is not None and remaining.anew else source
+    """Compute the motion of several lines; source: the result to go on with; left: what is to be done with it."""
+    changes = left.changes if left is not None else ()
+    source = None if left is not None and left.anew else source
     from hybrid.accuracy.system_accuracy import SystemPasses, is_refined, system_with_layers
     from hybrid.simulation.system_run import Recording, run_system
 
     if criterion is not None and not system.adaptive:
         raise TypeError(NO_ZONES)
     duration, listener = system.require_time().duration, listener_of(progress)
-    tell_of_compiling(listener, kernels_of_lines(system))
+    tell_of_compiling(listener, kernels_of(system))
     with interrupts() as stopped, ProgressReporter(listener, duration) as reporter:
         notes: list[tuple[str, str]] = []
         pending = ERROR_ESTIMATE if system.output.errors else ""

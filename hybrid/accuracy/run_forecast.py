@@ -30,7 +30,7 @@ from hybrid.model.run_time import COST_STEP
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 from hybrid.simulation.case import Case
-from hybrid.simulation.first_use import kernels_of, kernels_of_lines
+from hybrid.simulation.first_use import kernels_of
 from hybrid.simulation.time_loop import TimeLoop
 from hybrid.store.comparison_recorder import ComparisonRecorder
 
@@ -261,7 +261,7 @@ def _grown(system: System) -> float:
 
 def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     """The same of several lines: their first steps, as often as all runs would take them."""
-    if found.cells > MOST_CELLS or not is_warm(kernels_of_lines(system)):
+    if found.cells > MOST_CELLS or not is_warm(kernels_of(system)):
         return found
     from hybrid.simulation.system_run import SystemRun
     from hybrid.solve.system_statics import LineFailed

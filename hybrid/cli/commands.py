@@ -53,6 +53,7 @@ from hybrid.cli.pipe import guard_output, raise_lost_output
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
     from hybrid.scene.schema import Scene
+    from hybrid.scene.system import System
     from hybrid.store.reader import Result
 
 
@@ -65,11 +66,6 @@ def run(
     with session(as_json, quiet) as console:
         asked = load_either(console, scene, settings)
         duration = asked.require_time().duration
-        if not isinstance(asked, hybrid.Scene):
-            from hybrid.cli.system_commands import run_lines
-
-            run_lines(console, asked, output or Path(f"{scene.stem}.h5"), plot, keep)
-            return
         target = console.will_write(output or Path(f"{scene.stem}.h5"))
         picture = picture_beside(target, plot)
         cold = console.compiling(asked)
@@ -94,18 +90,12 @@ def resume(
 ) -> None:  # fmt: skip
     """Go on with a run that was stopped, beyond its end, or with other loads."""
     with session(as_json, quiet) as console:
-        from hybrid.simulation.restart import remaining_run, remaining_system
+        from hybrid.simulation.restart import remaining
 
         console.source = str(result)
         target, changed = console.will_write(output or result), settings or []
-        lines = remaining_system(result.resolve(), until, changed, start)
-        if lines is not None:
-            from hybrid.cli.system_commands import resume_lines
-
-            resume_lines(console, lines.system, result, target, plot, until=until, settings=changed, start=start)
-            return
         picture = picture_beside(target, plot)
-        left = remaining_run(result.resolve(), until, changed, start)
+        left = remaining(result.resolve(), until, changed, start)
         cold = console.compiling(left.scene)
         begin = clock.perf_counter()
         with console.progress() as tell:
@@ -130,39 +120,21 @@ def static(
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
         asked = load_either(console, scene, settings)
-        from hybrid.cli.system_stiffness import check_holding, show_holding
-        from hybrid.cli.tables import equilibrium_facts, equilibrium_table, errors_facts, errors_table
+        from hybrid.cli.progress_line import span
+        from hybrid.cli.stiffness_tables import check_holding, show_holding
 
         check_holding(asked, stiffness, offsets, reach, heading)
-        if not isinstance(asked, hybrid.Scene):
-            from hybrid.cli.system_commands import static_lines
-
-            static_lines(console, asked, output or Path(f"{scene.stem}.static.h5"), plot, keep)
-            show_holding(console, asked, stiffness, offsets, reach, heading)
-            return
         target = console.will_write(output or Path(f"{scene.stem}.static.h5"))
         picture = picture_beside(target, plot)
         console.compiling(asked, static=True)
-        from hybrid.cli.progress_line import span
-
         begin = clock.perf_counter()
         result = hybrid.static(asked, target, overwrite=not keep)
         wall = clock.perf_counter() - begin
-        if picture:
-            from hybrid.view.matplotlib_import import import_matplotlib
-
-            import_matplotlib()
-            hybrid.plot(result, picture)
-        facts = equilibrium_facts(result)
-        errors = errors_facts(result)
-        console.show(lambda: equilibrium_table(facts))
-        if errors:
-            console.show(lambda: errors_table(errors, result))
-        facts |= {"errors": errors}
-        console.events(result.events)
-        console.done(
-            f"equilibrium in {span(wall)} of wall time", target, picture, status=result.status, wall=wall, **facts
-        )
+        _draw(result, picture)
+        more, facts = _show_equilibrium(console, result)
+        text = f"equilibrium in {span(wall)} of wall time{more}"
+        console.done(text, target, picture, status=result.status, wall=wall, **facts)
+        show_holding(console, asked, stiffness, offsets, reach, heading)
 
 
 @app.command()
@@ -176,7 +148,7 @@ def plan(
 ) -> None:  # fmt: skip
     """Show what a run would compute, by which keys of the scene, and how long it takes: first steps are computed."""
     with session(as_json, False) as console:
-        from hybrid.cli.plan_tables import contents_table, outputs_table, plan_lines
+        from hybrid.cli.plan_tables import contents_tables, outputs_table, plan_facts, plan_rows
 
         asked = load_either(console, scene, settings)
         if outputs:
@@ -184,17 +156,12 @@ def plan(
             console.json("outputs", recorded=[x._asdict() for x in found], on_request=[x._asdict() for x in more])
             console.show(lambda: outputs_table(found, more))
             return
-        if not isinstance(asked, hybrid.Scene):
-            from hybrid.cli.system_commands import plan_of_lines
-
-            plan_of_lines(console, asked, verbose)
-            return
         made = hybrid.plan(asked)
-        zones = [asdict(zone) | {"cells": n} for zone, n in zip(made.zones, made.cells, strict=True)]
-        console.json("plan", **(asdict(made) | {"zones": zones, "cells": sum(made.cells)}))
-        console.show(lambda: "\n".join(plan_lines(asked, made)))
+        console.json("plan", **plan_facts(made))
+        console.show(lambda: "\n".join(plan_rows(asked, made)))
         if verbose:
-            console.show(lambda: contents_table(made))
+            for content in contents_tables(made):
+                console.show(content)
 
 
 @app.command()
@@ -307,11 +274,33 @@ def _count(n: int, what: str) -> str:
 
 
 def _ended(
-    console: Console, asked: Scene, result: Result, target: Path, wall: float, computed: float, cold: bool,
+    console: Console, asked: Scene | System, result: Result, target: Path, wall: float, computed: float, cold: bool,
     picture: Path | None,
 ) -> None:  # fmt: skip
     """Print the summary of a run that has ended; computed: s of it, by this command."""
     from hybrid.cli.progress_line import span, speed
+
+    _draw(result, picture)
+    logged = next(x for _, x in result.each_line())
+    steps = len(logged["steps/t"]) if "steps/t" in logged else 0
+    pace = "compilation included" if cold else f"computing alone, {speed(computed / wall)} x real time"
+    duration = asked.require_time().duration
+    text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
+    if computed < duration:
+        text = f"{duration:.6g} s in {steps} steps, the last {computed:.6g} s in {span(wall)} of wall time ({pace})"
+    more, facts = _show_motion(console, asked, result, target)
+    console.done(text + more, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
+
+
+def _show_motion(console: Console, asked: Any, result: Result, target: Path) -> tuple[str, dict[str, Any]]:
+    """Print what a run has reached; what to say of it behind its length, and for programs."""
+    if result.lines:
+        from hybrid.cli.lines_tables import show_lines
+        from hybrid.store.records import error_words
+
+        known = "error_total_position" in result.attributes
+        more = f"estimated error {error_words(result.attributes)}" if known else "error not estimated"
+        return f"; {more}", show_lines(console, result)
     from hybrid.cli.tables import (
         errors_facts,
         errors_table,
@@ -321,30 +310,42 @@ def _ended(
         zones_over_time,
     )
 
-    if picture:
-        from hybrid.view.matplotlib_import import import_matplotlib
-
-        import_matplotlib()
-        hybrid.plot(result, picture)
-    steps = len(result["steps/t"]) if "steps/t" in result else 0
-    pace = "compilation included" if cold else f"computing alone, {speed(computed / wall)} x real time"
-    duration = asked.require_time().duration
-    text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
-    if computed < duration:
-        text = f"{duration:.6g} s in {steps} steps, the last {computed:.6g} s in {span(wall)} of wall time ({pace})"
     console.events(result.events)
     facts = zones_over_time(result) if asked.model.kind == "adaptive" else {}
     if facts:
         console.show(lambda: zones_line(facts, target))
-    errors = errors_facts(result)
+    errors, extremes = errors_facts(result), extremes_facts(result)
     if errors:
         console.show(lambda: errors_table(errors, result))
-    else:
-        text += "; error not estimated"
-    extremes = extremes_facts(result)
     console.show(lambda: extremes_table(extremes))
-    facts |= {"errors": errors, "extremes": extremes}
-    console.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
+    return "" if errors else "; error not estimated", facts | {"errors": errors, "extremes": extremes}
+
+
+def _show_equilibrium(console: Console, result: Result) -> tuple[str, dict[str, Any]]:
+    """The same of an equilibrium."""
+    if result.lines:
+        from hybrid.cli.lines_tables import show_lines
+
+        path, residual = (result.attributes[f"static_{x}"] for x in ("path", "residual"))
+        found = show_lines(console, result)
+        return f" ({path}; residual force {residual:.2g} N)", found | {"path": path, "residual": residual}
+    from hybrid.cli.tables import equilibrium_facts, equilibrium_table, errors_facts, errors_table
+
+    facts, errors = equilibrium_facts(result), errors_facts(result)
+    console.show(lambda: equilibrium_table(facts))
+    if errors:
+        console.show(lambda: errors_table(errors, result))
+    console.events(result.events)
+    return "", facts | {"errors": errors}
+
+
+def _draw(result: Result, picture: Path | None) -> None:
+    """Draw a result; picture: where to, None: nowhere."""
+    if picture is not None:
+        from hybrid.view.matplotlib_import import import_matplotlib
+
+        import_matplotlib()
+        hybrid.plot(result, picture)
 
 
 def _with_command(arguments: list[str]) -> typer.Typer:

@@ -9,7 +9,7 @@ import shutil
 import stat
 import sys
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cached_property
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from hybrid.errors import ComputationError, SceneError
     from hybrid.scene.schema import Scene
+    from hybrid.scene.system import System
     from hybrid.simulation.progress import Progress
     from hybrid.store.records import Event
     from hybrid.studies.dispatch import StudyRunning
@@ -84,21 +85,16 @@ class Console:
         if not (self.quiet or self.as_json):
             self._tell(text, "yellow", wrap=True)
 
-    def compiling(self, scene: Scene, static: bool = False) -> bool:
+    def compiling(self, scene: Scene | System, static: bool = False) -> bool:
         """Whether kernels of a scene have to be compiled first, which takes long; if so, say it beforehand.
 
         static: for its equilibrium alone, whose stability is judged.
         """
-        from hybrid.simulation.first_use import kernels_of
-
-        return self.compiling_kernels(kernels_of(scene, static))
-
-    def compiling_kernels(self, names: Sequence[str]) -> bool:
-        """The same of kernels by name, as room.file.function."""
         from hybrid.kernels.machine.compile import is_warm
+        from hybrid.simulation.first_use import kernels_of
         from hybrid.simulation.progress import COMPILING
 
-        if is_warm(list(names)):
+        if is_warm(kernels_of(scene, static)):
             return False
         self.json("compiling")
         self.note(COMPILING)

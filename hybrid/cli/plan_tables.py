@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from functools import partial
 from math import isfinite
 from textwrap import shorten, wrap
 from typing import TYPE_CHECKING, Any
@@ -39,8 +41,32 @@ SHORT = {
 }
 
 
-def plan_lines(scene: Scene, plan: Plan) -> list[str]:
-    """The plan in lines of COLUMNS columns."""
+def plan_facts(plan: Plan | SystemPlan) -> dict[str, Any]:
+    """A plan for programs."""
+    found = asdict(plan)
+    if "zones" in found:
+        cells = found["cells"]
+        zones = [zone | {"cells": n} for zone, n in zip(found["zones"], cells, strict=True)]
+        found |= {"zones": zones, "cells": sum(cells)}
+    return found
+
+
+def plan_rows(scene: Any, plan: Any) -> list[str]:
+    """A plan for people, in rows of COLUMNS columns."""
+    rows = _rows_of_system if scene.line_names else _rows_of_cable
+    return rows(scene, plan)
+
+
+def contents_tables(plan: Any) -> list[Callable[[], Any]]:
+    """What makes everything that is on and off of a plan, of lines with names one after another."""
+    if not hasattr(plan, "lines"):
+        return [partial(_contents_table, plan)]
+    each = ((partial(str, f"line {name}"), partial(_contents_table, line)) for name, line in plan.lines.items())
+    return [content for both in each for content in both]
+
+
+def _rows_of_cable(scene: Scene, plan: Plan) -> list[str]:
+    """The plan of a cable."""
     on = {entry.what: entry.why for entry in plan.contents if entry.on}
     sections, attached = scene.cable.sections, len(scene.cable.attachments)
     length = sum(section.length for section in sections)
@@ -71,7 +97,7 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
     ]
 
 
-def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
+def _rows_of_system(system: System, plan: SystemPlan) -> list[str]:
     """The plan of several lines: each of them, what joins them, and what they have in common."""
     rows = _rows_of_lines(system, plan)
     every = list(plan.lines.values())
@@ -291,7 +317,7 @@ def _runs(plan: Plan) -> str:
     return f"{plan.runs} with those to compare with{more}"
 
 
-def contents_table(plan: Plan) -> Any:
+def _contents_table(plan: Plan) -> Any:
     """Everything: what is on and by which key, what is off and what would switch it on, cells of every zone."""
     from rich.console import Group
     from rich.table import Table

@@ -121,13 +121,13 @@ def report(
             console.done(f"{page.stat().st_size / 1e6:.1f} MB", page, size=page.stat().st_size)
         return
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
-        from hybrid.view.summary import facts_of, status_facts
+        from hybrid.view.summary import facts_of
 
         swings = _modes_of(opened, modes) if modes else None
         page = hybrid.report(opened, output or result.with_suffix(".html"), overwrite=overwrite, modes=swings)
         size, found = page.stat().st_size, dict[str, Any]()
         if as_json:
-            found["facts"] = [fact._asdict() for fact in (status_facts if opened.lines else facts_of)(opened)]
+            found["facts"] = [fact._asdict() for fact in facts_of(opened)]
         if as_json and opened.lines:  # each line by its name: the facts that one cable has
             found["lines"] = {name: [fact._asdict() for fact in facts_of(x)] for name, x in opened.lines.items()}
         console.done(f"{size / 1e6:.1f} MB", page, status=opened.status, size=size, **found)

@@ -45,27 +45,21 @@ def sensitivity(
 
 def _results(scene: Scene | System, motion: bool) -> list[str]:
     """What engineers ask first."""
+    tensions = [f"{x}/tension@{end}".lstrip("/") for x in scene.lines for end in ("start", "end")]
     if motion:
-        of = [""] if isinstance(scene, hybrid.Scene) else [f"{name}/" for name in scene.lines]
-        return [f"max {line}tension@{end}" for line in of for end in ("start", "end")]
-    if not isinstance(scene, hybrid.Scene):
-        return [f"{name}/tension@{end}" for name in scene.lines for end in ("start", "end")]
-    names = ["tension@start", "tension@end"]
-    return [*names, "max curvature"] if scene.model.kind != "catenary" else names
+        return [f"max {name}" for name in tensions]
+    bends = not scene.line_names and scene.scene_of("").model.kind != "catenary"
+    return [*tensions, *["max curvature"] * bends]
 
 
 def _numbers(scene: Scene | System) -> list[str]:
     """All numbers of the sections that are not 0."""
-    if isinstance(scene, hybrid.Scene):
-        cables = {"cable": scene.cable}
-    else:
-        cables = {f"lines.{name}": x.cable for name, x in scene.lines.items()}
     out = []
-    for place, cable in cables.items():
-        for i, section in enumerate(cable.sections):
+    for line, x in scene.lines.items():
+        for i, section in enumerate(x.cable.sections):
             for name, value in section.model_dump().items():
                 if isinstance(value, float) and value != 0.0 and name != "max_strain":
-                    out.append(f"{place}.sections[{i}].{name}")
+                    out.append(f"{scene.key_of(line)}.sections[{i}].{name}")
     return out
 
 

@@ -21,7 +21,6 @@ from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.stepped_ends import ENDS
 from hybrid.simulation.stepping import Simulation
-from hybrid.simulation.system_stepping import SystemSimulation
 from hybrid.store.selection import check_target, write_atomically
 
 # In the folder `resources` of the unit.
@@ -58,7 +57,7 @@ def export_fmu(scene: SceneLike | System, path: str | Path, *, name: str | None 
         # a module of its own for each unit: several may run in one interpreter
         token = hashlib.sha256((text + (folder / SCENE).read_text(encoding="utf-8")).encode()).hexdigest()[:16]
         script = folder / f"hybrid_{model}_{token}.py"
-        unit = "CableUnit" if isinstance(found, Scene) else "LinesUnit"
+        unit = "LinesUnit" if found.points else "CableUnit"
         script.write_text(_SCRIPT.format(model=model, unit=unit), encoding="utf-8")
         made = builder.build_FMU(
             script, folder / "made", [folder / SCENE, folder / INTERFACE, *files], **ABILITIES
@@ -107,25 +106,25 @@ def _yaml(data: Any) -> str:
 
 def _interface(scene: Scene | System) -> dict[str, Any]:
     """What may be set of the ends or points, and where they begin."""
-    with Simulation(scene) as cable:
-        if isinstance(cable, SystemSimulation):
-            points = {
-                name: {"settable": cable.settable(name), "position": np.round(cable.point(name).position, 12).tolist()}
-                for name in cable.scene.points
-            }
-            time = cable.scene.require_time()
-            return {"points": points, "lines": [*cable.scene.lines], "step": time.step, "duration": time.duration}
-        assert isinstance(scene, Scene)
-        positions = cable.state.position[[0, -1]]
+    made: Any = Simulation(scene)
+    with made:
         time = scene.require_time()
-        payout = next(filter(None, (getattr(end, "payout", None) for end in scene.ends.both)), None)
-        return {
-            "payout": payout is not None,
-            "winch": payout is not None and payout.from_outside,
-            "ends": {
-                end: {"settable": sorted(cable.settable(end)), "position": np.round(positions[k], 12).tolist()}
-                for k, end in enumerate(ENDS)
-            },
-            "step": time.step,
-            "duration": time.duration,
-        }
+        return {"step": time.step, "duration": time.duration} | (_points if scene.points else _ends)(made)
+
+
+def _points(made: Any) -> dict[str, Any]:
+    points = {
+        name: {"settable": made.settable(name), "position": np.round(made.point(name).position, 12).tolist()}
+        for name in made.scene.points
+    }
+    return {"points": points, "lines": [*made.scene.lines]}
+
+
+def _ends(made: Any) -> dict[str, Any]:
+    positions = made.state.position[[0, -1]]
+    payout = next(filter(None, (getattr(end, "payout", None) for end in made.scene.ends.both)), None)
+    ends = {
+        end: {"settable": sorted(made.settable(end)), "position": np.round(positions[k], 12).tolist()}
+        for k, end in enumerate(ENDS)
+    }
+    return {"ends": ends, "payout": payout is not None, "winch": payout is not None and payout.from_outside}

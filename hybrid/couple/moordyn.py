@@ -10,20 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
+from typing import Any
 
 import numpy as np
 
 from hybrid.couple.moordyn_places import PlacesAlone, frame_of_angles, spin_of_rates
 from hybrid.errors import Complaint, SceneError
+from hybrid.interop.moordyn.all_lines import JOINTS, scene_of_lines
 from hybrid.interop.moordyn.cables import chain_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import read_source
-from hybrid.interop.moordyn.systems import JOINTS, system_of
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.analysis import CatenaryModel
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import parse_either
-from hybrid.scene.system import System
 from hybrid.simulation.system_stepping import PointState, SystemSimulation
 
 # s: the longest step, and how long a system may be stepped.
@@ -82,11 +82,10 @@ class MoorDyn:
         if not self.deck.lines:
             self._without_lines()
             return
-        made = system_of(self.deck)
+        made = scene_of_lines(self.deck)
         self.text, self.notes = made.text, made.notes
-        scene, _ = parse_either(self.text)
-        assert isinstance(scene, System)
-        self.scene: System | None = scene
+        self.scene: Any = parse_either(self.text)[0]
+        scene = self.scene
         names = {
             id: f"point{id}" if f"point{id}" in scene.points else f"body{p.on}" for id, p in self.deck.points.items()
         }

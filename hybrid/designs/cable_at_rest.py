@@ -17,7 +17,7 @@ from scipy import sparse
 from hybrid.accuracy.api import resolution_at_rest
 from hybrid.designs.factors import Factors
 from hybrid.designs.gradients import Gradients
-from hybrid.designs.line_at_rest import LEFT_OUT, Beside, LineAtRest, Wanted
+from hybrid.designs.line_at_rest import LEFT_OUT, Beside, LineAtRest, parse_result
 from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
@@ -40,12 +40,14 @@ class CableAtRest(OfScene):
 
     scene: Scene
 
-    def __init__(self, scene: Scene, cells: float, wanted: Sequence[Wanted], places: Places = NO_PLACES) -> None:
-        """cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.
+    contact = None  # with other lines
+
+    def __init__(self, scene: Scene, cells: float, of: Sequence[str], places: Places = NO_PLACES) -> None:
+        """cells: their lengths over the usual, 0.5 or more; of: results; places: of an equilibrium with these cells.
 
         SceneError, ComputationError: as of `hybrid.sensitivity`.
         """
-        case = StaticCase(scene)
+        wanted, case = [parse_result(x, scene.length) for x in of], StaticCase(scene)
         resolution: Resolution = resolution_at_rest(case)
         self.scene = case.scene
         refuse_use(self.scene, "derivatives", given="hybrid sensitivity")  # with the model that accuracy has chosen
@@ -57,6 +59,7 @@ class CableAtRest(OfScene):
             expected = "an equilibrium in which the line does not touch itself"
             raise SceneError([Complaint("contact.self", "a line that touches itself", expected, "another shape")])
         self.line = LineAtRest(self.scene, self.model, found.state, wanted)
+        self.lines = [self.line]
         linear = linear_line(self.line.joined(self.line.here), "cable", found.state, sticks=False, quick=False)
         free, held = linear.free.reshape(-1, SIZE).copy(), self.line.here.ends.held
         for k in (0, 1):
@@ -72,6 +75,10 @@ class CableAtRest(OfScene):
         """Which unknowns are the place of an end."""
         size = SIZE * self.model.line.s.size
         return np.arange(1, 4) + (size - SIZE if k else 0)
+
+    def off_by_contact(self, keys: Sequence[str], found: Floats) -> Floats:
+        """(P, W) by how much derivatives may be off by the sample points of contact, of which there is none."""
+        return np.zeros_like(found)
 
     def by(self, keys: Sequence[str]) -> Floats:
         """(P, W) derivatives of all results by numbers."""

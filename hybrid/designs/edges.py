@@ -12,8 +12,8 @@ import numpy as np
 
 from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.line_at_rest import LineAtRest
+from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.numbers import changed_scene, number_of, size_of
-from hybrid.designs.system_at_rest import SystemAtRest
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.touchdown import penetration
@@ -51,7 +51,7 @@ def refuse_edges(asked: Scene | System, of: Sequence[str]) -> None:
 
 
 def by_cells(
-    asked: Scene | System, rest: CableAtRest | SystemAtRest, key: str, values_of: Callable[[Scene | System], Floats]
+    asked: Scene | System, rest: CableAtRest | NetworkAtRest, key: str, values_of: Callable[[Scene | System], Floats]
 ) -> tuple[Floats, Floats]:
     """Derivatives (W,) of where contact begins by a number, and their errors: all of what goes over too few cells.
 
@@ -59,7 +59,7 @@ def by_cells(
     ComputationError: there is no equilibrium beside this one.
     """
     number, size = number_of(asked, key), size_of(asked, key, number_of(asked, key))
-    cell = max(_cell(x) for x in ([rest.line] if isinstance(rest, CableAtRest) else rest.lines))
+    cell = max(_cell(x) for x in rest.lines)
 
     def change(step: float) -> Floats:
         more, less = (values_of(changed_scene(asked, key, number + x)) for x in (step, -step))

@@ -9,9 +9,9 @@ import numpy as np
 
 from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
 from hybrid.designs.motions import IN_MOTION, Motions, OfMotion, Peaks
+from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.numbers import scene_with
 from hybrid.designs.sensitivity import at_rest
-from hybrid.designs.system_at_rest import SystemAtRest
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.schema import Scene
@@ -30,7 +30,7 @@ class Point:
     """
 
     def __init__(
-        self, x: Floats, rests: Mapping[str, CableAtRest | SystemAtRest], motion: OfMotion, equilibria: Equilibria
+        self, x: Floats, rests: Mapping[str, CableAtRest | NetworkAtRest], motion: OfMotion, equilibria: Equilibria
     ) -> None:
         self.x, self.rests, self._motion, self._of = x, rests, motion, equilibria
         self.values = np.zeros(len(equilibria.wanted))
@@ -102,8 +102,6 @@ class Point:
     def nodes(self, case: str, name: str) -> Floats:
         """Arc lengths (N+1,) of the nodes of a line, m."""
         rest = self.rests[case]
-        if isinstance(rest, CableAtRest):
-            return rest.model.line.s
         return rest.lines[list(rest.scene.lines).index(name)].model.line.s
 
     def shapes(self) -> dict[str, dict[str, Floats]]:
@@ -112,13 +110,7 @@ class Point:
         Of a case whose motion alone is asked those of its output points where it begins.
         """
         begins = {case: run.begin for case, run in self._motion.runs.items()}
-        return {case: _shapes(self.rests[case]) if case in self.rests else begins[case] for case in self._of.scenes}
-
-
-def _shapes(rest: CableAtRest | SystemAtRest) -> dict[str, Floats]:
-    if isinstance(rest, CableAtRest):
-        return {"": rest.line.state.r.copy()}
-    return {name: line.state.r.copy() for name, line in zip(rest.scene.lines, rest.lines, strict=True)}
+        return {case: self.rests[case].shapes if case in self.rests else begins[case] for case in self._of.scenes}
 
 
 class Equilibria:

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from hybrid.designs.edges import refuse_edges
 from hybrid.designs.line_at_rest import AXES, refuse_parts
+from hybrid.designs.network_tangents import NetworkOthers
 from hybrid.designs.numbers import at_a_bound, number_of, scene_with, size_of
 from hybrid.designs.peaks import over_time, peaks, smoothed
 from hybrid.designs.replay import Course, course_of, replay, with_outputs
-from hybrid.designs.system_tangents import SystemOthers
 from hybrid.designs.tangents import Others, Seen, Unfollowed, has_two_sides, step_of
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
@@ -143,11 +143,8 @@ def followed(
     each_step, more = any(x.over == "t" for x in wanted), Motion.more(wanted) if smooth else None
     own = with_outputs(asked, course, each_step=each_step)
     scenes: list[Any] = [tuple(x and with_outputs(x, course, each_step=each_step) for x in pair) for pair in pairs]
-    others: Others | SystemOthers
-    if isinstance(own, System):
-        others = SystemOthers(own, scenes, steps, course.lines)
-    else:
-        others = Others(own, scenes, steps, course.lines[""], more)
+    kind: Any = NetworkOthers if own.line_names else Others
+    others: Others | NetworkOthers = kind(own, scenes, steps, course.lines, more)
     base = Motion(asked, wanted, course, smooth=smooth, begun=others.begin)
     names = {line: sorted({x.name for x in wanted if x.line == line}) for line in {x.line for x in wanted}}
     here, *beside = [[base.beside(x, wanted) for x in each] for each in others.results(names)]
@@ -180,20 +177,20 @@ def by_differences(
 
 def parse_history(asked: Scene | System, text: str) -> Wanted:
     found = NAME.match(text)
-    several = isinstance(asked, System)
-    example = "max east/tension@end" if several else "max tension@end"
-    if found is None or bool(found[2]) != several:
+    example = "max east/tension@end" if asked.line_names else "max tension@end"
+    if found is None or bool(found[2]) != bool(asked.line_names):
         expected = "max, min, mean, std, last or t=TIME, and NAME@S, of several lines LINE/NAME@S"
         raise SceneError([Complaint("of", text, expected, example)])
-    over, line, name, axis, at = found.groups()
+    over, _, name, axis, at = found.groups()
+    line = found[2] or ""
     time = math.nan
     if over.startswith("t="):
         over, time = "t", _time_of(asked, text, over.removeprefix("t="))
     section = OF_SECTION.match(at or "")
     at = None if section is not None else at
-    if isinstance(asked, System) and line not in asked.lines:
+    if line not in asked.lines:
         raise SceneError([Complaint("of", text, f"a line of {', '.join(asked.lines)}", example)])
-    cable = asked.lines[line].cable if isinstance(asked, System) else asked.cable
+    cable = asked.lines[line].cable
     length, count = cable.length, len(cable.sections)
     if section is not None and int(section[1]) >= count:
         raise SceneError([Complaint("of", text, f"a section of the line, which has {count}, counted from 0", example)])
@@ -207,7 +204,7 @@ def parse_history(asked: Scene | System, text: str) -> Wanted:
     if s is None and name in PROBES and "s" in PROBES[name].dims and over not in ("max", "min"):
         raise SceneError([Complaint("of", text, "a place", f"{text}@end")])
     of_section = None if section is None else int(section[1])
-    return Wanted(over, line or "", name, axis or "", np.inf if s == length else s, of_section, time)
+    return Wanted(over, line, name, axis or "", np.inf if s == length else s, of_section, time)
 
 
 def _time_of(asked: Scene | System, text: str, number: str) -> float:
@@ -240,10 +237,10 @@ class Motion:
         self.course, self.smooth = course, smooth
         self._smooth: dict[Wanted, Floats] = {}  # extremes of parabolas, where they have been asked for
         more = self.more(wanted) if smooth else None
-        self._cables = {k: x.cable for k, x in scene.lines.items()} if isinstance(scene, System) else {"": scene.cable}
+        self._cables = {k: x.cable for k, x in scene.lines.items()}
         each_step = any(x.over == "t" for x in wanted)
         with replay(scene, course, finer, more, each_step, begun) as result:
-            lines: dict[str, Any] = dict(result.lines) or {"": result}
+            lines: dict[str, Any] = dict(result.each_line())
             self.steps = {name: np.array(x["steps/t"]) for name, x in lines.items()}
             self.zones = {name: list(_zones(x)) for name, x in lines.items()}
             self.begin = {name: np.array(x.position[0]) for name, x in lines.items()}

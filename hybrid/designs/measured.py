@@ -16,7 +16,6 @@ from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.base import Finding
 from hybrid.scene.design import Design
-from hybrid.scene.schema import Scene
 from hybrid.scene.task_file import TaskFile
 from hybrid.studies.csv_table import Table, read_table
 
@@ -72,7 +71,7 @@ def measurements(task: TaskFile[Design], scene: AnyScene) -> Measurements:
             if has_place(result):
                 s = _arc_length(task, cells, cable_of(scene, name).length, line)
                 at = "@end" if s == cable_of(scene, name).length else f"@{s!r}"  # it stays the end of another length
-            of = f"{'' if isinstance(scene, Scene) else f'{name}/'}{result}{at}"
+            of = f"{f'{name}/' if name else ''}{result}{at}"
             key = (case, of if time is None else f"t={time!r} {of}{IN_MOTION}")
             if time is not None:
                 histories.setdefault((case, of), []).append((time, len(rows)))
@@ -153,7 +152,7 @@ def _columns(task: TaskFile[Design], table: Table, scene: AnyScene) -> dict[str,
             expected = f"a column of x, y, z, or one of: {', '.join([*whole, *vectors])}"
             raise SceneError([Complaint("measured.file", name, expected, line=1)], asked.file)
     needed = ["s"] if asked.at is None and (not columns or any(map(has_place, columns.values()))) else []
-    needed += [] if isinstance(scene, Scene) else ["line"]
+    needed += ["line"] if scene.line_names else []
     needed += ["case"] if len(task.asked.cases) > 1 else []
     header = ",".join(table.header)
     for name in needed:
@@ -181,11 +180,10 @@ def _where(task: TaskFile[Design], cells: dict[str, str], scene: AnyScene, line:
     asked, cases = task.asked.measured, task.asked.cases
     assert asked is not None
     case, name = cells.get("case", next(iter(cases), "")), cells.get("line", "")
-    lines = [""] if isinstance(scene, Scene) else [*scene.lines]
     if case not in (list(cases) or [""]):
         raise SceneError([Complaint("case", case, f"one of: {', '.join(cases)}", line=line)], asked.file)
-    if name not in lines:
-        raise SceneError([Complaint("line", name, f"one of: {', '.join(lines)}", line=line)], asked.file)
+    if name not in scene.lines:
+        raise SceneError([Complaint("line", name, f"one of: {', '.join(scene.lines)}", line=line)], asked.file)
     return case, name
 
 

@@ -79,16 +79,11 @@ def at_a_bound(key: str, number: float) -> SceneError:
     return SceneError([Complaint("by", key, "a number that may be a little more, and less", fix)])
 
 
-def length_of(scene: Scene | System) -> float:
-    """Of the longest line, m."""
-    return max(x.cable.length for x in scene.lines.values()) if isinstance(scene, System) else scene.length
-
-
 def size_of(asked: Scene | System, key: str, number: float) -> float:
     """What runs differ by parts of; SceneError: a number of how the scene is computed, which has no derivative."""
     refuse_computing(key)
     if PLACE.search(key):
-        return PART_OF_LENGTH * length_of(asked)
+        return PART_OF_LENGTH * asked.length
     if unit_of_key(asked, key) == "deg":
         return max(abs(number), RADIAN)
     return abs(number) or 1.0
@@ -109,6 +104,12 @@ class OfScene:
     """What is computed of a scene, and differentiated by its numbers."""
 
     scene: Scene | System
+    lines: Sequence[Any]  # LineAtRest, by name as in the scene
+
+    @property
+    def shapes(self) -> dict[str, Floats]:
+        """Places (N+1, 3) of the nodes of every line, m."""
+        return {name: line.state.r.copy() for name, line in zip(self.scene.lines, self.lines, strict=True)}
 
     def number(self, key: str) -> float:
         """The value of a key of the scene."""
@@ -121,7 +122,7 @@ class OfScene:
 
     def _step(self, key: str, number: float) -> float:
         if TOUCHED.search(key):
-            return OF_TOUCHED * (length_of(self.scene) if PLACE.search(key) else abs(number) or 1.0)
+            return OF_TOUCHED * (self.scene.length if PLACE.search(key) else abs(number) or 1.0)
         return (OF_LENGTH if LENGTH.search(key) else OF_NUMBER) * (abs(number) or 1.0)
 
 

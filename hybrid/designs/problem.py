@@ -21,7 +21,6 @@ from hybrid.outputs.probes import PROBES
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.design import Design, OfEquilibrium, Unknown
 from hybrid.scene.read import as_scene_or_system, parse_either, scene_text
-from hybrid.scene.schema import Scene
 from hybrid.scene.task_file import TaskFile
 from hybrid.studies.expressions import evaluated
 
@@ -322,11 +321,10 @@ def _result(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, 
         fix = "a target, which takes it as it is"
         expected = "a result that changes evenly: where contact begins goes by the nodes that come to the bed"
         raise task.refusal([Finding((*at, "quantity"), expected, fix)])
-    several = not isinstance(scene, Scene)
-    names = [] if isinstance(scene, Scene) else list(scene.lines)
-    if several and asked.line not in names:
+    names = scene.line_names
+    if names and asked.line not in names:
         raise task.refusal([Finding((*at, "line"), f"one of: {', '.join(names)}")])
-    if not several and asked.line is not None:
+    if not names and asked.line is not None:
         raise task.refusal([Finding((*at, "line"), "nothing: the scene has one line")])
     place = f"@sections[{asked.section}]" if asked.section is not None else ""
     if asked.at is not None:
@@ -340,13 +338,13 @@ def _result(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, 
     if asked.over is not None:
         if _has_places(asked) and asked.at is None and asked.over not in ("max", "min"):
             raise task.refusal([Finding((*at, "at"), f"the place whose {asked.over} is meant", "at: end")])
-        return f"{asked.over} {f'{asked.line}/' if several else ''}{asked.quantity}{place}{IN_MOTION}"
+        return f"{asked.over} {f'{asked.line}/' if asked.line else ''}{asked.quantity}{place}{IN_MOTION}"
     if _has_places(asked) and asked.at is None and not take:
         raise task.refusal([Finding((*at, "at"), "a place, or take: max or min along the line", "at: end")])
     if take and at[0] != "limits" and not _has_places(asked):
         raise task.refusal([Finding((*at, "take"), f"nothing: {asked.quantity} has one value for the whole line")])
     extreme = f"{take} " if _has_places(asked) and asked.at is None else ""
-    return f"{extreme}{f'{asked.line}/' if several else ''}{asked.quantity}{place}"
+    return f"{extreme}{f'{asked.line}/' if asked.line else ''}{asked.quantity}{place}"
 
 
 def _has_places(asked: OfEquilibrium) -> bool:
@@ -368,8 +366,8 @@ def _pieces(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, 
 
 
 def cable_of(scene: AnyScene, line: str | None) -> Any:
-    """The cable of a line; None: of a scene of one."""
-    return scene.cable if isinstance(scene, Scene) else scene.lines[line or ""].cable
+    """The cable of a line; None: of the line without a name."""
+    return scene.lines[line or ""].cable
 
 
 def refused_result(task: TaskFile[Design], error: SceneError) -> SceneError:

@@ -13,9 +13,8 @@ from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
 from hybrid.designs.edges import WAY as BY_CELLS
 from hybrid.designs.edges import by_cells, is_edge
 from hybrid.designs.in_motion import in_motion
-from hybrid.designs.line_at_rest import parse_result
+from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.numbers import number_of, refuse_computing
-from hybrid.designs.system_at_rest import SystemAtRest
 from hybrid.errors import ComputationError, Outcome
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
@@ -77,8 +76,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
         fine = at_rest(asked, of)
         values, found, ways = fine.values, fine.by(by), len(by) * (way_at_rest(asked, fine),)
         errors = OF_DIFFERENCE * np.abs(found - at_rest(asked, of, 2.0).by(by))
-        if isinstance(fine, SystemAtRest):
-            errors = np.maximum(errors, fine.off_by_contact(by, found))
+        errors = np.maximum(errors, fine.off_by_contact(by, found))
         if asked.environment.seabed is not None:  # there it goes up and down with the cells: two may be alike by chance
             errors = np.maximum(errors, ON_BED * np.abs(found))
         if edges:
@@ -98,12 +96,12 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     return out
 
 
-def way_at_rest(asked: Scene | System, rest: CableAtRest | SystemAtRest) -> str:
+def way_at_rest(asked: Scene | System, rest: CableAtRest | NetworkAtRest) -> str:
     """The way to derivatives at rest, with what is left out of them, and lines that have only begun to touch."""
     bed = asked.environment.seabed
     rubs = [bed and bed.friction, *(y.friction for y in asked.obstacles.values())]
-    contact = rest.contact if isinstance(rest, SystemAtRest) else None
-    if contact is not None and isinstance(asked, System) and asked.contact is not None:
+    contact = rest.contact
+    if contact is not None and asked.contact is not None:
         rubs.append(asked.contact.friction)
     begun = [f"lines {a} and {b} begin to touch" for a, b in contact.begins] if contact is not None else []
     return ", ".join([AT_REST, *(["friction left out"] if any(rubs) else []), *begun])
@@ -111,12 +109,12 @@ def way_at_rest(asked: Scene | System, rest: CableAtRest | SystemAtRest) -> str:
 
 def at_rest(
     asked: Scene | System, of: Sequence[str], cells: float = 1.0, places: Places = NO_PLACES
-) -> CableAtRest | SystemAtRest:
+) -> CableAtRest | NetworkAtRest:
     """The equilibrium of one cable or of several lines; of: results.
 
     cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.
     SceneError: what has no derivative; ComputationError: there is no equilibrium.
     """
-    if isinstance(asked, Scene):
-        return CableAtRest(asked, cells, [parse_result(x, asked.length) for x in of], places)
-    return SystemAtRest(asked, cells, of, places)
+    kind: Any = NetworkAtRest if asked.line_names else CableAtRest
+    found: CableAtRest | NetworkAtRest = kind(asked, cells, of, places)
+    return found

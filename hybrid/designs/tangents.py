@@ -113,15 +113,15 @@ class Others:
 
     def __init__(
         self, scene: Scene, scenes: Sequence[tuple[Scene, Scene | None]], steps: Sequence[float],
-        resolution: Resolution, more: Sequence[float] | None = None,
+        lines: Mapping[str, Resolution], more: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
         """scene: of the run; scenes: with more of each number by a step, and with less (None: it is not looked at);
 
-        more: as of `replay.with_outputs`.
+        lines: how finely, by name; more: as of `replay.with_outputs`.
         """
         self._more_points, self._scene = more, scene
-        self._scenes, self._steps, self._resolution = list(scenes), np.array(steps, float), resolution
-        self.models = [build(more, resolution, spare=False) for more, _ in scenes]
+        self._scenes, self._steps, self._resolution = list(scenes), np.array(steps, float), lines[""]
+        self.models = [build(more, lines[""], spare=False) for more, _ in scenes]
         self._first: list[Batch] = []
         self._base: list[Batch] = []  # outputs of the run
         self.sizes = np.zeros((len(scenes), TANGENT_SIZES))

@@ -11,21 +11,15 @@ import numpy as np
 from hybrid.store.reader import Result
 from hybrid.view.along import along
 from hybrid.view.decimate import even
+from hybrid.view.lines import LINE_COLOURS, AllLines, arms_of, bodies_of, points_of
 from hybrid.view.obstacles import rings
 from hybrid.view.projections import bed_heights, whole_zones
 from hybrid.view.scenery import box_and_planes
 from hybrid.view.style import BED, BODY, INK, colour_of
-from hybrid.view.summary import facts_of, status_facts
-from hybrid.view.system_views import LINE_COLOURS, AllLines, arms_of, bodies_of, points_of
+from hybrid.view.summary import facts_of
 
 DIGITS = 7  # of the largest number of a curve: more than a screen shows apart
 MOST_NODES = 1201  # of a line whose cells are marked: more would be one grey bar
-CABLE = ""  # the name of the line of a scene of one cable
-
-
-def lines_of(result: Result) -> dict[str, Result]:
-    """The lines of a result by name; one cable has no name."""
-    return dict(result.lines) or {CABLE: result}
 
 
 def around(result: Result) -> dict[str, Any]:
@@ -40,7 +34,7 @@ def heads(result: Result) -> list[dict[str, Any]]:
     named = dict(zip(result.lines, cycle(LINE_COLOURS), strict=False))
     return [
         {"name": name, "colour": named.get(name, ""), "length": float(np.ptp(line.s))}
-        for name, line in lines_of(result).items()
+        for name, line in result.each_line()
     ]
 
 
@@ -49,9 +43,9 @@ def frames(result: Result, outputs: list[int], most: int) -> list[dict[str, Any]
 
     Of a line: s, x, y, z (m), `along` (quantity -> [s, values]), zones, nodes (m).
     """
-    lines = [_along_line(line, outputs, most) for line in lines_of(result).values()]
+    lines = [_along_line(line, outputs, most) for _, line in result.each_line()]
     marks = _marks(result, outputs)
-    one = next(iter(lines_of(result).values()))
+    one = next(x for _, x in result.each_line())
     moved = [[_plain(x) for x in rings(one, i)] for i in outputs]
     times = result.times[outputs]
     return [
@@ -62,8 +56,7 @@ def frames(result: Result, outputs: list[int], most: int) -> list[dict[str, Any]
 
 def facts(result: Result) -> list[dict[str, Any]]:
     """What to know first, as the report has it."""
-    found = status_facts(result) if result.lines else facts_of(result)
-    return [{"key": x.key, "title": x.title, "text": x.text, "weight": x.weight, "s": x.s} for x in found]
+    return [{"key": x.key, "title": x.title, "text": x.text, "weight": x.weight, "s": x.s} for x in facts_of(result)]
 
 
 def _along_line(line: Result, outputs: list[int], most: int) -> list[dict[str, Any]]:
@@ -134,8 +127,6 @@ def _marks(result: Result, outputs: list[int]) -> list[list[dict[str, Any]]]:
 
 def _arms(result: Result, output: int) -> list[Any]:
     """From each body to its fairleads, as curves with gaps."""
-    if not result.lines:
-        return []
     return [_plain(arms_of(result, name, np.array([output]))[0]) for name in bodies_of(result)]
 
 

@@ -10,18 +10,18 @@ from hybrid.errors import Complaint, ComputationError, HybridError, SceneError
 from hybrid.kernels.machine.compile import is_warm
 from hybrid.live import drawing
 from hybrid.model.model_costs import with_model
-from hybrid.model.plan import Plan, SystemPlan, plan
+from hybrid.model.plan import plan
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import located_in, parse_either, scene_text
-from hybrid.scene.schema import Scene
-from hybrid.simulation.first_use import compile_beside, kernels_of, kernels_of_lines
+from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import static_system
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.reader import Result, written_result
 
 if TYPE_CHECKING:
+    from hybrid.scene.schema import Scene
     from hybrid.scene.system import System
 
 # Points along a line in a picture: one for each cell, as far as a screen shows them apart.
@@ -52,42 +52,43 @@ def picture_of(text: str, file: str, compiling: Callable[[], None]) -> tuple[dic
     except HybridError as error:
         out["problems"] = [{"line": None, "where": "scene", "text": str(error)}]
         return out, None
-    points = LEAST_POINTS if len(drawing.lines_of(result)) > 10 else MOST_POINTS
+    points = LEAST_POINTS if len(result.lines) > 10 else MOST_POINTS
     out |= drawing.around(result)
     out |= {"heads": drawing.heads(result), "frame": drawing.frames(result, [0], points)[0]}
     return out | {"facts": drawing.facts(result)}, result
 
 
-def equilibrium(scene: Scene | System, made: Plan | SystemPlan) -> Result:
+def equilibrium(scene: Scene | System, made: Any) -> Result:
     """The equilibrium with the cells of a first run: no coarser ones to estimate its error, no pre-run for its mesh.
 
     It is looked for as `hybrid static` does, from the scene alone: from the last picture Newton's method might find
     another one, where there are several.
     """
-    if not isinstance(scene, Scene):
-        memory = MemoryTarget()
-        static_system(scene, memory, partial(scene_text, scene))
-        return written_result(memory)
+    target, at_rest = MemoryTarget(), _lines_at_rest if scene.line_names else _cable_at_rest
+    at_rest(scene, made, target)
+    return written_result(target)
+
+
+def _lines_at_rest(scene: Any, made: Any, target: MemoryTarget) -> None:
+    static_system(scene, target, partial(scene_text, scene))
+
+
+def _cable_at_rest(scene: Any, made: Any, target: MemoryTarget) -> None:
     check_motions(scene)
-    assert isinstance(made, Plan)
     if model_is_free(scene, moves=False):
         scene = with_model(scene, "rod")
     if isinstance(scene.output.points, int):
         points = min(max(sum(made.cells) + 1, LEAST_POINTS), MOST_POINTS)
         output = scene.output.model_copy(update={"points": points, "errors": False})
         scene = scene.model_copy(update={"output": output})
-    target = MemoryTarget()
     StaticCase(scene).record(first_resolution(scene), target)
-    return written_result(target)
 
 
 def _begin_to_compile(scene: Scene | System, compiling: Callable[[], None]) -> None:
     """Begin to compile what an equilibrium calls, once on a machine; `compiling` hears of it beforehand."""
-    names = kernels_of(scene, True) if isinstance(scene, Scene) else kernels_of_lines(scene, True)
-    if not is_warm(names):
+    if not is_warm(kernels_of(scene, True)):
         compiling()
-        if isinstance(scene, Scene):
-            compile_beside(scene, static=True)
+        compile_beside(scene, static=True)
 
 
 def _refused(complaint: Complaint) -> dict[str, Any]:
@@ -113,9 +114,9 @@ def _failed(error: ComputationError, text: str, file: str) -> dict[str, Any]:
     return {"line": place.line, "column": place.column, "where": "equilibrium", "given": what, "text": "\n".join(lines)}
 
 
-def _plan_rows(scene: Scene | System, made: Plan | SystemPlan) -> list[list[str]]:
+def _plan_rows(scene: Any, made: Any) -> list[list[str]]:
     """What a run would compute, as rows of a name and a text."""
-    if isinstance(made, SystemPlan):
+    if scene.line_names:
         rows = []
         for name, line in made.lines.items():
             kinds = ", ".join(dict.fromkeys(zone.kind for zone in line.zones))
@@ -123,8 +124,8 @@ def _plan_rows(scene: Scene | System, made: Plan | SystemPlan) -> list[list[str]
         rows.append(["in all", f"{made.cells} cells, {made.unknowns} unknowns"])
     else:
         rows = _zone_rows(made)
-    if isinstance(scene, Scene) and isinstance(made, Plan) and model_is_free(scene):
-        rows.insert(0, ["model", "the cheapest, by a pre-run: " + ", ".join(kind for kind, _ in made.choice)])
+        if model_is_free(scene):
+            rows.insert(0, ["model", "the cheapest, by a pre-run: " + ", ".join(kind for kind, _ in made.choice)])
     if scene.time is None:
         rows.append(["time", "no motion (no table `time`)"])
     else:
@@ -132,7 +133,7 @@ def _plan_rows(scene: Scene | System, made: Plan | SystemPlan) -> list[list[str]
     return rows
 
 
-def _zone_rows(made: Plan) -> list[list[str]]:
+def _zone_rows(made: Any) -> list[list[str]]:
     cells = sum(made.cells)
     if made.base_cells is not None:
         rows = [["zones", "adaptive: rod where a criterion asks for it, catenary elsewhere"]]

@@ -74,7 +74,7 @@ class Playback:
 
     def _read(self) -> int:
         with open_result(self.path) as result:
-            outputs = len(next(iter(result.lines.values())).times) if result.lines else len(result.times)
+            outputs = len(next(x for _, x in result.each_line()).times)
             outputs = min(outputs, len(result.times))
             if outputs < self._next:  # another run has begun
                 self.frames, self.stride, self._next = [], 1, 0
@@ -89,8 +89,7 @@ class Playback:
             new = list(range(begin, outputs, self.stride))
             if not self.running and (outputs - 1) % self.stride:
                 new.append(outputs - 1)
-            lines = drawing.lines_of(result)
-            points = POINTS if len(lines) <= MANY_LINES else FEW_POINTS
+            points = POINTS if len(result.lines) <= MANY_LINES else FEW_POINTS
             if new:
                 self.frames += drawing.frames(result, new, points)
             self._next = outputs

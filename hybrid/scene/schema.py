@@ -191,9 +191,37 @@ class Scene(Table):
         "computed in a plane where the whole scene lies in one, for as long as nothing could push it out of it [-]",
     )
 
+    # What a scene of several lines has as well, so that nobody has to ask which of the two it is.
+    points: ClassVar[Mapping[str, Any]] = {}
+    bodies: ClassVar[Mapping[str, Any]] = {}
+    line_names: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def lines(self) -> dict[str, Scene]:
+        """The lines by name: this one, whose name is empty."""
+        return {"": self}
+
+    @property
+    def adaptive(self) -> tuple[str, ...]:
+        """Names of the lines whose zones move."""
+        return ("",) if isinstance(self.model, AdaptiveModel) else ()
+
+    @property
+    def starts_as_placed(self) -> bool:
+        """Whether the motion starts where the scene has the line, at rest, and not in equilibrium."""
+        return not isinstance(self.initial, Equilibrium)
+
+    def scene_of(self, name: str) -> Scene:
+        """A line as a scene of its own: there is one."""
+        return self.lines[name]
+
+    def key_of(self, name: str) -> str:
+        """The key of the table that says what a line is made of."""
+        return "cable"
+
     @property
     def length(self) -> float:
-        """Unstretched length of the cable [m]."""
+        """Unstretched length of the longest line [m]."""
         return self.cable.length
 
     @classmethod

@@ -251,6 +251,20 @@ class System(Table):
     )
 
     @property
+    def line_names(self) -> tuple[str, ...]:
+        """Names of the lines; none where the one line has no name."""
+        return tuple(self.lines)
+
+    @property
+    def length(self) -> float:
+        """Unstretched length of the longest line [m]."""
+        return max(x.cable.length for x in self.lines.values())
+
+    def key_of(self, name: str) -> str:
+        """The key of the table that says what a line is made of."""
+        return f"lines.{name}"
+
+    @property
     def adaptive(self) -> tuple[str, ...]:
         """Names of the lines whose zones move."""
         return tuple(name for name, line in self.lines.items() if isinstance(line.model, AdaptiveModel))

@@ -47,11 +47,19 @@ SAMPLE = {
 }  # fmt: skip
 
 
-def kernels_of(scene: Scene, static: bool = False) -> list[str]:
+def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
     """The kernels that a run of a scene calls, as room.file.function, by the last of each family; the solver's first.
 
-    Whether it is computed in a plane follows from the scene; rarely its first shape leaves the plane.
     static: those of its equilibrium, whose stability is judged where there are rods and no end moments.
+    """
+    kernels: Any = _kernels_of_lines if scene.line_names else _kernels_of_cable
+    return list(kernels(scene, static))
+
+
+def _kernels_of_cable(scene: Scene, static: bool) -> list[str]:
+    """Of a cable.
+
+    Whether it is computed in a plane follows from the scene; rarely its first shape leaves the plane.
     """
     beside = _beside_solver(scene, static)
     tables = scene.environment, scene.cable, scene.ends, scene.initial
@@ -66,8 +74,8 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     return [*solvers, *beside, *more, *([TOUCHING] if scene.contact.self else [])]
 
 
-def kernels_of_lines(system: System, static: bool = False) -> list[str]:
-    """The same of several lines."""
+def _kernels_of_lines(system: System, static: bool) -> list[str]:
+    """Of lines with names."""
     found = [*OF_LINES, REST_OF_LINES if static else STEPS_OF_LINES]
     if system.adaptive:
         found.append(CRITERIA if static else ZONES)
@@ -84,7 +92,7 @@ def _has_rods(scene: Scene) -> bool:
     return isinstance(scene.model, RodModel) or any(isinstance(zone, RodZone) for zone in zones)
 
 
-def _beside_solver(scene: Scene, static: bool) -> list[str]:
+def _beside_solver(scene: Any, static: bool) -> list[str]:
     """In the order in which they are best compiled beside the solver."""
     needed = [STEPS, OUTPUTS]  # steps: their kernel notes the extremes of an equilibrium, too
     if scene.time is not None and not static and payout_of(scene) is not None:
@@ -96,12 +104,14 @@ def _beside_solver(scene: Scene, static: bool) -> list[str]:
     return needed
 
 
-def compile_beside(scene: Scene, static: bool = False) -> None:
+def compile_beside(scene: Scene | System, static: bool = False) -> None:
     """Let a second process compile what a scene calls besides the solver, which this one compiles meanwhile.
 
     Each waits for what the other is compiling (machine.compile).  Does nothing where all is compiled, or where there is
-    one core.  static: for its equilibrium alone.
+    one core, or lines have names.  static: for its equilibrium alone.
     """
+    if scene.line_names:
+        return
     needed = _beside_solver(scene, static)
     if MODEL_ERROR in needed:  # a line in a plane needs both solvers
         needed.insert(needed.index(OUTPUTS) + 1, SOLVER[1])

@@ -113,11 +113,20 @@ def remaining_run(
 
 
 class RemainingLines(NamedTuple):
-    """What is to be done with several lines; anew: from t = 0, and not from the checkpoint."""
+    """What is to be done with several lines; anew, reached: as of `RemainingRun`."""
 
-    system: System
+    scene: System
     changes: tuple[LoadChange[System], ...]
     anew: bool
+    reached: float
+
+
+def remaining(
+    path: Path, until: float | None = None, settings: Sequence[str] = (), start: float | None = None
+) -> RemainingRun | RemainingLines:
+    """What a result leaves to be done, as of `remaining_run`, of one line or of several."""
+    lines = remaining_system(path, until, settings, start)
+    return remaining_run(path, until, settings, start) if lines is None else lines
 
 
 def remaining_system(
@@ -145,11 +154,11 @@ def remaining_system(
         if done:
             fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
-        return RemainingLines(found, changes, False)
+        return RemainingLines(found, changes, False, reached)
     if until is not None:
         found, changes = _longer_lines(found, changes, until, reached)
     if not settings:
-        return RemainingLines(found, changes, False)
+        return RemainingLines(found, changes, False, reached)
     begin = reached if start is None else start
     last = changes[-1] if changes else LoadChange(0.0, found)
     changed = _several(scene_text(last.scene), settings)
@@ -159,7 +168,8 @@ def remaining_system(
     _check_lines(last, changed, kept_resolution(found, path), begin, end)
     if end != found.require_time().duration:
         found, changes = _longer_lines(found, changes, end, reached)
-    return RemainingLines(found, (*changes, LoadChange(begin, changed)), begin < reached)
+    anew = begin < reached
+    return RemainingLines(found, (*changes, LoadChange(begin, changed)), anew, 0.0 if anew else reached)
 
 
 def _several(text: str, settings: Sequence[str] = ()) -> System:

@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import difflib
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -309,6 +309,10 @@ class StoredResult:
     def lines(self) -> Lines[Self]:
         """The lines of a result of several lines by name, each a result of its own; of one line there are none."""
         return Lines(self.line, self._contents.order if self._contents.is_open else ())
+
+    def each_line(self) -> Iterable[tuple[str, Self]]:
+        """Names and results of the lines; a result of one line that has no name is that of the line ""."""
+        return self.lines.items() or [("", self)]
 
     def line(self, name: str) -> Self:
         """A line of a result of several lines, as a result of its own; `lines` has their names."""

@@ -42,8 +42,7 @@ def accuracy_of_case(result: Result) -> tuple[str, float]:
 
     The worst of all lines.  "", NaN: none was asked.
     """
-    lines = result.lines or {"": result}
-    found = [(name, line, asked) for name, line in lines.items() for asked in asked_accuracy(line)]
+    found = [(name, line, asked) for name, line in result.each_line() for asked in asked_accuracy(line)]
     if not found:
         return "", np.nan
     used = max(float(line.attributes.get("accuracy_used", np.nan)) for _, line, _ in found)

@@ -77,7 +77,7 @@ def _computed(job: Job, row: dict[str, Any], case: int) -> Outcome:
     with result:
         kinds = {event.kind for event in result.events}
         events = ", ".join([*(k for k in EVENTS_BY_WEIGHT if k in kinds), *sorted(kinds - set(EVENTS_BY_WEIGHT))])
-        logged = next(iter(result.lines.values()), result)
+        logged = next(x for _, x in result.each_line())
         steps = len(logged["steps/t"]) if "steps/t" in logged else 0
         found = collected(result, job.wanted)
         why = "; ".join(f"{name}: {reason}" for name, reason in found.reasons.items())

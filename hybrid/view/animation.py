@@ -107,7 +107,7 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int, width
     from hybrid.view.matplotlib_backend import film
 
     if result.lines:
-        from hybrid.view.system_views import film_page
+        from hybrid.view.lines import film_page
 
         page, shown = film_page(result, factor)
         return film(page, shown, frames, dpi)

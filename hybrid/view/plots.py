@@ -79,7 +79,7 @@ def plot_summary(
     from hybrid.view.matplotlib_backend import draw_page
 
     if result.lines:
-        from hybrid.view.system_views import page
+        from hybrid.view.lines import page
 
         if times is not None or history is not None:
             refuse_several(result, "times and history")

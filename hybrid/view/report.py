@@ -59,9 +59,9 @@ def html(result: Result, modes: PagedModes | None = None) -> str:
     """The page as text."""
     swings = section(modes) if modes is not None else ""
     if result.lines:
-        from hybrid.view import system_report
+        from hybrid.view import lines_report
 
-        return system_report.html(result, swings)
+        return lines_report.html(result, swings)
     facts, store = facts_of(result), Store()
     shown = kept(result, [fact.t for fact in facts])
     scene = scenery(result, store, shown)

@@ -13,10 +13,10 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
 from hybrid.view.decimate import Kept, Store, even
+from hybrid.view.lines import AllLines
+from hybrid.view.lines_report import scenery as lines_scenery
 from hybrid.view.scenery import scenery
 from hybrid.view.style import short
-from hybrid.view.system_report import scenery as system_scenery
-from hybrid.view.system_views import AllLines
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -76,7 +76,7 @@ def _scene(result: Result) -> dict[str, Any]:
     shown = {
         name: Kept(frames, even(len(line.s), each), every.outputs, len(line.s)) for name, line in every.lines.items()
     }
-    return system_scenery(result, every, shown, Arrays())
+    return lines_scenery(result, every, shown, Arrays())
 
 
 def _moment(scene: dict[str, Any], way: dict[str, Any] | None, k: int) -> list[dict[str, Any]]:

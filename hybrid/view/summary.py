@@ -49,18 +49,16 @@ class Fact(NamedTuple):
 
 
 def facts_of(result: Result) -> list[Fact]:
-    """All facts, in the order of importance to a reader: warnings, loads, limits, errors, status."""
+    """All facts, in the order of importance to a reader: warnings, loads, limits, errors, status.
+
+    Of lines with names those of all together: warnings, and how it ended.
+    """
     facts = [*_warnings(result), *_quantities(result)]
-    if len(result.times):
+    if len(result.times) and not result.lines:
         makers: tuple[Callable[[Result], Fact], ...] = (_tension, _bend, _slack, _limits, _hockling, _seabed, _errors)
         facts += [make(result) for make in makers]
         facts += [_pressed(result, *x) for x in PRESSED if f"{GROUP}/{x[0]}_max" in result]
     return [*facts, _status(result)]
-
-
-def status_facts(result: Result) -> list[Fact]:
-    """Warnings, and how it ended: what is known of several lines together."""
-    return [*_warnings(result), *_quantities(result), _status(result)]
 
 
 def attention(facts: list[Fact]) -> list[Fact]:

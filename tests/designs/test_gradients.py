@@ -10,8 +10,8 @@ import pytest
 
 from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.gradients import Gradients
+from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.sensitivity import at_rest
-from hybrid.designs.system_at_rest import SystemAtRest
 from hybrid.scene.read import as_scene_or_system
 from tests.designs.test_body_derivatives import SCENES
 from tests.designs.test_derivatives import LINE, SEA, pinned, scene
@@ -33,7 +33,7 @@ CASES: dict[str, tuple[Any, list[str], list[str]]] = {
 CASES |= {what: SCENES[what] for what in ("a body", "two bodies", "a point", "members")}
 
 
-def sides(rest: CableAtRest | SystemAtRest, keys: list[str]) -> tuple[Any, Any, np.ndarray]:
+def sides(rest: CableAtRest | NetworkAtRest, keys: list[str]) -> tuple[Any, Any, np.ndarray]:
     """What numbers leave over, what they shift, and derivatives by a solve for each."""
     seen: list[Any] = []
     plain: Callable[..., Any] = rest.forward
@@ -42,7 +42,7 @@ def sides(rest: CableAtRest | SystemAtRest, keys: list[str]) -> tuple[Any, Any, 
     return *seen[0], found
 
 
-def by_gradients(rest: CableAtRest | SystemAtRest, right: Any, shifts: Any) -> tuple[list[Any], list[Any]]:
+def by_gradients(rest: CableAtRest | NetworkAtRest, right: Any, shifts: Any) -> tuple[list[Any], list[Any]]:
     """(P, W) of each line: gradients along what numbers move, and the sizes of what is added up there."""
     out = []
     if isinstance(rest, CableAtRest):
@@ -59,12 +59,12 @@ def by_gradients(rest: CableAtRest | SystemAtRest, right: Any, shifts: Any) -> t
     return list(sums), list(sizes)
 
 
-def least(rest: CableAtRest | SystemAtRest, keys: list[str]) -> np.ndarray:
+def least(rest: CableAtRest | NetworkAtRest, keys: list[str]) -> np.ndarray:
     """(P, W) a thousandth of results by numbers."""
     return 1e-3 * np.abs(rest.values) / np.array([[abs(rest.number(key)) or 1.0] for key in keys])
 
 
-def _of_all_lines(rest: SystemAtRest, found: list[np.ndarray]) -> list[np.ndarray]:
+def _of_all_lines(rest: NetworkAtRest, found: list[np.ndarray]) -> list[np.ndarray]:
     """(P, W) of every line, of those that have results."""
     of = dict(zip(rest.gradients, found, strict=True))
     return [of.get(l, np.zeros((len(found[0]), 0))) for l in range(len(rest.lines))]
@@ -78,7 +78,7 @@ def test_the_transposed_solve_is_the_forward_one(case: str) -> None:
     right, shifts, _ = sides(rest, keys)
     forward, sizes = by_gradients(rest, right, shifts)
     found = rest.transposed(right, shifts)
-    if isinstance(rest, SystemAtRest):
+    if isinstance(rest, NetworkAtRest):
         forward, sizes = ([rest._in_order(_of_all_lines(rest, x))] for x in (forward, sizes))
         found = rest._in_order(found)
     whole = np.maximum(np.maximum(np.abs(forward[0]), sizes[0]), least(rest, keys))

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from scene_texts import SUSPENSION
 
-from hybrid.cli.plan_tables import plan_lines
+from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.plan import output_times, plan, size_of_result
 from hybrid.scene.analysis import OUTPUTS, PER_PERIOD, UNASKED_BYTES
 from hybrid.scene.read import as_scene_or_system, parse_scene
@@ -66,4 +66,4 @@ def test_a_file_that_nobody_asked_for_has_a_bounded_size() -> None:
 )
 def test_a_plan_says_how_many_and_how_much(every: float | None, said: str) -> None:
     scene = as_scene_or_system(cable(900.0, **({"every": every} if every else {})))
-    assert said in " ".join(" ".join(plan_lines(scene, plan(scene))).split())
+    assert said in " ".join(" ".join(plan_rows(scene, plan(scene))).split())

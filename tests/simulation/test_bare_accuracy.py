@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.accuracy.errors_by_cause import Errors
 from hybrid.accuracy.refinement import asked_text, bounds_of, judge, not_asked_text
-from hybrid.cli.plan_tables import plan_lines
+from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.model_costs import with_model
 from hybrid.model.resolution import Reach, Resolution, first_resolution, for_motion, requested_accuracy
 from hybrid.scene.read import as_scene_or_system, parse_scene, scene_text
@@ -179,10 +179,10 @@ def test_what_is_not_asked_is_said_beside_what_is_met() -> None:
 
 
 def test_plan_says_in_metres_what_is_asked() -> None:
-    lines = " ".join(x.strip() for x in plan_lines(scene(), hybrid.plan(scene(), measure=False)))
+    lines = " ".join(x.strip() for x in plan_rows(scene(), hybrid.plan(scene(), measure=False)))
     assert "2 % of how far the line moves (0.02 to 2 m of position), 2 % of the tension along the line" in lines
     limited = scene(min_bend_radius=5.0)
-    lines = " ".join(x.strip() for x in plan_lines(limited, hybrid.plan(limited, measure=False)))
+    lines = " ".join(x.strip() for x in plan_rows(limited, hybrid.plan(limited, measure=False)))
     assert "2 to 10 % of min_bend_radius, as its verdict needs" in lines
 
 

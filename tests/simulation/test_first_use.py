@@ -108,10 +108,7 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
     taking = KeptCode.taking
     monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
     scene = as_scene_or_system(KINDS[kind])
-    if isinstance(scene, hybrid.Scene):
-        known = first_use.kernels_of(scene, static)
-    else:
-        known = first_use.kernels_of_lines(scene, static)
+    known = first_use.kernels_of(scene, static)
     hybrid.static(scene) if static else hybrid.run(scene)
     texts = [x for value in vars(first_use).values() for x in (value if isinstance(value, tuple) else (value,))]
     large = {x for x in texts if isinstance(x, str) and x.count(".") == 2}

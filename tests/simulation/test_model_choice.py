@@ -11,7 +11,7 @@ from bits import Stopping, differences, went_on
 
 import hybrid
 from hybrid.accuracy import model_choice
-from hybrid.cli.plan_tables import plan_lines
+from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.build import build
 from hybrid.model.model_costs import CHOSEN, Cost, cheapest
 from hybrid.model.resolution import first_resolution, model_is_free
@@ -168,7 +168,7 @@ def test_the_plan_says_which_why_and_where_rods_are():
     """The text is that of the run's event; a clamp makes a rod beside it, which the text names."""
     said, plan = chosen(hybrid.run(CLAMPED)), hybrid.plan(CLAMPED)
     assert plan.chosen == "rod" and said.startswith(f"rods everywhere; {plan.why}")
-    (line,) = (x for x in plan_lines(hybrid.validate_scene(CLAMPED), plan) if x.startswith("model"))
+    (line,) = (x for x in plan_rows(hybrid.validate_scene(CLAMPED), plan) if x.startswith("model"))
     assert line.startswith("model") and "rod, chosen by a pre-run: rod" in line
     found = re.search(r"(\d+)% of them rod: s = (.*) m\)", plan.why)
     assert found is not None

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import hybrid
 import hybrid.model.payout
-from hybrid.cli.plan_tables import plan_lines
+from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import SceneError
 from hybrid.model.payout_law import law_of, length_at
 from hybrid.scene.payout import Payout
@@ -543,7 +543,7 @@ def test_rates_and_lengths_from_a_file(tmp_path: Path) -> None:
 def test_the_plan_says_how_long_the_line_will_be() -> None:
     def said(payout: dict[str, Any]) -> str:
         scene = hybrid.validate_scene(hanging(payout, 20.0))
-        found = [x for x in plan_lines(scene, hybrid.plan(scene)) if x.startswith("payout")]
+        found = [x for x in plan_rows(scene, hybrid.plan(scene)) if x.startswith("payout")]
         return found[0].split(maxsplit=1)[1]
 
     assert said({"rate": 0.5, "begin": 2, "ramp": 4}) == "40 to 48 m, at most 0.5 m/s; up to 24 cells"

@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.accuracy.run_forecast import _grown
-from hybrid.cli.plan_tables import system_plan_lines
+from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import ComputationError, Outcome
 from hybrid.scene.read import as_scene_or_system
 from hybrid.scene.system import System
@@ -76,5 +76,5 @@ def test_the_plan_says_what_a_slack_line_may_cost() -> None:
     assert isinstance(open_, System) and isinstance(named, System)
     assert open_.slack_becomes_rod and not named.slack_becomes_rod and _grown(open_) == 1.6
     plan = replace(hybrid.plan(open_, measure=False), seconds=8.0, most_seconds=19.0)
-    said = " ".join(" ".join(system_plan_lines(open_, plan)).split())
+    said = " ".join(" ".join(plan_rows(open_, plan)).split())
     assert "about 8 s of CPU for all runs (up to 19 s if a line goes slack and becomes a rod" in said

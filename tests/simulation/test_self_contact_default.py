@@ -11,7 +11,7 @@ from bits import Stopping, differences, went_on
 
 import hybrid
 import hybrid.model.build
-from hybrid.cli.plan_tables import plan_lines
+from hybrid.cli.plan_tables import plan_rows
 from hybrid.kernels.contact.self_contact_law import INNER, OUTER
 from hybrid.kernels.contact.self_contact_pairs import WINDOW
 from hybrid.kernels.contact.self_distance import INSIDE
@@ -80,7 +80,7 @@ def test_contact_that_begins_by_itself_is_told(led: hybrid.Result) -> None:
     assert all(t >= begun[0].t for t, on, _ in said if on)
     for more, told in (({}, True), ({"contact": {"self": False}}, False), ({"contact": {"self": True}}, False)):
         scene = hybrid.validate_scene(led_through(**more))
-        lines = " ".join(" ".join(plan_lines(scene, hybrid.plan(scene))).split())
+        lines = " ".join(" ".join(plan_rows(scene, hybrid.plan(scene))).split())
         assert ("whatever its ends do; its steps take 2 to 20 times as long" in lines) == told
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.cli.plan_tables import plan_lines
+from hybrid.cli.plan_tables import plan_rows
 
 NO_GRAVITY = {"environment": {"gravity": 0.0}}
 TAUT = {"length": 1.0, "mass": 0.1, "bending_stiffness": 0.01, "torsional_stiffness": 0.01, "axial_stiffness": 1e4}
@@ -345,7 +345,7 @@ def test_a_current_that_acts_on_nothing_says_so(drag, clump):
         "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10}, "dimension": 3,
     }  # fmt: skip
     idle = not (drag or clump)
-    plan = "\n".join(plan_lines(hybrid.validate_scene(data), hybrid.plan(data)))
+    plan = "\n".join(plan_rows(hybrid.validate_scene(data), hybrid.plan(data)))
     assert ("current acts on nothing" in plan) == idle
     assert len(idle_notes(hybrid.static(data))) == idle
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.cli.plan_tables import plan_lines
+from hybrid.cli.plan_tables import plan_rows
 from hybrid.store.hockling import formation_tension, kink_torque, pop_out, strand_distance
 
 
@@ -109,7 +109,7 @@ def test_the_plan_names_the_torque_from_which_a_hanging_line_can_throw_a_loop() 
     for radius, text in ((0.3, "a loop kinks from"), (1e-6, "no torque makes a loop kink")):
         section["min_bend_radius"] = radius
         checked = hybrid.validate_scene(scene)
-        told = " ".join(" ".join(plan_lines(checked, hybrid.plan(checked))).split())
+        told = " ".join(" ".join(plan_rows(checked, hybrid.plan(checked))).split())
         assert text in told
         kink = kink_torque(EI, 0.02, radius)
         assert f"kinks from {kink:.3g} N m on" in told or not np.isfinite(kink)
@@ -142,5 +142,5 @@ def test_the_plan_knows_the_bed_and_the_stretch() -> None:
     assert measured is not None and tables is not None and tables.rough and not measured.rough
     least = float(rest.tension.min())
     assert measured.torque == pytest.approx(2.0 * np.sqrt(200.0 * least), rel=0.01)
-    told = " ".join(" ".join(plan_lines(hybrid.validate_scene(scene), hybrid.plan(scene, measure=False))).split())
+    told = " ".join(" ".join(plan_rows(hybrid.validate_scene(scene), hybrid.plan(scene, measure=False))).split())
     assert "a loop can form from about" in told and "hybrid static" in told

@@ -20,12 +20,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.interop.moordyn.all_lines import scene_of_lines
 from hybrid.interop.moordyn.cables import Cable, cables
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, in_order, note
 from hybrid.interop.moordyn.rows import Source, read_source
 from hybrid.interop.moordyn.scenes import ImportedScene, scene_of
-from hybrid.interop.moordyn.systems import system_of
 from hybrid.interop.moordyn.writer import WRITTEN, Computed, WrittenDeck, deck_of
 
 __all__ = ["ImportedDeck", "ImportedScene", "Note", "WrittenDeck", "export_moordyn", "import_moordyn"]
@@ -94,7 +94,7 @@ def import_moordyn(path: str | Path, line: int | None = None, separate: bool = F
     deck = read_deck(source)
     found, lost = cables(deck)
     if line is None and not separate and len(found) + len(lost) > 1:
-        made = system_of(deck)
+        made = scene_of_lines(deck)
         return ImportedDeck(deck.file, {made.name: made}, in_order([*deck.notes, *_no_place(source, deck)]))
     if line is not None:
         found = _chosen(deck, found, lost, line)

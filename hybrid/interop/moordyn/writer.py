@@ -25,7 +25,6 @@ from hybrid.interop.moordyn.bodies import body_row
 from hybrid.interop.moordyn.tables import NEAR
 from hybrid.scene.cable import Section
 from hybrid.scene.read import parse_either
-from hybrid.scene.schema import Scene
 
 Triple = tuple[float, float, float]
 NO_BED = 1e4  # m under the surface, where a scene has none
@@ -102,10 +101,9 @@ def deck_of(result: Computed) -> WrittenDeck:
     scene, _ = parse_either(result.scene_text)
     shapes = {name: _shape(line) for name, line in result.lines.items()} or {"": _shape(result)}
     writer = _Writer(scene, shapes)
-    if not isinstance(scene, Scene):
-        for name in scene.bodies:
-            place, turned = (result[f"bodies/{name}/{key}"][0].tolist() for key in ("position", "rotation"))
-            writer.add_body(name, place, turned)
+    for name in scene.bodies:
+        place, turned = (result[f"bodies/{name}/{key}"][0].tolist() for key in ("position", "rotation"))
+        writer.add_body(name, place, turned)
     text = writer.text()
     if writer.complaints:
         raise SceneError(list(dict.fromkeys(writer.complaints)), shorten(scene.title, 60, placeholder=" …"))
@@ -159,12 +157,10 @@ class _Writer:
 
     def text(self) -> str:
         self._sea()
-        if isinstance(self.scene, Scene):
-            shape = self.shapes[""]
-            ends = [self._end(name, shape) for name in ("start", "end")]
-            self._line("cable", "", self.scene.cable, ends)
-        else:
-            self._system()
+        made = {name: self._free_or_fixed(name) for name in self.scene.points}
+        for name, line in self.scene.lines.items():
+            ends = self._joined_ends(name, line, made) if name else [self._end(end) for end in ("start", "end")]
+            self._line(self.scene.key_of(name), name, line.cable, ends)
         types = "".join(f"{name} {' '.join(map(_number, values))}\n" for values, name in self.types.items())
         numbered = "".join(f"{i} {row}\n" for i, row in enumerate(self.bodies.values(), 1))
         bodies = _BODIES + numbered if self.bodies else ""
@@ -209,8 +205,7 @@ class _Writer:
     def _options(self) -> Iterator[tuple[str, float]]:
         environment, bed = self.scene.environment, self.scene.environment.seabed
         depth = self.surface - bed.z if bed is not None else NO_BED
-        several = not isinstance(self.scene, Scene)  # as the import takes kBot
-        near = [width for width, low in self.widths if several and low < self.surface - (1.0 - NEAR) * depth]
+        near = [width for width, low in self.widths if self.scene.points and low < self.surface - (1.0 - NEAR) * depth]
         width = max(near or [width for width, _ in self.widths], default=NO_DIAMETER)
         if bed is not None and any(x != width for x, _ in self.widths):
             self.notes.append(
@@ -230,19 +225,15 @@ class _Writer:
 
     # --- lines ---------------------------------------------------------------------------------
 
-    def _system(self) -> None:
-        made: dict[str, str] = {}
-        for name in self.scene.points:
-            made[name] = self._free_or_fixed(name)
-        for name, line in self.scene.lines.items():
-            if line.break_at is not None:
-                self.notes.append(f"lines.{name}.break_at is left out")
-            for end in ("start", "end"):
-                if getattr(line.connections, end).payout is not None:
-                    at = f"lines.{name}.connections.{end}.payout"
-                    self.notes.append(f"{at} is left out: the line of the deck keeps its length at t = 0")
-            ends = [self._joined(name, end, made[getattr(line, end)]) for end in ("start", "end")]
-            self._line(f"lines.{name}", name, line.cable, ends)
+    def _joined_ends(self, name: str, line: Any, made: dict[str, str]) -> list[str]:
+        """What a line is attached to at both ends: points, which are made."""
+        if line.break_at is not None:
+            self.notes.append(f"lines.{name}.break_at is left out")
+        for end in ("start", "end"):
+            if getattr(line.connections, end).payout is not None:
+                at = f"lines.{name}.connections.{end}.payout"
+                self.notes.append(f"{at} is left out: the line of the deck keeps its length at t = 0")
+        return [self._joined(name, end, made[getattr(line, end)]) for end in ("start", "end")]
 
     def _joined(self, name: str, end: str, made: str) -> str:
         """What the end of a line is attached to: its point, which is made, or a rod that holds its direction there."""
@@ -439,8 +430,8 @@ class _Writer:
             lump.add(end, end.volume if self.fluid is not None else 0.0)
         return self._point("Free", place, lump)
 
-    def _end(self, name: str, shape: _Shape) -> str:
-        end = getattr(self.scene.ends, name)
+    def _end(self, name: str) -> str:
+        end, shape = getattr(self.scene.ends, name), self.shapes[""]
         place = shape.at(0.0 if name == "start" else shape.s[-1])
         kind = "Coupled" if end.prescribed_motion is not None else "Fixed"
         if end.release is not None:

@@ -17,15 +17,14 @@ import hybrid
 import hybrid.cli.commands  # registers them
 from hybrid.cli.app import app
 from hybrid.cli.console import Console
-from hybrid.cli.plan_tables import system_plan_lines
-from hybrid.cli.system_commands import ended
+from hybrid.cli.lines_tables import show_lines
+from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import ResultError
 from hybrid.scene.read import as_scene_or_system
 from hybrid.store.records import Zone
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks, Text
-from hybrid.view.system_report import _extreme_text, html
-from hybrid.view.system_views import (
+from hybrid.view.lines import (
     AllLines,
     arms_of,
     clearest_view,
@@ -35,6 +34,7 @@ from hybrid.view.system_views import (
     rotations,
     views_of_lines,
 )
+from hybrid.view.lines_report import _extreme_text, html
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 PLACES = {"east": (100, 0), "north": (-50, 87), "south": (-50, -87)}
@@ -217,7 +217,7 @@ def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None
 
 
 def test_the_table_of_a_run_judges_each_line(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    ended(Console(False, False), hybrid.open(path), path, None, "ended")
+    show_lines(Console(False, False), hybrid.open(path))
     said = " ".join(capsys.readouterr().out.split())
     east, north = said.split("line east")[1].split("line north")
     assert "; max_tension of 1000 N BROKEN" in east and "BROKEN" not in north
@@ -230,7 +230,7 @@ def test_the_stress_of_pipes_is_judged(tmp_path: Path, capsys: pytest.CaptureFix
     points = {"a": {"position": [0, 0, -60]}, "b": {"position": [100, 0, 0]}}
     path = tmp_path / "pipe.h5"
     result = hybrid.static({"points": points, "lines": {"l": line}}, path)
-    ended(Console(False, False), result, path, None, "ended")
+    show_lines(Console(False, False), result)
     assert re.search(r"von_mises of \S+ Pa, above the 1e\+06 Pa allowed; BROKEN", capsys.readouterr().out)
     text = html(result)
     assert "Line l: von mises." in text and "None, beside limits that are broken." in text
@@ -368,11 +368,11 @@ def test_the_table_of_many_lines_fits(
     many: Path, columns: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
-    ended(Console(False, False), hybrid.open(many), many, None, "ended")
+    show_lines(Console(False, False), hybrid.open(many))
     said = capsys.readouterr().out.splitlines()
     rows = [x.split() for x in said if x.startswith("leg")]
     assert [row[0] for row in rows] == ["leg12", "leg13", "leg11", "leg10", "leg9", "leg8", "leg7", "leg6"]
-    assert "max_tension BROKEN" in " ".join(rows[0]) and all(len(x) <= columns for x in said[:-1])
+    assert "max_tension BROKEN" in " ".join(rows[0]) and all(len(x) <= columns for x in said)
     assert any("6 other lines: tension from" in x for x in said) and any("11 others with smaller" in x for x in said)
 
 
@@ -381,7 +381,7 @@ def test_a_plan_of_many_lines_has_a_row_for_those_that_are_alike() -> None:
     for line in scene["lines"].values():
         line["sections"] = [SECTION]
     system = as_scene_or_system(scene)
-    rows = system_plan_lines(system, hybrid.plan(system, measure=False))  # type: ignore[arg-type]
+    rows = plan_rows(system, hybrid.plan(system, measure=False))  # type: ignore[arg-type]
     assert any(x.startswith("14 lines ") and "120 m" in x for x in rows) and not any(
         x.startswith("line ") for x in rows
     )

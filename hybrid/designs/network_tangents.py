@@ -88,14 +88,14 @@ class _Tables(NamedTuple):
     kept: list[Any]
 
 
-class SystemOthers:
+class NetworkOthers:
     """The systems of scenes with more of each number beside that of a run, and with less on its other side."""
 
     def __init__(
         self, system: System, scenes: Sequence[tuple[System, System | None]], steps: Sequence[float],
-        lines: Mapping[str, Resolution],
+        lines: Mapping[str, Resolution], more: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
-        """system: of the run; scenes: as of `tangents.Others`; lines: how finely, by name."""
+        """system: of the run; scenes, lines: as of `tangents.Others`; more: of it alone."""
         self._system = system
         self._scenes, self._steps, self._resolution = list(scenes), list(steps), SystemResolution(lines)
         self._models = [build_system(more, self._resolution) for more, _ in scenes]

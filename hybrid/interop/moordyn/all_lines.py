@@ -37,9 +37,9 @@ JOINTS = ("rod",)
 _APART = "; or --separate, for each cable that can be as a scene of its own"
 
 
-def system_of(deck: Deck) -> ImportedScene:
+def scene_of_lines(deck: Deck) -> ImportedScene:
     """All lines of a deck as one scene; SceneError, in lines of the deck, if it makes none."""
-    made = _SystemMaker(deck)
+    made = _SceneMaker(deck)
     text = made.text()
     if made.complaints:
         raise SceneError(sorted(dict.fromkeys(made.complaints), key=lambda c: c.line or 0), deck.file)
@@ -50,7 +50,7 @@ def system_of(deck: Deck) -> ImportedScene:
     return ImportedScene("system", tuple(sorted(deck.lines)), scene, text, in_order(made.notes))
 
 
-class _SystemMaker(Tables):
+class _SceneMaker(Tables):
     """Text, notes and complaints of all lines of a deck."""
 
     def __init__(self, deck: Deck) -> None:

@@ -1,18 +1,11 @@
-"""What run, static and plan do for a scene of several lines."""
+"""What run and static print of lines with names, and of the points and bodies where they meet."""
 
 from __future__ import annotations
 
 import math
-import time as clock
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import hybrid
-from hybrid.cli.app import picture_beside
-from hybrid.cli.plan_tables import contents_table, system_plan_lines
 from hybrid.cli.tables import (
     extremes_facts,
     judged_text,
@@ -24,11 +17,9 @@ from hybrid.cli.tables import (
 )
 from hybrid.store.envelope import NOT_VERIFIED
 from hybrid.store.partners import TOUCH
-from hybrid.store.records import error_words
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
-    from hybrid.scene.system import System
     from hybrid.store.reader import Result
 
 # Lines, points and bodies that are listed each; of more so many, the worst, are shown.
@@ -36,76 +27,20 @@ MOST_LISTED = 12
 SHOWN = 8
 
 
-def run_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
-    """Compute the motion of several lines."""
-    console.will_write(target)
-    _moved(console, asked, target, picture_beside(target, plot), partial(hybrid.run, asked, target, overwrite=not keep))
-
-
-def resume_lines(console: Console, asked: System, source: Path, target: Path, plot: bool, **more: Any) -> None:
-    """Go on with the motion of several lines; more: as of `hybrid.resume`."""
-    _moved(console, asked, target, picture_beside(target, plot), partial(hybrid.resume, source, target, **more))
-
-
-def _moved(console: Console, asked: System, target: Path, picture: Path | None, compute: Callable[..., Result]) -> None:
-    """Compute a motion, and print what it has reached; picture: where all lines are drawn, None: nowhere."""
-    from hybrid.cli.progress_line import span
-    from hybrid.simulation.first_use import kernels_of_lines
-
-    console.compiling_kernels(kernels_of_lines(asked))
-    begin = clock.perf_counter()
-    with console.progress() as tell:
-        result = compute(progress=tell)
-    wall = clock.perf_counter() - begin
-    steps = len(result.lines[next(iter(result.lines))]["steps/t"])
-    text = f"{asked.require_time().duration:.6g} s in {steps} steps, {span(wall)} of wall time"
-    if "error_total_position" in result.attributes:
-        text += f"; estimated error {error_words(result.attributes)}"
-    else:
-        text += "; error not estimated"
-    ended(console, result, target, picture, text, steps=steps, wall=wall)
-
-
-def static_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
-    """Find the equilibrium of several lines."""
-    from hybrid.cli.progress_line import span
-    from hybrid.simulation.first_use import kernels_of_lines
-
-    console.will_write(target)
-    picture = picture_beside(target, plot)
-    console.compiling_kernels(kernels_of_lines(asked, static=True))
-    begin = clock.perf_counter()
-    result = hybrid.static(asked, target, overwrite=not keep)
-    wall = clock.perf_counter() - begin
-    path, residual = (result.attributes[f"static_{x}"] for x in ("path", "residual"))
-    text = f"equilibrium in {span(wall)} of wall time ({path}; residual force {residual:.2g} N)"
-    ended(console, result, target, picture, text, path=path, residual=residual, wall=wall)
-
-
-def ended(console: Console, result: Result, target: Path, picture: Path | None, text: str, **facts: Any) -> None:
-    """Print what lines and points have reached, and draw them; picture: as of `_moved`."""
+def show_lines(console: Console, result: Result) -> dict[str, Any]:
+    """Print what lines, points and bodies have reached, and return it."""
     from hybrid.view.worst import worst_first
 
-    if picture is not None:
-        from hybrid.view.matplotlib_import import import_matplotlib
-
-        import_matplotlib()
-        hybrid.plot(result, picture)
     names = list(result.lines) if len(result.lines) <= MOST_LISTED else worst_first(result)
     lines = {name: extremes_facts(result.lines[name]) | verdicts_of(result.lines[name]) for name in names}
-    moves = len(result.times) > 1
     held = quantities_facts(result)
     points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
-    end = float(result.times[-1]) if moves else None
+    end = float(result.times[-1]) if len(result.times) > 1 else None
     meetings = [(x.t, x.text) for x in result.events if x.kind == TOUCH]
     meetings += [(x.t_force, f"{x.partner}: {x.text}") for x in result.contacts()]
     console.show(lambda: _table(lines, points, bodies, held, end, meetings))
-    pictures = [picture] if picture is not None else []
-    console.done(
-        text, target, *pictures, status=result.status, lines=lines, points=points, bodies=bodies, quantities=held,
-        **facts,
-    )  # fmt: skip
+    return {"lines": lines, "points": points, "bodies": bodies, "quantities": held}
 
 
 def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
@@ -239,14 +174,3 @@ def _of_body(facts: dict[str, Any]) -> str:
 def _vector(x: list[float], least: float = 0.0) -> str:
     zero = max(1e-9 * max(abs(c) for c in x), least)
     return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
-
-
-def plan_of_lines(console: Console, asked: System, verbose: bool) -> None:
-    """Show what a run of several lines would compute."""
-    made = hybrid.plan(asked)
-    console.json("plan", **asdict(made))
-    console.show(lambda: "\n".join(system_plan_lines(asked, made)))
-    if verbose:
-        for name, line in made.lines.items():
-            console.show(partial(str, f"line {name}"))
-            console.show(partial(contents_table, line))

@@ -74,7 +74,7 @@ class _Changed(NamedTuple):
     own: Floats
 
 
-class SystemAtRest(OfScene):
+class NetworkAtRest(OfScene):
     """The equilibrium on one mesh, its factors, and the values of results."""
 
     scene: System

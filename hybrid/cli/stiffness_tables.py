@@ -12,21 +12,17 @@ from hybrid.errors import Complaint, SceneError
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
-    from hybrid.scene.schema import Scene
-    from hybrid.scene.system import System
 
 COUNT = 11  # offsets from one side to the other
 NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
-def check_holding(
-    asked: Scene | System, stiffness: str | None, offsets: str | None, reach: float | None, heading: float
-) -> None:
+def check_holding(asked: Any, stiffness: str | None, offsets: str | None, reach: float | None, heading: float) -> None:
     """SceneError where what is asked cannot be had, before anything is computed."""
     if reach is not None and offsets is None:
         raise SceneError([Complaint("--reach", f"{reach:g}", "a point or body to shift", "--offsets point:NAME")])
     given = {name: at for name, at in (("--stiffness", stiffness), ("--offsets", offsets)) if at is not None}
-    if isinstance(asked, hybrid.Scene):
+    if not asked.line_names:
         for name, at in given.items():
             expected, fix = (
                 "a scene of several lines, with points and lines",
@@ -50,7 +46,7 @@ def check_holding(
 
 
 def show_holding(
-    console: Console, asked: System, stiffness: str | None, offsets: str | None, reach: float | None, heading: float,
+    console: Console, asked: Any, stiffness: str | None, offsets: str | None, reach: float | None, heading: float,
 ) -> None:  # fmt: skip
     """Print the stiffness at a point or body, and the forces on one that is held beside its equilibrium."""
     if stiffness is not None:

@@ -13,14 +13,7 @@ from hybrid.store.reader import Result
 from hybrid.view import report_parts as parts
 from hybrid.view.decimate import Kept, Store, even, kept, script_json
 from hybrid.view.figure import Panel
-from hybrid.view.panels import ranges
-from hybrid.view.plotly_backend import colour_scale, figure_of
-from hybrid.view.save import REPORT_MARK
-from hybrid.view.scenery import box_and_planes, speed_of
-from hybrid.view.style import BODY, INK, prefix, short
-from hybrid.view.summary import Fact, amount, facts_of, limits_of_lines, status_facts
-from hybrid.view.svg_backend import draw
-from hybrid.view.system_views import (
+from hybrid.view.lines import (
     AllLines,
     arms_of,
     bodies_of,
@@ -35,6 +28,13 @@ from hybrid.view.system_views import (
     tension_ranges,
     views_of_lines,
 )
+from hybrid.view.panels import ranges
+from hybrid.view.plotly_backend import colour_scale, figure_of
+from hybrid.view.save import REPORT_MARK
+from hybrid.view.scenery import box_and_planes, speed_of
+from hybrid.view.style import BODY, INK, prefix, short
+from hybrid.view.summary import Fact, amount, facts_of, limits_of_lines
+from hybrid.view.svg_backend import draw
 from hybrid.view.worst import is_without_moment
 from hybrid.view.zones import COLOURS
 
@@ -100,7 +100,7 @@ def _of_others(every: AllLines, command: str) -> str:
 
 def facts_of_all(result: Result, every: AllLines) -> list[Fact]:
     """What to know first: warnings with the names of lines, how the run ended, and limits of each line."""
-    facts = [*status_facts(result), *limits_of_lines({x: every.lines[x] for x in every.worst})]
+    facts = [*facts_of(result), *limits_of_lines({x: every.lines[x] for x in every.worst})]
     for name in every.worst:
         line = every.lines[name]
         for fact in facts_of(line) if len(line.times) else []:
