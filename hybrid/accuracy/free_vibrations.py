@@ -28,7 +28,6 @@ from hybrid.linear.loaded_line import LoadedLine
 from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_at_rest, sparse_rows
 from hybrid.linear.rest import CABLE, Rest, line_at_rest, system_at_rest
 from hybrid.model.system import SystemResolution
-from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -124,13 +123,12 @@ def of_system(system: System, resolution: SystemResolution, times: Floats) -> Ma
 
 def lost_vibrations(asked: Scene | System, rest: Callable[[], Rest], times: Floats) -> Mapping[str, LostBy]:
     """By line and quantity, what steps that end at `times` (n,) s make of free vibrations about an equilibrium."""
-    motions = list(_motions(asked))
+    motions = asked.motions
     begins = [_quiet_from(x) for x in motions]
     quiet = max((x for x in begins if x is not None), default=0.0)
     fluid = asked.environment.fluid
     still = fluid is None or fluid.waves is None
-    starts = isinstance(asked.initial, Equilibrium) if isinstance(asked, Scene) else not asked.starts_as_placed
-    if not begins or None in begins or not (still and starts) or len(times) < 2:
+    if not begins or None in begins or not still or asked.starts_as_placed or len(times) < 2:
         return {}
     try:
         found = rest()
@@ -140,15 +138,6 @@ def lost_vibrations(asked: Scene | System, rest: Callable[[], Rest], times: Floa
         return {}
     breaks = sorted({0.0, *(x for motion in motions for x in _breaks(motion) if x < quiet)})
     return Vibrations(found).lost(breaks, min(quiet, float(times[-1])), np.asarray(times), _radius(asked))
-
-
-def _motions(asked: Scene | System) -> Iterator[Motion]:
-    """Of ends, points and bodies."""
-    if isinstance(asked, Scene):
-        found = [end.prescribed_motion for end in asked.ends.both]
-    else:
-        found = [getattr(x, "motion", None) for x in (*asked.points.values(), *asked.bodies.values())]
-    yield from (x for x in found if x is not None)
 
 
 def _quiet_from(motion: Motion) -> float | None:

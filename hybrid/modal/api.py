@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -169,10 +170,18 @@ def equilibrium_of(asked: Scene | System, cells: float = 1.0) -> Rest:
 
     SceneError: the scene is refused; ComputationError: there is none.
     """
-    if isinstance(asked, Scene):
-        case = StaticCase(asked)
-        resolution = resolution_at_rest(case)
-        return line_at_rest(case, resolution.coarser(cells=cells) if cells > 1.0 else resolution)
+    at_rest: Any = _network_at_rest if asked.line_names else _cable_at_rest
+    found: Rest = at_rest(asked, cells)
+    return found
+
+
+def _cable_at_rest(asked: Scene, cells: float) -> Rest:
+    case = StaticCase(asked)
+    resolution = resolution_at_rest(case)
+    return line_at_rest(case, resolution.coarser(cells=cells) if cells > 1.0 else resolution)
+
+
+def _network_at_rest(asked: System, cells: float) -> Rest:
     system = layered_lines(asked, SystemResolution.first(asked), False)
     if cells > 1.0:
         system = replace(system, lines={k: x.coarser(cells=cells) for k, x in system.lines.items()})
@@ -331,10 +340,7 @@ def _error(fine: _Found, coarse: _Found, k: int) -> float | None:
 
 def of_first_length(asked: Scene | System) -> list[str]:
     """What is to be known of a line that is paid out."""
-    if isinstance(asked, Scene):
-        paid = ["the line is"] if payout_of(asked) is not None else []
-    else:
-        paid = [f"line {name} is" for name in asked.lines if payout_of(asked.scene_of(name)) is not None]
+    paid = [f"line {name} is" if name else "the line is" for name in asked.lines if payout_of(asked.scene_of(name))]
     return [f"{who} paid out: all of this is of its first length, to which it does not return" for who in paid]
 
 

@@ -40,7 +40,7 @@ def compared(
     result: Any = run(as_scene_or_system(data))
     found = {}
     for name, line in lines.items():
-        one = result if isinstance(asked, Scene) else result.lines[name]
+        one = result.lines[name] if result.lines else result
         late = one.times > BEGINS * duration / (1.0 - BEGINS)
         for what in CHECKED:
             deviation = line.deviation(what)

@@ -211,6 +211,11 @@ class Scene(Table):
         """Whether the motion starts where the scene has the line, at rest, and not in equilibrium."""
         return not isinstance(self.initial, Equilibrium)
 
+    @property
+    def motions(self) -> list[Motion]:
+        """How ends are moved."""
+        return [end.prescribed_motion for end in self.ends.both if end.prescribed_motion is not None]
+
     def scene_of(self, name: str) -> Scene:
         """A line as a scene of its own: there is one."""
         return self.lines[name]

@@ -40,6 +40,7 @@ from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
 from hybrid.scene.lines_contact import LinesContact
 from hybrid.scene.motion_checks import Held, lasting_period, moved_in
+from hybrid.scene.motion_tables import Motion
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.points import WINCH, Failure, Fairlead, FixedPoint, FreePoint, Name, Point
 from hybrid.scene.quantities import Quantities
@@ -254,6 +255,12 @@ class System(Table):
     def line_names(self) -> tuple[str, ...]:
         """Names of the lines; none where the one line has no name."""
         return tuple(self.lines)
+
+    @property
+    def motions(self) -> list[Motion]:
+        """How points and bodies are moved."""
+        held = (getattr(x, "motion", None) for x in (*self.points.values(), *self.bodies.values()))
+        return [x for x in held if x is not None]
 
     @property
     def length(self) -> float:

@@ -11,7 +11,7 @@ from hybrid.store.envelope import extreme
 from hybrid.store.partners import partner_of
 from hybrid.store.reader import Result
 from hybrid.view import report_parts as parts
-from hybrid.view.decimate import Kept, Store, even, kept, script_json
+from hybrid.view.decimate import Kept, Store, even, kept
 from hybrid.view.figure import Panel
 from hybrid.view.lines import (
     AllLines,
@@ -29,8 +29,7 @@ from hybrid.view.lines import (
     views_of_lines,
 )
 from hybrid.view.panels import ranges
-from hybrid.view.plotly_backend import colour_scale, figure_of
-from hybrid.view.save import REPORT_MARK
+from hybrid.view.plotly_backend import colour_scale
 from hybrid.view.scenery import box_and_planes, speed_of
 from hybrid.view.style import BODY, INK, prefix, short
 from hybrid.view.summary import Fact, amount, facts_of, limits_of_lines
@@ -50,35 +49,33 @@ EXTREMES = (
 )  # fmt: skip
 
 
-def html(result: Result, modes: str = "") -> str:
-    """The page as text; modes: the section of `modes_page`."""
-    store, every = Store(), AllLines(result)
-    facts = facts_of_all(result, every)
-    several = every.outputs > 1
-    shown = _kept(every)
-    scene = scenery(result, every, shown, store) if every.outputs else None
-    groups = _panels(result, every, shown)
-    figures = [figure_of(panel, store) for group in groups.values() for panel in group]
-    numbers = iter(range(len(figures)))
-    numbered = {name: [(next(numbers), panel) for panel in group] for name, group in groups.items()}
-    made = {
-        "title": escape(result.title or "(no title)"),
-        "subtitle": escape(_subtitle(result, every)),
-        "verdict": parts.verdict_html(facts, several),
-        "facts": _facts([f for f in facts if f.weight != "alarm"], every) + _tables(result, every),
-        "cable": _space(result, every, scene, shown) if scene else "",
-        "figures": _graphs(numbered, every) + modes,
-        "statistics": _statistics(result, every),
-        "events": parts.events_html(result, several),
-        "energy": "",
-        "settings": parts.settings_html(result),
-        "scene_title": "Scene as it was run (YAML)",
-        "scene": escape(result.scene_text),
-        "footer": escape(parts.footer()),
-        "mark": REPORT_MARK,
-        "index": script_json({"scene": scene, "figures": figures}),
-    }
-    return parts.filled_page(made, store)
+class ReportOfLines:
+    """What the page of lines with names has of its own."""
+
+    def __init__(self, result: Result, store: Store) -> None:
+        self._result, self._every = result, AllLines(result)
+        self.facts, self.several = facts_of_all(result, self._every), self._every.outputs > 1
+        self._shown = _kept(self._every)
+        self.scene = scenery(result, self._every, self._shown, store) if self._every.outputs else None
+        self.panels = _panels(result, self._every, self._shown)
+
+    @property
+    def subtitle(self) -> list[str]:
+        """Outputs, lines and bodies."""
+        n, times = self._every.outputs, self._every.times
+        outputs = f"{n} outputs to t = {short(times[-1], 6)} s" if n > 1 else "static, one output" if n else "no output"
+        return [outputs, *facts_line(self._result, self._every)]
+
+    def sections(self, numbered: dict[str, list[tuple[int, Panel]]]) -> dict[str, str]:
+        """Sections by their names in the template; numbered: the graphs."""
+        result, every, plain = self._result, self._every, [f for f in self.facts if f.weight != "alarm"]
+        return {
+            "facts": _facts(plain, every) + _tables(result, every),
+            "cable": _space(result, every, self.scene, self._shown) if self.scene else "",
+            "figures": _graphs(numbered, every),
+            "statistics": _statistics(result, every),
+            "energy": "",
+        }
 
 
 def _statistics(result: Result, every: AllLines) -> str:
@@ -119,16 +116,6 @@ def _facts(facts: list[Fact], every: AllLines) -> str:
     folded = f"<details><summary>Estimated errors of {len(left)} other lines</summary>{others}</details>"
     shown = parts.facts_html([x for x in facts if x.key not in left], several)
     return shown + folded * any(x.key in left for x in facts)
-
-
-def _subtitle(result: Result, every: AllLines) -> str:
-    n = every.outputs
-    outputs = (
-        f"{n} outputs to t = {short(every.times[-1], 6)} s" if n > 1 else "static, one output" if n else "no output"
-    )
-    made = str(result.attributes.get("created", ""))[:16].replace("T", " ")
-    computed = f"computed {made} UTC with hybrid-cable {result.versions.get('hybrid-cable', '?')}"
-    return "; ".join([outputs, *facts_line(result, every), computed])
 
 
 def _kept(every: AllLines) -> dict[str, Kept]:

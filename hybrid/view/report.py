@@ -17,6 +17,7 @@ from hybrid.store.limits import capacity_of, code_of
 from hybrid.store.reader import Result
 from hybrid.view.decimate import MOST_ON_CURVE, Kept, Store, kept, script_json
 from hybrid.view.figure import Panel
+from hybrid.view.lines_report import ReportOfLines
 from hybrid.view.modes_page import PagedModes, section
 from hybrid.view.notebook_card import picture
 from hybrid.view.panels import end_forces, energy, energy_parts, history, ranges, touchdown
@@ -57,38 +58,66 @@ def write_report(result: Result, path: str | Path, *, overwrite: bool = False, m
 
 def html(result: Result, modes: PagedModes | None = None) -> str:
     """The page as text."""
-    swings = section(modes) if modes is not None else ""
-    if result.lines:
-        from hybrid.view import lines_report
-
-        return lines_report.html(result, swings)
-    facts, store = facts_of(result), Store()
-    shown = kept(result, [fact.t for fact in facts])
-    scene = scenery(result, store, shown)
-    panels = _panels(result, shown)
-    figures = [figure_of(panel, store) for group in panels.values() for panel in group]
-    index = {"scene": scene or None, "figures": figures}
+    store = Store()
+    made = ReportOfLines(result, store) if result.lines else _OfLine(result, store)
+    figures = [figure_of(panel, store) for group in made.panels.values() for panel in group]
     numbers = iter(range(len(figures)))
-    numbered = {name: [(next(numbers), panel) for panel in group] for name, group in panels.items()}
-    several = len(result.times) > 1
-    parts = {
+    numbered = {name: [(next(numbers), panel) for panel in group] for name, group in made.panels.items()}
+    own = made.sections(numbered)
+    parts = {  # in the order of the contents
         "title": escape(result.title or "(no title)"),
-        "subtitle": escape(_subtitle(result, shown)),
-        "verdict": verdict_html(facts, several),
-        "facts": facts_html(facts, several),
-        "cable": _cable(result, scene, shown) if scene else "",
-        "figures": _graphs(result, numbered, several) + swings,
-        "statistics": statistics_html(result),
-        "events": events_html(result, several),
-        "energy": _energy(result, numbered["energy"]),
+        "subtitle": escape("; ".join([*made.subtitle, _computed(result)])),
+        "verdict": verdict_html(made.facts, made.several),
+        "facts": own["facts"],
+        "cable": own["cable"],
+        "figures": own["figures"] + (section(modes) if modes is not None else ""),
+        "statistics": own["statistics"],
+        "events": events_html(result, made.several),
+        "energy": own["energy"],
         "settings": settings_html(result),
         "scene": escape(result.scene_text),
         "scene_title": "Scene as it was run (YAML)",
         "footer": escape(footer()),
         "mark": REPORT_MARK,
-        "index": script_json(index),
+        "index": script_json({"scene": made.scene, "figures": figures}),
     }
     return filled_page(parts, store)
+
+
+def _computed(result: Result) -> str:
+    """When and with what a result was computed."""
+    made = str(result.attributes.get("created", ""))[:16].replace("T", " ")
+    return f"computed {made} UTC with hybrid-cable {result.versions.get('hybrid-cable', '?')}"
+
+
+class _OfLine:
+    """What the page of one line has of its own."""
+
+    def __init__(self, result: Result, store: Store) -> None:
+        self.facts, self.several = facts_of(result), len(result.times) > 1
+        self._result, self._shown = result, kept(result, [fact.t for fact in self.facts])
+        self.scene = scenery(result, store, self._shown) or None
+        self.panels = _panels(result, self._shown)
+
+    @property
+    def subtitle(self) -> list[str]:
+        """Outputs and length."""
+        n, s = len(self._result.times), self._result.s
+        outputs = (
+            "no output" if n == 0 else "static, one output" if n == 1 and self._result.status == "complete" else ""
+        )
+        outputs = outputs or f"{n} output{'s' * (n != 1)} to t = {short(self._result.times[-1], 6)} s"
+        return [outputs, f"{short(length_of(self._result), 6)} m of cable, {len(s)} point{'s' * (len(s) != 1)}"]
+
+    def sections(self, numbered: dict[str, list[tuple[int, Panel]]]) -> dict[str, str]:
+        """Sections by their names in the template; numbered: the graphs."""
+        return {
+            "facts": facts_html(self.facts, self.several),
+            "cable": _cable(self._result, self.scene, self._shown) if self.scene else "",
+            "figures": _graphs(self._result, numbered, self.several),
+            "statistics": statistics_html(self._result),
+            "energy": _energy(self._result, numbered["energy"]),
+        }
 
 
 def _panels(result: Result, shown: Kept) -> dict[str, list[Panel]]:
@@ -110,16 +139,6 @@ def _panels(result: Result, shown: Kept) -> dict[str, list[Panel]]:
         "ranges": along,
         "energy": [panel for panel in (energy(result, "energy"), energy(result, "work")) if panel],
     }
-
-
-def _subtitle(result: Result, shown: Kept) -> str:
-    n, s = len(result.times), result.s
-    outputs = "no output" if n == 0 else "static, one output" if n == 1 and result.status == "complete" else ""
-    outputs = outputs or f"{n} output{'s' * (n != 1)} to t = {short(result.times[-1], 6)} s"
-    size = f"{short(length_of(result), 6)} m of cable, {len(s)} point{'s' * (len(s) != 1)}"
-    made = str(result.attributes.get("created", ""))[:16].replace("T", " ")
-    computed = f"computed {made} UTC with hybrid-cable {result.versions.get('hybrid-cable', '?')}"
-    return f"{outputs}; {size}; {computed}"
 
 
 def _cable(result: Result, scene: dict[str, Any], shown: Kept) -> str:

@@ -34,7 +34,8 @@ from hybrid.view.lines import (
     rotations,
     views_of_lines,
 )
-from hybrid.view.lines_report import _extreme_text, html
+from hybrid.view.lines_report import _extreme_text
+from hybrid.view.report import html
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 PLACES = {"east": (100, 0), "north": (-50, 87), "south": (-50, -87)}
