@@ -18,7 +18,6 @@ from derivative_scenes import KINDS, keys_of, scene_at_rest
 
 import hybrid
 from hybrid.designs.cable_at_rest import CableAtRest, Places
-from hybrid.designs.line_at_rest import Wanted, parse_result
 from hybrid.designs.numbers import with_number
 from hybrid.designs.sensitivity import at_rest
 from hybrid.kernels.algebra.block_elimination import SIZE
@@ -72,7 +71,7 @@ def spent(*what: Callable[[], Any], rounds: int = ROUNDS) -> list[float]:
 def test_a_derivative_over_its_equilibrium(model: str, cells: int) -> None:
     scene = hung(model, cells)
     of = ["tension@0", "max curvature"]
-    rest = CableAtRest(scene, 1.0, [parse_result(x, scene.length) for x in of])
+    rest = CableAtRest(scene, 1.0, of)
     static, one, all_, once, error = spent(
         lambda: hybrid.static(scene), lambda: rest.by(NUMBERS[:1]), lambda: rest.by(NUMBERS * 4),
         lambda: hybrid.sensitivity(scene, of, NUMBERS[:1]), lambda: hybrid.sensitivity(scene, of, NUMBERS * 4),
@@ -107,14 +106,14 @@ def believed(differences: list[np.ndarray]) -> np.ndarray:
     return np.take_along_axis(stacked[1:-1], best[None], axis=0)[0]
 
 
-def results(scene: hybrid.Scene, wanted: list[Wanted], places: Places) -> np.ndarray:
+def results(scene: hybrid.Scene, wanted: list[str], places: Places) -> np.ndarray:
     """Of an equilibrium, whose last Newton correction is counted: what is left over would be the error of differences."""
     rest = CableAtRest(scene, 1.0, wanted, places)
     left, still = rest.line.left(rest.line.here)[0], np.zeros((1, rest.model.line.s.size, SIZE))
     return np.asarray(rest.values + rest.forward(left[rest._free][:, None], still)[0])
 
 
-def off(scene: hybrid.Scene, wanted: list[Wanted], keys: list[str]) -> np.ndarray:
+def off(scene: hybrid.Scene, wanted: list[str], keys: list[str]) -> np.ndarray:
     """(keys, results) by how much derivatives differ from differences of equilibria on nodes that go along, in parts."""
     rest = CableAtRest(scene, 1.0, wanted)
     found, out = rest.by(keys), []
@@ -144,7 +143,7 @@ def test_differences_of_equilibria() -> None:
             continue
         scene = hybrid.validate_scene(tables)
         place = f"position.z@{0.4517 * scene.length!r}"  # at no node, beside which second derivatives jump
-        wanted = [parse_result(x, scene.length) for x in [*of, place]]
+        wanted = [*of, place]
         try:
             found = off(scene, wanted, keys_of(tables))
         except hybrid.ComputationError as error:

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.designs import system_at_rest
+from hybrid.designs import network_at_rest
 from hybrid.designs.cable_at_rest import CableAtRest
-from hybrid.designs.line_at_rest import parse_result
 from hybrid.designs.numbers import changed_scene, with_number
 from hybrid.designs.sensitivity import at_rest
 from hybrid.model.nearby_clamped import seats_know_no_shape, shaped_anew
@@ -160,10 +159,10 @@ def test_arrays_of_clamped_lines_are_those_of_lines_that_are_built_anew(what, mo
     tables, of, keys = SCENES[what]
     made, built = as_scene_or_system(tables), []
     rest = at_rest(made, of)
-    monkeypatch.setattr(system_at_rest, "shaped_anew", lambda *x: built.append(1) or shaped_anew(*x))
+    monkeypatch.setattr(network_at_rest, "shaped_anew", lambda *x: built.append(1) or shaped_anew(*x))
     ours = rest.by(keys)
     assert not built
-    monkeypatch.setattr(system_at_rest, "seats_know_no_shape", lambda *_: False)
+    monkeypatch.setattr(network_at_rest, "seats_know_no_shape", lambda *_: False)
     anew = rest.by(keys)
     assert built
     np.testing.assert_allclose(ours, anew, rtol=1e-7, atol=1e-9 * np.abs(anew).max())
@@ -241,10 +240,9 @@ def with_torque(law):
 def test_torque_of_tension(law):
     """Without the tension of the cell after next, height by mass was off by a fifth, and twist by an eighth."""
     made, of = with_torque(TORQUES[law]), ["tension@0", "max curvature", "position.z@50", "twist@50"]
-    wanted = [parse_result(x, made.length) for x in of]
-    rest = CableAtRest(made, 1.0, wanted)
+    rest = CableAtRest(made, 1.0, of)
     for key in ("cable.sections[0].mass", "ends.end.position[0]", "cable.sections[0].tension_torque"):
         number = rest.number(key)
         ours, d = rest.by([key])[0], 1e-5 * number
-        more, less = (CableAtRest(changed_scene(made, key, number + x), 1.0, wanted).values for x in (d, -d))
+        more, less = (CableAtRest(changed_scene(made, key, number + x), 1.0, of).values for x in (d, -d))
         np.testing.assert_allclose(ours, (more - less) / (2.0 * d), rtol=1e-5, err_msg=key)

@@ -186,7 +186,7 @@ def test_steps_that_are_divided_are_no_neighbours(monkeypatch):
     def shorter(asked, course, *more):
         part = 0.5 if asked.cable.sections[0].mass > 5.0 else 1.0
         lines = {key: replace(x, step=part * x.step) for key, x in course.lines.items()}
-        return plain(asked, course._replace(lines=lines), *more)
+        return plain(asked, replace(course, lines=lines), *more)
 
     def unfollowed(*_):
         raise Unfollowed("nothing")

@@ -9,7 +9,6 @@ import pytest
 
 import hybrid
 from hybrid.designs import line_at_rest
-from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene_or_system
 from tests.designs.test_derivatives import LINE, SEA, pinned, scene
@@ -36,7 +35,7 @@ def test_far_nodes_do_not_count(case: str, monkeypatch: pytest.MonkeyPatch) -> N
     if case == "a buoy":
         tables = tables | {"lines": {name: x | {"mesh": {"cells": 200}} for name, x in tables["lines"].items()}}
     rest = at_rest(as_scene_or_system(tables), of)
-    found, lines = rest.by(keys), rest.lines if isinstance(rest, NetworkAtRest) else [rest.line]
+    found, lines = rest.by(keys), rest.lines
     assert all(x._near is not None for x in lines if x.wanted)
     monkeypatch.setattr(line_at_rest, "MANY", 10**9)
     least = 1e-3 * np.abs(rest.values) / np.array([[abs(rest.number(key)) or 1.0] for key in keys])

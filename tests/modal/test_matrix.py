@@ -7,7 +7,7 @@ import pytest
 
 import hybrid
 from hybrid.designs.cable_at_rest import CableAtRest
-from hybrid.designs.line_at_rest import displaced, parse_result
+from hybrid.designs.line_at_rest import displaced
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.linear.matrices import linear_line
 from tests.solve.test_bed_of_depths import hill, mooring
@@ -74,7 +74,7 @@ SCENES = {
 @pytest.mark.parametrize("what", SCENES)
 def test_it_is_what_the_equations_change_by(what):
     made = SCENES[what]()
-    rest = CableAtRest(made, 1.0, [parse_result("tension@0", made.length)])
+    rest = CableAtRest(made, 1.0, ["tension@0"])
     line, state, free = rest.line, rest.line.state.copy(), rest._free
     linear = linear_line(line.joined(line.here), "cable", state, sticks=False, quick=False)
     K = (linear.stiffness + linear.by_layers).toarray()[free]
