@@ -200,6 +200,8 @@ OF_AN_END = "moment and tangent at ends."
 KINK_COUNTS = "counts as a bend"
 # Of an event "out of plane": the motion is right, because it is one in space from there on.
 IN_SPACE = "it goes on in space"
+# In the texts of "error uncertain" of named quantities, which an attribute of the result has as well.
+AS_MUCH = "finer cells and steps change as much as coarser ones did"
 # Kind of the event of a run that another program had begun.
 OTHER_PROGRAM = "other program"
 # Kind of the event that gives the number (value) of events of another kind (criterion) that were not written.

@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid.accuracy.errors_by_cause import Errors
 from hybrid.accuracy.extreme_errors import ExtremeErrors
+from hybrid.errors import AS_MUCH
 from hybrid.model.resolution import Limited, RequestedAccuracy, Resolution
 from hybrid.outputs.probes import SIDED_ERRORS as RIGHT_OF
 from hybrid.scene.accuracy import ALONG, NOT_ASKED, ROUGHEST
@@ -211,9 +212,8 @@ def not_converged(found: Mapping[str, float], asked: RequestedAccuracy | None) -
         named = asked is None or asked.asks(name) or (name == "tension" and asked.asks(END_FORCE))
         kind = "error uncertain" if named else "not converged"  # forces at the ends are that tension too
         texts.setdefault(kind, []).append(f"{name.replace('_', ' ')} ({times:.2g} times)")
-    why = "finer cells and steps change as much as coarser ones did"
     end = "the error may be larger than its figure"
-    return [(kind, f"{why}: {', '.join(names)}; {end}") for kind, names in texts.items()]
+    return [(kind, f"{AS_MUCH}: {', '.join(names)}; {end}") for kind, names in texts.items()]
 
 
 def times_the_cost(now: Resolution, finer: Resolution) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 from hybrid.accuracy.error_report import CAUSES, UNITS
 from hybrid.accuracy.extreme_errors import errors_by_cause, figures
 from hybrid.accuracy.system_samples import extremes_of, touch_unasked
-from hybrid.errors import ComputationError, SceneError
+from hybrid.errors import AS_MUCH, ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.sections import section_changes
@@ -132,7 +132,7 @@ def write_system_errors(
     notes = [(FAILED, failed)] if failed else []
     doubtful = [f"{x.replace('_', ' ')} of line {name}" for name, each in doubts.items() for x in each]
     if doubtful:
-        text = "coarser runs change as much or more from one to the next: the error may be larger than its figure"
+        text = f"{AS_MUCH}: the error may be larger than its figure"
         notes.append(("error uncertain", f"{', '.join(doubtful)}: {text}; a finer mesh or a shorter step tells"))
     amend_lines(target, fields, errors, attributes, of_all, notes)
 

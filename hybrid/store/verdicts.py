@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, IN_SPACE, KINK_COUNTS, OF_AN_END
+from hybrid.errors import AS_MUCH, EVENTS_BY_WEIGHT, IN_SPACE, KINK_COUNTS, OF_AN_END
 from hybrid.store.capacity import bound_of_steps, bound_with_errors
 from hybrid.store.code_checks import code_of_steps, code_with_errors
 from hybrid.store.envelope import (
@@ -242,14 +242,13 @@ def _doubts(
     result: StoredResult, names: frozenset[str], s: Floats, more: Doubtful = MappingProxyType({})
 ) -> Iterator[Doubt]:
     """What makes quantities doubtful, the worst first: events, errors that are not known; more: kinds beside DOUBTS."""
-    kinds = {**DOUBTS, **more}
+    kinds, unknown = {**DOUBTS, **more}, not_converged_in(result.attributes)
     rank = {kind: k for k, kind in enumerate(EVENTS_BY_WEIGHT)}
     for event in sorted(result.events, key=lambda e: (rank.get(e.kind, len(rank)), e.t)):
-        if event.kind not in kinds or _is_harmless(event):
-            continue
+        if event.kind not in kinds or _is_harmless(event) or (unknown and AS_MUCH in event.text):
+            continue  # the last: of named quantities alone, below
         if (found := _of_event(result, event, kinds[event.kind], names, s)) is not None:
             yield found
-    unknown = not_converged_in(result.attributes)
     for name in sorted(names - {"torque", "von_mises", "wall_tension", "contact_force"}):
         if name in unknown:
             yield Doubt(f"the error of {_words(name)} is not known: it does not converge", "shorter steps and cells")

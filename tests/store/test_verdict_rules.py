@@ -71,6 +71,18 @@ def test_what_an_event_makes_doubtful(kind: str) -> None:
         assert found.verdict == (OPEN if kind in OF_ALL | of else "met"), (name, found)
 
 
+@pytest.mark.parametrize(("text", "verdicts"), [
+    ("finer cells and steps change as much as coarser ones did: tension (1.1 times); it may be larger", ("met", OPEN)),
+    ("a vibration of 0.2 s", (OPEN, OPEN)),
+])  # fmt: skip
+def test_a_quantity_that_does_not_converge_leaves_others_as_they_are(text: str, verdicts: tuple[str, str]) -> None:
+    """Position and end forces, of which tension does not: forces at the ends are that tension."""
+    for name, verdict in zip(("position", "end_force_start"), verdicts, strict=True):
+        result = reported(errors=True, rod=True, asked=name, events=[(0.0, 0.0, 100.0, "error uncertain", text)])
+        result.attributes["errors_not_converged"] = "tension"
+        assert asked_accuracy(result)[0].verdict == verdict, name
+
+
 def test_no_kind_is_in_the_table_that_is_not_listed_here() -> None:
     assert {*DOUBTS, *OF_ACCURACY} == OF_ALL | OF_BENDS | OF_PULLS | OF_BOTH | OF_TORQUE
 
