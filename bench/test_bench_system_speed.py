@@ -267,6 +267,32 @@ def test_a_step_of_lines_against_one_of_a_cable() -> None:
         assert one < 1.2 * cable
 
 
+def beside(what: str) -> dict[str, Any]:
+    """Ten lines, beside which there is nothing, a sheave under one of them, or contact of one with itself."""
+    tables = legs(50, 10, "catenary", 30.0, 30.0)
+    if what == "sheave":  # on the bed, 200 m from the middle
+        tables["obstacles"] = {"drum": {
+            "kind": "sheave", "at": [250, 0, -99.5], "axis": [0, 1, 0], "radius": 1.0, "groove": 0.2, "rim": 0.1,
+            "stiffness": 1e4, "bearing": {"inertia": 100.0, "damping": 10.0},
+        }}  # fmt: skip
+    elif what == "contact":
+        tables["lines"]["l0"]["contact"] = {"self": True}
+    elif what == "winch":  # of one that ends at a weight
+        tables["points"]["a0"] = {"kind": "free", "initial_guess": [60, 0, -99], "mass": 5000.0}
+        winch = {"tension": 3e4, "inertia": 500.0, "damping": 500.0, "ramp": 8.0}
+        tables["lines"]["l0"]["connections"] = {"end": {"payout": {"longest": 450.0, "winch": winch}}}
+    return tables
+
+
+def test_a_sheave_a_winch_or_contact_of_one_line_slows_no_other() -> None:
+    """The loop of ten lines, of which one has it: at most what that line costs is added to those of the others."""
+    for what in ("sheave", "winch", "contact"):
+        each = [[step_of(beside(x))[0] for x in ("nothing", what)] for _ in range(3)]
+        without, found = 1e6 * np.min(each, axis=0)
+        print(f"\n{what}: ten lines of 50 cells {without:.0f} us a step without it, {found:.0f} us with it", flush=True)
+        assert found < 1.8 * without
+
+
 def test_many_lines() -> None:
     for cells, count, every, duration in ((100, 100, 60.0, 60.0), (100, 100, 1.0, 60.0), (20, 1000, 6.0, 6.0)):
         step, whole = step_of(legs(cells, count, "catenary", every, duration))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def checkpoint(run: SystemRun) -> dict[str, Any]:
     """What the next steps depend on, between two steps, with no output waiting: named arrays and plain values."""
     lines = {
-        line.name: line.checkpoint(work, run.t) | {"state": state._asdict()}
+        line.name: line.checkpoint(work, run.t) | {"state": state._asdict(), "rho": float(line.books.clock.last_rho)}
         for line, work, state in zip(run.lines, run.solver.work, run.state.lines, strict=True)
     }
     body_work = run.solver.body_work[:, :SPRING]
@@ -84,7 +84,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     template |= dict.fromkeys(name for name in as_there_are if name in template)
     saved = {"quantities": run.quantities.unknown(), "under": {}, "overlaps": [], **saved}  # nor did it keep ranges
     saved["quantities"] = run.quantities.of_today(saved["quantities"])
-    saved["lines"] = of_today(saved.get("lines"), template["lines"])
+    saved["lines"] = of_today(saved.get("lines"), template["lines"], saved["rho"])
     for name, line in template["lines"].items():
         if name in template["zones"]:
             line["envelope"] = None  # of other meshes as well
@@ -129,10 +129,10 @@ def _of(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     return line if isinstance(line, Mapping) else {}
 
 
-def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
+def of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:
     """Lines of a checkpoint with what earlier programs did not have: mean tensions, the end of a report, answers to
 
-    torques, and what diagnostics remember.
+    torques, what diagnostics remember, and a spectral radius of their own; rho: that of all lines.
     """
     if not (isinstance(lines, dict) and all(isinstance(x, dict) for x in lines.values())):
         return lines
@@ -150,7 +150,7 @@ def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
         if mine is not None and "torsion" in mine:
             line = {"torsion": mine["torsion"]} | line
         if mine is not None:
-            line = {"before": mine["before"]} | line
+            line = {"before": mine["before"], "rho": rho} | line
         if mine is not None and isinstance(line.get("noted"), dict):
             line = line | {"noted": mine["noted"] | line["noted"]}
         found[name] = line
@@ -191,6 +191,7 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
         mine = found["lines"][line.name]
         for name, values in mine["state"].items():
             getattr(state, name)[:] = values
+        line.books.clock.last_rho = mine["rho"]
         line.restore(mine, work, run.t, x.joints)
     if run.zones is not None:
         run.zones.restore(found["zones"])

@@ -33,6 +33,7 @@ class JoinedLine(NamedTuple):
     slackens: bool = False  # whether a motion goes on with slack catenaries, and rest is taken with them if need be
     rides: NDArray[np.int64] = np.zeros(0, np.int64)  # (M,) bodies that carry obstacles, -1: none does; empty: no body
     borne: Floats = np.zeros(0)  # (N,) strain that cells bear, of a line that may lie on obstacles; empty: of no other
+    keeps_pace: bool = False  # whether its zones or its length follow the steps with the spectral radius of all lines
     lengthens: bool = False  # whether its winch holds a tension and an end is joined: its length is an unknown of all
 
 

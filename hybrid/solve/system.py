@@ -20,14 +20,14 @@ from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.contact.self_contact import blank_contact_job
 from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
-from hybrid.kernels.junctions.body_contact import meet_bodies
-from hybrid.kernels.junctions.body_forces import EACH_BODY, TOUCHED, blank_meeting_job
+from hybrid.kernels.junctions.body_contact import CARRY
+from hybrid.kernels.junctions.body_forces import EACH_BODY, TOUCHED
 from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
-from hybrid.kernels.junctions.joined_sheaves import blank_spinning_job, spin_sheaves
 from hybrid.kernels.junctions.junctions import HANDED
-from hybrid.kernels.junctions.system_contact import blank_touching_job, room_for_products, touch_system
-from hybrid.kernels.junctions.system_job import SystemTask, blank_system_job
+from hybrid.kernels.junctions.lone_lines import find_near, lead_lone
+from hybrid.kernels.junctions.system_contact import room_for_products
+from hybrid.kernels.junctions.system_job import SystemTask
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
@@ -37,9 +37,9 @@ from hybrid.kernels.run.run import in_space
 from hybrid.kernels.run.system import JUNCTIONS, book_system_step, solve_system
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.forces import FRICTION, WAVES
-from hybrid.kernels.state.obstacle_rows import FREE
+from hybrid.kernels.state.obstacle_rows import FREE, MOVES
 from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
-from hybrid.kernels.state.state import Floats, Line, State, Work, state_for
+from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, State, Work, state_for
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, Limits, Task
 from hybrid.kernels.step.step import friction_axes
@@ -47,6 +47,7 @@ from hybrid.kernels.step.step_law import REFUSED
 from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.contact_statics import left_over
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
+from hybrid.solve.joint_jobs import JointJobs, Rooms
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.stability import ANCHOR
@@ -110,116 +111,165 @@ class SystemSolver:
         self._fairleads = np.array([x.fairleads for x in lines], float).reshape(-1, 2, 3)
         self._arms, self._gaps = np.zeros_like(self._fairleads), np.zeros_like(self._fairleads)
         self._seats = np.array([x.seats for x in lines], float).reshape(-1, 2, SEAT)
-        self._handed, self._follow = np.zeros((HANDED - 1, HANDED)), np.zeros((2, 6, 6))
-        self._answers, self._turned = np.zeros((2, ANSWER)), np.zeros(COLUMNS)
         self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
         self._contacts, self.shared = {k: x for k, x in enumerate(contacts) if x is not None}, shared
-        touch = {*self._contacts, *(shared.lines if shared is not None else ())}
         self._rides = lines[0].rides  # obstacles are those of all lines
         self._sheaves = int((lines[0].line.moved == FREE).sum())
-        self._winches = sum(x.lengthens for x in lines)
-        beside = self._sheaves or self._winches
-        touch |= {*range(len(lines))} if self._rides.size or beside else set()
-        self.work = [_room(x, k in touch) for k, x in enumerate(lines)]
+        # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.  Of
+        # each whether it always moves with others (-1), or else how near it is to a body or sheave that it may move.
+        self._near = np.array([-1 if max(x.joints) >= 0 else 0 for x in lines], np.int64)
+        together = [k for k in self._touching_lines if k not in self._contacts or lines[k].keeps_pace]
+        self._near[together] = -1
+        self._alone = np.zeros(len(lines), np.int64)
+        self._mixes = [bool(self._rides.size or self._sheaves) and near == 0 for near in self._near]
+        self.work = [_room(x, self._keeps(k, x)) for k, x in enumerate(lines)]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
-        self._floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
         self.blurred: set[int] = set()  # lines of the last equilibrium of which round-off hides whether they buckle
         self.turns: tuple[SystemState, SystemState] | None = None  # states between which steps go back and forth
-        carried = [x.line.h.size + 1 if _carries(x) else 0 for x in lines]
-        columns = COLUMNS if self._seats[:, :, TURNS].any() else 3
-        self._first = np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64)
-        self._columns = np.zeros((columns, max(sum(carried), 1), SIZE))
-        self._functional, self._parts = np.zeros(FUNCTIONAL), np.zeros_like(self._columns)
         self.net = np.zeros((points, 3))
-        unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
-        self._matrix = np.zeros((unknowns + 5, unknowns + 1))
-        blank = Table(blank_job)
-        # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
-        # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.
-        size, rows = blank.numbers.size, range(len(lines))
-        self.lone = [k for k in rows if not touch and max(lines[k].joints) < 0]
-        self.joined = [k for k in rows if k not in self.lone]
-        self._numbers = np.zeros((2, len(lines), size), np.int64)
-        self.lone_numbers = np.zeros((len(self.lone), size), np.int64)
-        self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in rows]
-        self._lone_tables = {k: blank.again(x) for k, x in zip(self.lone, self.lone_numbers, strict=True)}
-        self._joined_numbers, self._joined_tables = self._numbers, dict(enumerate(self._tables))
-        if self.lone:
-            self._joined_numbers = np.zeros((2, len(self.joined), size), np.int64)
-            self._joined_tables = {
-                k: tuple(blank.again(x[j]) for x in self._joined_numbers) for j, k in enumerate(self.joined)
-            }
-        self._asked = SystemTask()
-        self._jobs = Table(blank_system_job), Table(blank_system_job)
-        self._solver = in_space.address(self._numbers[0, 0])
         mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
         self.scale = max(x.scale for x in lines)
         self.length = max(x.length for x in lines)
         self.anchor = ANCHOR * self.scale / (mass * self.length)  # 1/s2
-        room = {
-            "asked": self._asked, "columns": self._columns, "functional": self._functional, "parts": self._parts,
-            "answers": self._answers, "q": self._turned, "net": self.net, "bodies": self.bodies, "work": self.body_work,
-            "S": self._handed, "G": self._follow, "A": self._matrix, "solver": self._solver, "rides": self._rides,
-        }  # fmt: skip
-        of_lines = {
-            "joints": self.joints, "fairleads": self._fairleads, "seats": self._seats, "arms": self._arms,
-            "gaps": self._gaps, "floors": self._floors, "allowed": self.allowed, "first": self._first,
-        }  # fmt: skip
-        for job, numbers in zip(self._jobs, self._numbers, strict=True):
-            job.bind(tables=numbers, numbers=numbers.view(np.float64), **of_lines, **room)
-        self._joined_jobs = self._jobs
-        if self.lone:
-            self._joined_jobs = Table(blank_system_job), Table(blank_system_job)
-            of_lines = {name: np.ascontiguousarray(x[self.joined]) for name, x in of_lines.items()}
-            for job, numbers in zip(self._joined_jobs, self._joined_numbers, strict=True):
-                job.bind(tables=numbers, numbers=numbers.view(np.float64), **of_lines, **room)
+        self._pressing: NDArray[np.int64] = np.zeros(0, np.int64)
+        self._pressed: dict[str, Any] = {}
+        self._touched: tuple[Any, ...] = ()  # what jobs get where lines touch themselves or each other
+        self._phase, self._at_rest, self._asked = np.zeros(1, np.int64), np.zeros(1, np.int64), SystemTask()
+        blank = Table(blank_job)
+        # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
+        self._numbers = np.zeros((2, len(lines), blank.numbers.size), np.int64)
+        self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in range(len(lines))]
+        self._solver = in_space.address(self._numbers[0, 0])
+        self._rooms = self._make_rooms()
+        self._together = self._all = JointJobs(self._rooms, self._numbers, range(len(lines)))
+        self.lone: list[int] = []
+        self.joined = list(range(len(lines)))
+        self.lone_numbers = self._numbers[0, :0]
+        self._lone_tables: dict[int, Table] = {}
+        self._joined_tables = dict(enumerate(self._tables))
         for k, (x, work, books) in enumerate(zip(lines, self.work, self.books, strict=True)):
             limits = Limits(REACH * x.length, x.scale, 1)
             self.bind_line(
                 k, task=Task(ASSEMBLY, limits=limits), line=x.line, sea=x.sea, ends=x.ends, work=work, books=books,
                 was=NO_PUSH, now=NO_PUSH,
             )  # fmt: skip
-            if k in self._lone_tables:
-                self._lone_tables[k].bind(task=Task(RUN, limits=limits._replace(most=MOST_OF_STEP)))
-        self._pressing: NDArray[np.int64] = np.zeros(0, np.int64)
-        self._pressed: dict[str, Any] = {}
-        self._phase = np.zeros(1, np.int64)
-        self._meeting = [Table(blank_meeting_job), Table(blank_meeting_job)] if self._rides.size else []
+        self._group()
+
+    def _keeps(self, number: int, x: JoinedLine) -> bool:
+        """Whether all factors of a line may serve again: for contact, bodies, sheaves, and winches of joined lines."""
+        beside = bool(self._rides.size or self._sheaves or any(each.lengthens for each in self.lines))
+        return number in self._touching_lines or (beside and (self._mixes[number] or self._near[number] < 0))
+
+    def _make_rooms(self) -> Rooms:
+        """What jobs of the lines work in."""
+        lines, points, bodies = self.lines, len(self.net), self.bodies
+        carried = [x.line.h.size + 1 if _carries(x) else 0 for x in lines]
+        columns = np.zeros((COLUMNS if self._seats[:, :, TURNS].any() else 3, max(sum(carried), 1), SIZE))
+        unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
+        self._matrix = np.zeros((unknowns + 5, unknowns + 1))
+        shared = {
+            "columns": columns, "functional": np.zeros(FUNCTIONAL), "parts": np.zeros_like(columns),
+            "answers": np.zeros((2, ANSWER)), "q": np.zeros(COLUMNS), "net": self.net, "bodies": bodies,
+            "work": self.body_work, "S": np.zeros((HANDED - 1, HANDED)), "G": np.zeros((2, 6, 6)),
+            "A": self._matrix,
+        }  # fmt: skip
+        of_lines = {
+            "joints": self.joints, "seats": self._seats, "arms": self._arms,
+            "first": np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64),
+        }  # fmt: skip
+        floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
+        own = {"fairleads": self._fairleads, "gaps": self._gaps, "floors": floors, "allowed": self.allowed}
+        apart = {"near": self._near, "alone": self._alone, "asked": self._asked, "solver": self._solver}
+        begins = np.append(0, np.cumsum([x.line.s.size for x in lines])[:-1]).astype(np.int64)
+        rooms = Rooms(shared, of_lines, own, apart | {"rides": self._rides, "phase": self._phase}, begins, {}, {})
         if self._rides.size:
-            self._meet()
-        self._spinning = [Table(blank_spinning_job), Table(blank_spinning_job)] if beside else []
-        if beside:
-            self._spin()
-        self._touching = Table(blank_touching_job), Table(blank_touching_job)
-        self._at_rest = np.zeros(1, np.int64)
+            rooms.meeting.update(self._room_to_meet())
+        if self._sheaves or any(x.lengthens for x in lines):
+            rooms.spinning.update(self._room_to_spin())
+        return rooms
 
     def bind_line(self, number: int, **values: Any) -> None:
         """Put values in their places in the jobs of a line."""
         for table in self._tables[number]:
             table.bind(**values)
         if number in self._lone_tables:
-            self._lone_tables[number].bind(**values)
-        elif self.lone:
+            self._lone_tables[number].bind(**self._by_itself(number, values))
+        elif self._together is not self._all:
             for table in self._joined_tables[number]:
                 table.bind(**values)
+
+    def _by_itself(self, number: int, values: dict[str, Any]) -> dict[str, Any]:
+        """The same for a line that is solved by itself: what is free moves as told, and no factors serve again."""
+        if not self._mixes[number]:
+            return values
+        found = {**values}
+        if (line := values.get("line")) is not None:
+            moved = line.moved.copy()
+            moved[moved == FREE] = MOVES
+            found["line"] = line._replace(moved=moved)
+        if (work := values.get("work")) is not None and not (number in self._contacts or work.torsion.known.size):
+            found["work"] = work._replace(X=work.X[: self.lines[number].line.s.size * ROW])
+        for name in {"old", "new"} & {*values}:
+            found[name] = values[name]._replace(sheave=NO_SHEAVES)
+        return found
+
+    def _group(self) -> None:
+        """Which lines are solved by themselves from now on, and tables for these and for the others."""
+        some = not any(self._mixes) or bool((self._near != 0).any())  # else what is free moves with the first line
+        self._alone[:] = (self._near == 0) & (some | (np.arange(len(self.lines)) > 0))
+        self.lone, self.joined = (np.flatnonzero(self._alone == x).tolist() for x in (1, 0))
+        self.lone_numbers = np.zeros((len(self.lone), self._numbers.shape[2]), np.int64)
+        self._lone_tables = {}
+        for k, numbers in zip(self.lone, self.lone_numbers, strict=True):
+            x, table = self.lines[k], self._tables[k][0].again(numbers)
+            task = Task(RUN, limits=Limits(REACH * x.length, x.scale, MOST_OF_STEP))
+            table.bind(task=task, **self._by_itself(k, {"line": x.line, "work": self.work[k]}))
+            self._lone_tables[k] = table
+        self._together, self._joined_tables = self._all, dict(enumerate(self._tables))
+        if self.lone:
+            numbers = np.zeros((2, len(self.joined), self._numbers.shape[2]), np.int64)
+            self._joined_tables = {
+                k: tuple(mine.again(x[j]) for mine, x in zip(self._tables[k], numbers, strict=True))
+                for j, k in enumerate(self.joined)
+            }
+            self._together = JointJobs(self._rooms, numbers, self.joined)
+            if self._touched:
+                self._together.touch(*self._touched)
+
+    def find_near(self, now: SystemState, t: float) -> None:
+        """Find which lines are near what is free in the state of now, t (s), and solve these with it from now on."""
+        if not any(self._mixes):
+            return
+        self._bind_states(0, now, now)
+        for x in self.lines:
+            carry_obstacles(t, t, x.sea)
+        shifts = self.body_work[:, U : U + 3].copy()
+        self.body_work[:, U : U + 3] = 0.0
+        self._all.ask_bodies(CARRY)
+        self.body_work[:, U : U + 3] = shifts
+        find_near(self._all.jobs[0].numbers)
+
+    def regroup(self) -> dict[str, Any]:
+        """Solve lines with what they have been found near, and others by themselves: as of `take_turns`."""
+        self._group()
+        return self._bind_turns()
 
     def take_line(self, number: int, line: Line) -> None:
         """A line is in other arrays from now on."""
         self.lines = tuple(x._replace(line=line) if k == number else x for k, x in enumerate(self.lines))
         self.bind_line(number, line=line)
 
-    def _meet(self) -> None:
-        """Lines touch the bodies that carry obstacles."""
+    def _room_to_meet(self) -> dict[str, Any]:
+        """Room of lines that touch the bodies that carry obstacles."""
         bodies = sorted({int(b) for b in self._rides if b >= 0})
         slots = np.full(len(self.bodies), -1, np.int64)
         slots[bodies] = np.arange(len(bodies))
-        nodes = [x.line.s.size for x in self.lines]
-        total, rows = sum(nodes), EACH_BODY * len(bodies)
+        total, rows = sum(x.line.s.size for x in self.lines), EACH_BODY * len(bodies)
         self._pressing = np.zeros(1 + len(bodies), np.int64)
-        room = {
+        self._pressed = {
             "gaps": np.zeros_like(self._gaps), "rides": self._rides, "carriers": np.array(bodies, np.int64),
-            "slots": slots, "begins": np.append(0, np.cumsum(nodes)[:-1]).astype(np.int64), "phase": self._phase,
+            "slots": slots, "phase": self._phase,
             "found": self._pressing, "touched": np.zeros((total * len(bodies), TOUCHED)),
             "own": np.zeros((len(bodies), 36)), "wrench": np.zeros((len(bodies), 6)),
             "marks": np.zeros(total, np.int64), "kept": np.zeros((total, SIZE)),
@@ -227,40 +277,17 @@ class SystemSolver:
             "turned": np.zeros((rows, len(self.bodies), 6)), "coupling": np.zeros((rows, rows + 1)),
             "order": np.zeros(rows, np.int64),
         }  # fmt: skip
-        self._pressed = room
-        for job, meeting, numbers in zip(self._jobs, self._meeting, self._numbers, strict=True):
-            meeting.bind(**self._of_lines(numbers), **room)
-            job.bind(
-                rides=self._rides,
-                phase=self._phase,
-                meet=meet_bodies.address(meeting.numbers),
-                meet_table=meeting.numbers,
-            )
+        return self._pressed
 
-    def _spin(self) -> None:
-        """Lines turn the sheaves among the obstacles, and winches give of joined lines what keeps their tension."""
-        nodes, bodies = [x.line.s.size for x in self.lines], len(self.bodies)
-        room = {
-            "gaps": np.zeros_like(self._gaps), "phase": self._phase, "asked": self._asked,
-            "begins": np.append(0, np.cumsum(nodes)[:-1]).astype(np.int64), "marks": np.zeros(sum(nodes), np.int64),
-            "kept": np.zeros((sum(nodes), SIZE)), "moved": np.zeros((bodies, 6)),
-            "turned": np.zeros((self._sheaves, bodies, 6)), "lengthened": np.zeros((self._winches, sum(nodes), SIZE)),
-            "drawn": np.zeros((self._winches, bodies, 6)),
-        }  # fmt: skip
-        for meeting, spinning in zip(self._meeting, self._spinning, strict=False):
-            spinning.bind(meet=meet_bodies.address(meeting.numbers), meet_table=meeting.numbers)
-        for job, spinning, numbers in zip(self._jobs, self._spinning, self._numbers, strict=True):
-            spinning.bind(**self._of_lines(numbers), **room)
-            at = spin_sheaves.address(spinning.numbers)
-            job.bind(phase=self._phase, spin=at, spin_table=spinning.numbers)
-
-    def _of_lines(self, numbers: NDArray[np.int64]) -> dict[str, Any]:
-        """What those share that put contact into the corrections of all lines, of jobs `numbers`."""
+    def _room_to_spin(self) -> dict[str, Any]:
+        """Room of sheaves that lines turn, and of winches that give of joined lines what keeps their tension."""
+        nodes, bodies = sum(x.line.s.size for x in self.lines), len(self.bodies)
+        winches = sum(x.lengthens for x in self.lines)
         return {
-            "tables": numbers, "joints": self.joints, "seats": self._seats, "arms": self._arms, "first": self._first,
-            "columns": self._columns, "functional": self._functional, "parts": self._parts, "answers": self._answers,
-            "net": self.net, "bodies": self.bodies, "work": self.body_work, "S": self._handed, "G": self._follow,
-            "A": self._matrix, "q": self._turned,
+            "gaps": np.zeros_like(self._gaps), "phase": self._phase, "asked": self._asked,
+            "marks": np.zeros(nodes, np.int64), "kept": np.zeros((nodes, SIZE)), "moved": np.zeros((bodies, 6)),
+            "turned": np.zeros((self._sheaves, bodies, 6)), "lengthened": np.zeros((winches, nodes, SIZE)),
+            "drawn": np.zeros((winches, bodies, 6)),
         }  # fmt: skip
 
     def _touch(self) -> None:
@@ -278,16 +305,12 @@ class SystemSolver:
         nodes = sum(x.line.s.size for x in self.lines)
         room = {
             "gaps": np.zeros_like(self._gaps), "kept": np.zeros((nodes, SIZE)), "asked": self._at_rest,
-            "moved": np.zeros((len(self.bodies), 6)), "hessenberg": room_for_products(), "shared": shared,
-            "contacts": tables, "phase": self._phase,
+            "moved": np.zeros((len(self.bodies), 6)), "hessenberg": room_for_products(), "phase": self._phase,
         }  # fmt: skip
-        for meeting, touching in zip(self._meeting, self._touching, strict=False):
-            touching.bind(meet=meet_bodies.address(meeting.numbers), meet_table=meeting.numbers)
-        for spinning, touching in zip(self._spinning, self._touching, strict=False):
-            touching.bind(spin=spin_sheaves.address(spinning.numbers), spin_table=spinning.numbers)
-        for job, touching, numbers in zip(self._jobs, self._touching, self._numbers, strict=True):
-            touching.bind(**self._of_lines(numbers), **room)
-            job.bind(touch=touch_system.address(touching.numbers), touch_table=touching.numbers)
+        self._touched = room, tables, shared
+        self._all.touch(*self._touched)
+        if self.lone:
+            self._together.touch(*self._touched)
 
     @property
     def line_tables(self) -> NDArray[np.int64]:
@@ -324,33 +347,36 @@ class SystemSolver:
 
     def take_turns(self, states: tuple[SystemState, SystemState]) -> dict[str, Any]:
         """Steps lead from the first state to the second and back from now on: what run.system_run.StepsJob has."""
-        old, new = self.turns = states
-        for parity, (a, b) in enumerate((states, states[::-1])):
+        self.turns = states
+        return self._bind_turns()
+
+    def _bind_turns(self) -> dict[str, Any]:
+        """Let all jobs lead from one of the states that take turns to the other."""
+        assert self.turns is not None
+        old, new = self.turns
+        for parity, (a, b) in enumerate((self.turns, self.turns[::-1])):
             self._bind_states(parity, a, b)
         for k, contact in self._contacts.items():
             contact.follow(old.lines[k], new.lines[k])
         for k, table in self._lone_tables.items():
-            table.bind(old=old.lines[k], new=new.lines[k])
+            table.bind(**self._by_itself(k, {"old": old.lines[k], "new": new.lines[k]}))
+        numbers, mixes = self._all.jobs[0].numbers, any(self._mixes)
         return {
-            "even": self._jobs[0].numbers, "odd": self._jobs[1].numbers,
-            "joined_even": self._joined_jobs[0].numbers, "joined_odd": self._joined_jobs[1].numbers,
+            "even": numbers, "odd": self._all.jobs[1].numbers,
+            "joined_even": self._together.jobs[0].numbers, "joined_odd": self._together.jobs[1].numbers,
             "joined": np.array(self.joined, np.int64), "lone": self.lone_numbers,
             "lone_lines": np.array(self.lone, np.int64), "marcher": self._solver,
+            "leader": lead_lone.address(numbers) if mixes else 0, "finder": find_near.address(numbers) if mixes else 0,
         }  # fmt: skip
 
     def _bind_states(self, parity: int, old: SystemState, new: SystemState) -> None:
         for tables, a, b in zip(self._tables, old.lines, new.lines, strict=True):
             tables[parity].bind(old=a, new=b)
-        if self.lone:
+        self._all.bind_bodies(parity, old.bodies, new.bodies)
+        if self._together is not self._all:
             for k, tables in self._joined_tables.items():
                 tables[parity].bind(old=old.lines[k], new=new.lines[k])
-        for jobs in (self._jobs, self._joined_jobs):
-            jobs[parity].bind(old=old.bodies, new=new.bodies)
-        if self._contacts or self.shared is not None:
-            self._touching[parity].bind(old=old.bodies, new=new.bodies)
-        for both in (self._meeting, self._spinning):
-            if both:
-                both[parity].bind(old=old.bodies, new=new.bodies)
+            self._together.bind_bodies(parity, old.bodies, new.bodies)
 
     def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
         self.turns = None
@@ -363,7 +389,7 @@ class SystemSolver:
             task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most,
             task.rho_before, task.fixed, t, 1.0, task.cut,
         )  # fmt: skip
-        outcome, iterations, left, line, where = solve_system(self._jobs[0].numbers)
+        outcome, iterations, left, line, where = solve_system(self._all.jobs[0].numbers)
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())
 
     def residual(self) -> float:
@@ -494,7 +520,7 @@ class SystemSolver:
         errors = np.array([work.report[LOCAL_ERROR] for work in self.work])  # fairleads move as their bodies
         used, ratio = float(self.work[0].report[USED_RHO]), float((errors / self.allowed).max())
         if not ratio > REFUSED:
-            book_system_step(self._jobs[0].numbers)
+            book_system_step(self._all.jobs[0].numbers)
         return replace(taken, error=float(errors.max()), ratio=ratio, rho=used)
 
     def consistent_accelerations(
@@ -668,6 +694,9 @@ class SystemSolver:
         for k, (x, work) in enumerate(zip(self.lines, self.work, strict=True)):
             self.work[k] = work._replace(X=np.zeros((x.line.h.size + 1) * (ROW + KEPT)))
             self.bind_line(k, work=self.work[k])
+        if any(self._mixes):  # other right-hand sides have what lines may do to what is free
+            self._near[self._mixes], self._mixes = -1, [False] * len(self.lines)
+            self._group()
 
     def factor(self, states: SystemState, ca: float) -> bool:
         """Leave the factors of states as they are where `keep_factors` keeps them; ca: as of `evaluate_forces`.

@@ -16,6 +16,7 @@ from hybrid.kernels.run.system import book_system_step, solve_system
 from hybrid.kernels.run.system_run import (
     CUT_LINE,
     LINE,
+    REGROUP,
     SLACK_LINE,
     TURNED_LINE,
     blank_steps_job,
@@ -59,7 +60,10 @@ class SystemSteps:
         self._log, self.seen = np.zeros((0, 0, len(b.LOG))), np.zeros(0, np.int64)
         self._solver: SystemSolver | None = None
         self._first: np.ndarray | None = None  # a job of the solver, until the kernels of its steps are known
-        self._waves = 0
+        self._waves, self._is_new = (
+            0,
+            True,
+        )  # whether nobody knows which lines are near what is free in the state of now
         clock = self.clock
         clock.rho, clock.allowed, clock.tolerance, clock.error_ratio = rho, np.inf, 1.0, 1.0
         self.controlled = largest > 0.0
@@ -81,7 +85,7 @@ class SystemSteps:
             rows = max(16, min(one_line.ROWS, MOST_LOGGED // (lines * len(b.LOG))))
             self._log, self.seen = np.zeros((rows, lines, len(b.LOG))), np.zeros(lines, np.int64)
             counts.rows = 0
-        jobs = solver.take_turns(self._states)
+        jobs, self._is_new = solver.take_turns(self._states), True
         self._cells = sum(x.line.h.size for x in solver.lines)
         self._waves = max((len(x.sea.waves) for x in solver.lines), default=0)
         self.worked[0] = solver.body_work
@@ -177,7 +181,14 @@ class SystemSteps:
         if self._first is not None:
             self._job.bind(solver=solve_system.address(self._first), book=book_system_step.address(self._first))
             self._first = None
-        return int(run_system(self._job.numbers))
+        assert self._solver is not None
+        if self._is_new:
+            self._solver.find_near(self.states[0], float(self.clock.now))
+            self._job.bind(**self._solver.regroup())
+            self._is_new = False
+        while (code := int(run_system(self._job.numbers))) == REGROUP:
+            self._job.bind(**self._solver.regroup())
+        return code
 
     @property
     def due(self) -> bool:
@@ -216,7 +227,7 @@ class SystemSteps:
 
         interval: s, that the last step took, 0: of that nothing is known; step: s, the usual one.
         """
-        clock, counts = self.clock, self.counts
+        clock, counts, self._is_new = self.clock, self.counts, True
         clock.previous = clock.now - interval
         counts.phase, counts.rows, counts.samples = b.BEGIN_STEP, 0, 0
         counts.output = int(np.searchsorted(self.outputs, clock.now + SAME_TIME * step, side="right"))

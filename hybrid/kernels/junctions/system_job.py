@@ -47,6 +47,8 @@ class SystemJob(NamedTuple):
     touch_table: NDArray[np.int64]  # of kernels.junctions.system_contact.touch_system
     rides: NDArray[np.int64]  # (M,) the body that carries an obstacle, -1: none does; empty: no body has a shape
     phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies and spin_sheaves
+    near: NDArray[np.int64]  # (L,) of all lines, how near they are to what is free (kernels.junctions.lone_lines)
+    alone: NDArray[np.int64]  # (L,) and whether they are solved by themselves
     meet_table: NDArray[np.int64]  # of kernels.junctions.body_contact.meet_bodies
     spin_table: NDArray[np.int64]  # of kernels.junctions.joined_sheaves.spin_sheaves
     solver: int = 0  # address of the kernel that marches a line
@@ -80,7 +82,7 @@ def blank_system_job() -> SystemJob:
     return SystemJob(
         SystemTask(), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
         z((1, 1, 1)), z(1), z((1, 1, 1)), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
-        z((2, 6, 6)), z((1, 1)), one, one, one, one, one,
+        z((2, 6, 6)), z((1, 1)), one, one, one, one, one, one, one,
     )  # fmt: skip
 
 

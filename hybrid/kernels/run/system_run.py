@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK
+from hybrid.kernels.junctions.lone_lines import is_grouped_otherwise, is_touched_alone
 from hybrid.kernels.junctions.members_water import read_members
 from hybrid.kernels.junctions.system_job import (
     read_system,
@@ -52,12 +53,14 @@ from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKES
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import note_cuts
 from hybrid.kernels.step.job import call_follower, call_solver, read
-from hybrid.kernels.step.newton import CUT_SHORT, OK, SLACK, STEP, TURNED_TOO_FAR
+from hybrid.kernels.step.newton import ADDRESS, CUT_SHORT, GAIN, OK, SLACK, STEP, TURNED_TOO_FAR, ask_contact
 from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, passes, take_past
 
 # Of `lines`: the line (-1: a body) where the last try was worst, and of the last try that was given up; whose end turned
 # too far in a step last; and which was slack in one.
 LINE, CUT_LINE, TURNED_LINE, SLACK_LINE = range(4)
+# What a call returns beside codes of kernels.state.books: lines are to be solved with others, or by themselves, from now on.
+REGROUP = 16
 # Of `limits`: the reach of Newton's method, m; its iterations at most; the arm by which moments on bodies are compared
 # with forces, m.
 OF_REACH, OF_ITERATIONS, OF_ARM = 0, 1, 2
@@ -93,6 +96,8 @@ class StepsJob(NamedTuple):
     beside: NDArray[np.int64]  # of a kernels.run.system_tangents.SystemTangents
     solver: int = 0  # address of kernels.run.system.solve_system
     marcher: int = 0  # of the kernel that solves a step of one line
+    leader: int = 0  # of kernels.junctions.lone_lines.lead_lone; 0: no line can come near what is free
+    finder: int = 0  # and of find_near
     book: int = 0  # of book_system_step
     sampler: int = 0  # of sample_system
     stirrer: int = 0  # of kernels.junctions.members_water.stir_members; 0: no body has members
@@ -178,6 +183,14 @@ def stir_water(steps, system):
 
 
 @inner
+def gains(job, clock):
+    """Whether contact of a line with itself has put energy in, in a try that may be halved."""
+    if not job.contact[ADDRESS] > 0 or job.reel != 0 or 0.5 * (clock.try_end - clock.now) < clock.shortest:
+        return False
+    return ask_contact(job.contact, job.contact_table, GAIN) > 0.0
+
+
+@inner
 def try_lone(steps, system):
     """Solve the step that is tried of every line that is joined to nothing that moves with it.
 
@@ -188,11 +201,13 @@ def try_lone(steps, system):
         job, l = read(steps.lone[j]), steps.lone_lines[j]
         own = job.books.clock
         own.now, own.try_end, own.rho = clock.now, clock.try_end, clock.rho
-        own.step_before, own.rho_before = clock.last_dt, clock.last_rho
+        own.step_before, own.rho_before = clock.last_dt, own.last_rho
         job.books.counts.most_iterations, job.books.counts.taken = steps.counts.most_iterations, steps.counts.taken
         outcome, it, left, where = call_solver(steps.marcher, steps.lone[j])
         if outcome == CUT_SHORT:
             outcome, steps.counts.is_cut = OK, 1
+        if outcome == OK and gains(job, clock):
+            outcome = TURNED_TOO_FAR  # in halves
         if outcome == OK and not job.work.report[SLACKEST] > system.floors[l]:
             outcome, where = SLACK, int(job.work.report[SLACKEST_CELL])
         if outcome != OK:
@@ -204,9 +219,10 @@ def try_lone(steps, system):
 @inner
 def try_step(steps, system):
     """Solve the step that is tried, and note how that ended."""
-    clock, counts, asked, table = steps.clock, steps.counts, system.asked, steps.joined_even
+    clock, counts, asked = steps.clock, steps.counts, system.asked
+    table, own = steps.joined_even, steps.even
     if counts.parity:
-        table = steps.joined_odd
+        table, own = steps.joined_odd, steps.odd
     asked.what, asked.dt, asked.time = STEP, clock.try_end - clock.now, clock.try_end
     asked.before, asked.rho_of_step, asked.rho_of_last = clock.last_dt, clock.rho, clock.last_rho
     asked.cv, asked.ca, asked.scale, asked.fixed = 0.0, 0.0, 1.0, 1.0 - counts.controlled
@@ -218,17 +234,36 @@ def try_step(steps, system):
         books = read(system.tables[l]).books
         books.counts.parity, books.clock.shortest = counts.parity, clock.shortest
         books.counts.controlled = counts.controlled
-    outcome, line, it, left, where = try_lone(steps, system)
-    if outcome == OK and (steps.joined.shape[0] > 0 or system.work.shape[0] > 0):
-        result, more, worse, row, place = call_step(steps.solver, table)
+    outcome, line, it, left, where = OK, -1, 0, 0.0, -1
+    if steps.joined.shape[0] > 0 or system.work.shape[0] > 0:
+        result, it, left, row, where = call_step(steps.solver, table)
         if result == CUT_SHORT:
             result, counts.is_cut = OK, 1
-        outcome, it, left, where = result, max(it, more), max(left, worse), place
+        outcome, line = result, -1
         if row >= 0:
             line = steps.joined[row]
+    if outcome == OK:
+        if steps.leader != 0:
+            call_book(steps.leader, own)
+        result, failed, more, worse, place = try_lone(steps, system)
+        outcome, it, left = result, max(it, more), max(left, worse)
+        if failed >= 0:
+            line, where = failed, place
     counts.outcome, counts.tries, counts.where, clock.correction = outcome, it, where, left
     counts.taken += it
     steps.lines[LINE] = line
+
+
+@inner
+def touches_free(steps, system):
+    """Whether a line that was solved by itself has come to touch what is free, at the end of the try."""
+    if steps.finder == 0 or steps.counts.outcome != OK:
+        return False
+    next_table = steps.odd
+    if steps.counts.parity:
+        next_table = steps.even
+    call_book(steps.finder, next_table)
+    return is_touched_alone(system)
 
 
 @inner
@@ -321,11 +356,14 @@ def accept(steps, system):
     counts.parity = 1 - counts.parity
     counts.steps += 1
     counts.iterations = counts.tries
-    flags = note_cuts(clock, counts, dt)
+    flags, first = note_cuts(clock, counts, dt), 0
+    if steps.joined.shape[0] > 0:
+        first = steps.joined[0]
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
         report, row = job.work.report, steps.log[counts.rows, l]
-        if l == 0:
+        job.books.clock.last_rho = report[USED_RHO]
+        if l == first:
             clock.last_rho = report[USED_RHO]
         row[0], row[1], row[2], row[3] = clock.now, dt, counts.tries + counts.wasted, clock.correction
         row[4], row[5], row[6] = residual, counts.repeats, report[LOCAL_ERROR]
@@ -427,6 +465,9 @@ def run_system(table):
             try_step(steps, system)
             counts.phase = JUDGE
             pay_lines(steps)
+            if touches_free(steps, system):
+                give_up(steps)
+                return REGROUP
             if counts.asks & ASK_TRIES:
                 return TRIED
             if steps.follower != 0 and (counts.outcome != OK or follow_lines(steps) != 0):
@@ -437,3 +478,5 @@ def run_system(table):
         if verdict > 0:
             call_book(steps.book, own)
             accept(steps, system)
+            if steps.finder != 0 and is_grouped_otherwise(system):
+                return REGROUP
