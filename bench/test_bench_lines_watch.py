@@ -15,7 +15,7 @@ import pytest
 
 import hybrid
 from hybrid.model.obstacles import stiffness_at_impact
-from hybrid.simulation import lines_watch
+from hybrid.simulation import lines_contact
 from tests.validation.thrown_lines import WIDTH, section, straight, throw
 
 pytestmark = pytest.mark.bench
@@ -63,7 +63,7 @@ def test_watching_that_finds_nothing(count: int, monkeypatch: pytest.MonkeyPatch
     for _ in range(RUNS):
         on.append(cpu(tables))
         with monkeypatch.context() as patch:
-            patch.setattr(lines_watch, "watched_pairs", lambda *_: [])
+            patch.setattr(lines_contact, "watched_pairs", lambda *_: [])
             off.append(cpu(tables))
     print(f"\n{count} lines of {CELLS} cells: watched {min(on):.3f} s, not {min(off):.3f} s, {min(on) / min(off):.3f}")
     assert min(on) < 1.1 * min(off)

@@ -55,9 +55,8 @@ from hybrid.simulation.layer_mesh import layered_lines, shown_lines
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution, with_survey
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange
-from hybrid.simulation.restore import refused, resolution_from, resolution_tree
+from hybrid.simulation.restore import kept_resolution, refused, resolution_from, resolution_tree
 from hybrid.simulation.run_sample import RunSample
-from hybrid.simulation.system_checkpoint import kept_resolution
 from hybrid.simulation.system_run import Recording, run_system, static_system
 from hybrid.store.amend import amend_lines
 from hybrid.store.checkpoint import read_before

@@ -23,8 +23,7 @@ from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ProgressReporter
-from hybrid.simulation.restore import resolution_from
-from hybrid.simulation.system_checkpoint import kept_resolution
+from hybrid.simulation.restore import kept_resolution, resolution_from
 from hybrid.simulation.system_run import Recording, run_system
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.checkpoint import read_checkpoint

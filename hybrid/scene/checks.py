@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from hybrid.scene import (
     attachment_checks,
@@ -35,7 +35,7 @@ from hybrid.scene.analysis import (
     Time,
     ZonesModel,
 )
-from hybrid.scene.base import Finding, Place
+from hybrid.scene.base import Finding, Pair, Place
 from hybrid.scene.body_shapes import Carried
 from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.ends import Clamped, Ends, Free, Pinned
@@ -43,9 +43,6 @@ from hybrid.scene.obstacles import Obstacles, SheaveObstacle
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.quantities import of_one_line
 from hybrid.scene.start_checks import SAME_LENGTH
-
-if TYPE_CHECKING:
-    from hybrid.scene.system import SystemOutput
 
 # Error of a step, as a part of the length, that positions of 16 digits can still tell from their own round-off.
 FINEST_STEP = 1e-12
@@ -236,7 +233,14 @@ def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[
         yield Finding(("output", "errors"), expected, "leave it out, or leave accuracy out")
 
 
-def elevation_has_waves(output: Output | SystemOutput, environment: Environment) -> Iterator[Finding]:
+class ElevationAsked(Protocol):
+    """Outputs of one line or of several."""
+
+    @property
+    def elevation(self) -> tuple[Pair, ...] | None: ...
+
+
+def elevation_has_waves(output: ElevationAsked, environment: Environment) -> Iterator[Finding]:
     if output.elevation and (environment.fluid is None or environment.fluid.waves is None):
         expected = "nothing, because the sea has no waves (environment.fluid.waves)"
         yield Finding(("output", "elevation"), expected, "leave it out, or give waves")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import Time
@@ -22,7 +22,6 @@ from hybrid.scene.obstacles import Obstacles
 
 if TYPE_CHECKING:
     from hybrid.scene.motion_file import Record
-    from hybrid.scene.schema import Scene
 
 # A harmonic motion counts as starting from rest below this part of its top speed: round-off.
 AT_REST = 1e-6
@@ -43,7 +42,17 @@ STEEL_WAVES = 5000.0
 TOP_SPEED, TOP_ACCELERATION = 1.875, 10.0 / math.sqrt(3.0)
 
 
-def check_motions(scene: Scene) -> None:
+class Moving(Protocol):
+    """What moves and loads a line: of its scene, the tables that are asked here."""
+
+    @property
+    def ends(self) -> Ends: ...
+
+    @property
+    def environment(self) -> Environment: ...
+
+
+def check_motions(scene: Moving) -> None:
     """SceneError if a motion cannot be read, does not start from rest, jumps, is too fast, or ends too early."""
     found = motion_findings(
         {name: getattr(scene, name) for name in ("ends", "time", "cable", "environment", "obstacles")}
@@ -300,12 +309,12 @@ def _winch_ramps(ends: Ends) -> Iterator[tuple[float, float]]:
             yield payout.winch.begin, payout.winch.ramp
 
 
-def longest_period(scene: Scene) -> float:
+def longest_period(scene: Moving) -> float:
     """The longest period, s, of waves and of motions of the ends; 0 where none is named."""
     return max(_all_periods(scene.ends, scene.environment).values(), default=0.0)
 
 
-def stationary_from(scene: Scene) -> tuple[float, float] | None:
+def stationary_from(scene: Moving) -> tuple[float, float] | None:
     """From when on (s) all that moves or loads a line is periodic or a stationary sea, and the longest period (s).
 
     None: it is not, or cannot be known: of a file, a velocity, line that is paid out, an end that is let go.
@@ -335,7 +344,7 @@ def prescribed_twist(ends: Ends) -> float:
     return twist
 
 
-def ramp_ends(scene: Scene) -> list[float]:
+def ramp_ends(scene: Moving) -> list[float]:
     """Times, s, at which something stops growing or moving, or a load turns: a step should end there."""
     fluid, ends = scene.environment.fluid, scene.ends
     moves = [m.travel for _, _, m in _motions(ends) if m.travel is not None]

@@ -1,24 +1,40 @@
-"""Contact of lines of a system with each other: made of a model, and whether a way between two shapes crosses lines."""
+"""Lines beside each other: their contact, whether they cross between two shapes, a watch over those without contact."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterator
+from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from hybrid.kernels.contact.self_contact_law import OUTER
+from hybrid.kernels.junctions.lines_distance import (
+    AT,
+    HAVE_MET,
+    MET,
+    MOVED,
+    NEAR,
+    OTHER,
+    ROOM,
+    TIME,
+    WATCHED,
+    blank_lines_job,
+    watch_lines,
+)
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
-from hybrid.model.lines_contact import Touching
+from hybrid.model.lines_contact import Touching, joined_ends_of
 from hybrid.model.system import SystemModel
+from hybrid.scene.system import System
 from hybrid.simulation.contact_equilibrium import JUMP, jumps
 from hybrid.simulation.self_watch import diameters, least_bending
 from hybrid.solve.joined import SystemState
 from hybrid.solve.shared_contact import SharedContact, TouchingLine
-from hybrid.store.partners import meeting_text
 
-if TYPE_CHECKING:
-    from hybrid.simulation.system_run import SystemRun
+PASSED = "lines pass through each other"  # kind of an event
 
 
 def shared_of(model: SystemModel, rubs: bool = False) -> SharedContact | None:
@@ -66,13 +82,88 @@ def pair_text(shared: SharedContact, model: SystemModel) -> str:
     return f"lines {model.names[a]} and {model.names[b]} are {distance:.3g} m apart at s = {s:.4g} and {other:.4g} m"
 
 
-def tell_meetings(run: SystemRun) -> None:
-    """An event for every two lines that have met, when they do first."""
-    told = run.met
-    shared: SharedContact | None = run.solver.shared
-    for a, b, t, s, other in sorted(shared.met() if shared is not None else (), key=lambda x: x[2]):
-        if (a, b) in told:
-            continue
-        told.add((a, b))
-        text = meeting_text(run.model.names[a], run.model.names[b], s, other)
-        run.recorder.event(t, 0.0, 0.0, "lines touch", text)
+# --- lines between which no contact is computed -------------------------------------------------------
+
+
+def watched_pairs(system: System, model: SystemModel) -> list[tuple[int, int]]:
+    """Numbers of lines, two each, that have diameters, and between which no contact is computed."""
+    thick = [k for k, x in enumerate(model.models) if (diameters(x) > 0.0).all()]
+    touching = model.touching
+    return [(a, b) for a, b in combinations(thick, 2) if touching is None or b not in touching.partners(a)]
+
+
+def _joined_by_place(system: System, width: float) -> NDArray[np.int64]:
+    """As joined_ends_of, but what is held or moved is one thing only where it is one place at first.
+
+    width: m, the largest diameter.
+    """
+    joined = joined_ends_of(system)
+    held = np.argwhere(joined == 0)
+    lines = list(system.lines.values())
+    at = np.array([system.first_place((lines[k].start, lines[k].end)[end]) for k, end in held]).reshape(-1, 3)
+    first = 1 + int(joined.max(initial=0))
+    for row, place in zip(held, at, strict=True):  # the number of the first that is there
+        beside = np.linalg.norm(at - place, axis=1) <= OUTER * width
+        joined[tuple(row)] = first + int(beside.argmax())
+    return joined
+
+
+class LinesWatch:
+    """What looks after every step whether two of such lines have met, or are near."""
+
+    def __init__(
+        self, system: System, model: SystemModel, met: set[tuple[int, int]], clock: Clock,
+        alone: Collection[tuple[int, int]] = (),
+    ) -> None:  # fmt: skip
+        """met: lines of which it is known; clock: of the run; alone: lines that may meet, but are let pass."""
+        may = set(combinations(model.may_meet, 2)) - set(alone)
+        rows = [(*x, MET * (x in met), x in may, 0) for x in watched_pairs(system, model)]
+        self._pairs = np.array(rows, np.int64).reshape(-1, WATCHED)
+        self._room = np.zeros((len(self._pairs), ROOM))
+        width = [diameters(x) for x in model.models]
+        begins = np.concatenate([[0], np.cumsum([x.size for x in width])[:-1]]).astype(np.int64)
+        widest = max((float(x.max()) for x in width), default=0.0)
+        self.joined = _joined_by_place(system, widest)
+        self._bound = {
+            "joined": self.joined, "begins": begins, "width": np.concatenate(width),
+            "clock": clock, "pairs": self._pairs, "room": self._room, "moved": np.zeros((len(width), MOVED)),
+        }  # fmt: skip
+        self._jobs = Table(blank_lines_job), Table(blank_lines_job)
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether there is anything that may still meet."""
+        return bool((self._pairs[:, HAVE_MET] != MET).any())
+
+    def attach(self, tables: NDArray[np.int64]) -> tuple[np.ndarray, np.ndarray, int]:
+        """Tables for both parities and the address of the kernel; tables: (2, L, ..) jobs of the lines."""
+        for job, numbers in zip(self._jobs, tables, strict=True):
+            job.bind(tables=numbers, **self._bound)
+        even, odd = self._jobs
+        return even.numbers, odd.numbers, watch_lines.address(even.numbers)
+
+    def begin(self, system: System) -> set[tuple[int, int]]:
+        """Look at the start, to which the jobs of even parity lead; lines that meet at a point or body and lie in each
+
+        other there, by a narrow angle, are returned: of these nothing is said.
+        """
+        watch_lines(self._jobs[0].numbers)
+        lines = list(system.lines.values())
+        ends = [{system.body_of(p) or p for p in (x.start, x.end)} for x in lines]
+        return {(a, b) for a, b, *_ in self.met() if any(x is y or x == y for x in ends[a] for y in ends[b])}
+
+    def met(self) -> list[tuple[int, int, float, float, float]]:
+        """Lines that have met, two each: numbers, when (s), and at which arc lengths (m)."""
+        return [
+            (int(a), int(b), float(row[TIME]), float(row[AT]), float(row[OTHER]))
+            for (a, b, has, *_), row in zip(self._pairs, self._room, strict=True)
+            if has == MET
+        ]
+
+    def near(self) -> list[tuple[int, int, float, float]]:
+        """Lines that are near each other, and contact begins, two each: numbers, and at which arc lengths (m)."""
+        return [
+            (int(a), int(b), float(row[AT]), float(row[OTHER]))
+            for (a, b, has, *_), row in zip(self._pairs, self._room, strict=True)
+            if has == NEAR
+        ]

@@ -15,8 +15,7 @@ from hybrid.model.build import Model
 from hybrid.model.lines_contact import touching_among
 from hybrid.model.self_reach import contact_bits
 from hybrid.scene.schema import Scene
-from hybrid.simulation.lines_contact import pair_text
-from hybrid.simulation.lines_watch import PASSED
+from hybrid.simulation.lines_contact import PASSED, pair_text
 from hybrid.simulation.self_watch import diameters
 from hybrid.simulation.system_contact_equilibrium import crossings, energy_between
 

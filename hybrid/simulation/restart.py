@@ -24,7 +24,7 @@ from hybrid.model.self_reach import self_reach
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import as_scene_or_system, parse_either, parse_scene, scene_text
 from hybrid.scene.schema import Scene
-from hybrid.simulation.restore import refused, resolution_from, restored_points
+from hybrid.simulation.restore import kept_resolution, refused, resolution_from, restored_points
 from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
@@ -136,8 +136,6 @@ def remaining_system(
 
     ResultError: nothing is left to do; SceneError: what is asked cannot be.
     """
-    from hybrid.simulation.system_checkpoint import kept_resolution
-
     with open_result(path) as result:
         if not result.lines:
             return None

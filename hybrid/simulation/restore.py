@@ -15,7 +15,7 @@ from functools import cache
 from importlib.metadata import version
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,9 +35,14 @@ from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.initial_zones import manager_for
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
-from hybrid.store.checkpoint import Checkpoint
+from hybrid.store.checkpoint import Checkpoint, read_checkpoint
+from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree, matched
 from hybrid.store.reader import Result
+
+if TYPE_CHECKING:  # its tables take long to make
+    from hybrid.model.system import SystemResolution
+    from hybrid.scene.system import System
 
 # Rooms that have a part in the numbers of a file.
 COMPUTES = ("accuracy", "adapt", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store")
@@ -136,6 +141,24 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
         "ends": tuple(saved["ends"].tolist()),
     }
     return Resolution(**saved | {"grading": grading} | rows)
+
+
+def kept_resolution(system: System, source: Path) -> SystemResolution:
+    """How finely a result was computed that has a checkpoint.  ResultError: it is none of this system."""
+    from hybrid.model.system import SystemResolution
+
+    with opened(source) as file:
+        tree = read_checkpoint(file).resolution
+    first = SystemResolution.first(system)
+    if not tree:  # of an earlier program
+        return first
+    with refused(source):
+        if set(tree) != set(system.lines):
+            raise ValueError("resolutions of other lines")
+        found = {name: resolution_from(tree[name], system.scene_of(name)) for name in system.lines}
+        if len({(x.step, x.every, x.local is None) for x in found.values()}) > 1:
+            raise ValueError("lines with other steps")
+        return SystemResolution(found)
 
 
 def restored_points(result: Result, length: float, far: float | None = None) -> OutputPoints:

@@ -12,12 +12,11 @@ from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE
-from hybrid.model.system import SystemResolution
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.obstacles import files_of as obstacle_files
 from hybrid.scene.system import System
 from hybrid.simulation.lines_contact_start import touch_each_other
-from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree
+from hybrid.simulation.restore import program, refused, resolution_tree
 from hybrid.simulation.system_contact import let_touch
 from hybrid.simulation.transient_checkpoint import FIRST_REPORT, FIRST_WORKS, zoning_of_today
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
@@ -62,7 +61,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     # It took members as at the first guess, and rotations were within half a turn of 0.
     older: dict[str, Any] = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "changes": 0}
     older |= {"cuts": run.loop.cuts(), "vibrations": {}, "rotations": run.rotations.last}
-    older |= dict.fromkeys(("passed", "met", "let_pass", "between"), [])
+    older |= {key: [] for key in ("passed", "met", "let_pass", "between")}
     complete = "interval" in saved  # else steps ended at outputs
     older |= {"rho": run.system.require_time().rho_inf, "interval": 0.0, "worked": run.loop.worked[1, :, :SPRING]}
     saved = older | dict(saved)
@@ -204,22 +203,6 @@ def content(run: SystemRun) -> dict[str, Any]:
     resolution = {name: resolution_tree(x) for name, x in run.resolution.lines.items()}
     asks = run.criterion is not None
     return {"program": program(), "asks": asks, "resolution": resolution, "state": checkpoint(run)}
-
-
-def kept_resolution(system: System, source: Path) -> SystemResolution:
-    """How finely a result was computed that has a checkpoint.  ResultError: it is none of this system."""
-    with opened(source) as file:
-        tree = read_checkpoint(file).resolution
-    first = SystemResolution.first(system)
-    if not tree:  # of an earlier program
-        return first
-    with refused(source):
-        if set(tree) != set(system.lines):
-            raise ValueError("resolutions of other lines")
-        found = {name: resolution_from(tree[name], system.scene_of(name)) for name in system.lines}
-        if len({(x.step, x.every, x.local is None) for x in found.values()}) > 1:
-            raise ValueError("lines with other steps")
-        return SystemResolution(found)
 
 
 def kept_changes(source: Path, most: int) -> int:

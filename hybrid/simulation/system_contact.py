@@ -8,6 +8,9 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hybrid.errors import Complaint, Outcome, SceneError
 from hybrid.kernels.state.books import ZONES
 from hybrid.kernels.state.forces import MAY_TOUCH
@@ -16,18 +19,21 @@ from hybrid.model.self_reach import touching, touching_no_more
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.contact_start import GIVEN_UP, given_up
-from hybrid.simulation.lines_contact import pair_text
+from hybrid.simulation.lines_contact import PASSED, pair_text
 from hybrid.simulation.lines_contact_start import given_up_text, lines_near, touch_each_other, touching_now
-from hybrid.simulation.lines_watch import tell_passages
-from hybrid.simulation.self_watch import deepest_text
+from hybrid.simulation.self_watch import deepest_text, diameters
 from hybrid.simulation.system_contact_equilibrium import energy_between, touches_alone
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.system_statics import LineFailed
+from hybrid.store.partners import meeting_text
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun
 
+# Diameters by which ways from a joint to where lines that lie along each other meet differ at most.
+ALONG = 2.0
 # Where lines are that are said to be within themselves.
 WITHOUT_CONTACT, AT_START = "in the equilibrium, which is found without contact", "at the start"
 
@@ -215,3 +221,55 @@ def _evaluate_forces(run: SystemRun, after: str) -> None:
     taken = run.solver.forces_in_motion(run.state, run.t)
     if taken.outcome != Outcome.OK:
         raise LineFailed(taken.line, taken.outcome, run.t, None, after)
+
+
+def tell_meetings(run: SystemRun) -> None:
+    """An event for every two lines that have met, when they do first."""
+    told = run.met
+    shared: SharedContact | None = run.solver.shared
+    for a, b, t, s, other in sorted(shared.met() if shared is not None else (), key=lambda x: x[2]):
+        if (a, b) in told:
+            continue
+        told.add((a, b))
+        text = meeting_text(run.model.names[a], run.model.names[b], s, other)
+        run.recorder.event(t, 0.0, 0.0, "lines touch", text)
+
+
+def _side_by_side(run: SystemRun, joined: NDArray[np.int64], a: int, b: int, s: float, other: float) -> bool:
+    """Whether two lines that met at s and other (m) of them lay along each other all the way from a common joint.
+
+    They did where both places are as far from it along the lines, and one of the lines is straight up to there.
+    """
+    width = max(float(diameters(run.model.models[k]).max()) for k in (a, b))
+    for m, k in ((m, k) for m in (0, -1) for k in (0, -1) if joined[a, m] == joined[b, k]):
+        ways, bows = [], []
+        for line, at, tip in ((a, s, m), (b, other, k)):
+            nodes, r = run.model.models[line].line.s, run.state.lines[line].r
+            place = [np.interp(at, nodes, r[:, j]) for j in range(3)]
+            ways.append(abs(at - float(nodes[tip])))
+            bows.append(ways[-1] - float(np.linalg.norm(place - r[tip])))
+        if abs(ways[0] - ways[1]) < ALONG * width and min(bows) < width:
+            return True
+    return False
+
+
+def tell_passages(run: SystemRun) -> None:
+    """An event for every two lines that have met without contact, when they do first.
+
+    Of lines that lie along each other from what both are joined to there is nothing to tell, as at the start.
+    """
+    if (watch := run.watch) is None:
+        return
+    for a, b, t, s, other in sorted(watch.met(), key=lambda x: x[2]):
+        if (a, b) in run.passed:
+            continue
+        run.passed.add((a, b))
+        if _side_by_side(run, watch.joined, a, b, s, other):
+            continue
+        one, two = run.model.names[a], run.model.names[b]
+        text = (
+            f"lines {one} and {two} pass through each other: no contact between them is computed, and at s = {s:.4g} m "
+            f"of {one} and s = {other:.4g} m of {two} their centrelines are nearer than the mean of their diameters; "
+            f"contact: {{between: [[{one}, {two}]]}} keeps them apart"
+        )
+        run.recorder.event(t, 0.0, 0.0, PASSED, text)

@@ -21,8 +21,7 @@ from hybrid.model.lines_contact import touching_among
 from hybrid.model.system import SystemModel
 from hybrid.scene.system import System
 from hybrid.simulation.contact_equilibrium import KEPT, contact_of, nearness, passes_itself
-from hybrid.simulation.lines_contact import crossed, shared_of
-from hybrid.simulation.lines_watch import watched_pairs
+from hybrid.simulation.lines_contact import crossed, shared_of, watched_pairs
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.flaws import behind_obstacles, passed_obstacles
 from hybrid.solve.joined import JoinedLine, SystemState

@@ -37,20 +37,18 @@ from hybrid.simulation.events import energy_gains_text
 from hybrid.simulation.failure import Stopped, explanation, first_remedy, write_snapshot
 from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
 from hybrid.simulation.interrupts import at_once
-from hybrid.simulation.lines_contact import shared_of, tell_meetings
+from hybrid.simulation.lines_contact import LinesWatch, shared_of
 from hybrid.simulation.lines_contact_start import note_crossings
-from hybrid.simulation.lines_watch import LinesWatch, tell_passages
 from hybrid.simulation.pair_forces import fields_of_pairs, values_of_pairs
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
-from hybrid.simulation.restore import refused, require_same
+from hybrid.simulation.restore import kept_resolution, refused, require_same
 from hybrid.simulation.result_file import places_of_elevation
 from hybrid.simulation.step_events import CUTS, count_iterations, note_cut, note_iterations, note_slack
 from hybrid.simulation.system_checkpoint import (
     content,
     files_of,
     kept_changes,
-    kept_resolution,
     other_program,
     restore,
 )
@@ -62,6 +60,8 @@ from hybrid.simulation.system_contact import (
     end_contact,
     gives_up_contact,
     refuse_within_itself,
+    tell_meetings,
+    tell_passages,
 )
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import WAITING, LineResult, LineStep

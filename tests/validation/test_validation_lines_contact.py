@@ -18,7 +18,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.junctions.lines_distance import APART, HAVE_MET
 from hybrid.kernels.state.books import Clock
 from hybrid.model.system import build_system
-from hybrid.simulation.lines_watch import LinesWatch
+from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.system_start import joined_lines
 from hybrid.solve.joined import SystemState
 from hybrid.solve.system import SystemSolver
