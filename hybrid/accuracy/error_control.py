@@ -210,11 +210,11 @@ class ErrorController:
         self.first = self.next = resolution
         return self.proceed()
 
-    def compare_with(self, runs: Sequence[RunSample | None], failed: str = "") -> None:
+    def compare_with(self, runs: Sequence[RunSample | None], failed: ComputationError | None = None) -> None:
         """Take over runs to compare with; failed: why there is not even the first."""
-        if failed or runs[0] is None:
-            text = f"error not known: a coarser run to compare with failed: {failed}"
-            self._notes.append(("no error figure", text))
+        if failed is not None:
+            self.lacks_errors(failed)
+        if runs[0] is None:
             return
         self.comparisons = runs[0], runs[1], runs[2]
 
@@ -229,9 +229,9 @@ class ErrorController:
                 result = self._counted(self.result(resolution))
             except ComputationError as error:
                 if self.estimate is None and unknown is not None:
-                    self._lacks_errors(error, "finer run")
+                    self.lacks_errors(error, "finer run")
                     return unknown, None
-                if self.estimate is None and self._finds_no_rest(error):
+                if self.estimate is None and self.finds_no_rest(error):
                     self.first = self.next = resolution.coarser(0.5)
                     continue
                 if self.estimate is None:
@@ -244,8 +244,10 @@ class ErrorController:
             if self.estimate is None:
                 if self.comparisons is None:
                     self.comparisons = self._compute_comparisons(self.first or resolution)
-                if self.comparisons is None and self._halves(result):
+                if self.comparisons is None and self.is_too_coarse(result):
                     self.settle(True)  # it may be beside the one before
+                    self.halve()
+                    self.first = self.next = result.resolution.coarser(0.5)
                     unknown = result
                     continue
                 if self.asked is not None:  # else no finer result follows, and they need not stay in memory
@@ -268,28 +270,29 @@ class ErrorController:
                 self.note_missed(verdict)
         return self.estimate.run, errors
 
-    def _finds_no_rest(self, error: ComputationError) -> bool:
+    def finds_no_rest(self, error: ComputationError) -> bool:
         """Whether cells half as long may find the equilibrium that a result has not: its rods fold or buckle."""
         again = error.t is None and error.outcome in (Outcome.UNSTABLE, Outcome.FOLDED)
         again = again and self.asked is not None and self.free.mesh and self._judged < MOST_HALVINGS
         self._judged += again
         return again
 
-    def _halves(self, result: RunSample) -> bool:
+    def is_too_coarse(self, result: RunSample) -> bool:
         """Whether a result of cells half as long follows, because those of the runs to compare with are too long.
 
         So they are where no equilibrium is found on them; a motion that fails may have other reasons.
         """
         too_long = self._at_rest and self.asked is not None and self.free.mesh
         finer = result.resolution.coarser(0.5)
-        if not too_long or self._judged >= MOST_HALVINGS or (self.budget and not self.budget.allows([result], [finer])):
-            return False
-        self._judged += 1
-        self._notes.pop()  # that errors are not known
-        self.first = self.next = finer
-        return True
+        allowed = self.budget is None or self.budget.allows([result], [finer])
+        return too_long and self._judged < MOST_HALVINGS and allowed
 
-    def _lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
+    def halve(self) -> None:
+        """Forget that errors are not known: a result of cells half as long follows."""
+        self._judged += 1
+        self._notes.pop()
+
+    def lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
         """Note that errors are not known, as such a run has failed."""
         self._at_rest = error.t is None
         text = f"error not known: a {what} failed: {str(error).splitlines()[0]}"
@@ -408,7 +411,7 @@ class ErrorController:
                     found[k] = self._counted(run())
                 except ComputationError as error:
                     if not k:
-                        self._lacks_errors(error)
+                        self.lacks_errors(error)
                         return None
         assert found[0] is not None
         return found[0], found[1], found[2]

@@ -156,17 +156,52 @@ class SystemPasses:
         """The result, as fine as it takes, with its errors; source: a result to go on with."""
         first, result = self._goes_on(source) if source is not None else (None, None)
         if first is None:
-            resolution = first = self.surveyed(SystemResolution.first(self.system))
+            first = self.surveyed(SystemResolution.first(self.system))
             self._expect(first)
-            result = self._record(resolution, self.target, RESULT, found=_tree(first))
+            resolution, result = self._first_result(first)
         else:
-            assert source is not None
+            assert source is not None and result is not None
             resolution = kept_resolution(self.system, source)
-        assert result is not None
+            self._spend(result)
+            self._compare(first)
+        self._refine(resolution, result)
+
+    def _first_result(self, first: SystemResolution) -> tuple[SystemResolution, Samples]:
+        """The first result, of cells half as long where on these, or those to compare with, no equilibrium is found."""
+        while True:
+            try:
+                result = self._record(first, self.target, RESULT, found=_tree(first))
+                break
+            except ComputationError as error:
+                if not any([x.finds_no_rest(error) for x in self.controls.values()]):
+                    raise
+            first = self._halved(first)
+        self._spend(result)
+        self._compare(first)
+        while any(x.comparisons is None and x.is_too_coarse(result[name]) for name, x in self.controls.items()):
+            for control in self.controls.values():
+                control.halve()
+            finer = self._halved(first)
+            try:
+                result = self._replacement.finer(partial(self._record, finer, name=REFINEMENT, found=_tree(finer)))
+            except ComputationError as error:
+                for control in self.controls.values():
+                    control.lacks_errors(error, "finer run")
+                break
+            self._replacement.settle(True)
+            first = finer
+            self._spend(result)
+            self._compare(first)
+        return first, result
+
+    def _halved(self, now: SystemResolution) -> SystemResolution:
+        """Cells half as long, of lines that leave their mesh open."""
+        free = {name: mesh_is_free(scene) for name, scene in self.scenes.items()}
+        return SystemResolution({name: x.coarser(0.5) if free[name] else x for name, x in now.lines.items()})
+
+    def _spend(self, result: Samples) -> None:
         if self._budget is not None:
             self._budget.spend(list(result.values()))
-        self._compare(first)
-        self._refine(resolution, result)
 
     def _goes_on(self, source: Path) -> tuple[SystemResolution, Samples]:
         """What the runs to compare with were computed for, and the result, which is computed to its end."""
@@ -276,14 +311,14 @@ class SystemPasses:
         self._compared_touching = self._touches
         every = {name: comparison_resolutions(x, self.moves) for name, x in first.lines.items()}
         found: list[Samples | None] = [None, None, None]
-        failed = ""
+        failed: ComputationError | None = None
         for k in (0, 1, 2) if self.moves else (0, 2):  # without steps the second is the first
             resolution = SystemResolution({name: x[k] for name, x in every.items()})
             try:
                 found[k] = self._record(resolution, None, ESTIMATION)
             except ComputationError as error:
                 if not k:
-                    failed = str(error).splitlines()[0]
+                    failed = error
                     break
             if not k and (first_found := found[0]) is not None:
                 found[0] = self._with_model_errors(first_found, resolution, self._compared_rods)
@@ -339,8 +374,7 @@ class SystemPasses:
             except KeyboardInterrupt as error:
                 why, stopped = "a finer run was stopped from outside", error
                 break
-            if self._budget is not None:
-                self._budget.spend(list(found.values()))
+            self._spend(found)
             wanted, kept = self._judged_finer(finer, found)
             if kept:
                 result, resolution = found, finer

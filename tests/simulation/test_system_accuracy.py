@@ -231,6 +231,30 @@ def test_a_finer_run_that_is_no_better_is_not_kept(how: str, tmp_path: Path, mon
     assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("part", "times"), [(1.0, 2.0), (1.5, 4.0)])
+def test_cells_that_find_no_equilibrium_are_halved(
+    part: float, times: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the first run to compare with, and those of the result, as of one cable."""
+    scene, computed = bridle(accuracy="10%"), system_accuracy.static_system
+    del scene["time"]
+    with hybrid.static(scene) as plain:
+        fineness = float(plain.lines["tow"].attributes["effort_fineness"])
+
+    def finds_rest(system: System, target: Any, text: Any, resolution: Any, *more: Any) -> Any:
+        if resolution.one.fineness < part * fineness:
+            raise ComputationError(hybrid.errors.Outcome.UNSTABLE, None, 0.0)
+        return computed(system, target, text, resolution, *more)
+
+    monkeypatch.setattr(system_accuracy, "static_system", finds_rest)
+    with hybrid.static(scene, tmp_path / "rest.h5") as found:
+        assert all(x["met"] for line in found.lines.values() for x in verdicts(line).values())
+        assert found.lines["tow"].attributes["effort_fineness"] == times * fineness
+        assert "no error figure" not in {e.kind for e in found.events}
+    assert [x.name for x in tmp_path.iterdir()] == ["rest.h5"]
+
+
 def test_what_a_line_does_not_have_is_refused_with_its_name() -> None:
     scene = bridle(accuracy={"bending_moment": "5%"})
     with pytest.raises(hybrid.SceneError, match="in line west"):
