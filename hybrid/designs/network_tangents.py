@@ -57,7 +57,7 @@ from hybrid.model.ends import table_of_loads
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemModel, SystemResolution, build_system
 from hybrid.scene.system import System
-from hybrid.simulation.system_lines import HELD, observer_of
+from hybrid.simulation.system_lines import observer_of
 from hybrid.simulation.system_run import SystemRun
 from hybrid.simulation.system_start import joined_lines
 from hybrid.solve.joined import JoinedLine, SystemState
@@ -303,7 +303,7 @@ class NetworkOthers:
 
     def _ends(self, x: JoinedLine, state: State) -> Any:
         """What ends of a line impose, as outputs have it: they are where its nodes are."""
-        return x.ends._replace(held=HELD, position=state.r[[0, -1]])
+        return x.ends._replace(held=np.minimum(x.ends.held, 1), position=state.r[[0, -1]])
 
     @property
     def errors(self) -> Floats:
@@ -326,8 +326,8 @@ class NetworkOthers:
     ) -> tuple[Mapping[str, Seen], ...]:
         more = {}
         for l in base:
-            books, cells = self._books[p][l], self._model.models[l].line.h.size
-            rest, _ = batch_of_rows(books.samples[: int(books.counts.samples)], cells, HELD, False, 0, 0)
+            books, cells, held = self._books[p][l], self._model.models[l].line.h.size, self._run.lines[l].held
+            rest, _ = batch_of_rows(books.samples[: int(books.counts.samples)], cells, held, False, 0, 0)
             more[l] = joined([self._first[p][l], rest])
         scene, other = self._scenes[p]
         seen = self._looked_at(scene, self._others[p].model, more, names)

@@ -1,7 +1,7 @@
 """Lines that break from their points, and points that give way: what may break, and the system after it.
 
-The ends that come loose are joined to a free point of their own without mass, which is what a free end is; one that
-was clamped bends there no more, and no torque passes through the catenary zones of its line.
+An end that comes loose alone is a free end of its line; ends that stay together are joined to a free point of their
+own without mass.  What was clamped bends there no more, and no torque passes through the catenary zones of its line.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.model.release import unclamped
+from hybrid.model.release import unclamped, without_hold
 from hybrid.model.system import SystemModel
-from hybrid.scene.points import Failure, FreePoint
+from hybrid.scene.points import Failure
 from hybrid.scene.system import System
 
 
@@ -38,22 +38,28 @@ def weaknesses(system: System) -> tuple[Weakness, ...]:
             text = f"line {name} breaks from point {point}"
             found.append((text, ((names.index(name), k),), line.break_at, True))
     for name, point_ in system.points.items():
-        if not isinstance(point_, FreePoint) and point_.break_at is not None:
+        failure = getattr(point_, "break_at", None)
+        if failure is not None:
             ends = tuple((names.index(x), int(end == "end")) for x, end in system.lines_at(name))
-            found.append((f"point {name} gives way", ends, point_.break_at, False))
+            found.append((f"point {name} gives way", ends, failure, False))
     return tuple(
         Weakness(text, ends, failure.time or np.inf, failure.tension or np.inf, leaves)
         for text, ends, failure, leaves in found
     )
 
 
-def after_failure(model: SystemModel, weakness: Weakness) -> SystemModel:
-    """The system with the ends of a weakness loose, as far as they are at their point; the old one is as it was."""
+def after_failure(model: SystemModel, weakness: Weakness, t: float) -> SystemModel:
+    """The system with the ends of a weakness loose from t (s) on, as far as they are at their point; the old one is as
+
+    it was.
+    """
     ends = [at for at in weakness.ends if at not in model.loose]
     points, loose = len(model.free), model.loose | (set(ends) if weakness.leaves else set())
     joined = [model.joints[line][k] for line, k in ends]
     if not ends or (0 <= joined[0] < points and sum(pair.count(joined[0]) for pair in model.joints) == len(ends)):
         return replace(model, loose=loose)  # what is there is free already
+    if len(ends) == 1:
+        return _with_free_end(replace(model, loose=loose), *ends[0], t)
     joints = [[j if j < points else j + 1 for j in pair] for pair in model.joints]  # bodies come behind the points
     for line, k in ends:
         joints[line][k] = points
@@ -67,3 +73,12 @@ def after_failure(model: SystemModel, weakness: Weakness) -> SystemModel:
         model, free=(*model.free, weakness.name), joints=tuple((a, b) for a, b in joints),
         places=np.vstack([model.places, shape]), loose=loose, models=tuple(models), seats=seats,
     )  # fmt: skip
+
+
+def _with_free_end(model: SystemModel, line: int, k: int, t: float) -> SystemModel:
+    """The system with an end (line, 0 or 1) that nothing holds from t (s) on."""
+    joints, seats, models = [list(x) for x in model.joints], model.seats.copy(), [*model.models]
+    joints[line][k], seats[line, k] = -1, 0.0
+    supports = {**model.supports, (line, k): models[line].ends}
+    models[line] = without_hold(models[line], k, t)
+    return replace(model, joints=tuple((a, b) for a, b in joints), seats=seats, models=tuple(models), supports=supports)

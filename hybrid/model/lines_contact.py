@@ -15,7 +15,7 @@ from hybrid.model.contents import Entry
 from hybrid.model.self_reach import payouts, self_reach
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.lines_contact import LinesContact
-from hybrid.scene.points import Fairlead, FreePoint
+from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint
 from hybrid.scene.schema import Scene
 
 if TYPE_CHECKING:  # its tables take long to make
@@ -118,7 +118,7 @@ def joined_ends_of(system: System) -> NDArray[np.int64]:
     for k, line in enumerate(system.lines.values()):
         for end, point in enumerate((line.start, line.end)):
             found = system.points[point]
-            if isinstance(found, FreePoint):
+            if isinstance(found, FreePoint | GuidedPoint):
                 joined[k, end] = free[point]
             elif isinstance(found, Fairlead) and isinstance(system.bodies[found.body], FreeBody):
                 joined[k, end] = free[found.body]

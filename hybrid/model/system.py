@@ -27,7 +27,7 @@ from hybrid.model.clamps import (
     with_clamps,
 )
 from hybrid.model.contents import IDLE, Entry, obstacle_entries
-from hybrid.model.ends import EndLoad
+from hybrid.model.ends import EndConditions, EndLoad
 from hybrid.model.first_state import first_state
 from hybrid.model.initial_shape import dead_loads, hung
 from hybrid.model.lines_contact import MEETS, Touching, beside_others, that_may_meet, touching_of
@@ -95,6 +95,7 @@ class SystemModel:
     touching: Touching | None = None  # which lines touch each other
     may_meet: tuple[int, ...] = ()  # numbers of those that do from where they come near each other
     loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
+    supports: Mapping[tuple[int, int], EndConditions] = field(default_factory=dict)  # what held free ones
     # (M,) number of the body that carries an obstacle, -1: none does; empty: no body has a shape
     rides: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
 
@@ -281,7 +282,10 @@ def _leave_own_bodies(system: System, models: Sequence[Model]) -> NDArray[np.int
     surfaces, numbers = list(system.surfaces), list(system.free_bodies)
     for model, line in zip(models, system.lines.values(), strict=True):
         carried, length = model.sea.values.carried, model.length
-        places = system.first_place(line.start), system.first_place(line.end)
+        places = [
+            model.start.r[-k] if system.is_free_end(x) else system.first_place(x)
+            for k, x in enumerate((line.start, line.end))
+        ]
         for end, name in enumerate((line.start, line.end)):
             point = system.points[name]
             shape = getattr(system.bodies[point.body], "shape", None) if isinstance(point, Fairlead) else None
@@ -505,7 +509,7 @@ def balanced_places(system: System, model: SystemModel) -> tuple[Floats, Floats]
     the places, so that Newton's method with shortened steps finds them from anywhere.
     """
     points, count = len(model.free), len(model.body_places)
-    held = {name: np.array(system.first_place(name)) for name in system.points if not system.is_joined(name)}
+    held = {name: np.array(system.first_place(name)) for name in system.points if system.is_held(name)}
     if not points + count or not held:
         return model.places, model.body_places
     lines, loads = list(system.lines.values()), [_loads(each) for each in model.models]
@@ -525,6 +529,12 @@ def balanced_places(system: System, model: SystemModel) -> tuple[Floats, Floats]
             out[points + b, 2] += row[LIFT] - row[STIFFNESS] * (places[points + b, 2] - row[LEVEL])
             K[o, o] -= row[STIFFNESS]
         for l, (line, each, load, joints) in enumerate(zip(lines, model.models, loads, model.joints, strict=True)):
+            loose = [system.is_free_end(p) for p in (line.start, line.end)]
+            if any(loose):  # it hangs from its other end with all that acts on it
+                for k in (0, 1):
+                    if joints[k] >= 0:
+                        out[joints[k]] += load.sum(axis=0)
+                continue
             ends = [
                 held[p] if j < 0 else places[j] + beside[l, k]
                 for k, (p, j) in enumerate(zip((line.start, line.end), joints, strict=True))

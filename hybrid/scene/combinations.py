@@ -82,7 +82,7 @@ def refuse_use(scene: Table, use: Use, given: str = "") -> None:
     complaints = []
     for x in found:
         value = x.given or (given if x.at[0] not in type(scene).model_fields or x.at == ("lines",) else "")
-        complaints.append(Complaint(dotted(x.at), value or _value(scene, x.at), x.expected, x.fix))
+        complaints.append(Complaint(dotted(x.at), value or value_at(scene, x.at), x.expected, x.fix))
     if complaints:
         raise SceneError(complaints)
 
@@ -112,7 +112,7 @@ def _placed(tables: Tables, at: Place) -> Place:
     return ("lines", name, *at) if name is not None and at[0] in _OF_LINE else at
 
 
-def _value(scene: Table, at: Place) -> str:
+def value_at(scene: Table, at: Place) -> str:
     """What a scene has there, for people."""
     value: Any = scene
     for part in at:

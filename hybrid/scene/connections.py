@@ -108,7 +108,7 @@ def connection_findings(system: System) -> Iterator[Finding]:
 def _clamp_findings(system: System, name: str, key: str, held: ClampedConnection) -> Iterator[Finding]:
     line, point = system.lines[name], getattr(system.lines[name], key)
     at = ("lines", name, "connections", key)
-    if not holds_rod(line.chosen_model, key, line.cable.length):
+    if not (system.is_held(point) or holds_rod(line.chosen_model, key, line.cable.length)):
         expected = "pinned, because this end of the line is a catenary, which has no moment"
         yield Finding(at, expected, "give `bending_stiffness` to all sections, and `model: rod`", "clamped")
     if held.tangent is None and not isinstance(system.points[point], FreePoint):
@@ -119,7 +119,8 @@ def _rigid_point_findings(system: System, name: str) -> Iterator[Finding]:
     """What is wrong with lines that are clamped to a free point."""
     here, point = system.clamped_at(name), system.points[name]
     if not here:
-        if isinstance(point, FreePoint) and point.moment is not None:
+        takes = system.is_free_end(name) and isinstance(point, FreePoint) and not point.is_body
+        if isinstance(point, FreePoint) and point.moment is not None and not takes:
             expected = "nothing, because all lines turn freely at this point: nothing there takes a moment"
             fix = "leave it out, or clamp two lines there: `connections: {end: clamped}` of one, `{start: clamped}`"
             yield Finding(("points", name, "moment"), expected, fix)
@@ -129,7 +130,7 @@ def _rigid_point_findings(system: System, name: str) -> Iterator[Finding]:
     held = [system.clamp(*x) for x in here]
     if len(here) == 1:
         expected = f"another line that is clamped at point {name}, because a free point alone holds no direction"
-        yield Finding(at, expected, "clamp a second line there, or none", "one line")
+        yield Finding(at, expected, "clamp a second line there, or none, or make the point `kind: guided`", "one line")
     elif all(x is not None and x.bend_stiffness == 0.0 for x in held):
         expected = f"a line at point {name} without bend_stiffness 0: nothing holds the direction of the point"
         yield Finding((*at, "bend_stiffness"), expected, "leave it out for one of them", "0")

@@ -7,6 +7,7 @@ end out of it.  Directions need not have length one; whoever uses them normalise
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
@@ -241,11 +242,15 @@ class Guided(EndTable):
 
     @model_validator(mode="after")
     def _only_turns(self) -> Guided:
-        if self.motion is not None:
-            expected = "rotation only, because the position of a guided end is free"
-            fix = "use roll, pitch or yaw here; kind: clamped can be moved"
-            refuse(Finding(("motion", name), expected, fix) for name in self.motion.shifts())
+        refuse(moved_guides(self.motion))
         return self
+
+
+def moved_guides(motion: Motion | None) -> Iterator[Finding]:
+    """What moves the place of a guided end."""
+    expected = "rotation only, because the position of a guided end is free"
+    fix = "use roll, pitch or yaw here; kind: clamped can be moved"
+    return (Finding(("motion", name), expected, fix) for name in (motion.shifts() if motion is not None else ()))
 
 
 class Free(EndTable):
@@ -323,8 +328,9 @@ class Ends(Table):
         return {name: end.held_position for name, end in self.named().items() if end.held_position is not None}
 
     def initial_guesses(self) -> dict[str, Triple]:
-        """First positions [m] of the bodies that have one, by name (`start`, `end`)."""
-        return {name: end.initial_guess for name, end in self.bodies().items() if end.initial_guess is not None}
+        """First positions [m] of ends that are not held, as far as they are given, by name (`start`, `end`)."""
+        known = {name: end.first_position for name, end in self.named().items() if end.held_position is None}
+        return {name: place for name, place in known.items() if place is not None}
 
     @property
     def turns(self) -> float:

@@ -1,4 +1,4 @@
-"""Points where lines of a system end: fixed ones, free ones, and fairleads of bodies."""
+"""Points where lines of a system end: fixed ones, free ones, guided ones, and fairleads of bodies."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
 from hybrid.scene.base import After, Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
-from hybrid.scene.end_loads import GivenLoad, Loading
-from hybrid.scene.ends import Body, Free
+from hybrid.scene.end_loads import GivenLoad, Loading, Triple
+from hybrid.scene.ends import Body, Free, moved_guides
 from hybrid.scene.motion_tables import Motion
 
 _BREAK = (
@@ -48,6 +48,12 @@ class Failure(Table):
         return self
 
 
+class _FreeNear(Free):
+    """A free end that the search of the equilibrium puts somewhere first."""
+
+    initial_guess: Vector | None = None
+
+
 class FixedPoint(Table):
     """A point that is held or moved: an anchor, a fairlead of a vessel whose motion is known."""
 
@@ -60,13 +66,15 @@ class FixedPoint(Table):
 
 
 class FreePoint(Table):
-    """A point that lines alone hold: a knot, a buoy, a clump.  It has no moment of inertia."""
+    """A point that lines alone hold: a knot, a buoy, a clump, the free end of a line.  It has no moment of inertia."""
 
     instead: ClassVar[Mapping[str, str]] = WINCH
 
     kind: Literal["free"] = Field(default="free", description="moves with the lines that meet there")
-    initial_guess: Vector = Field(
-        description="where the search of the equilibrium puts the point first, inertial frame [m]"
+    initial_guess: Vector | None = Field(
+        default=None,
+        description="where the search of the equilibrium puts the point first, inertial frame; absent: of the end of "
+        "one line where its first shape has it; where lines meet it is needed [m]",
     )
     mass: NonNegative = Field(default=0.0, description="mass in air, its weight over gravity [kg]")
     volume: NonNegative = Field(default=0.0, description="displaced volume, for its buoyancy [m^3]")
@@ -76,7 +84,8 @@ class FreePoint(Table):
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     force: Loading | None = Field(default=None, description="force on the point, inertial frame [N]")
     moment: Loading | None = Field(
-        default=None, description="moment on a point to which lines are clamped, inertial frame [N m]"
+        default=None,
+        description="moment on a point to which lines are clamped, or on the free end of a rod, inertial frame [N m]",
     )
 
     @model_validator(mode="after")
@@ -99,11 +108,36 @@ class FreePoint(Table):
 
     @property
     def end(self) -> Body | Free:
-        """The end of a line that carries the point."""
+        """The end of a line that carries the point, without the moments on it."""
         if not self.is_body:
             return Free(force=self.force)
         given = {k: getattr(self, k) for k in ("mass", "volume", "height", "shape", "drag_area", "added_mass")}
         return Body(**given, thrust=self.force, initial_guess=self.initial_guess)
+
+    def only_end(self, near: Triple | None) -> Body | Free:
+        """The end of the one line that ends there; near: where it is first looked for [m], None: nowhere."""
+        if self.is_body:
+            return self.end.model_copy(update={"initial_guess": near})
+        return _FreeNear(force=self.force, moment=self.moment, initial_guess=near)
+
+
+class GuidedPoint(Table):
+    """The end of one line that holds its direction and leaves its place free."""
+
+    instead: ClassVar[Mapping[str, str]] = WINCH
+
+    kind: Literal["guided"] = Field(
+        default="guided", description="direction held, place free: the end of one line, which is clamped there"
+    )
+    force: Loading | None = Field(default=None, description="force on the point, inertial frame [N]")
+    motion: Motion | None = Field(
+        default=None, description="how the direction turns; a guided point takes no translation"
+    )
+
+    @model_validator(mode="after")
+    def _only_turns(self) -> GuidedPoint:
+        refuse(moved_guides(self.motion))
+        return self
 
 
 class Fairlead(Table):
@@ -120,10 +154,11 @@ class Fairlead(Table):
 Point = Annotated[
     Annotated[FixedPoint, Tag("<fixed>")]
     | Annotated[FreePoint, Tag("<free>")]
+    | Annotated[GuidedPoint, Tag("<guided>")]
     | Annotated[Fairlead, Tag("<fairlead>")],
     Discriminator(by_kind),
     Kinds(
-        ("fixed", "free", "fairlead"),
+        ("fixed", "free", "guided", "fairlead"),
         usual=("fixed",),
         implied=(("position", "fixed"), ("initial_guess", "free"), ("body", "fairlead")),
     ),

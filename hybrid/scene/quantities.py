@@ -218,9 +218,6 @@ def of_several_lines(wanted: Mapping[str, Quantity], lines: Mapping[str, Any], s
                 expected = f"a part of {each.line} that leaves out point {min(met)}, where it meets {each.other}"
                 fix = f"such as `range: [{0.1 * length:.4g}, {0.9 * length:.4g}]`"
                 yield Finding((*here, "range"), expected, fix, "nothing: the clearance of two lines that meet is none")
-        if each.kind == "touchdown_excursion" and each.reference is None:
-            expected = "a place [x, y], in m, in a scene of several lines"
-            yield Finding((*here, "reference"), expected, "that of the touchdown point of `hybrid static`", "nothing")
 
 
 def _of_line(

@@ -261,7 +261,7 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
     """Make the paths of files that motions, loads and obstacles name absolute: a scene is used from anywhere."""
     points, bodies = (data.get(x) if isinstance(data, dict) else None for x in ("points", "bodies"))
     files = [*product(("ends",), ("start", "end"), ("motion", "force", "moment", "thrust", "payout"))]
-    files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force"))
+    files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force", "moment"))
     files += product(("bodies",), bodies if isinstance(bodies, dict) else (), ("motion", "force", "moment"))
     obstacles = _at(data, ("obstacles",))
     for name in obstacles if isinstance(obstacles, dict) else ():

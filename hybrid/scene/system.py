@@ -11,7 +11,7 @@ from functools import cached_property
 from itertools import accumulate, combinations, pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.errors import SceneError
 from hybrid.scene.accuracy import USUAL, Accuracy, AskedAccuracy, of_unnamed_model
@@ -24,6 +24,7 @@ from hybrid.scene.analysis import (
     LineInitial,
     Mesh,
     Model,
+    OutputPoints,
     Resolution,
     RodModel,
     Straight,
@@ -32,17 +33,29 @@ from hybrid.scene.analysis import (
     size_of_output,
 )
 from hybrid.scene.attachments import Attachment
-from hybrid.scene.base import Finding, NonNegative, Pair, Positive, Table, Text, Truth, Whole, refuse, turned
+from hybrid.scene.base import (
+    Finding,
+    NonNegative,
+    Pair,
+    Positive,
+    Table,
+    Text,
+    Truth,
+    Whole,
+    refuse,
+    turned,
+    value_or_table,
+)
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
 from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.connections import ClampedConnection, Connections
 from hybrid.scene.end_loads import GivenLoad
-from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
+from hybrid.scene.ends import Clamped, End, Ends, Guided, Pinned, Triple
 from hybrid.scene.lines_contact import LinesContact
 from hybrid.scene.motion_checks import Held, lasting_period, moved_in
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.obstacles import Obstacles
-from hybrid.scene.points import WINCH, Failure, Fairlead, FixedPoint, FreePoint, Name, Point
+from hybrid.scene.points import WINCH, Failure, Fairlead, FixedPoint, FreePoint, GuidedPoint, Name, Point
 from hybrid.scene.quantities import Quantities
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.scene.system_checks import system_findings
@@ -151,7 +164,7 @@ class JoinedLine(Table):
         return self
 
 
-def _placed(initial: Initial, start: Triple) -> Initial:
+def _placed(initial: Initial, start: Triple | None) -> Initial:
     """A first shape that begins where its first point is, whether an end is held or not."""
     begins = isinstance(initial, Straight) and initial.origin is None
     return initial.model_copy(update={"origin": start}) if begins else initial
@@ -177,14 +190,22 @@ def _between(initial: Initial, ends: Mapping[str, End]) -> Initial:
     return initial.model_copy(update={"points": tuple(moved)})
 
 
+DEFAULT_POINTS = 101  # output points of a line that says nothing of them
+LinePoints = Annotated[
+    Annotated[Whole, Field(ge=2), Tag("<value>")] | Annotated[dict[Name, OutputPoints], Tag("<table>")],
+    Discriminator(value_or_table),
+]
+
+
 class SystemOutput(Table):
     """What is kept."""
 
     every: Positive | None = Field(default=None, description=EVERY)
-    points: Annotated[Whole, Field(ge=2)] = Field(
-        default=101,
-        description="points along each line, evenly over its length, its ends included; those of `history`, point "
-        "loads, changes of section and joints are added [-]",
+    points: LinePoints = Field(
+        default=DEFAULT_POINTS,
+        description="points along each line, evenly over its length, its ends included, or by name of the line its "
+        "number or a list of arc lengths, of others 101; those of `history`, point loads, changes of section and "
+        "joints are added [m]",
     )
     history: dict[Name, Annotated[tuple[NonNegative, ...], Field(min_length=1)]] = Field(
         default={}, description="by name of the line: arc lengths that plots follow over time [m]"
@@ -207,6 +228,10 @@ class SystemOutput(Table):
         default=None,
         description="estimate how wrong the result is, by mesh and time step; absent: where an accuracy is asked",
     )
+
+    def points_of(self, line: str) -> int | tuple[float, ...]:
+        """How many points are kept of a line, or their arc lengths [m]."""
+        return self.points.get(line, DEFAULT_POINTS) if isinstance(self.points, dict) else self.points
 
 
 class System(Table):
@@ -298,8 +323,8 @@ class System(Table):
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Names of the points that are free, in order."""
-        return tuple(name for name, point in self.points.items() if isinstance(point, FreePoint))
+        """Names of the points that are free and at which lines meet, in order."""
+        return tuple(x for x in self.points if isinstance(self.points[x], FreePoint) and not self.is_free_end(x))
 
     @property
     def free_bodies(self) -> dict[str, FreeBody]:
@@ -325,11 +350,17 @@ class System(Table):
         return list(combinations(self.lines, 2)) if self.contact.between is None else list(self.contact.between)
 
     def first_place(self, point: str) -> Triple:
-        """Where a point is held at rest, or first looked for [m]."""
+        """Where a point is held at rest, or first looked for [m]; not of a free end that says nothing of it."""
+        place = self._known_place(point)
+        assert place is not None
+        return place
+
+    def _known_place(self, point: str) -> Triple | None:
+        """The same; None: the first shape of the line has it."""
         found = self.points[point]
         if isinstance(found, Fairlead):
             return self.bodies[found.body].place(found.place)
-        return found.position if isinstance(found, FixedPoint) else found.initial_guess
+        return found.position if isinstance(found, FixedPoint) else getattr(found, "initial_guess", None)
 
     @property
     def guesses(self) -> dict[str, Triple]:
@@ -341,9 +372,18 @@ class System(Table):
         found = self.points[point]
         return self.bodies[found.body] if isinstance(found, Fairlead) else None
 
+    def is_free_end(self, point: str) -> bool:
+        """Whether a point is that end of one line which its place does not hold: free with no other line, or guided."""
+        found = self.points[point]
+        return isinstance(found, GuidedPoint) or (isinstance(found, FreePoint) and len(self.lines_at(point)) == 1)
+
+    def is_held(self, point: str) -> bool:
+        """Whether the place of a point is known: it is fixed, or on a body that is."""
+        return isinstance(self.points[point], FixedPoint) or isinstance(self.body_of(point), FixedBody)
+
     def is_joined(self, point: str) -> bool:
-        """Whether a point moves by what pulls there: it is free, or on a free body."""
-        return isinstance(self.points[point], FreePoint) or isinstance(self.body_of(point), FreeBody)
+        """Whether a point moves by what pulls there, and is more than the end of a line: a knot, or on a free body."""
+        return not self.is_held(point) and not self.is_free_end(point)
 
     def may_leave(self, name: str, end: Literal["start", "end"]) -> bool:
         """Whether an end of a line moves by what pulls there, or may once something has broken."""
@@ -395,11 +435,11 @@ class System(Table):
     def direction(self, name: str, end: str) -> tuple[Triple, Triple | None] | None:
         """Inertial directions in which a line is clamped at rest, or first: its tangent and its material axis a1.
 
-        None: it turns freely, or is clamped to a free point, whose axes are not known here.
+        None: it turns freely, or is clamped to a free point, whose axes are not known here, or is guided.
         """
         held = self.clamp(name, end)
         point = getattr(self.lines[name], end)
-        if held is None or held.tangent is None or isinstance(self.points[point], FreePoint):
+        if held is None or held.tangent is None or isinstance(self.points[point], FreePoint | GuidedPoint):
             return None
         body = self.body_of(point)
         if body is None:
@@ -413,8 +453,9 @@ class System(Table):
         return tuple(
             key
             for key in ("start", "end")
-            if isinstance(self.points[getattr(line, key)], FreePoint)
-            and self.lines_at(getattr(line, key))[0] == (name, key)
+            if isinstance(self.points[point := getattr(line, key)], FreePoint)
+            and not self.is_free_end(point)
+            and self.lines_at(point)[0] == (name, key)
         )
 
     def scene_of(
@@ -461,6 +502,9 @@ class System(Table):
             point, body = self.points[getattr(line, key)], self.body_of(getattr(line, key))
             held = self.direction(name, key) if directions is None else directions.get(key)
             place, motion, payout = first[key], None, getattr(line.connections, key).payout
+            if self.is_free_end(getattr(line, key)):
+                ends[key] = self._free_end(name, key, place)
+                continue
             if isinstance(point, FixedPoint):
                 place, motion = point.position, point.motion
                 if held is None and motion is not None and self.clamped_at(getattr(line, key)):
@@ -469,6 +513,7 @@ class System(Table):
                 motion = body.shift
             elif places is not None:
                 place = places[getattr(line, key)]
+            assert place is not None
             if key in carrying and isinstance(point, FreePoint):
                 ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
             elif held is None:
@@ -498,12 +543,27 @@ class System(Table):
         if scene is not None:
             return scene.model_copy(update=tables)
         tables["title"] = f"{self.title}, line {name}" if self.title else f"line {name}"
-        given: dict[str, Any] = {key: getattr(self.output, key) for key in ("points", "errors")}
+        given: dict[str, Any] = {"points": self.output.points_of(name), "errors": self.output.errors}
         given["every"] = self.output_interval if self.time is not None else self.output.every
         given["history"] = self.output.history.get(name)
         given["criteria"] = self.output.criteria and (name in self.adaptive or not self.adaptive)  # none: each says so
         tables["output"] = {key: value for key, value in given.items() if value is not None}
         return Scene.model_validate(tables)
+
+    def _free_end(self, name: str, key: Literal["start", "end"], near: Triple | None) -> End:
+        """The end of a line at a point that is no more than that; near: as of `FreePoint.only_end`."""
+        point, initial = self.points[getattr(self.lines[name], key)], self.lines[name].initial
+        if isinstance(point, GuidedPoint):
+            held = self.clamp(name, key)
+            assert held is not None
+            assert held.tangent is not None
+            return Guided(
+                tangent=held.tangent, normal=held.normal, turns=held.turns, force=point.force, motion=point.motion
+            )
+        assert isinstance(point, FreePoint)
+        if isinstance(initial, Equilibrium) and (initial.direction is not None or initial.guess == "straight"):
+            near = None  # the search starts from a line straight in a direction
+        return point.only_end(near)
 
     def _contact_of(self, name: str) -> Contact:
         """Contact of a line with itself, which knows whether it rubs on others."""
@@ -528,15 +588,20 @@ class System(Table):
             return asked
         return of_unnamed_model(asked, any(x.pipe is not None and x.pipe.max_stress for x in line.sections))
 
-    def _places(self, line: JoinedLine) -> dict[str, Triple]:
-        """Where the points of a line are first [m], a free one no farther from the other than the line is long."""
+    def _places(self, line: JoinedLine) -> dict[str, Triple | None]:
+        """Where the points of a line are first [m], a free one no farther from the other than the line is long; None:
+
+        a free end that is where the first shape of the line has it.
+        """
         names = {"start": line.start, "end": line.end}
-        places = {key: self.first_place(name) for key, name in names.items()}
-        distance = math.dist(places["start"], places["end"])
+        places = {key: self._known_place(name) for key, name in names.items()}
+        start, end = places["start"], places["end"]
+        if start is None or end is None:
+            return places
+        distance = math.dist(start, end)
         part = REACHED * line.cable.length / distance if distance > 0.0 and not self.starts_as_placed else 1.0
-        for key, other in (("end", "start"), ("start", "end")):
-            if part < 1.0 and self.is_joined(names[key]):
-                (x, y, z), (a, b, c) = places[key], places[other]
+        for key, (x, y, z), (a, b, c) in (("end", end, start), ("start", start, end)):
+            if part < 1.0 and not self.is_held(names[key]):
                 places[key] = (a + part * (x - a), b + part * (y - b), c + part * (z - c))
                 break
         return places
@@ -544,13 +609,15 @@ class System(Table):
     @property
     def points_kept(self) -> int:
         """How many places along all lines are kept at every output, but for those that are added."""
-        return self.output.points * len(self.lines)
+        kept = (self.output.points_of(name) for name in self.lines)
+        return sum(x if isinstance(x, int) else len(x) for x in kept)
 
     @property
     def lasting_period(self) -> float:
         """The shortest period of waves and motions [s]; infinity: there is none."""
-        held = [x for x in (*self.points.values(), *self.bodies.values()) if x.kind == "fixed"]
-        moved = [Held(x.motion, x.position, (1.0, 0.0, 0.0)) for x in held if x.motion is not None]
+        given = (*self.points.values(), *self.bodies.values())
+        motions = [(getattr(x, "motion", None), getattr(x, "position", None)) for x in given]
+        moved = [Held(motion, place, (1.0, 0.0, 0.0)) for motion, place in motions if motion is not None]
         return lasting_period([*moved_in(None, self.obstacles), *((x, x.motion) for x in moved)], self.environment)
 
     @property

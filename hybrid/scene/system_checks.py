@@ -18,7 +18,7 @@ from hybrid.scene.connections import connection_findings
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.plane import TYPED, plane_of
-from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
+from hybrid.scene.points import Fairlead, FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.quantities import of_several_lines
 from hybrid.scene.schema import Scene
 from hybrid.scene.suggestions import nearest
@@ -62,8 +62,10 @@ def _unknown_names(system: System) -> Iterator[Finding]:
         if pair[0] == pair[1]:
             expected = "two lines; whether a line touches itself is asked by lines.NAME.contact"
             yield Finding(("contact", "between", i), expected, "name another line, or leave the pair out")
-    for name in system.output.history:
-        yield from _unknown(name, system.lines, ("output", "history", name), "line")
+    points = system.output.points
+    for key, names in (("history", system.output.history), ("points", points if isinstance(points, dict) else {})):
+        for name in names:
+            yield from _unknown(name, system.lines, ("output", key, name), "line")
 
 
 def _lonely_points(system: System) -> Iterator[Finding]:
@@ -74,6 +76,11 @@ def _lonely_points(system: System) -> Iterator[Finding]:
             yield Finding(
                 ("points", name), expected, f"leave it out, or let a line end there: `end: {name}`", "no line"
             )
+        elif isinstance(point, GuidedPoint):
+            yield from _guided_findings(system, name)
+        elif isinstance(point, FreePoint) and point.initial_guess is None and not system.is_free_end(name):
+            expected = "three numbers [x, y, z], in m, from where the equilibrium of the lines that meet here is sought"
+            yield Finding(("points", name, "initial_guess"), expected, "add `initial_guess: [x, y, z]` (m)", "nothing")
         elif isinstance(point, FreePoint) and all(system.breaks(*at) for at in system.lines_at(name)):
             line, _ = system.lines_at(name)[0]
             expected = f"a line at point {name} that does not break there and carries what is left"
@@ -86,11 +93,32 @@ def _lonely_points(system: System) -> Iterator[Finding]:
             yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
 
 
+def _guided_findings(system: System, name: str) -> Iterator[Finding]:
+    """What is wrong with a guided point: one line is clamped there, in a direction of the world."""
+    (line, end), *others = system.lines_at(name)
+    if others:
+        expected = "free, because a guided point is the end of one line, and several end here"
+        yield Finding(("points", name, "kind"), expected, "clamp the lines to each other: `kind: free`", "guided")
+    held, at = system.clamp(line, end), ("lines", line, "connections", end)
+    if held is None or held.tangent is None:
+        expected = f"the direction in which point {name} holds the line"
+        yield Finding((*at, "tangent"), expected, "add `tangent: [0, 0, 1]`", "nothing")
+        return
+    wrong = [key for key in ("swivel", "bend_stiffness", "payout") if getattr(held, key) not in (None, False)]
+    for key in wrong:
+        expected = f"nothing, because point {name} is guided: without a `normal` it lets the line spin"
+        yield Finding((*at, key), expected, "leave it out")
+
+
 def floating_groups(system: System) -> Iterator[Finding]:
     """Free points and bodies from which no way along lines leads to what is fixed: none of them has an equilibrium."""
     ways = [{x.start, x.end} for x in system.lines.values()]
     ways += [{p, f"body {x.body}"} for p, x in system.points.items() if isinstance(x, Fairlead)]
     held = {name for name, point in system.points.items() if isinstance(point, FixedPoint)}
+    fluid = system.environment.fluid
+    if system.environment.seabed is not None or (fluid is not None and fluid.surface is not None):  # may bear a line
+        alone = [x for x in system.lines.values() if system.is_free_end(x.start) and system.is_free_end(x.end)]
+        held |= {p for x in alone for p in (x.start, x.end)}  # each of them is judged by itself
     held |= {f"body {name}" for name, body in system.bodies.items() if isinstance(body, FixedBody)}
     while more := {p for way in ways if way & held for p in way} - held:
         held |= more
@@ -113,8 +141,9 @@ def _start_findings(system: System) -> Iterator[Finding]:
             fix = "say so of every line; points and bodies start at rest where initial_guess has them"
             yield Finding(("lines", name, "initial"), expected, fix, "equilibrium")
         elif isinstance(line.initial, Straight) and any(line.initial.velocity or ()):
-            expected = "rest, because the points of the line start at rest"
-            yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
+            if system.is_joined(line.start) or system.is_joined(line.end):
+                expected = "rest, because the points of the line start at rest"
+                yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
 
 
 def _touching_findings(system: System) -> Iterator[Finding]:
@@ -205,7 +234,7 @@ def _of_system(system: System, name: str, found: Finding) -> Finding:
         at[:1] == ("accuracy",) and line.accuracy is not None
     ):
         at = ("lines", name, *at)
-    elif at[:2] == ("output", "history"):
+    elif at[:2] == ("output", "history") or (at[:2] == ("output", "points") and len(at) > 2):
         at = (*at[:2], name, *at[2:])
     elif at[:1] == ("accuracy",):
         expected = f"{found.expected}, in line {name}"
@@ -218,6 +247,9 @@ def _of_system(system: System, name: str, found: Finding) -> Finding:
             words = (x.replace("ends.", f"lines.{name}.connections.") for x in (found.expected, found.fix))
             expected, fix = (x.replace("cable.", f"lines.{name}.") for x in words)
             return Finding(at, expected, fix, found.given)
+        if rest[:1] == ("tangent",):
+            at = ("lines", name, "connections", str(at[1]), *rest)
+            return Finding(at, found.expected, found.fix, found.given)
         if isinstance(system.points[point], FreePoint) and rest:
             rest = ({"position": "initial_guess", "thrust": "force"}.get(str(rest[0]), rest[0]), *rest[1:])
         at = ("points", point, *rest)

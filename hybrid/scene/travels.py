@@ -24,7 +24,7 @@ def travel_findings(system: System) -> Iterator[Finding]:
     fails = [*system.lines.values(), *(x for x in system.points.values() if isinstance(x, FixedPoint | Fairlead))]
     breaks = any(x.break_at is not None for x in fails)  # what is broken reaches anywhere
     duration = system.time.duration if system.time is not None and not breaks else 0.0
-    placed = {name: system.first_place(name) for name in system.points if not system.is_joined(name)}
+    placed = {name: system.first_place(name) for name in system.points if system.is_held(name)}
     motions = {name: _motion(system, name) for name in placed}
     beside = _neighbours(system)
     for name, other, reach, between in _held_pairs(placed, motions, beside):

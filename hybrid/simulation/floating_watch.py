@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -82,10 +83,10 @@ def _floating(system: System, level: float) -> list[str]:
     in the depth has and is neither.
     """
     found = []
-    for name in system.free:
-        point = system.points[name]
+    for name, point in system.points.items():
         if isinstance(point, FreePoint) and point.volume and _net(system, point) > 0.0:
-            top = point.initial_guess[2] + 0.5 * _height(point)
+            place = point.initial_guess
+            top = -math.inf if place is None else place[2] + 0.5 * _height(point)
             if point.height is not None or top >= level:
                 found.append(name)
     return found

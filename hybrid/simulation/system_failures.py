@@ -85,7 +85,7 @@ class Failures:
     def _part(self, k: int) -> None:
         """Take the ends off their point, in a solver of its own."""
         run = self._run
-        run.model = after_failure(run.model, self.all[k])
+        run.model = after_failure(run.model, self.all[k], run.t)
         self.broken.append(k)
         for line, model in zip(run.lines, run.model.models, strict=True):
             line.follow(model)

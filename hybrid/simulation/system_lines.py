@@ -73,8 +73,6 @@ if TYPE_CHECKING:
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
 WAITING = 64
-# Both ends of a line count as held in its outputs, by their points.
-HELD = np.ones(2, np.int8)
 # Of the length: ends that are so near to where they were have not been moved.
 SAME_PLACE = 1e-9
 # Flags of a step (kernels.state.books), and bits of kernels.contact.self_distance.
@@ -148,6 +146,7 @@ class LineResult:
         """
         self.number, self.name, self.model, self.scene = number, name, model, scene
         self.events, self.paying = EventLog(), paying
+        self.held = np.ones(2, np.int8)  # (2,) ends that count as held in outputs: all but free ones, by their points
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
         self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None)
@@ -377,13 +376,13 @@ class LineResult:
         """The outputs that steps have sampled, as many as there are in the buffer; in arrays of their own."""
         line, books = self.model.line, self.books
         varies = self.model.layout is not None
-        sizes = line.h.size, HELD, varies, len(line.torsion), books.touch.shape[1], line.moved.size
+        sizes = line.h.size, self.held, varies, len(line.torsion), books.touch.shape[1], line.moved.size
         kept = slip_size(line), bool(line.bits & REMEMBERS)
         return batch_of_rows(books.samples[:count].copy(), *sizes, *kept)[0]
 
     def state_now(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
         """The state at t (s), now, as an output that is made of it."""
-        held = ends._replace(held=HELD, position=state.r[[0, -1]])
+        held = ends._replace(held=self.held, position=state.r[[0, -1]])
         touch = self.books.touch[0] if self.books.touch.size else None
         return batch_of_one(t, held, state, work.report, self.books.work[0], self.model.sea.values, touch)
 
@@ -524,7 +523,8 @@ class LineResult:
         self.observer.first_energy = saved["first_energy"]
         if self.contact is not None:
             self.contact.restore(saved["self_contact"], t)
-        model.ends.restore(saved["ends"], t)
+        ends = saved["ends"] | {"released": model.ends.released}  # as what broke says: files of 1.0 have none released
+        model.ends.restore(ends, t)
         apart = np.abs(saved["ends"]["position"] - model.ends.values.position).max(axis=1)
         for k in (0, 1):
             if joints[k] < 0 and apart[k] > SAME_PLACE * model.length:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from hybrid.kernels.junctions.bodies import DONE, SPRING
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.model.build import Model
-from hybrid.model.release import unclamped
+from hybrid.model.release import unclamped, without_hold
 from hybrid.model.self_reach import touching
 from hybrid.model.system import SystemModel, build_system
 from hybrid.scene.system import System
@@ -42,15 +42,19 @@ def loaded_as(
         models = tuple(
             replace(x, line=touching.bits(x.line)) if k in touching.lines else x for k, x in enumerate(models)
         )
+    supports = {(line, k): other.models[line].ends for line, k in model.supports}
     return replace(
-        model, models=models, bodies=other.bodies, known=other.known, scenes=other.scenes, moments=other.moments
-    )
+        model, models=models, bodies=other.bodies, known=other.known, scenes=other.scenes, moments=other.moments,
+        supports=supports,
+    )  # fmt: skip
 
 
 def _line_as(name: str, now: Model, later: Model, system: System, t: float) -> Model:
     """The model of a line with other loads, on its cells of now, with what has come off it."""
     for k in (0, 1):
-        if later.cable.held_tangent[k] and not now.cable.held_tangent[k]:  # it has broken off
+        if now.ends.released[k]:
+            later = without_hold(later, k, t)
+        elif later.cable.held_tangent[k] and not now.cable.held_tangent[k]:  # it has broken off
             later = unclamped(later, k)
     if now.layout is not None:
         later = on_layout(later, now.layout)

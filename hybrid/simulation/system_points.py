@@ -22,7 +22,7 @@ from hybrid.model.bodies import angles_of
 from hybrid.model.system import SystemModel
 from hybrid.outputs.probes import elevation, elevation_field
 from hybrid.scene.bodies import FreeBody
-from hybrid.scene.points import Fairlead, FreePoint, Point
+from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, Point
 from hybrid.scene.system import System
 from hybrid.store.format import Field
 
@@ -40,7 +40,10 @@ def fields_of(system: System) -> list[Field]:
         at = f"points/{name}"
         fields.append(vector(f"{at}/position", "m", f"position of point {name}"))
         fields.append(vector(f"{at}/velocity", "m/s", f"velocity of point {name}"))
-        if not isinstance(point, FreePoint):
+        if isinstance(point, GuidedPoint):
+            what = f"moment of the line that is clamped at point {name}, about it, which its support bears"
+            fields.append(vector(f"{at}/moment", "N m", what))
+        elif not isinstance(point, FreePoint):
             bears = "its body" if system.body_of(name) is not None else "its support"
             fields.append(vector(f"{at}/force", "N", f"force of the lines on point {name}, which {bears} bears"))
             if system.clamped_at(name):
@@ -118,11 +121,13 @@ def values_of(system: System, model: SystemModel, seen: Sampled) -> dict[str, Fl
                 frames = seen.frame(len(model.bodies) + model.rigid.index(name))
                 values[f"points/{name}/rotation"] = angles_of(frames)
             continue
-        reports = [(seen.lines[k].report, FORCE_A - 3 * node) for k, node in here]
-        values[f"points/{name}/force"] = force = sum((r[:, f : f + 3] for r, f in reports), none)
         moment = _clamp_moment(system, model, seen, name)
         if moment is not None:
             values[f"points/{name}/moment"] = moment
+        if isinstance(point, GuidedPoint):
+            continue
+        reports = [(seen.lines[k].report, FORCE_A - 3 * node) for k, node in here]
+        values[f"points/{name}/force"] = force = sum((r[:, f : f + 3] for r, f in reports), none)
         if system.body_of(name) is not None:
             pulls[point.body].append((position, force, none if moment is None else moment))  # type: ignore[union-attr]
     for name, known in model.known.items():
@@ -200,7 +205,7 @@ def _place(
             velocity = x[:, SAMPLE_V:SAMPLE_W] + np.cross(seen.spin(k), arm)
             return x[:, SAMPLE_PLACE:SAMPLE_AXES] + arm, velocity
     line, node = first
-    ends, found = model.models[line].ends, []
+    ends, found = model.supports.get((line, -node), model.models[line].ends), []
     for t in seen.t:
         ends.at(t)
         found.append((ends.values.position[-node].copy(), ends.velocity[-node].copy()))

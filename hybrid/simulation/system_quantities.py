@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -21,15 +20,14 @@ from hybrid.store.format import Field
 
 
 def idle_ends(system: System, model: SystemModel) -> list[tuple[int, int]]:
-    """Ends (line, 0 or 1) that are alone at a free point on which nothing acts."""
-    lines = Counter(joint for pair in model.joints for joint in pair)
+    """Ends (line, 0 or 1) that are alone at a free point on which nothing acts, or have come loose."""
     found = []
-    for end in ((line, k) for line in range(len(model.joints)) for k in (0, 1)):
-        joint = model.joints[end[0]][end[1]]
-        if 0 <= joint < len(model.free) and lines[joint] == 1:
-            point = system.points.get(model.free[joint])
-            knot = isinstance(point, FreePoint) and not point.is_body and point.force is None
-            found += [end] if knot or end in model.loose else []
+    for number, (name, x, joints) in enumerate(zip(model.names, model.models, model.joints, strict=True)):
+        for k, point in enumerate((system.lines[name].start, system.lines[name].end)):
+            at = system.points[point]
+            loaded = getattr(at, "force", None) is not None or (isinstance(at, FreePoint) and at.is_body)
+            if joints[k] < 0 and not x.ends.values.held[k] and (not loaded or (number, k) in model.loose):
+                found.append((number, k))
     return found
 
 
@@ -134,7 +132,7 @@ class SystemQuantities:
 
     def _seen(self, name: str, states: Batch) -> Batch:
         """States of a line with ends that nothing takes as the free ends that they are."""
-        held = states.held.copy()
+        held = np.ones_like(states.held)
         held[:, [k for line, k in self._idle if line == name]] = 0
         return states._replace(held=held)
 

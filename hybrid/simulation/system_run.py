@@ -256,7 +256,7 @@ class SystemRun:
     @property
     def turned(self) -> bool:
         """Whether moments are given at points."""
-        return any(self.system.moments_on(name) for name in self.system.free)
+        return any(getattr(point, "moment", None) is not None for point in self.system.points.values())
 
     @property
     def _parts(self) -> dict[str, Recorder]:
@@ -496,6 +496,8 @@ class SystemRun:
             shared.take(self.shared, own, self.t)
         self.shared = shared
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
+        for line, x in zip(self.lines, lines, strict=True):
+            line.held = np.minimum(x.ends.held, 1)
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])

@@ -90,9 +90,11 @@ def _nearer(system: System) -> str:
     for name, place in system.guesses.items():
         for line, end in system.lines_at(name):
             other = system.lines[line].end if end == "start" else system.lines[line].start
+            if not system.is_held(other):
+                continue
             length = sum(section.length for section in system.lines[line].sections)
             away = math.dist(place, system.first_place(other))
-            if not system.is_joined(other) and away > worst * length:
+            if away > worst * length:
                 point, worst = system.points[name], away / length
                 key = f"bodies.{point.body}" if isinstance(point, Fairlead) else f"points.{name}"
                 text = (

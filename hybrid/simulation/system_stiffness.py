@@ -108,7 +108,7 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     else:
         solver, state = _let_go(system, model, found, kind, name)
         held = system.bodies[name] if kind == "body" else None
-        position = np.array(held.position if isinstance(held, FixedBody) else system.first_place(name))
+        position = np.array(held.position) if isinstance(held, FixedBody) else _place(system, model, found, name)
         rotation = np.array(held.rotation) if isinstance(held, FixedBody) else None
         first, own = 3 * len(free[0]) + (6 * len(free[1]) if kind == "body" else 0), np.zeros((size, size))
     matrix = _stiffness(solver, state, first, size, len(solver.net))

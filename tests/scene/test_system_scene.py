@@ -75,7 +75,7 @@ def test_refused_with_place_and_remedy(old: str, new: str, line: int, where: str
 def test_points_that_nothing_holds_are_refused() -> None:
     text = TEXT.replace("  buoy: {", "  a: {initial_guess: [0, 0, 9]}\n  b: {initial_guess: [5, 0, 9]}\n  buoy: {")
     text = text.replace("lines:\n", "lines:\n  loose: {start: a, end: b, sections: [{length: 9, mass: 1}]}\n")
-    with pytest.raises(SceneError, match="nothing holds it"):
+    with pytest.raises(SceneError, match=r"nothing holds this cable, which weighs 88\.29 N"):
         parse_either(text)
 
 
