@@ -28,7 +28,7 @@ import hybrid
 from hybrid.errors import HybridError
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # of the tests, where a scene is said in other ways
-from tests.combinations.pairs import as_system, scene_of, seen_by
+from tests.combinations.pairs import as_network, scene_of, seen_by
 
 Tables = dict[str, Any]
 Rng = np.random.Generator
@@ -174,7 +174,7 @@ def drape(rng: Rng) -> Found:
     if thing["kind"] != "box":
         checks["turned"] = off(hybrid.static(seen_by(M, deepcopy(tables))).position[-1], x @ M.T, L)
     checks["exchanged"] = off(hybrid.static(exchanged(tables)).position[-1], x[::-1], L)
-    checks["system"] = off(hybrid.static(as_system(tables)).lines["one"].position[-1], x, L)
+    checks["system"] = off(hybrid.static(as_network(tables)).lines["cable"].position[-1], x, L)
     finer = hybrid.static(tables | {"mesh": {"cells": 4 * tables["mesh"]["cells"]}})
     return f"{thing['kind']} {tables['model']}", checks | {"finer": off(finer.position[-1], x, L)}, r
 
@@ -198,7 +198,7 @@ def moving(rng: Rng) -> Found:
     checks = {"exchanged": off(hybrid.run(exchanged(tables)).position, r.position[:, ::-1], L)}
     if thing["kind"] != "box":
         checks["turned"] = off(hybrid.run(seen_by(M, deepcopy(tables))).position, r.position @ M.T, L)
-    checks["system"] = off(hybrid.run(as_system(tables)).lines["one"].position, r.position, L)
+    checks["system"] = off(hybrid.run(as_network(tables)).lines["cable"].position, r.position, L)
     checks["step/4"] = off(hybrid.run(tables | {"time": {"duration": T, "step": T / n / 4}}).position, r.position, L)
     done = np.abs(r["work/end"]).max() + np.abs(r["work/friction"]).max()
     return f"{thing['kind']} {[x for x in ('motion', 'spin', 'bearing') if x in thing]}", checks | {

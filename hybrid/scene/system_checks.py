@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from hybrid.scene.analysis import Equilibrium, Straight
+from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.checks import elevation_has_waves
@@ -140,10 +140,9 @@ def _start_findings(system: System) -> Iterator[Finding]:
             expected = f"straight or points, because line {placed[0]} starts so, and nothing is in equilibrium then"
             fix = "say so of every line; points and bodies start at rest where initial_guess has them"
             yield Finding(("lines", name, "initial"), expected, fix, "equilibrium")
-        elif isinstance(line.initial, Straight) and any(line.initial.velocity or ()):
-            if system.is_joined(line.start) or system.is_joined(line.end):
-                expected = "rest, because the points of the line start at rest"
-                yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
+        elif any(getattr(line.initial, "velocity", None) or ()) and any(map(system.is_joined, (line.start, line.end))):
+            expected = "rest, because the points of the line start at rest"
+            yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
 
 
 def _touching_findings(system: System) -> Iterator[Finding]:

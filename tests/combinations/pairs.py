@@ -8,8 +8,11 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
+from hybrid.scene.read import as_scene, scene_text
+from hybrid.scene.short_form import network_of
 from tests.problems import tables_with
 
 LENGTH, OUTPUTS = 12.0, 5
@@ -218,34 +221,9 @@ def exchanged(tables: Tables) -> Tables:
     return found
 
 
-def as_system(tables: Tables) -> Tables | None:
-    """The scene as a system of one line; None: several lines have no key for what it has."""
-    found = deepcopy(tables)
-    cable, ends = found.pop("cable"), found.pop("ends")
-    line: Tables = {"start": "a", "end": "b", "model": found.pop("model"), "contact": found.pop("contact")} | cable
-    line["initial"] = found.pop("initial")
-    for key in {"mesh", "resolution"} & {*found}:
-        line[key] = found.pop(key)
-    found["points"] = points = {}
-    for name, (key, end) in zip("ab", ends.items(), strict=True):
-        end = dict(end)
-        kind = end.pop("kind")
-        if kind == "guided" or "moment" in end:
-            return None
-        if kind == "clamped":
-            keys = {"tangent", "normal", "turns", "swivel", "bend_stiffness"} & {*end}
-            line.setdefault("connections", {})[key] = {"kind": kind} | {x: end.pop(x) for x in sorted(keys)}
-        if "payout" in end:
-            line.setdefault("connections", {}).setdefault(key, {"kind": kind})["payout"] = end.pop("payout")
-        if "release_at" in end:
-            line["break_at"] = end.pop("release_at") | {"end": key}
-        if "thrust" in end:
-            end["force"] = end.pop("thrust")
-        held = kind in ("pinned", "clamped")
-        points[name] = {"kind": "fixed" if held else "free"} | end
-        if not held:
-            points[name].setdefault("initial_guess", [10, 0, 3])
-    found["lines"] = {"one": line}
+def as_network(tables: Tables) -> Tables:
+    """The scene as a network of one line."""
+    found: Tables = yaml.safe_load(scene_text(network_of(as_scene(tables))))
     return found
 
 

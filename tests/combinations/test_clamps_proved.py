@@ -13,7 +13,7 @@ import hybrid
 from hybrid.kernels.laws.bending_slip import EACH, beside_spring, slip_answer
 from hybrid.model.build import build
 from hybrid.scene.read import as_scene
-from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, S, Tables, as_system
+from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, S, Tables, as_network
 from tests.problems import tables_with
 
 SPRING = 30.0  # N m/rad, 1.9 of half a cell
@@ -100,9 +100,8 @@ def test_a_clamp_on_a_spring_is_one_turned_by_its_moment(rest: str) -> None:
             S + "drag": {"normal": 1.2}, "time": None, "output": {"points": 13, "exact": True}}  # fmt: skip
     tables = tables_with(BASE, held | REST[rest])
     soft = hybrid.static(tables)
-    system = as_system(tables)
-    assert system is not None
-    assert np.abs(hybrid.static(system).lines["one"].position - soft.position).max() < 1e-9
+    system = as_network(tables)
+    assert np.abs(hybrid.static(system).lines["cable"].position - soft.position).max() < 1e-9
     ends: Tables = {}
     for key, end, moment, k in (
         (START, CLAMP, soft["moment_start"], springs[0]),

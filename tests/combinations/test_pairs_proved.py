@@ -9,7 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError
-from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_system
+from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_network
 from tests.problems import tables_with
 
 EXACT: Tables = {"output.exact": True}
@@ -202,9 +202,8 @@ def test_cells_to_a_layer_of_several_lines_are_where_the_pre_run_of_one_puts_the
     paid = {END: BASE["ends"]["end"] | {"motion": None, "payout": {"rate": 6.0, "ramp": 0.5}}}
     more: Tables = {START: CLAMP, "mesh": None, "resolution": {"cells_per_layer": 3}, S + "damping": {"mass": 8.0}}
     tables = tables_with(BASE, EXACT | paid | more | {"time": {"duration": 2.0, "step": 0.01}})
-    system = as_system(tables)
-    assert system is not None
-    one, two = hybrid.run(tables).mesh[0].s, hybrid.run(system).lines["one"].mesh[0].s
+    system = as_network(tables)
+    one, two = hybrid.run(tables).mesh[0].s, hybrid.run(system).lines["cable"].mesh[0].s
     assert np.abs(np.diff(one)[:8] / np.diff(two)[:8] - 1.0).max() < 0.1
 
 
@@ -425,9 +424,8 @@ def test_friction_that_has_settled_on_a_pipe_is_that_of_the_capstan() -> None:
     """
     tables = over_a_pipe()
     found, plain = hybrid.static(tables), hybrid.static(over_a_pipe("neglected"))
-    system = as_system(tables)
-    assert system is not None
-    several = hybrid.static(system).lines["one"]
+    system = as_network(tables)
+    several = hybrid.static(system).lines["cable"]
     assert slope_on_the_pipe(found) == pytest.approx(MU, rel=0.01)
     assert abs(slope_on_the_pipe(plain)) < 0.005
     assert np.abs(several.tension - found.tension).max() < 1e-6 * found.tension.max()

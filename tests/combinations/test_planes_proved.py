@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
-from tests.combinations.pairs import Tables, as_system, seen_by
+from tests.combinations.pairs import Tables, as_network, seen_by
 
 LENGTH = 12.0
 SECTION: Tables = {
@@ -33,9 +33,7 @@ def hung(model: str = "rod", **more: Any) -> Tables:
 
 
 def system(tables: Tables) -> Tables:
-    found = as_system(tables | {"initial": {"kind": "equilibrium"}})
-    assert found is not None
-    return found
+    return as_network(tables | {"initial": {"kind": "equilibrium"}})
 
 
 def over(kind: str = "cylinder", **obstacle: Any) -> Tables:
@@ -62,7 +60,7 @@ def test_a_line_of_several_in_a_plane_is_what_the_plane_computes(model: str) -> 
     if model == "catenary":  # which has to stay taut
         tables["ends"]["start"] = {"kind": "pinned", "position": [0, 0, 0]}
         tables["ends"]["end"]["motion"] = {"surge": {"amplitude": 0.2, "period": 4.0}, "ramp": 0.5}
-    one, two = hybrid.run(tables), hybrid.run(system(tables)).lines["one"]
+    one, two = hybrid.run(tables), hybrid.run(system(tables)).lines["cable"]
     assert np.abs(one.position - two.position).max() < 1e-8 * LENGTH
     assert np.abs(one.tension - two.tension).max() < 1e-6 * np.abs(one.tension).max()
     assert not two.position[..., 1].any() and not two.velocity[..., 1].any()
@@ -77,7 +75,7 @@ def test_beside_obstacles_in_a_plane_nothing_leaves_it(kind: str, several: bool)
     free = {key: x for key, x in tables.items() if key != "dimension"}
     said, whole = (system(x) if several else x for x in (tables, free))
     found, space = hybrid.run(said), hybrid.run(whole)
-    line, other = (x.lines["one"] if several else x for x in (found, space))
+    line, other = (x.lines["cable"] if several else x for x in (found, space))
     assert not line.position[..., 1].any()
     assert np.abs(line.position - other.position).max() == 0.0
     away = np.linalg.norm((line.position - tables["obstacles"]["pipe"]["at"])[..., [0, 2]], axis=-1).min(axis=1)
@@ -94,7 +92,7 @@ def test_beside_obstacles_in_a_plane_nothing_leaves_it(kind: str, several: bool)
         again["ends"]["end"]["motion"] = motion | ways
         again["environment"]["fluid"]["current"] = [0.3 * c, 0.3 * s, 0.0]
         turned = hybrid.run(system(again) if several else again)
-        there = (turned.lines["one"] if several else turned).position @ M
+        there = (turned.lines["cable"] if several else turned).position @ M
         assert np.abs(there[..., 1]).max() < 1e-9 * LENGTH
         assert np.abs(there - line.position).max() < 1e-6 * LENGTH
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.combinations.pairs import ADAPTIVE, BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_system
+from tests.combinations.pairs import ADAPTIVE, BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_network
 from tests.problems import tables_with
 
 # --- turns of an end beside a swivel --------------------------------------------------------------
@@ -24,9 +24,8 @@ def test_a_swivel_lets_the_turns_of_an_end_go_back(model: Any) -> None:
     assert np.abs(held["torque"]).max() > 1.0
     for turns in (0.7, -5.3, 200.0):
         tables = tables_with(BASE, swivel | {END + ".turns": turns})
-        system = as_system(tables)
-        assert system is not None
-        for found in (hybrid.run(tables), hybrid.run(system).lines["one"]):
+        system = as_network(tables)
+        for found in (hybrid.run(tables), hybrid.run(system).lines["cable"]):
             assert np.abs(found.position - plain.position).max() < 1e-9
             assert np.abs(found["torque"]).max() < 1e-9
         what = next(x for x in hybrid.plan(tables).contents if x.what.startswith("twist by"))

@@ -12,7 +12,7 @@ import hybrid
 from hybrid.model.build import build
 from hybrid.model.material import Material
 from hybrid.scene.read import validate_scene
-from tests.combinations.pairs import BASE, END, FEATURES, SECTION, as_system
+from tests.combinations.pairs import BASE, END, FEATURES, SECTION, as_network
 from tests.problems import tables_with
 
 MOVES = {"kind": "adaptive", "always_move": True}
@@ -120,7 +120,7 @@ def test_stepped_from_outside_and_as_a_system_it_is_the_same() -> None:
     """Steps that are taken back leave every bit; times of steps differ by a bit or two from those of a run."""
     scene = slack(**LINES["60 m, level"], model=MOVES)
     whole, plain, again = hybrid.run(scene), stepped(scene, False), stepped(scene, True)
-    one = hybrid.run(cast(Any, as_system(scene))).lines["one"]
+    one = hybrid.run(as_network(scene)).lines["cable"]
     for name in SAME:
         np.testing.assert_array_equal(again[name][:], plain[name][:])
         np.testing.assert_allclose(plain[name][:], whole[name][:], rtol=1e-9, atol=1e-12)
@@ -149,8 +149,8 @@ def kinks(result: hybrid.Result) -> list[Any]:
 def test_where_kinks_count_as_bends_an_event_says_so(name: str) -> None:
     """Of one cable and of a line of a system, once, of all the line; no verdict on bends, beyond the limit or within it."""
     broken, within = (limited(radius, **LEFT[name]) for radius in (8.0, 0.1))
-    lines = hybrid.run(cast(Any, as_system(within))).lines
-    for found, radius in ((hybrid.run(broken), 8.0), (lines["one"], 0.1)):
+    lines = hybrid.run(as_network(within)).lines
+    for found, radius in ((hybrid.run(broken), 8.0), (lines["cable"], 0.1)):
         (said,) = kinks(found)
         first = next(event for event in found.events if event.kind == "grow")
         assert said.t == first.t > 0.0 and (said.s_a, said.s_b) == (0.0, 60.0)

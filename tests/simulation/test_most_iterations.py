@@ -24,7 +24,7 @@ def stepped(
         for k in range(steps):
             place = heave(0.2 * (k + 1))
             if network:
-                cable.set_point("b", *place)
+                cable.set_point("end", *place)
             else:
                 cable.set_end("end", *place)
             cable.step()

@@ -10,7 +10,7 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
-from tests.combinations.pairs import as_system
+from tests.combinations.pairs import as_network
 from tests.problems import tables_with
 
 SECTION = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0}
@@ -216,9 +216,8 @@ def test_a_twisted_catenary_is_let_go_with_its_twist(model: str, tmp_path: Path)
             catenary = (6.0 + 2.0 / 6.0) * 0.5 * GJ * (2.0 * np.pi * turns / 10.0) ** 2
             assert event.energy == pytest.approx(-catenary, rel=0.1)
             assert result.work["end"][-1] == pytest.approx(event.energy, rel=1e-6)
-    lines = as_system(tables)
-    assert lines is not None
-    found = hybrid.run(lines).lines["one"]
+    lines = as_network(tables)
+    found = hybrid.run(lines).lines["cable"]
     assert np.abs(found.position - position).max() < 1e-9 * 10.0
     later = np.abs(found.t - 0.5) > 1e-9  # of a system an output there is of the moment before
     assert np.abs(found["torque"] - torque)[later].max() < 1e-6

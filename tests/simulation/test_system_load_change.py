@@ -14,7 +14,7 @@ from test_system_resume import clamped, mooring, spar
 import hybrid
 import hybrid.simulation.system_run
 from hybrid.errors import SceneError
-from tests.combinations.pairs import as_system, scene_of
+from tests.combinations.pairs import as_network, scene_of
 from tests.problems import tables_with
 
 CURRENT = ["environment.fluid.current=[0.9, -0.3, 0]"]
@@ -108,17 +108,16 @@ def test_changes_are_made_at_their_time_however_often_it_is_stopped(
 def test_a_line_of_several_changes_as_a_cable_does(tmp_path: Path) -> None:
     """Current and motion of the end: the same motion of one cable and of a system of one line."""
     cable = tables_with(scene_of("water", "clamp"), {"output.exact": True})
-    lines = as_system(cable)
-    assert lines is not None
+    lines = as_network(cable)
     travel = "{by: [0.05, 0, 0.1], over: 0.5, begin: 0.3}"
-    cable, lines = (tables_with(x, {at: None}) for x, at in ((cable, "ends.end.motion"), (lines, "points.b.motion")))
+    cable, lines = (tables_with(x, {at: None}) for x, at in ((cable, "ends.end.motion"), (lines, "points.end.motion")))
     found = []
-    for scene, end in ((cable, "ends.end"), (lines, "points.b")):
+    for scene, end in ((cable, "ends.end"), (lines, "points.end")):
         path = tmp_path / f"{end}.h5"
         hybrid.run(scene, path).close()
         settings = [*CURRENT, f"{end}.motion.travel={travel}"]
         with hybrid.resume(path, tmp_path / "changed.h5", settings=settings, start=0.2) as result:
-            found.append((result.lines["one"] if result.lines else result).position)
+            found.append((result.lines["cable"] if result.lines else result).position)
     assert np.abs(found[0] - found[1]).max() < 1e-9
     assert np.abs(found[0][-1, -1] - found[0][0, -1]).max() > 0.01
 

@@ -16,7 +16,7 @@ from bits import FEW_STEPS, Stopping, differences, went_on
 import hybrid
 import hybrid.simulation.system_run
 from hybrid.errors import ResultError, SceneError
-from tests.combinations.pairs import as_system, scene_of
+from tests.combinations.pairs import as_network, scene_of
 
 WAVES = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 5.0}
 SEA = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0, "waves": WAVES}}
@@ -227,7 +227,7 @@ def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path, mon
 @pytest.mark.long  # 0.9 s
 def test_twist_beside_ends_goes_by_the_cells_of_each_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lengths of cells blend, and outputs that wait are looked at together: by those of the last, twist was off."""
-    scene: Any = as_system(scene_of("cells that follow", "torque of tension"))
+    scene: Any = as_network(scene_of("cells that follow", "torque of tension"))
     stopping = Stopping(monkeypatch)
     hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
     assert went_on(scene, tmp_path / "run.h5", stopping, [7, 8]) == 2
@@ -241,9 +241,9 @@ def test_slack_bends_at_a_winch_are_those_of_the_cells_of_each_output(
     """The event named the cell at the winch as long as it was when outputs were looked at: 1.9 m for 1.1 m."""
     cable = scene_of("payout")
     cable["ends"]["end"]["payout"] = {"rate": 2.0, "ramp": 0.1}
-    scene: Any = as_system(cable)
+    scene: Any = as_network(cable)
     stopping = Stopping(monkeypatch)
     whole = hybrid.run(scene, tmp_path / "whole.h5", progress=stopping)
-    assert [x.kind for x in whole.lines["one"].events] == ["unresolved slack bend"]
+    assert [x.kind for x in whole.lines["cable"].events] == ["unresolved slack bend"]
     assert went_on(scene, tmp_path / "run.h5", stopping, [7, 8]) == 2
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []

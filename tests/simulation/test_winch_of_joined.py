@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from test_winch import G, blend
 
 import hybrid
-from tests.combinations.pairs import as_system
+from tests.combinations.pairs import as_network
 from tests.validation.obstacle_scenes import CENTRELINE
 from tests.validation.test_validation_moving_obstacles import weights
 
@@ -150,11 +150,9 @@ def over_a_sheave(inertia: float) -> Tables:
 def test_a_winch_lets_a_rope_run_over_a_sheave(inertia: float) -> None:
     """(m L + J/rho^2 + I) L'' = F - T(t) by another integrator; winch and sheave stand beside each other in Newton's method."""
     tables = over_a_sheave(inertia)
-    scene = as_system(tables)
-    assert scene is not None
-    scene["points"]["b"]["initial_guess"] = tables["initial"]["points"][-1]
+    scene = as_network(tables)
     found = hybrid.run(scene)
-    line, late = found.lines["one"], found.t > 1.2
+    line, late = found.lines["cable"], found.t > 1.2
 
     def law(t: float, y: np.ndarray) -> list[float]:
         return [y[1], (10.0 - blend(t, 10.0, 7.0, 1.0, 0.2)) / (0.1 * y[0] + inertia / CENTRELINE**2 + 0.5)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.combinations.pairs import as_system, seen_by, turned_and_mirrored
+from tests.combinations.pairs import as_network, seen_by, turned_and_mirrored
 from tests.validation.obstacle_scenes import CENTRELINE, Tables, paid_over_drum
 from tests.validation.test_validation_payout_obstacles import kick, pull, slow
 
@@ -222,7 +222,7 @@ NAMES = ("position", "tension", "reaction_end", "payout/power", "obstacles/drum/
 
 def test_a_system_of_one_line_is_the_cable(chute: Any) -> None:
     scene, one, _ = chute
-    two = hybrid.run(as_system(scene)).lines["one"]
+    two = hybrid.run(as_network(scene)).lines["cable"]
     for name in ("position", "tension", "reaction_end", "obstacles/drum/moment", "work/end", "work/obstacles"):
         assert np.abs(two[name] - one[name]).max() < 1e-6 * np.abs(one[name]).max(), name
 
@@ -248,12 +248,12 @@ def test_a_winch_at_the_start_is_the_mirror_image(chute: Any) -> None:
 def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(chute: Any, tmp_path: Path, several: bool) -> None:
     scene, one, _ = chute
     if several:
-        scene = as_system(scene)
+        scene = as_network(scene)
         one = hybrid.run(scene)
     hybrid.run(scene | {"time": {"duration": 1.0, "step": 0.01}}, tmp_path / "half.h5")
     two = hybrid.resume(tmp_path / "half.h5", until=2.0)
     if several:
-        one, two = one.lines["one"], two.lines["one"]
+        one, two = one.lines["cable"], two.lines["cable"]
     for name in NAMES:
         assert np.array_equal(one[name], two[name]), name
 
@@ -281,7 +281,7 @@ def test_a_drum_that_is_set_from_outside_turns_as_by_a_spin(several: bool) -> No
     one = hybrid.run(scene)
     scene["obstacles"]["drum"] = {x: y for x, y in scene["obstacles"]["drum"].items() if x != "spin"}
     scene["obstacles"]["drum"]["from_outside"] = True
-    with hybrid.Simulation(as_system(scene) if several else scene) as simulation:
+    with hybrid.Simulation(as_network(scene) if several else scene) as simulation:
         for k in range(150):
             t = 0.01 * (k + 1)
             x = min(t / 0.4, 1.0)
@@ -290,7 +290,7 @@ def test_a_drum_that_is_set_from_outside_turns_as_by_a_spin(several: bool) -> No
             simulation.set_obstacle("drum", rotation=np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
             simulation.advance(t)
         result = simulation.result()
-    two = result.lines["one"] if several else result
+    two = result.lines["cable"] if several else result
     np.testing.assert_allclose(pull(two)[-1], pull(one)[-1], rtol=2e-4)
     assert two["work/friction"][-1] == pytest.approx(one["work/friction"][-1], rel=2e-3)
     assert two["work/obstacles"][-1] == pytest.approx(one["work/obstacles"][-1], rel=2e-3)

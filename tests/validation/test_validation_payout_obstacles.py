@@ -14,7 +14,7 @@ from hybrid.kernels.state.obstacle_rows import OBSTACLE, PIECE_END, STIFFNESS, S
 from hybrid.model.build import build
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.simulation.payout_nodes import NodeChanges
-from tests.combinations.pairs import as_system, seen_by, turned_and_mirrored
+from tests.combinations.pairs import as_network, seen_by, turned_and_mirrored
 from tests.problems import tables_with
 from tests.validation.obstacle_scenes import over_pipe, paid_over_drum
 
@@ -128,7 +128,7 @@ def chute() -> Any:
 
 def test_a_system_of_one_line_is_the_cable(chute: Any) -> None:
     scene, one = chute
-    two = hybrid.run(as_system(scene)).lines["one"]
+    two = hybrid.run(as_network(scene)).lines["cable"]
     for name in ("position", "tension", "reaction_end", "payout/power", "work/end", "work/friction", "work/zones"):
         assert np.abs(two[name] - one[name]).max() < 1e-7 * np.abs(one[name]).max(), name
 

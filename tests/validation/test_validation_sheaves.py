@@ -13,7 +13,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.state.obstacle_rows import SPIN
-from tests.combinations.pairs import as_system
+from tests.combinations.pairs import as_network
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND
 from tests.validation.test_validation_moving_obstacles import ran, weights
 from tests.validation.thrown_lines import WIDTH, straight, throw
@@ -49,13 +49,6 @@ def crossed_legs(inertia: float, held: bool = True) -> Tables:
     return tables | {"time": {"duration": 0.5, "step": 0.002}, "output": {"every": 0.01, "points": 101}}
 
 
-def in_a_system(tables: Tables) -> Tables:
-    found = as_system(tables)
-    assert found is not None
-    found["points"]["b"]["initial_guess"] = tables["initial"]["points"][-1]
-    return found
-
-
 @pytest.fixture(scope="module")
 def pulled() -> Any:
     return ran(crossed_legs(0.02, held=False))
@@ -75,7 +68,7 @@ def test_it_is_the_same_as_a_system_of_one_line() -> None:
     tables = crossed_legs(0.02)
     tables["time"]["duration"] = 0.4
     cable = ran(tables)
-    line = hybrid.run(in_a_system(tables)).lines["one"]
+    line = hybrid.run(as_network(tables)).lines["cable"]
     assert cable["self_contact"].max() > 10.0 and np.abs(cable["obstacles/drum/rotation"]).max() > 0.05
     np.testing.assert_allclose(line.position, cable.position, atol=1e-9)
     np.testing.assert_allclose(line["obstacles/drum/rotation"], cable["obstacles/drum/rotation"], atol=1e-9)

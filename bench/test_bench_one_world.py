@@ -1,0 +1,226 @@
+"""Whether a cable is a network of one line: each of its scenes as both, every dataset and event, and what both cost.
+
+    pytest bench/test_bench_one_world.py -m bench -n 0 -s                       # all: an hour of one processor
+    pytest bench/test_bench_one_world.py -m bench -n 0 -s -k "digests or rest"  # families: see FAMILIES
+    HYBRID_ONE_WORLD=winch pytest bench/test_bench_one_world.py -m bench -n 0 -s -k examples
+
+computes scenes of the digests, of the examples and of the pairs of features, in space and with steps that end at outputs,
+and compares to 1e-9 of the scale of each dataset (tests/combinations/networks.py).  HYBRID_ONE_WORLD: part of the names
+of scenes that are to be computed.  One line a scene, then a summary; a scene that differs beyond what EXCEPTIONS allows
+fails.  `-k cost` prints a table of the processor time of a step, and of whole runs; nothing is asserted of times.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+import signal
+import sys
+import time as clock
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from digest_scenes import EXAMPLES, at_rest, moving
+
+import hybrid
+from hybrid.errors import ComputationError, HybridError, SceneError
+from hybrid.scene.read import as_scene
+from hybrid.scene.short_form import NotInNetwork, network_of
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # of the tests, where scenes are said in other ways
+from tests.combinations.networks import SAME, both, differences, events_differ
+from tests.combinations.pairs import FEATURES, pairs, scene_of
+
+pytestmark = pytest.mark.bench
+Data = dict[str, Any]
+ONLY = os.environ.get("HYBRID_ONE_WORLD", "")
+MOST_SECONDS = 90  # of a scene: both of its computations
+PARTS = 8  # of the pairs
+# By part of the name of a scene: how far datasets may differ, as a part of their scale, and why.  Infinite: of other sizes.
+EXCEPTIONS: dict[str, tuple[float, str]] = {}
+
+
+class _Late(Exception):
+    pass
+
+
+@contextmanager
+def _within(seconds: int) -> Iterator[None]:
+    """Stop what takes longer."""
+
+    def ring(*_: Any) -> None:
+        raise _Late
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _digests() -> dict[str, Data]:
+    return {name: data for name, data in moving().items() if "lines" not in data}
+
+
+def _rest() -> dict[str, Data]:
+    return {name: data for name, data in at_rest().items() if "lines" not in data}
+
+
+def _examples() -> dict[str, Data]:
+    """All examples of one cable, of motions the first 150 steps or seconds."""
+    found = {}
+    for path in sorted(EXAMPLES.rglob("*.yaml")):
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        if not isinstance(data, dict) or "cable" not in data:
+            continue
+        if time := data.get("time"):
+            time["duration"] = min(time["duration"], 150 * time["step"] if "step" in time else 5.0)
+            data.setdefault("output", {})["every"] = time["duration"] / 10
+        found[str(path.relative_to(EXAMPLES).with_suffix(""))] = data
+    return found
+
+
+def _features() -> dict[str, Data]:
+    return {name: scene_of(name) for name in FEATURES}
+
+
+def _pairs(part: int) -> dict[str, Data]:
+    return {" + ".join(names): scene_of(*names) for names in [*pairs()][part::PARTS]}
+
+
+FAMILIES = {
+    "digests": _digests, "rest": _rest, "examples": _examples, "features": _features,
+    **{f"pairs {k}": partial(_pairs, k) for k in range(PARTS)},
+}  # fmt: skip
+
+
+def _exception(name: str) -> tuple[float, str]:
+    return next((x for part, x in EXCEPTIONS.items() if part in name), (SAME, ""))
+
+
+def _compared(name: str, data: Data, rest: bool) -> tuple[str, str]:
+    """How a scene went, in one word, and what is to be said of it."""
+    try:
+        with _within(MOST_SECONDS):
+            cable, network = both(copy.deepcopy(data), rest)
+    except _Late:
+        return "late", f"more than {MOST_SECONDS} s"
+    except NotInNetwork as error:
+        return "not in a network", " ".join(str(error).split())[:160]
+    except (SceneError, ComputationError) as error:
+        return _as_cable(data, rest, error)
+    with cable, network:
+        found, events = differences(cable, network), events_differ(cable, network)
+    allowed, why = _exception(name)
+    told = ", ".join(map(str, found[:4])) + (f" and {len(found) - 4} more" if len(found) > 4 else "")
+    told += f" | events {', '.join(events)}" if events else ""
+    if not told:
+        return "same", ""
+    if why and all(x.by <= allowed for x in found):
+        return "exception", f"{told} ({why})"
+    return "differs", told
+
+
+def _as_cable(data: Data, rest: bool, error: HybridError) -> tuple[str, str]:
+    """How a scene went of which one of the two is not computed: neither is, or one alone."""
+    text = f"{type(error).__name__}: {' '.join(str(error).split())[:160]}"
+    try:
+        with _within(MOST_SECONDS):
+            (hybrid.static if rest else hybrid.run)(copy.deepcopy(data)).close()
+    except _Late:
+        return "late", f"more than {MOST_SECONDS} s"
+    except (SceneError, ComputationError):
+        return "neither", text
+    return "differs", f"the cable is computed; {text}"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_cables_are_networks(family: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(EXAMPLES)  # files that scenes name
+    scenes = {name: data for name, data in FAMILIES[family]().items() if ONLY in name}
+    went = Counter[str]()
+    differ = []
+    for name, data in scenes.items():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            how, told = _compared(name, data, family == "rest")
+        went[how] += 1
+        differ += [name] if how in ("differs", "not in a network") else []
+        print(f"\n{family:10}{name:56}{how:18}{told}", end="", flush=True)
+    print(f"\n{family}: {len(scenes)} scenes: " + ", ".join(f"{n} {how}" for how, n in went.most_common()), flush=True)
+    assert not differ, f"{len(differ)} of {len(scenes)} differ: {', '.join(differ)}"
+
+
+# --- what a step, and a whole run, costs ----------------------------------------------------------
+
+CELLS = (20, 100, 400, 1000)
+FEW, MANY = 200, 1000  # steps of which the difference is measured
+AGAIN = 3  # times that each is measured: the least counts
+STEP = 0.02  # s
+SECTION = {"length": 100, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
+MODELS: dict[str, Any] = {
+    "catenary": "catenary", "rod": "rod", "zones that move": {"kind": "adaptive", "always_move": True},
+    "cells that follow": {"kind": "adaptive", "curvature_error": 0.05}, "payout": "rod",
+}  # fmt: skip
+
+
+def _heaving(kind: str, cells: int, steps: int, plane: bool) -> Data:
+    """A line in water whose end heaves, or is paid out."""
+    section = SECTION | ({} if kind == "catenary" else {"bending_stiffness": 200.0})
+    end: Data = {"kind": "pinned", "position": [80, 0, 20]}
+    moved = {"motion": {"heave": {"amplitude": 0.5, "period": 6}, "ramp": 6}}
+    end |= {"payout": {"rate": 0.2, "ramp": 1.0, "longest": 110}} if kind == "payout" else moved
+    data: Data = {
+        "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}, "initial": "equilibrium",
+        "model": MODELS[kind], "time": {"duration": steps * STEP, "step": STEP},
+        "output": {"every": steps * STEP / 5}, "dimension": 2 if plane else 3,
+    }  # fmt: skip
+    return data if kind == "cells that follow" else data | {"mesh": {"cells": cells}}
+
+
+def _cpu(scene: Any, target: Path | None = None) -> float:
+    """The least processor time of a run, s."""
+    hybrid.run(scene, target).close()
+    found = []
+    for _ in range(AGAIN):
+        begin = clock.process_time()
+        hybrid.run(scene, target).close()
+        found.append(clock.process_time() - begin)
+    return min(found)
+
+
+def _costs(kind: str, cells: int, plane: bool, folder: Path) -> tuple[float, ...]:
+    """Processor time of a step, us, and of a run with its file, s, of the cable and of the network."""
+    found = []
+    for said in (as_scene, lambda data: network_of(as_scene(data))):
+        few, many = (said(_heaving(kind, cells, steps, plane)) for steps in (FEW, MANY))
+        found += [1e6 * (_cpu(many) - _cpu(few)) / (MANY - FEW), _cpu(few, folder / "run.h5")]
+    return tuple(found)
+
+
+def test_cost(tmp_path: Path) -> None:
+    print(f"\n{'':38}{'us a step':>10}{'network':>10}{'ratio':>7}{'run (s)':>10}{'network':>10}{'ratio':>7}")
+    for kind in MODELS:
+        for plane in (True, False):
+            for cells in CELLS[:1] if kind == "cells that follow" else CELLS:
+                name = f"{kind}, {cells} cells, {'plane' if plane else 'space'}"
+                if ONLY not in name:
+                    continue
+                try:
+                    with _within(10 * MOST_SECONDS):
+                        step, run, other, whole = _costs(kind, cells, plane, tmp_path)
+                except _Late:
+                    print(f"{name:38} more than {10 * MOST_SECONDS} s", flush=True)
+                    continue
+                ratios = f"{step:10.1f}{other:10.1f}{other / step:7.2f}{run:10.3f}{whole:10.3f}{whole / run:7.2f}"
+                print(f"{name:38}{ratios}", flush=True)

@@ -1,0 +1,148 @@
+"""The scene of a cable as a network of one line, and where the keys of the one are in the other.
+
+Words of the short form, left, and of the network:
+
+    cable.sections, cable.attachments        lines.cable.sections, lines.cable.attachments
+    model, mesh, resolution, contact, initial    lines.cable.model, ...
+    ends.end of kind pinned or clamped       points.end of kind fixed; how the line is held: lines.cable.connections.end
+    ends.end of kind guided                  points.end of kind guided, with such a connection
+    ends.end of kind free or body            points.end of kind free
+    everything else                          as it is
+
+The line is called `cable`, and the points are called as the ends are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.analysis import CatenaryModel, Output
+from hybrid.scene.base import Finding, Place, dotted
+from hybrid.scene.combinations import value_at
+from hybrid.scene.ends import End, Release
+from hybrid.scene.points import Failure
+from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
+
+LINE = "cable"
+ENDS = ("start", "end")
+# Tables of a scene that a line has.
+OF_LINE = ("mesh", "resolution", "contact", "initial")
+# Of an end by its kind: the kind of its point, what keys of the point are called there, which keys the connection has.
+POINTS: dict[str, tuple[str, dict[str, str], tuple[str, ...]]] = {
+    "pinned": ("fixed", {"release_at": "break_at"}, ("payout",)),
+    "clamped": (
+        "fixed", {"release_at": "break_at"}, ("tangent", "normal", "turns", "swivel", "bend_stiffness", "payout"),
+    ),
+    "guided": ("guided", {}, ("tangent", "normal", "turns")),
+    "free": ("free", {}, ()),
+    "body": ("free", {"thrust": "force"}, ()),
+}  # fmt: skip
+
+
+class NotInNetwork(SceneError):
+    """The scene of a cable has what a network of one line cannot have yet."""
+
+
+@dataclass(frozen=True)
+class ShortForm:
+    """Where keys of a network are in the scene of the cable that it was made of.
+
+    pairs: places in the network and in the scene; what is below such a place is below the other one.
+    """
+
+    pairs: tuple[tuple[Place, Place], ...]
+
+    def place(self, at: Place) -> Place:
+        """Where a key of the network is in the scene."""
+        known = [x for x in self.pairs if at[: len(x[0])] == x[0]]
+        if not known:
+            return at
+        there, here = max(known, key=lambda x: len(x[0]))
+        return (*here, *at[len(there) :])
+
+    def text(self, message: str) -> str:
+        """A message about the network in words of the scene."""
+        for there, here in sorted(self.pairs, key=lambda x: -len(x[0])):
+            message = re.sub(rf"\b{re.escape(dotted(there))}\b", dotted(here), message)
+        message = re.sub(rf"\bline {LINE}\b", "the cable", message)
+        return re.sub(r"\bpoint (start|end)\b", r"ends.\1", message)
+
+    def finding(self, found: Finding) -> Finding:
+        """What is wrong with the network, of the scene."""
+        given = None if found.given is None else self.text(found.given)
+        return Finding(self.place(found.at), self.text(found.expected), self.text(found.fix), given)
+
+
+def network_of(scene: Scene) -> System:
+    """The network of one line that computes what a scene of a cable does.  NotInNetwork: there is none yet."""
+    made = {name: _end(getattr(scene.ends, name)) for name in ENDS}
+    line: dict[str, Any] = {name: getattr(scene, name) for name in OF_LINE if getattr(scene, name) is not None}
+    line |= {"start": "start", "end": "end", "connections": {name: held for name, (_, held) in made.items()}}
+    line |= {key: getattr(scene.cable, key) for key in type(scene.cable).model_fields}
+    if "model" in scene.model_fields_set or not isinstance(scene.model, CatenaryModel):
+        line["model"] = scene.model  # else a catenary stands for none, and is a rod where it goes slack
+    tables: dict[str, Any] = {
+        "points": {name: point for name, (point, _) in made.items()}, "lines": {LINE: line},
+        "output": _output(scene.output),
+    }  # fmt: skip
+    same = ("title", "environment", "obstacles", "time", "accuracy", "dimension")
+    tables |= {name: getattr(scene, name) for name in same if getattr(scene, name) is not None}
+    try:
+        return System.model_validate(tables)
+    except ValidationError as error:
+        raise NotInNetwork(list(_complaints(scene, error))) from None
+
+
+def short_form(scene: Scene) -> ShortForm:
+    """Where the keys of the network of a scene are in that."""
+    pairs: list[tuple[Place, Place]] = [(("lines", LINE), ("cable",))]
+    pairs += [(("lines", LINE, name), (name,)) for name in ("model", *OF_LINE)]
+    pairs += [(("output", name, LINE), ("output", name)) for name in ("points", "history")]
+    for name in ENDS:
+        _, called, _ = POINTS[getattr(scene.ends, name).kind]
+        pairs += [(("points", name), ("ends", name)), (("lines", LINE, "connections", name), ("ends", name))]
+        pairs += [(("points", name, there), ("ends", name, here)) for here, there in called.items()]
+    return ShortForm(tuple(pairs))
+
+
+def _end(end: End) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The point of an end, and how the line is connected to it."""
+    kind, called, connected = POINTS[end.kind]
+    given = {key: getattr(end, key) for key in type(end).model_fields if key != "kind"}
+    given = {key: x for key, x in given.items() if x is not None}
+    point = {called.get(key, key): _table(x) for key, x in given.items() if key not in connected}
+    held = {key: x for key, x in given.items() if key in connected}
+    return {"kind": kind} | point, {"kind": "clamped" if "tangent" in held else "pinned"} | held
+
+
+def _table(value: Any) -> Any:
+    """When an end is let go, as a point says it; all else as it is."""
+    return Failure(time=value.time, tension=value.tension) if isinstance(value, Release) else value
+
+
+def _output(output: Output) -> dict[str, Any]:
+    """What is kept, by the name of the line where lines have their own."""
+    found = {key: getattr(output, key) for key in type(output).model_fields if getattr(output, key) is not None}
+    found["quantities"] = {name: q.model_copy(update={"line": LINE}) for name, q in output.quantities.items()}
+    for key in ("points", "history"):
+        if isinstance(found.get(key), tuple):
+            found[key] = {LINE: found[key]}
+    return found
+
+
+def _complaints(scene: Scene, error: ValidationError) -> Iterator[Complaint]:
+    """What a network refuses, where the scene has it."""
+    form = short_form(scene)
+    for each in error.errors(include_url=False):
+        at = tuple(x for x in each["loc"] if not str(x).startswith("<"))
+        findings = (each.get("ctx") or {}).get("findings") or [Finding((), "what a network of one line has")]
+        for x in findings:
+            found = form.finding(Finding((*at, *x.at), x.expected, x.fix, x.given))
+            yield Complaint(dotted(found.at), found.given or value_at(scene, found.at), found.expected, found.fix)

@@ -1,0 +1,112 @@
+"""The scene of a cable as a network of one line, and messages about that in the words of the scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hybrid.errors import SceneError
+from hybrid.scene.base import Finding
+from hybrid.scene.points import FixedPoint, FreePoint, GuidedPoint
+from hybrid.scene.read import as_scene, as_scene_or_system, parse_either, scene_text
+from hybrid.scene.schema import Ends, Scene
+from hybrid.scene.short_form import LINE, POINTS, network_of, short_form
+from hybrid.scene.system import System
+from tests.combinations.pairs import CLAMP, END, FEATURES, START, scene_of
+from tests.problems import tables_with
+
+FORCE, MOMENT = [40.0, 3.0, 30.0], [0.0, 5.0, 0.0]
+
+
+def scene(*names: str, **changes: Any) -> Scene:
+    return as_scene(tables_with(scene_of(*names), {key.replace("__", "."): x for key, x in changes.items()}))
+
+
+@pytest.mark.parametrize("name", FEATURES)
+def test_a_cable_with_any_feature_is_a_network_that_is_read_back(name: str) -> None:
+    made = network_of(scene(name))
+    again, _ = parse_either(scene_text(made))
+    assert isinstance(again, System) and again == made
+
+
+def test_every_key_of_a_cable_has_its_place() -> None:
+    """All tables of a scene and all kinds of ends: a new one has to be given a place here."""
+    taken = {"cable", "ends", "output", "model", "mesh", "resolution", "contact", "initial"}
+    taken |= {"title", "environment", "obstacles", "time", "accuracy", "dimension"}
+    assert taken == {*Scene.model_fields}
+    kinds = {get.__name__.lower() for get in (type(x) for x in _one_of_each_end())}
+    assert kinds == {*POINTS}
+
+
+def _one_of_each_end() -> list[Any]:
+    tables: list[dict[str, Any]] = [
+        {"kind": "pinned", "position": [0, 0, 0]}, CLAMP, {"kind": "guided", "tangent": [1, 0, 0]}, {"kind": "free"},
+        {"kind": "body", "mass": 3.0},
+    ]  # fmt: skip
+    return [Ends.model_validate({"start": x, "end": x}).start for x in tables]
+
+
+def test_ends_that_nothing_holds_are_points_with_their_loads() -> None:
+    free = network_of(scene("clamp", **{END.replace(".", "__"): {"kind": "free", "force": FORCE, "moment": MOMENT}}))
+    point = free.points["end"]
+    assert isinstance(point, FreePoint) and point.force == (40.0, 3.0, 30.0) and point.moment == (0.0, 5.0, 0.0)
+    assert isinstance(free.points["start"], FixedPoint) and free.clamp(LINE, "start") is not None
+    guided = network_of(scene(**{END.replace(".", "__"): {"kind": "guided", "tangent": [1, 0, 0], "force": FORCE}}))
+    held = guided.clamp(LINE, "end")
+    assert isinstance(guided.points["end"], GuidedPoint) and held is not None and held.tangent == (1.0, 0.0, 0.0)
+    assert guided.scene_of(LINE).ends.end == Ends.model_validate({
+        "start": CLAMP, "end": {"kind": "guided", "tangent": [1, 0, 0], "force": FORCE},
+    }).end  # fmt: skip
+
+
+def test_both_ends_may_be_let_go_at_times_of_their_own() -> None:
+    let_go = {f"{START}.release_at": {"time": 0.2}, f"{END}.release_at": {"tension": 50.0}}
+    made = network_of(as_scene(tables_with(scene_of(), let_go)))
+    start, end = (made.points[x].break_at for x in ("start", "end"))  # type: ignore[union-attr]
+    assert start is not None and end is not None and (start.time, end.tension) == (0.2, 50.0)
+
+
+def test_places_and_messages_of_a_network_are_said_in_words_of_the_scene() -> None:
+    form = short_form(scene("body"))
+    for there, here in {
+        ("points", "end", "force", "until"): ("ends", "end", "thrust", "until"),
+        ("points", "start", "position"): ("ends", "start", "position"),
+        ("points", "start", "break_at", "time"): ("ends", "start", "release_at", "time"),
+        ("lines", "cable", "sections", 0, "mass"): ("cable", "sections", 0, "mass"),
+        ("lines", "cable", "model", "zones"): ("model", "zones"),
+        ("lines", "cable", "connections", "start", "payout", "rate"): ("ends", "start", "payout", "rate"),
+        ("output", "points", "cable", 3): ("output", "points", 3),
+        ("environment", "seabed"): ("environment", "seabed"),
+    }.items():
+        assert form.place(there) == here
+    said = form.text("line cable breaks from point end; see lines.cable.sections[0] and points.start.break_at")
+    assert said == "the cable breaks from ends.end; see cable.sections[0] and ends.start.release_at"
+    found = form.finding(Finding(("points", "end", "initial_guess"), "a place near lines.cable.initial"))
+    assert found.at == ("ends", "end", "initial_guess") and found.expected == "a place near initial"
+
+
+def test_a_moment_at_the_end_of_a_line_is_for_a_rod_without_a_body() -> None:
+    tables = network_of(scene("body")).model_dump(mode="json", exclude_none=True)
+    with pytest.raises(SceneError, match="nothing there takes a moment"):
+        as_scene_or_system(tables_with(tables, {"points.end.moment": MOMENT}))
+
+
+@pytest.mark.parametrize("wrong", [
+    ({"points.end": {"kind": "guided"}}, "the direction in which point end holds the line"),
+    ({"points.end": {"kind": "guided", "motion": {"heave": {"amplitude": 1, "period": 3}}}}, "rotation only"),
+    ({"points.end": {"kind": "guided"}, "lines.cable.connections.end": {"tangent": [1, 0, 0], "swivel": True}},
+     "lets it spin|lets the line spin"),
+])  # fmt: skip
+def test_a_guided_point_that_is_none_is_refused(wrong: tuple[dict[str, Any], str]) -> None:
+    tables = network_of(scene()).model_dump(mode="json", exclude_none=True)
+    with pytest.raises(SceneError, match=wrong[1]):
+        as_scene_or_system(tables_with(tables, wrong[0]))
+
+
+def test_a_free_point_where_lines_meet_says_where_it_is_first() -> None:
+    tables = network_of(scene("free end")).model_dump(mode="json", exclude_none=True)
+    second = tables["lines"]["cable"] | {"start": "end", "end": "far"}
+    more = {"lines.second": second, "points.far": {"position": [20.0, 0.0, 0.0]}}
+    with pytest.raises(SceneError, match="the lines that meet here"):
+        as_scene_or_system(tables_with(tables, more))

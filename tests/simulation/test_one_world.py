@@ -1,0 +1,42 @@
+"""A cable and the network that is made of it are the same computation: every dataset, and every event."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.combinations.networks import both, differences, events_differ
+from tests.combinations.pairs import CLAMP, DRAG, END, START, WATER, scene_of
+from tests.problems import tables_with
+
+FREE = {"kind": "free", "force": [40, 3, 30]}
+GUIDED = {"kind": "guided", "tangent": [1, 0.1, 0.2], "normal": [0, 1, 0], "force": [60, 3, 30]}
+STIFF = {"cable.sections.0.bending_stiffness": 2e3}
+TURNED = {"motion": {"pitch": {"amplitude": 2.0, "period": 1.0}, "ramp": 0.5}}
+THROWN = {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0.2], "velocity": [0, 1, 3]}
+# Each with one thing that an end of a cable has: how many events it has.
+SCENES: dict[str, dict[str, Any]] = {
+    "a free end with a force, in water": {END: FREE, "environment.fluid": WATER} | DRAG,
+    "a moment at a free end": {START: CLAMP, END: FREE | {"moment": [0, 50, 10]}} | STIFF,
+    "a guided end that turns": {END: GUIDED | TURNED, "time.duration": 0.3},
+    "a vehicle": {END: {"kind": "body", "mass": 3.0, "thrust": {"value": [8, 2, 0], "until": 0.25}}},
+    "thrown, both ends free": {START: {"kind": "free"}, END: {"kind": "free"}, "initial": THROWN},
+    "a clamp beside a catenary": {START: CLAMP, "model": "catenary"},
+    "arc lengths of outputs": {"output.points": [0.0, 3.1, 12.0], "output.history": [5.0]},
+    "zones that move": {"model": {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[4, 8]]}},
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_cable_is_a_network_of_one_line(name: str) -> None:
+    tables = tables_with(scene_of(), SCENES[name])
+    cable, network = both(tables)
+    assert [str(x) for x in differences(cable, network)] == []
+    assert events_differ(cable, network) == []
+
+
+def test_at_rest() -> None:
+    cable, network = both(tables_with(scene_of("seabed"), {END: GUIDED, "time": None}), rest=True)
+    assert [str(x) for x in differences(cable, network)] == []
+    assert events_differ(cable, network) == []
