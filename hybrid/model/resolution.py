@@ -353,7 +353,7 @@ def _limits(scene: Scene, finest: float) -> tuple[Limited, ...]:
 
 def has_limits(scene: Scene) -> bool:
     """Whether anything of a scene is held against a limit: of a section, a code, a pipe, a named quantity."""
-    names = ("min_bend_radius", "max_tension", "min_tension", "capacity", "code")
+    names = ("min_bend_radius", "max_tension", "min_tension", "max_contact_force", "capacity", "code")
     sections = scene.cable.sections
     quantities = scene.output.quantities.values()
     return (

@@ -32,10 +32,11 @@ EXTREMES = "extremes"
 
 # Limits of sections, with what is held against them of the envelope; and quantities whose extremes are compared.
 OF_SECTIONS = {
-    "min_bend_radius": "curvature_max",
-    "max_tension": "tension_max",
-    "min_tension": "tension_min",
-    "max_stress": "von_mises_max",
+    "min_bend_radius": ("curvature_max",),
+    "max_tension": ("tension_max",),
+    "min_tension": ("tension_min",),
+    "max_stress": ("von_mises_max",),
+    "max_contact_force": ("contact_max", "self_contact_max", "obstacle_contact_max"),
 }
 RANGES = {
     "tension": ("tension_min", "tension_max"),
@@ -54,10 +55,11 @@ def extremes_about(values: Mapping[str, np.ndarray], s: np.ndarray) -> dict[str,
     found, nodes = dict[str, np.ndarray](), values.get(SCALE)
     if nodes is None:
         return found
-    for limit, name in OF_SECTIONS.items():
-        full, allowed = f"{GROUP_OF_NODES}/{name}", values.get(f"{GROUP_OF_NODES}/{limit}")
-        if full in values and allowed is not None and np.isfinite(allowed).any():
-            found[limit] = _about(nodes, part_used(limit, values[full], allowed), s)
+    for limit, names in OF_SECTIONS.items():
+        allowed = values.get(f"{GROUP_OF_NODES}/{limit}")
+        known = [values[full] for x in names if (full := f"{GROUP_OF_NODES}/{x}") in values]
+        if known and allowed is not None and np.isfinite(allowed).any():
+            found[limit] = _about(nodes, np.fmax.reduce([part_used(limit, x, allowed) for x in known]), s)
     for quantity, names in RANGES.items():
         full_names = [f"{GROUP_OF_NODES}/{x}" for x in names]
         if all(x in values for x in full_names):

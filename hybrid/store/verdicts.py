@@ -315,12 +315,20 @@ def _verified(result: StoredResult, x: Judged) -> Judged:
         held = np.append(held, result[f"{GROUP}/s"][np.isfinite(result[f"{GROUP}/{x.limit}"])])
     if x.limit == "max_contact_force":
         doubt = unfinished(result) or next(_doubts(result, frozenset({"contact_force"}), held), None)
-        doubt = doubt or Doubt("errors of contact forces are not estimated", FINER)
+        doubt = doubt or _pressed(result, x)
     else:
         doubt = doubt_of(result, name, s=held) or _reached(result, name, x)
     if doubt is None:
         return x._replace(verdict=WITHIN)
     return x._replace(verdict=NOT_VERIFIED, why=doubt.why, remedy=doubt.remedy, used=None)
+
+
+def _pressed(result: StoredResult, x: Judged) -> Doubt | None:
+    """That the error of a contact force over all steps is not known, or may take it beyond its limit."""
+    error = extreme_errors(result).get(x.limit)
+    if error is None:
+        return Doubt("errors of contact forces are not estimated", FINER)
+    return None if x.value / x.allowed + error <= 1.0 else Doubt("with its error it may pass the limit", FINER)
 
 
 def _too_sharp(result: StoredResult, names: AbstractSet[str], t: float) -> Doubt | None:
