@@ -23,10 +23,10 @@ from hybrid.simulation.result_checks import damped_jolts, undersampled_end_force
 from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, is_along
 from hybrid.store.amend import NOTHING_MORE, Happened, amend
 from hybrid.store.format import Field
-from hybrid.store.late_file import LateFile
 from hybrid.store.limits import EXTREME_ERRORS
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import not_converged_attribute
+from hybrid.store.whole_file import LateFile
 
 if TYPE_CHECKING:
     from hybrid.accuracy.free_vibrations import LostBy

@@ -45,9 +45,9 @@ from hybrid.simulation.restart import RemainingRun
 from hybrid.simulation.restore import refused
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.array_recorder import MemoryTarget, Target
-from hybrid.store.late_file import LateFile
 from hybrid.store.named_arrays import Tree
 from hybrid.store.stored_rows import remove_rows
+from hybrid.store.whole_file import LateFile
 
 
 class Passes:

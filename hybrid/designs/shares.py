@@ -26,7 +26,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.study import Kept
 from hybrid.store.lock import locked
-from hybrid.store.names import ALIASES
+from hybrid.store.records import ALIASES
 from hybrid.store.study_file import StudyFile
 from hybrid.studies.cases import digest_of, scene_of
 from hybrid.studies.collect import names_of

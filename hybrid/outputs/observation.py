@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from hybrid.outputs.observed_states import ObservedStates
 from hybrid.outputs.output_grid import ends_of, means_beside, means_on_line
 from hybrid.outputs.strains import part_without_spring, strains
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
-from hybrid.outputs.vectors import across, cross, size
+from hybrid.outputs.vectors import across, cross, dot, size
 from hybrid.solve.bending_corrector import Shift
 
 
@@ -354,6 +355,30 @@ def _passed_torques(view: ObservedStates) -> Floats:
             if low <= high:
                 out[o + low - a : o + high - a + 1] = view.batch.turn[:, z, TORQUE]
     return out
+
+
+def bends_by_load(plain: Observation, corrected: Observation) -> Floats:
+    """Change of curvature (ns, nb) 1/m from a line as computed to the turns of its chords where bending shifts it to.
+
+    A joint takes the moment of the rod, so that beside it the line goes on about EI/T times the curvature away from
+    where the rod lies.  A bed of stiffness k, or what else depends on the place, answers with another load across, and
+    curvature is load over tension.  The moment that is left out knows nothing of that; the chords of the shifted line
+    do, as they turn from cell to cell.
+    None at ends, at point loads, where a kink is no curvature, and in layers of pins, which lie within a cell.
+    """
+    d, nodes = corrected.d, plain.grid.side_nodes
+    bends = np.zeros((len(d) + 1, plain.columns))
+    turns = 2.0 * size(cross(d[:-1], d[1:])) / (1.0 + dot(d[:-1], d[1:]))
+    bends[1:-1] = turns / plain.of_line("hn", np.arange(1, len(d)))
+    change = np.abs(bends[nodes] - plain.curvature_on_sides)
+    change[np.isin(nodes, plain.end_nodes)] = 0.0
+    parts, spans = plain.grid.parts, plain.grid.spans
+    for (one, (first, last, row)), (two, (_, _, after)) in pairwise(zip(parts, spans, strict=True)):
+        if one.kind == two.kind:
+            change[[row + last - first, after]] = 0.0
+    for layer, _ in plain._taken_at_ends:
+        change[layer.rows] = 0.0
+    return np.asarray(plain.grid.sides @ change)
 
 
 @dataclass(frozen=True)

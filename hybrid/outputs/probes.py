@@ -18,7 +18,7 @@ from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR, OutputPoints
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
-from hybrid.outputs.observation import Observation, Probe
+from hybrid.outputs.observation import Observation, Probe, bends_by_load
 from hybrid.outputs.obstacle_forces import (
     obstacle_fields,
     obstacle_force_fields,
@@ -27,7 +27,6 @@ from hybrid.outputs.obstacle_forces import (
 )
 from hybrid.outputs.output_grid import NO_HINGES, Grid, VaryingGrid
 from hybrid.outputs.quantities import Quantities
-from hybrid.outputs.shifted_bends import by_load
 from hybrid.outputs.vectors import size
 from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.stepper import POWERS
@@ -148,8 +147,8 @@ SIDED_ERRORS = tuple(name for name in MODEL_ERRORS if name in SIDED)
 def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats]:
     """MODEL_ERRORS on the output grid: how far what is corrected for bending is from what is not.
 
-    The curvature of a catenary, w/T, changes with its tension too, and with what its place makes of the load (by_load);
-    of both the moment that is left out knows nothing.
+    The curvature of a catenary, w/T, changes with its tension too, and with what its place makes of the load
+    (`bends_by_load`); of both the moment that is left out knows nothing.
     """
     change, bends = np.abs(corrected.tension - plain.tension), plain.curvature_twist[:, 0]
     taut = (plain.tension > change) & plain.grid.in_catenary[:, None]
@@ -158,7 +157,7 @@ def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats
     out = {
         "position": size(plain.grid.nodes @ (corrected.r - plain.r)),
         "tension": change,
-        "curvature": np.maximum(by_moment, by_load(plain, corrected)),
+        "curvature": np.maximum(by_moment, bends_by_load(plain, corrected)),
         "bending_moment": np.abs(corrected.bending_moment - plain.bending_moment),
     }
     for k, name in enumerate(("end_force_start", "end_force_end")):

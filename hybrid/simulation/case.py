@@ -79,13 +79,13 @@ from hybrid.store.checkpoint import digest_of, read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.envelope import GROUP as ENVELOPE
 from hybrid.store.hdf5_file import is_result, open_file, opened
-from hybrid.store.late_file import LateFile
 from hybrid.store.limits import EXTREMES, extremes_about
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE, PENDING, RODS_AT_START, THERE
 from hybrid.store.stored_array import StoredArray
 from hybrid.store.stored_rows import RowsRecorder, rows_path
+from hybrid.store.whole_file import LateFile
 from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 
 # Of every step, what extremes of the end forces follow from.

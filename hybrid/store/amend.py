@@ -19,11 +19,11 @@ from hybrid.store.checkpoint import BEFORE, write_before
 from hybrid.store.format import EVENTS, Field, annotate, attach_scales, checked, plain_text
 from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
 from hybrid.store.integrity import copy_unsigned, sign_new
-from hybrid.store.late_file import LateFile
 from hybrid.store.lines import GROUP
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import FINER_RESULT, PENDING
 from hybrid.store.table import NUMBERS, Table, write_rows
+from hybrid.store.whole_file import LateFile
 
 AFTERWARDS = ("error_", "effort_", "accuracy_")  # what attributes begin with that are brought here
 NOTHING_MORE: Tree = {}  # what a run that is done leaves to go on with

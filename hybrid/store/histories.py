@@ -16,7 +16,7 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.statistics import extremes, moments
 from hybrid.statistics.moments import STEADY, mean_over_time
-from hybrid.store.names import ALIASES
+from hybrid.store.records import ALIASES
 from hybrid.store.stored_result import StoredResult
 
 Floats = np.ndarray

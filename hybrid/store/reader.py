@@ -31,11 +31,11 @@ from hybrid.store.histories import (
     summary_of,
     usual_names,
 )
-from hybrid.store.late_file import LateFile
 from hybrid.store.lock import is_held
 from hybrid.store.partners import Pressed, contacts_of
 from hybrid.store.stored_result import StoredResult
 from hybrid.store.verdicts import Verdicts, section_limits, verdicts_of
+from hybrid.store.whole_file import LateFile
 
 if TYPE_CHECKING:
     import xarray

@@ -1,4 +1,4 @@
-"""What a result consists of: zones and their history, events, attributes, the columns of a group."""
+"""What a result consists of: zones and their history, events, attributes; other names that are understood."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.names import NOT_CONVERGED, OLD_ATTRIBUTES
 
 # Attribute of a result that is complete and to which more will be added, and what that is.
 PENDING, ERROR_ESTIMATE, FINER_RESULT = "pending", "error estimate", "finer result"
@@ -16,6 +15,35 @@ PENDING, ERROR_ESTIMATE, FINER_RESULT = "pending", "error estimate", "finer resu
 RODS_AT_START = "rods_at_start"
 
 UNKNOWN = "error not known: not converged"  # in place of the figure of an error that says nothing
+# Attribute: names, with commas, of quantities of which finer runs change as much as coarser ones did.
+NOT_CONVERGED = "errors_not_converged"
+# Other names of what a file holds: short ones, and those of older versions.
+ALIASES = {"times": "t", "moment": "bending_moment"}
+OLD_NAMES = {
+    f"{table}/pull_{end}": f"{table}/end_force_{end}"
+    for table in ("steps", *(f"errors/{cause}" for cause in ("mesh", "time", "model", "total")))
+    for end in ("start", "end")
+}
+OLD_ATTRIBUTES = {f"error_{cause}_pull": f"error_{cause}_end_force" for cause in ("mesh", "time", "model", "total")}
+OLD_EVENTS = {
+    "pull between outputs": "end force between outputs",
+    "clamp left out": "bending at clamp neglected",
+    "point left out": "bending at point load neglected",
+    "torque left out": "torque neglected",
+    "friction left out": "static friction neglected",
+    "zones held": "zones fixed",
+    "turned in": "end rotated in",
+    "events left out": "events omitted",
+    "error beyond estimate": "model error not estimated",
+    "not judged": "stability not judged",
+    "loses energy": "numerical dissipation",
+}
+
+
+def right_of(name: str) -> str:
+    """Name of the array with the values on the right of jumps: right/tension, errors/total/right_tension."""
+    group, _, last = name.rpartition("/")
+    return f"{group}/right_{last}" if group else f"right/{name}"
 
 
 class Zone(NamedTuple):

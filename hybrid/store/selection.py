@@ -21,7 +21,7 @@ import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, ResultError, optional_package
 from hybrid.store.envelope import stored_window
-from hybrid.store.names import ALIASES, right_of
+from hybrid.store.records import ALIASES, right_of
 from hybrid.store.stored_result import StoredResult
 
 if TYPE_CHECKING:

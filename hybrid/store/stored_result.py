@@ -42,9 +42,12 @@ from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.contents import Contents, FileContents
 from hybrid.store.integrity import readable
 from hybrid.store.lines import Lines
-from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
 from hybrid.store.records import (
+    ALIASES,
     FINER_RESULT,
+    OLD_ATTRIBUTES,
+    OLD_EVENTS,
+    OLD_NAMES,
     PENDING,
     THERE,
     Attributes,
@@ -55,6 +58,7 @@ from hybrid.store.records import (
     Zone,
     ZoneHistory,
     joined,
+    right_of,
 )
 
 # Of a time: a step so near to an output ends there.

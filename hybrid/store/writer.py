@@ -56,13 +56,13 @@ from hybrid.store.hdf5_file import (
 )
 from hybrid.store.header import Header, made
 from hybrid.store.integrity import sign
-from hybrid.store.late_file import LateFile
 from hybrid.store.lines import GROUP, add_parts, in_turn, of_all, of_part
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.recorder import STATUS, BaseRecorder, pause
 from hybrid.store.records import PENDING
 from hybrid.store.table import Table
 from hybrid.store.template import template
+from hybrid.store.whole_file import LateFile
 
 # Outputs are held back at most so many times as long as writing takes: a reader hardly notices, a kill loses no more,
 # and a run that saves a thousand times a second spends 2 % of its time here instead of half.

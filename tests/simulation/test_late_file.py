@@ -17,7 +17,7 @@ from hybrid.simulation.progress import RESULT, Progress
 from hybrid.store import late_file, writer
 from hybrid.store.array_contents import ArrayContents
 from hybrid.store.contents import FileContents
-from hybrid.store.late_file import LateFile
+from hybrid.store.whole_file import LateFile
 
 TIMES = ("cpu", "created", "effort_cpu")  # that differ from run to run
 

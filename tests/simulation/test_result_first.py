@@ -27,7 +27,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store import late_file, writer
-from hybrid.store.late_file import LateFile
+from hybrid.store.whole_file import LateFile
 from hybrid.view.headed_page import page_of
 from hybrid.view.notebook_card import card
 from hybrid.view.summary import facts_of

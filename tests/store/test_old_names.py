@@ -10,7 +10,7 @@ import numpy as np
 import hybrid
 from hybrid.store.format import Field
 from hybrid.store.header import Header
-from hybrid.store.names import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
+from hybrid.store.records import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
 from hybrid.store.writer import Recorder
 
 
