@@ -37,9 +37,8 @@ from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.body_shapes import way_out
-from hybrid.scene.connections import Connections
 from hybrid.scene.plane import TYPED, plane_of
-from hybrid.scene.points import Fairlead
+from hybrid.scene.points import Connections, Fairlead
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 

@@ -1,4 +1,4 @@
-"""Points where lines of a system end: fixed ones, free ones, guided ones, and fairleads of bodies."""
+"""Points where lines end: fixed, free, guided, fairleads of bodies; and how lines are connected to them."""
 
 from __future__ import annotations
 
@@ -8,14 +8,35 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
-from hybrid.scene.base import After, Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
+from hybrid.scene.base import (
+    After,
+    Direction,
+    Finding,
+    Kinds,
+    NonNegative,
+    Number,
+    Positive,
+    Table,
+    Text,
+    Truth,
+    Vector,
+    by_kind,
+    parallel,
+    refuse,
+)
 from hybrid.scene.end_loads import GivenLoad, Loading, Triple
-from hybrid.scene.ends import Body, Free, moved_guides
+from hybrid.scene.ends import BEND_STIFFNESS, PAYOUT, TWISTED_BY, Body, Free, moved_guides
 from hybrid.scene.motion_tables import Motion
+from hybrid.scene.payout import Payout
 
 _BREAK = (
     "when what holds the point fails, at a time or after the first step with so large a force of its lines: they hang "
     "on together, and the point is free; lines that were clamped there turn freely then; absent: never"
+)
+
+_AXES = (
+    "in axes of the body; of a fixed point in inertial axes, from where it stands at rest; of a free point in axes of "
+    "its own, the same for all lines there"
 )
 
 # What to do with a key that ends of one cable have.
@@ -163,3 +184,66 @@ Point = Annotated[
         implied=(("position", "fixed"), ("initial_guess", "free"), ("body", "fairlead")),
     ),
 ]
+
+
+# --- how lines are connected: free to turn, or clamped, rigidly or by an angular spring ----------------
+
+
+class PinnedConnection(Table):
+    """The line turns freely at its point."""
+
+    kind: Literal["pinned"] = Field(default="pinned", description="turns freely, no moment")
+    payout: Payout | None = Field(default=None, description=PAYOUT)
+
+
+class ClampedConnection(Table):
+    """The line holds its direction at its point, and its moment acts there.  It needs a rod at that end."""
+
+    kind: Literal["clamped"] = Field(default="clamped", description="direction held: moment and torque pass")
+    tangent: Direction | None = Field(
+        default=None,
+        description=f"direction of increasing s at this end, {_AXES}; any length; absent: two lines that go "
+        "straight on at a free point [-]",
+    )
+    normal: Direction | None = Field(
+        default=None,
+        description="direction of the material axis a1 at this end, in the same axes; only its part across the tangent "
+        "counts; absent: no twist of a line that is bent the short way from tangent to tangent [-]",
+    )
+    turns: Number = Field(default=0.0, description=TWISTED_BY)
+    swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
+    bend_stiffness: NonNegative | None = Field(default=None, description=BEND_STIFFNESS)
+    payout: Payout | None = Field(default=None, description=PAYOUT)
+
+    @model_validator(mode="after")
+    def _normal_is_across(self) -> ClampedConnection:
+        if self.normal is not None and self.tangent is None:
+            refuse([Finding(("tangent",), "a direction, because a normal is given", "give the direction of the line")])
+        if self.normal is not None and self.tangent is not None and parallel(self.tangent, self.normal):
+            expected = "a direction across the tangent; this one is parallel to it"
+            refuse([Finding(("normal",), expected, "any direction not along the tangent will do")])
+        if self.swivel and self.bend_stiffness == 0.0:
+            expected = "false, because with bend_stiffness 0 nothing is left that is held"
+            refuse([Finding(("swivel",), expected, "leave the connection out: the line then turns freely")])
+        return self
+
+
+Connection = Annotated[
+    Annotated[PinnedConnection, Tag("<pinned>")] | Annotated[ClampedConnection, Tag("<clamped>")],
+    Discriminator(by_kind),
+    Kinds(
+        ("pinned", "clamped"),
+        usual=("clamped",),
+        implied=(
+            *((key, "clamped") for key in ("tangent", "normal", "turns", "swivel", "bend_stiffness")),
+            ("payout", "pinned"),
+        ),
+    ),
+]
+
+
+class Connections(Table):
+    """How a line is connected to its points at both ends."""
+
+    start: Connection = Field(default=PinnedConnection(), description="at s = 0; absent: it turns freely")
+    end: Connection = Field(default=PinnedConnection(), description="at s = length; absent: it turns freely")

@@ -48,14 +48,24 @@ from hybrid.scene.base import (
 )
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
 from hybrid.scene.cable import Cable, Contact, Environment, Section
-from hybrid.scene.connections import ClampedConnection, Connections
 from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Guided, Pinned, Triple
 from hybrid.scene.lines_contact import LinesContact
 from hybrid.scene.motion_checks import Held, lasting_period, moved_in
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.obstacles import Obstacles
-from hybrid.scene.points import WINCH, Failure, Fairlead, FixedPoint, FreePoint, GuidedPoint, Name, Point
+from hybrid.scene.points import (
+    WINCH,
+    ClampedConnection,
+    Connections,
+    Failure,
+    Fairlead,
+    FixedPoint,
+    FreePoint,
+    GuidedPoint,
+    Name,
+    Point,
+)
 from hybrid.scene.quantities import Quantities
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.scene.system_checks import system_findings

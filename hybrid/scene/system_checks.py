@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import heapq
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, combinations
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -13,16 +15,17 @@ from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.checks import elevation_has_waves
-from hybrid.scene.combinations import refused, tables_of
-from hybrid.scene.connections import connection_findings
+from hybrid.scene.combinations import holds_rod, refused, tables_of
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
+from hybrid.scene.motion_tables import TURNS, Motion
 from hybrid.scene.plane import TYPED, plane_of
-from hybrid.scene.points import Fairlead, FixedPoint, FreePoint, GuidedPoint
+from hybrid.scene.points import ClampedConnection, Fairlead, FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.quantities import of_several_lines
 from hybrid.scene.schema import Scene
+from hybrid.scene.start_checks import SAME_LENGTH
 from hybrid.scene.suggestions import nearest
-from hybrid.scene.travels import travel_findings
+from hybrid.scene.ways import farthest, moving_key, shift, smaller
 
 if TYPE_CHECKING:
     from hybrid.scene.system import JoinedLine, System
@@ -265,3 +268,168 @@ def _unknown(name: str, known: Mapping[str, Any], at: Place, what: str) -> Itera
         expected = f"the name of a {what}: {', '.join(known) or 'there is none'}"
         fix = nearest(name, dict.fromkeys(known, "")) or f"add `{name}: ...` to {tables}"
         yield Finding(at, expected, fix)
+
+
+# --- how the ends of lines are connected ---------------------------------------------------------
+
+
+def connection_findings(system: System) -> Iterator[Finding]:
+    """What is wrong with the connections of a system of lines."""
+    for name in system.lines:
+        for key in ("start", "end"):
+            held = system.clamp(name, key)
+            if held is not None:
+                yield from _clamp_findings(system, name, key, held)
+            payout = getattr(system.lines[name].connections, key).payout
+            if payout is not None and isinstance(system.points[getattr(system.lines[name], key)], FreePoint):
+                fix = "make the point `kind: fixed`, or the fairlead of a body"
+                expected = "nothing, because a winch stands on a fixed point or on a body"
+                yield Finding(("lines", name, "connections", key, "payout"), expected, fix)
+    for name, point in system.points.items():
+        if isinstance(point, FixedPoint) and point.motion is not None and not system.clamped_at(name):
+            for turn in (x for x in point.motion.harmonics() if x in TURNS):
+                fix = "leave it out, or clamp a line there: `connections: {end: {tangent: [0, 0, 1]}}`"
+                expected = "no rotation, because lines turn freely at a point"
+                yield Finding(("points", name, "motion", turn), expected, fix)
+        elif isinstance(point, FreePoint):
+            yield from _rigid_point_findings(system, name)
+
+
+def _clamp_findings(system: System, name: str, key: str, held: ClampedConnection) -> Iterator[Finding]:
+    line, point = system.lines[name], getattr(system.lines[name], key)
+    at = ("lines", name, "connections", key)
+    if not (system.is_held(point) or holds_rod(line.chosen_model, key, line.cable.length)):
+        expected = "pinned, because this end of the line is a catenary, which has no moment"
+        yield Finding(at, expected, "give `bending_stiffness` to all sections, and `model: rod`", "clamped")
+    if held.tangent is None and not isinstance(system.points[point], FreePoint):
+        yield Finding((*at, "tangent"), "the direction of the line at this end", "add `tangent: [0, 0, 1]`", "nothing")
+
+
+def _rigid_point_findings(system: System, name: str) -> Iterator[Finding]:
+    """What is wrong with lines that are clamped to a free point."""
+    here, point = system.clamped_at(name), system.points[name]
+    if not here:
+        takes = system.is_free_end(name) and isinstance(point, FreePoint) and not point.is_body
+        if isinstance(point, FreePoint) and point.moment is not None and not takes:
+            expected = "nothing, because all lines turn freely at this point: nothing there takes a moment"
+            fix = "leave it out, or clamp two lines there: `connections: {end: clamped}` of one, `{start: clamped}`"
+            yield Finding(("points", name, "moment"), expected, fix)
+        return
+    line, key = here[0]
+    at = ("lines", line, "connections", key)
+    held = [system.clamp(*x) for x in here]
+    if len(here) == 1:
+        expected = f"another line that is clamped at point {name}, because a free point alone holds no direction"
+        yield Finding(at, expected, "clamp a second line there, or none, or make the point `kind: guided`", "one line")
+    elif all(x is not None and x.bend_stiffness == 0.0 for x in held):
+        expected = f"a line at point {name} without bend_stiffness 0: nothing holds the direction of the point"
+        yield Finding((*at, "bend_stiffness"), expected, "leave it out for one of them", "0")
+    elif len(here) > 2 or any(x is not None and x.tangent is not None for x in held):
+        for (line, key), x in zip(here, held, strict=True):
+            if x is not None and x.tangent is None:
+                expected = f"the direction of the line in axes of point {name}, the same for all lines there"
+                where = ("lines", line, "connections", key, "tangent")
+                yield Finding(where, expected, "add `tangent: [1, 0, 0]`, and fitting ones to the others", "nothing")
+
+
+# --- how far points that are held may be from each other -----------------------------------------
+
+
+def travel_findings(system: System) -> Iterator[Finding]:
+    """Points that are, or move, farther from another than all lines between them are long, at the utmost strain."""
+    fails = [*system.lines.values(), *(x for x in system.points.values() if isinstance(x, FixedPoint | Fairlead))]
+    breaks = any(x.break_at is not None for x in fails)  # what is broken reaches anywhere
+    duration = system.time.duration if system.time is not None and not breaks else 0.0
+    placed = {name: system.first_place(name) for name in system.points if system.is_held(name)}
+    motions = {name: _motion(system, name) for name in placed}
+    beside = _neighbours(system)
+    for name, other, reach, between in _held_pairs(placed, motions, beside):
+        if not between or _beside(system, name, other):
+            continue
+        most = reach * (1.0 + SAME_LENGTH)
+        distance, t = farthest((placed[name], placed[other]), (motions[name], motions[other]), duration, most)
+        if distance <= most:
+            continue
+        motion, long = motions[name], sum(system.lines[x].cable.length for x in between)
+        lines = f"line {between[0]}" if len(between) == 1 else f"lines {', '.join(reversed(between))}"
+        expected = f"at most {reach:.8g} m from point {other}, as far as {lines} of {long:.8g} m may reach (max_strain)"
+        key = moving_key(motion) if motion is not None and t > 0.0 else ""
+        moved = shift(motion, t)
+        at = ", ".join(f"{x + by:.6g}" for x, by in zip(placed[name], moved, strict=True))
+        far = f"{distance:.8g} m from point {other}"
+        if key:
+            fix, given = f"longer lines, or {smaller(key)}", f"motion to [{at}] at t = {t:.6g} s, {far}"
+            yield Finding(("points", name, "motion", key), expected, fix, given)
+        else:
+            yield Finding(("points", name), expected, "longer lines, or points that are nearer", f"[{at}], {far}")
+        return
+
+
+def _motion(system: System, name: str) -> Motion | None:
+    """The motion of a fixed point, if tables move it."""
+    point = system.points[name]
+    motion = point.motion if isinstance(point, FixedPoint) else None
+    return motion if motion is not None and moving_key(motion) else None
+
+
+def _beside(system: System, a: str, b: str) -> bool:
+    """Whether a point is on a body that moves as is known, whose motion is not followed here."""
+    bodies = [system.body_of(x) for x in (a, b)]
+    return any(isinstance(x, FixedBody) and x.motion is not None for x in bodies)
+
+
+# Points beside each point: how far (m) they may be from it at most, and the line between them, if it is one.
+Neighbours = Mapping[str, list[tuple[str, float, tuple[str, ...]]]]
+
+
+def _neighbours(system: System) -> Neighbours:
+    """Points beside each point, along a line or on the same free body."""
+    beside: dict[str, list[tuple[str, float, tuple[str, ...]]]] = {name: [] for name in system.points}
+    for key, line in system.lines.items():
+        if line.connections.start.payout is not None or line.connections.end.payout is not None:
+            continue
+        far = line.cable.length if line.cable.inextensible else line.cable.reach
+        beside[line.start].append((line.end, far, (key,)))
+        beside[line.end].append((line.start, far, (key,)))
+    on: dict[str, list[tuple[str, Fairlead]]] = {}
+    for name, x in system.points.items():
+        if isinstance(x, Fairlead) and system.is_joined(name):
+            on.setdefault(x.body, []).append((name, x))
+    for same in on.values():
+        for (a, one), (b, two) in combinations(same, 2):
+            apart = math.dist(one.place, two.place)
+            beside[a].append((b, apart, ()))
+            beside[b].append((a, apart, ()))
+    return beside
+
+
+def _held_pairs(
+    placed: Mapping[str, Any], motions: Mapping[str, Motion | None], beside: Neighbours
+) -> Iterator[tuple[str, str, float, tuple[str, ...]]]:
+    """Each two points that are held and that lines or bodies join: the one that moves, if one does, the other, how far
+
+    (m) it may be, and the lines between them.  In the order of the scene.
+    """
+    order = {name: i for i, name in enumerate(placed)}
+    ways = {name: _reaches(beside, name) for name in placed}
+    for a, i in order.items():
+        for b in sorted((x for x in ways[a] if order.get(x, -1) > i), key=order.__getitem__):
+            name, other = (a, b) if motions[a] is not None else (b, a)
+            reach, between = ways[name][other]
+            yield name, other, reach, between
+
+
+def _reaches(beside: Neighbours, begin: str) -> Mapping[str, tuple[float, tuple[str, ...]]]:
+    """How far (m) each point may at most be from one that is held, along lines and bodies that are free, and which
+
+    lines these are.
+    """
+    reach: dict[str, tuple[float, tuple[str, ...]]] = {}
+    queue: list[tuple[float, str, tuple[str, ...]]] = [(0.0, begin, ())]
+    while queue:
+        far, name, lines = heapq.heappop(queue)
+        if name not in reach:
+            reach[name] = far, lines
+            for other, more, by in beside[name]:
+                heapq.heappush(queue, (far + more, other, lines + by))
+    return reach

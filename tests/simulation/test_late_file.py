@@ -14,7 +14,7 @@ from bits import Stopping, differences
 import hybrid
 from hybrid.accuracy import api
 from hybrid.simulation.progress import RESULT, Progress
-from hybrid.store import late_file, writer
+from hybrid.store import whole_file, writer
 from hybrid.store.array_contents import ArrayContents
 from hybrid.store.contents import FileContents
 from hybrid.store.whole_file import LateFile
@@ -82,7 +82,7 @@ def test_the_result_is_read_from_memory_as_from_its_file(tmp_path: Path, monkeyp
         assert {type(x) for x in mine.attributes.values()} == {type(x) for x in its.attributes.values()}
         assert (mine.zones[:], mine.events, mine.scene_text) == (its.zones[:], its.events, its.scene_text)
         assert len(mine.refresh().names) < len(its.names)  # of the file that is there now
-    monkeypatch.setattr(late_file, "MOST_STAYING", 0)
+    monkeypatch.setattr(whole_file, "MOST_STAYING", 0)
     with hybrid.run(described(), tmp_path / "run.h5") as result:
         assert isinstance(result._contents, FileContents)
 

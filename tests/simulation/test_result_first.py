@@ -26,7 +26,7 @@ from hybrid.simulation import system_cells, system_run
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
 from hybrid.simulation.static_case import StaticCase
-from hybrid.store import late_file, writer
+from hybrid.store import whole_file, writer
 from hybrid.store.whole_file import LateFile
 from hybrid.view.headed_page import page_of
 from hybrid.view.notebook_card import card
@@ -289,7 +289,7 @@ def test_of_results_that_follow_each_other_the_last_is_written(
     monkeypatch.setattr(LateFile, "place", _noting(written, LateFile.place))
     monkeypatch.setattr(writer, "pause", lambda _: 100.0)
     for waits, names in ((100.0, {"once.h5"}), (-1.0, {"each.h5", ".each.h5.finer"})):
-        monkeypatch.setattr(late_file, "WAITS", waits)
+        monkeypatch.setattr(whole_file, "WAITS", waits)
         written.clear()
         name = "once.h5" if waits > 0.0 else "each.h5"
         with hybrid.run(asked(), tmp_path / name) as result:
@@ -316,7 +316,7 @@ def test_a_finer_result_is_no_file_before_it_is_complete(tmp_path: Path, monkeyp
     written: list[str] = []
     monkeypatch.setattr(LateFile, "place", _noting(written, LateFile.place))
     monkeypatch.setattr(writer, "pause", lambda _: -1.0)  # outputs are due at once
-    monkeypatch.setattr(late_file, "WAITS", 100.0)
+    monkeypatch.setattr(whole_file, "WAITS", 100.0)
     with hybrid.run(asked(), tmp_path / "run.h5") as result:
         assert result.attributes["effort_runs"] > 4 and result.done
     assert written == ["run.h5"] and [x.name for x in tmp_path.iterdir()] == ["run.h5"]
