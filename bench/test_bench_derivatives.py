@@ -17,10 +17,9 @@ import pytest
 from derivative_scenes import KINDS, keys_of, scene_at_rest
 
 import hybrid
-from hybrid.designs.cable_at_rest import CableAtRest, Places
+from hybrid.designs.network_at_rest import Places
 from hybrid.designs.numbers import with_number
 from hybrid.designs.sensitivity import at_rest
-from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.scene.read import as_scene_or_system
 from tests.designs.test_body_derivatives import SCENES as SCENES_OF_BODIES
 
@@ -71,7 +70,7 @@ def spent(*what: Callable[[], Any], rounds: int = ROUNDS) -> list[float]:
 def test_a_derivative_over_its_equilibrium(model: str, cells: int) -> None:
     scene = hung(model, cells)
     of = ["tension@0", "max curvature"]
-    rest = CableAtRest(scene, 1.0, of)
+    rest = at_rest(scene, of)
     static, one, all_, once, error = spent(
         lambda: hybrid.static(scene), lambda: rest.by(NUMBERS[:1]), lambda: rest.by(NUMBERS * 4),
         lambda: hybrid.sensitivity(scene, of, NUMBERS[:1]), lambda: hybrid.sensitivity(scene, of, NUMBERS * 4),
@@ -108,14 +107,14 @@ def believed(differences: list[np.ndarray]) -> np.ndarray:
 
 def results(scene: hybrid.Scene, wanted: list[str], places: Places) -> np.ndarray:
     """Of an equilibrium, whose last Newton correction is counted: what is left over would be the error of differences."""
-    rest = CableAtRest(scene, 1.0, wanted, places)
-    left, still = rest.line.left(rest.line.here)[0], np.zeros((1, rest.model.line.s.size, SIZE))
-    return np.asarray(rest.values + rest.forward(left[rest._free][:, None], still)[0])
+    rest = at_rest(scene, wanted, 1.0, places)
+    left = rest.lines[0].left(rest.lines[0].here)[0][:, None]
+    return np.asarray(rest.values + rest.forward(rest._network.place.T @ left, [np.zeros_like(left)])[0][0])
 
 
 def off(scene: hybrid.Scene, wanted: list[str], keys: list[str]) -> np.ndarray:
     """(keys, results) by how much derivatives differ from differences of equilibria on nodes that go along, in parts."""
-    rest = CableAtRest(scene, 1.0, wanted)
+    rest = at_rest(scene, wanted)
     found, out = rest.by(keys), []
     for key, ours in zip(keys, found, strict=True):
         number, each = rest.number(key), []

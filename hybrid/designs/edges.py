@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.line_at_rest import LineAtRest
 from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.numbers import changed_scene, number_of, size_of
@@ -51,7 +50,7 @@ def refuse_edges(asked: Scene | System, of: Sequence[str]) -> None:
 
 
 def by_cells(
-    asked: Scene | System, rest: CableAtRest | NetworkAtRest, key: str, values_of: Callable[[Scene | System], Floats]
+    asked: Scene | System, rest: NetworkAtRest, key: str, values_of: Callable[[Scene | System], Floats]
 ) -> tuple[Floats, Floats]:
     """Derivatives (W,) of where contact begins by a number, and their errors: all of what goes over too few cells.
 

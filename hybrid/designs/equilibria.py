@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
 from hybrid.designs.motions import IN_MOTION, Motions, OfMotion, Peaks
-from hybrid.designs.network_at_rest import NetworkAtRest
+from hybrid.designs.network_at_rest import NO_PLACES, NetworkAtRest, Places
 from hybrid.designs.numbers import scene_with
 from hybrid.designs.sensitivity import at_rest
 from hybrid.errors import ComputationError, Outcome
@@ -29,9 +28,7 @@ class Point:
     rests: none of a case whose motion alone is asked.
     """
 
-    def __init__(
-        self, x: Floats, rests: Mapping[str, CableAtRest | NetworkAtRest], motion: OfMotion, equilibria: Equilibria
-    ) -> None:
+    def __init__(self, x: Floats, rests: Mapping[str, NetworkAtRest], motion: OfMotion, equilibria: Equilibria) -> None:
         self.x, self.rests, self._motion, self._of = x, rests, motion, equilibria
         self.values = np.zeros(len(equilibria.wanted))
         for case, rest in rests.items():

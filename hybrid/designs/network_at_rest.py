@@ -1,26 +1,30 @@
-"""The equilibrium of several lines, and what results of them answer to numbers of the scene.
+"""An equilibrium, and what its results answer to numbers of the scene.
 
-As of one cable (design.cable_at_rest), with the matrix of the network: lines that meet at free points move with them,
-and those at bodies turn with these (design.bodies_at_rest).
+At an equilibrium R(q; p) = 0, so that  A dq/dp = dR/dp  with the matrix A of the modes (theory.md, 20): one solve for
+each number, in place of two equilibria, or for each result where numbers are many (designs.gradients).  dR/dp is the
+change of the block rows of the same state between two networks.  Lines that meet at free points move with them, and
+those at bodies turn with these (designs.bodies_at_rest).  A cable is the network of one line.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
+from hybrid.accuracy.api import resolution_at_rest
 from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
-from hybrid.designs.cable_at_rest import NO_PLACES, Places, same_places
 from hybrid.designs.contact_at_rest import ContactAtRest
 from hybrid.designs.factors import Factors
 from hybrid.designs.gradients import Gradients
 from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
-from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, with_number
+from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, number_of, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.obstacle_rows import ROLLED
@@ -31,13 +35,17 @@ from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, same_nodes
 from hybrid.model.nearby_clamped import nearby_clamped, seats_know_no_shape, shaped_anew
 from hybrid.model.system import SystemModel, SystemResolution, with_surfaces
+from hybrid.scene.analysis import Output
+from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
+from hybrid.scene.short_form import LINE, ShortForm, network_of, short_form
 from hybrid.scene.system import System
 from hybrid.simulation.layer_mesh import layered_lines
+from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import static_system
 from hybrid.solve.joined import SystemState
 from hybrid.solve.system import SystemSolver
@@ -54,16 +62,47 @@ OF_BODY = {
 }  # fmt: skip
 
 
-def parse_result_of(system: System, text: str) -> tuple[str, Wanted]:
-    """The line and the parts of a result such as `east/tension@end`, `max hose/curvature`; SceneError: it is none."""
+# Places of nodes (`Resolution.places`) by line; empty: as the scene asks for.
+Places = Mapping[str, tuple[float, ...]]
+NO_PLACES: Places = MappingProxyType({})
+
+
+def _network_of(scene: Any) -> tuple[Any, System, SystemResolution, ShortForm | None]:
+    """The scene as it is computed, the network that does, how finely, and where keys of the scene are in that."""
+    if scene.line_names:
+        return scene, scene, layered_lines(scene, SystemResolution.first(scene), False), None
+    case = StaticCase(scene)
+    resolution = SystemResolution({LINE: resolution_at_rest(case)})  # which chooses the model
+    return case.scene, network_of(case.scene), resolution, short_form(case.scene)
+
+
+@contextmanager
+def _said_of(form: ShortForm | None) -> Iterator[None]:
+    """What fails within of the network of a cable is said of the cable."""
+    try:
+        yield
+    except ComputationError as error:
+        if form is None:
+            raise
+        detail = form.text(error.detail).removeprefix("the cable; ")
+        raise ComputationError(error.outcome, error.t, error.s, detail, error.snapshot, error.first) from None
+
+
+def parse_result_of(scene: Scene | System, text: str) -> tuple[str, Wanted]:
+    """The line and the parts of a result such as `east/tension@end`, `max hose/curvature`; SceneError: it is none.
+
+    Of a line that has no name `tension@end`.
+    """
+    if not scene.line_names:
+        return LINE, parse_result(text, scene.length)
     found = OF_LINE.match(text)
     name = found[2] if found is not None else ""
-    if found is None or name not in system.lines:
-        names = ", ".join(system.lines)
-        example = f"{next(iter(system.lines))}/tension@end"
+    if found is None or name not in scene.lines:
+        names = ", ".join(scene.lines)
+        example = f"{next(iter(scene.lines))}/tension@end"
         raise SceneError([Complaint("of", text, f"LINE/NAME@S, max LINE/NAME or min LINE/NAME, of {names}", example)])
     text = f"{found[1]} {found[3]}" if found[1] else found[3]
-    return name, parse_result(text, system.lines[name].cable.length)
+    return name, parse_result(text, scene.lines[name].cable.length)
 
 
 class _Changed(NamedTuple):
@@ -77,21 +116,20 @@ class _Changed(NamedTuple):
 class NetworkAtRest(OfScene):
     """The equilibrium on one mesh, its factors, and the values of results."""
 
-    scene: System
-
-    def __init__(self, system: System, cells: float, of: Sequence[str], places: Places = NO_PLACES) -> None:
-        """cells: their lengths over the usual, 0.5 or more; of: results; places: as of `CableAtRest`.
+    def __init__(self, scene: Scene | System, cells: float, of: Sequence[str], places: Places = NO_PLACES) -> None:
+        """cells: their lengths over the usual, 0.5 or more; of: results; places: of an equilibrium with these cells.
 
         SceneError, ComputationError: as of `hybrid.sensitivity`.
         """
-        refuse_use(system, "derivatives", given="hybrid sensitivity")
-        wanted = [parse_result_of(system, x) for x in of]
-        resolution = layered_lines(system, SystemResolution.first(system), False)
+        wanted = [parse_result_of(scene, x) for x in of]
+        self.scene, system, resolution, self._form = _network_of(scene)
+        refuse_use(self.scene, "derivatives", given="hybrid sensitivity")
         finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
         resolution = replace(resolution, lines=finely)
-        run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
+        with _said_of(self._form):
+            run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
         assert run.found is not None
-        self.scene, self._names = system, run.model.names
+        self._system, self._names, self._outputs = system, run.model.names, dict[str, Output]()
         self._scenes = {name: self._scene_of(system, name) for name in self._names}
         of_lines = zip(self._names, run.model.models, strict=True)
         self.places = {name: places_of(model, self._scenes[name]) for name, model in of_lines}
@@ -265,15 +303,35 @@ class NetworkAtRest(OfScene):
         return out
 
     def _scene_of(self, system: System, name: str) -> Scene:
-        """A line with the free points that it carries, and others where they are first."""
-        return system.scene_of(name, system.carried(name), system.guesses)
+        """A line with the free points that it carries, and others where they are first, and its named quantities."""
+        scene = system.scene_of(name, system.carried(name), system.guesses)
+        own = {key: q for key, q in system.output.quantities.items() if q.line in (name, None) and q.other is None}
+        if not own:
+            return scene
+        if name in self._outputs:  # the same table: what else has changed is told by tables
+            return scene.model_copy(update={"output": self._outputs[name]})
+        alone = {key: q.model_copy(update={"line": None}) for key, q in own.items()}
+        self._outputs[name] = scene.output.model_copy(update={"quantities": alone})
+        return scene.model_copy(update={"output": self._outputs[name]})
+
+    def _key_in(self, key: str) -> str:
+        """The key of the network that a key of the scene is."""
+        pairs = [] if self._form is None else [(dotted(there), dotted(here)) for there, here in self._form.pairs]
+        for there, here in sorted(pairs, key=lambda x: -len(x[1])):
+            if re.match(rf"{re.escape(here)}\b", key):
+                with suppress(SceneError):
+                    number_of(self._system, there + key.removeprefix(here))
+                    return there + key.removeprefix(here)
+        return key
 
     def _beside(self, key: str, number: float, step: float) -> tuple[_Changed, _Changed]:
         """The scene with a number that is more by a step, and less."""
         found = list[_Changed]()
-        for scene in (with_number(self.scene, key, number + d) for d in (step, -step)):
+        there = self._key_in(key)
+        for d in (step, -step):
             if number == 0.0:
-                refuse_use(scene, "derivatives", given=key)  # what it switches on
+                refuse_use(with_number(self.scene, key, d), "derivatives", given=key)  # what it switches on
+            scene = with_number(self._system, there, number + d)
             try:
                 changed = self._changed(scene, key)
             except ValueError:
@@ -288,17 +346,17 @@ class NetworkAtRest(OfScene):
 
     def _hangs_on(self, system: System, name: str) -> bool:
         """Whether a line hangs on what a changed scene has changed."""
-        if any(getattr(system, x) is not getattr(self.scene, x) for x in OF_ALL):
+        if any(getattr(system, x) is not getattr(self._system, x) for x in OF_ALL):
             return True
         line = system.lines[name]
-        if line is not self.scene.lines[name]:
+        if line is not self._system.lines[name]:
             return True
-        changed = {body for body, x in system.bodies.items() if _moves_lines(x, self.scene.bodies[body])}
+        changed = {body for body, x in system.bodies.items() if _moves_lines(x, self._system.bodies[body])}
         if any(getattr(system.bodies[x], "shape", None) is not None for x in changed):
             return True  # it is a surface for all lines
         for point in (line.start, line.end):
             at = system.points[point]
-            if at is not self.scene.points[point] or (isinstance(at, Fairlead) and at.body in changed):
+            if at is not self._system.points[point] or (isinstance(at, Fairlead) and at.body in changed):
                 return True
         return False
 
@@ -307,9 +365,9 @@ class NetworkAtRest(OfScene):
         anew = [self._hangs_on(system, name) for name in self._names]
         for new, name in zip(anew, self._names, strict=True):
             if new:
-                system.know_scene(name, self.scene.scene_of(name))
+                system.know_scene(name, self._system.scene_of(name))
         built = None
-        if self._bodies.count and any(getattr(system, x) is not getattr(self.scene, x) for x in OF_BODIES):
+        if self._bodies.count and any(getattr(system, x) is not getattr(self._system, x) for x in OF_BODIES):
             built = with_bodies(self._model, system)
         bodies = (self._model if built is None else built).bodies
         clamped = [x for l, (x, new) in enumerate(zip(self._names, anew, strict=True)) if new and self._bodies.turns(l)]
@@ -352,6 +410,12 @@ class NetworkAtRest(OfScene):
             x if x is line.here and _as_hard(x, new) else new
             for x, new, line in zip(lines, out, self.lines, strict=True)
         ]
+
+
+def same_places(a: Model, b: Model) -> bool:
+    """Whether nodes, sections and attachments of two models are at the same arc lengths."""
+    pairs = (a.line.s, b.line.s), (a.cable.bounds, b.cable.bounds), (a.cable.at, b.cable.at)
+    return all(np.array_equal(x, y) for x, y in pairs)
 
 
 def _moves_lines(body: RigidBody, of: RigidBody) -> bool:

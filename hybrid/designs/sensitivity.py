@@ -9,11 +9,10 @@ from typing import Any, NamedTuple, overload
 
 import numpy as np
 
-from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
 from hybrid.designs.edges import WAY as BY_CELLS
 from hybrid.designs.edges import by_cells, is_edge
 from hybrid.designs.in_motion import in_motion
-from hybrid.designs.network_at_rest import NetworkAtRest
+from hybrid.designs.network_at_rest import NO_PLACES, NetworkAtRest, Places
 from hybrid.designs.numbers import number_of, refuse_computing
 from hybrid.errors import ComputationError, Outcome
 from hybrid.scene.read import SceneLike, as_scene_or_system
@@ -96,7 +95,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     return out
 
 
-def way_at_rest(asked: Scene | System, rest: CableAtRest | NetworkAtRest) -> str:
+def way_at_rest(asked: Scene | System, rest: NetworkAtRest) -> str:
     """The way to derivatives at rest, with what is left out of them, and lines that have only begun to touch."""
     bed = asked.environment.seabed
     rubs = [bed and bed.friction, *(y.friction for y in asked.obstacles.values())]
@@ -107,14 +106,10 @@ def way_at_rest(asked: Scene | System, rest: CableAtRest | NetworkAtRest) -> str
     return ", ".join([AT_REST, *(["friction left out"] if any(rubs) else []), *begun])
 
 
-def at_rest(
-    asked: Scene | System, of: Sequence[str], cells: float = 1.0, places: Places = NO_PLACES
-) -> CableAtRest | NetworkAtRest:
+def at_rest(asked: Scene | System, of: Sequence[str], cells: float = 1.0, places: Places = NO_PLACES) -> NetworkAtRest:
     """The equilibrium of one cable or of several lines; of: results.
 
     cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.
     SceneError: what has no derivative; ComputationError: there is no equilibrium.
     """
-    kind: Any = NetworkAtRest if asked.line_names else CableAtRest
-    found: CableAtRest | NetworkAtRest = kind(asked, cells, of, places)
-    return found
+    return NetworkAtRest(asked, cells, of, places)

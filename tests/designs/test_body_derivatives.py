@@ -7,7 +7,6 @@ import pytest
 
 import hybrid
 from hybrid.designs import network_at_rest
-from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.numbers import changed_scene, with_number
 from hybrid.designs.sensitivity import at_rest
 from hybrid.model.nearby_clamped import seats_know_no_shape, shaped_anew
@@ -240,9 +239,9 @@ def with_torque(law):
 def test_torque_of_tension(law):
     """Without the tension of the cell after next, height by mass was off by a fifth, and twist by an eighth."""
     made, of = with_torque(TORQUES[law]), ["tension@0", "max curvature", "position.z@50", "twist@50"]
-    rest = CableAtRest(made, 1.0, of)
+    rest = at_rest(made, of)
     for key in ("cable.sections[0].mass", "ends.end.position[0]", "cable.sections[0].tension_torque"):
         number = rest.number(key)
         ours, d = rest.by([key])[0], 1e-5 * number
-        more, less = (CableAtRest(changed_scene(made, key, number + x), 1.0, of).values for x in (d, -d))
+        more, less = (at_rest(changed_scene(made, key, number + x), of).values for x in (d, -d))
         np.testing.assert_allclose(ours, (more - less) / (2.0 * d), rtol=1e-5, err_msg=key)

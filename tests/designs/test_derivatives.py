@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.numbers import changed_scene
+from hybrid.designs.sensitivity import at_rest
 
 G = 9.81
 
@@ -96,7 +96,7 @@ def test_differences_of_equilibria_on_the_bed(model):
 
 
 def results(scene, of):
-    return np.array(CableAtRest(scene, 1.0, of).values)
+    return np.array(at_rest(scene, of).values)
 
 
 @pytest.mark.parametrize("part", ["sections", "float"])
@@ -113,10 +113,10 @@ def test_the_largest_curvature_at_a_jump(part):
         tables["cable"]["attachments"] = [{"kind": "float", "at": 40.0, "buoyancy": 3000.0, "mass": 20.0}]
     made, key = hybrid.validate_scene(tables), "cable.sections[0].length"
     of = "max curvature", "position.z@45"
-    rest, still = CableAtRest(made, 1.0, of), hybrid.static(made)
+    rest, still = at_rest(made, of), hybrid.static(made)
     assert rest.values[0] == pytest.approx(np.nanmax(still.curvature[-1]), rel=1e-6)
     number = rest.number(key)
-    more, less = (CableAtRest(changed_scene(made, key, number + x), 1.0, of, rest.places).values for x in (1e-4, -1e-4))
+    more, less = (at_rest(changed_scene(made, key, number + x), of, 1.0, rest.places).values for x in (1e-4, -1e-4))
     np.testing.assert_allclose(rest.by([key])[0], (more - less) / 2e-4, rtol=1e-5)
 
 
@@ -128,7 +128,7 @@ def test_a_rope_answers_as_it_stretches_at_rest(key, dynamic):
     rope |= {"dynamic_stiffness": dynamic} if dynamic else {}
     made = hybrid.validate_scene(scene(rope, pinned(0, 0, 0), pinned(200, 0, 10), "catenary", 40))
     of = ["tension@end", "position.z@100"]
-    rest = CableAtRest(made, 1.0, of)
+    rest = at_rest(made, of)
     d = 1e-5 * rest.number(key)
     more, less = (results(changed_scene(made, key, rest.number(key) + x), of) for x in (d, -d))
     np.testing.assert_allclose(rest.by([key])[0], (more - less) / (2.0 * d), rtol=1e-6)
@@ -141,8 +141,8 @@ def test_a_rod_that_turns_freely_about_its_axis_has_derivatives():
     rope |= {"dynamic_stiffness": {"constant": 2e6, "per_tension": 20.0, "relaxation_time": 20.0}}
     made = hybrid.validate_scene(scene(rope, pinned(0, 0, -30), pinned(36, 3, -2), "rod", 30, SEA))
     of = ["tension@end", "reaction_start.x", "max curvature"]
-    rest = CableAtRest(made, 1.0, of)
-    torque = np.where(rest._free % 5 == 4, 1.0 / 30.0, 0.0)
+    rest = at_rest(made, of)
+    torque = np.where(np.flatnonzero(rest._network.lines[0].free) % 5 == 4, 1.0 / 30.0, 0.0)
     assert 1e3 < np.abs(rest._factors.solve(torque)).max() < 1e8  # rad for 1 N m; without the springs 1e12 and more
     for key in ("cable.sections[0].mass", "ends.end.position[1]"):
         d = 1e-5 * rest.number(key)
@@ -183,7 +183,7 @@ def test_a_jump_at_an_anchor_on_the_bed_is_in_no_derivative(key):
     sea = {"fluid": {"density": 1025, "current": [0.22, 0.03, 0]}, "seabed": {"z": bed, "stiffness": 4038.8}}
     made = hybrid.validate_scene(scene(rod, pinned(0, 0, bed), pinned(222, 15, 0), "rod", 40, sea))
     of = ["tension@0", "reaction_start.z"]
-    rest = CableAtRest(made, 1.0, of)
+    rest = at_rest(made, of)
     elastic = rest.by([key])[0] * rest.number(key) / rest.values[0]
     assert np.abs(elastic).max() < 0.01
 
@@ -463,11 +463,11 @@ def test_what_remembers_is_loaded_first_in_every_equilibrium():
 
 def differ(made, of, keys):
     """Derivatives are those of differences of equilibria on the same cells."""
-    rest = CableAtRest(made, 1.0, of)
+    rest = at_rest(made, of)
     for key, ours in zip(keys, rest.by(keys), strict=True):
         number = rest.number(key)
         d = 1e-5 * min(abs(number), 1.0)
-        more, less = (CableAtRest(changed_scene(made, key, number + x), 1.0, of, rest.places) for x in (d, -d))
+        more, less = (at_rest(changed_scene(made, key, number + x), of, 1.0, rest.places) for x in (d, -d))
         np.testing.assert_allclose(ours, (more.values - less.values) / (2.0 * d), rtol=2e-5, atol=1e-7, err_msg=key)
 
 
@@ -476,3 +476,12 @@ def test_a_number_that_switches_something_on():
     tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "rod", 40, SEA)
     with pytest.raises(hybrid.SceneError, match="stiffness_per_tension"):
         hybrid.sensitivity(tables, ["tension@0"], ["cable.sections[0].stiffness_per_tension"])
+
+
+def test_what_no_equilibrium_is_found_of_is_said_of_the_cable():
+    """As of the network that computes it, the line would have a name that the scene does not have."""
+    rope = {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e4}
+    folded = scene(rope, pinned(0, 0, 0), pinned(0, 0, 30), "catenary", 20)
+    with pytest.raises(hybrid.ComputationError, match="detail:   the ends are 0 m apart") as failed:
+        hybrid.sensitivity(folded, ["tension@0"], ["cable.sections[0].length"])
+    assert "line cable" not in str(failed.value) and not failed.value.line_name

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.gradients import Gradients
 from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.sensitivity import at_rest
@@ -33,7 +32,7 @@ CASES: dict[str, tuple[Any, list[str], list[str]]] = {
 CASES |= {what: SCENES[what] for what in ("a body", "two bodies", "a point", "members")}
 
 
-def sides(rest: CableAtRest | NetworkAtRest, keys: list[str]) -> tuple[Any, Any, np.ndarray]:
+def sides(rest: NetworkAtRest, keys: list[str]) -> tuple[Any, Any, np.ndarray]:
     """What numbers leave over, what they shift, and derivatives by a solve for each."""
     seen: list[Any] = []
     plain: Callable[..., Any] = rest.forward
@@ -42,15 +41,11 @@ def sides(rest: CableAtRest | NetworkAtRest, keys: list[str]) -> tuple[Any, Any,
     return *seen[0], found
 
 
-def by_gradients(rest: CableAtRest | NetworkAtRest, right: Any, shifts: Any) -> tuple[list[Any], list[Any]]:
+def by_gradients(rest: NetworkAtRest, right: Any, shifts: Any) -> tuple[list[Any], list[Any]]:
     """(P, W) of each line: gradients along what numbers move, and the sizes of what is added up there."""
-    out = []
-    if isinstance(rest, CableAtRest):
-        rows = [(rest.gradients, rest.movements(right, shifts), None)]
-    else:
-        moved = rest.movements(right, shifts)
-        rows = [(gradients, *moved[l]) for l, gradients in rest.gradients.items()]
-    for gradients, q, turns in rows:
+    out, moved = [], rest.movements(right, shifts)
+    for l, gradients in rest.gradients.items():
+        q, turns = moved[l]
         terms = [gradients.by_unknowns[None] * q[:, None]]
         terms += [] if turns is None else [gradients.by_turns[None] * turns[:, None]]
         flat = np.concatenate([x.reshape(*x.shape[:2], -1) for x in terms], axis=2)
@@ -59,7 +54,7 @@ def by_gradients(rest: CableAtRest | NetworkAtRest, right: Any, shifts: Any) -> 
     return list(sums), list(sizes)
 
 
-def least(rest: CableAtRest | NetworkAtRest, keys: list[str]) -> np.ndarray:
+def least(rest: NetworkAtRest, keys: list[str]) -> np.ndarray:
     """(P, W) a thousandth of results by numbers."""
     return 1e-3 * np.abs(rest.values) / np.array([[abs(rest.number(key)) or 1.0] for key in keys])
 
@@ -77,10 +72,8 @@ def test_the_transposed_solve_is_the_forward_one(case: str) -> None:
     rest = at_rest(as_scene_or_system(tables), of)
     right, shifts, _ = sides(rest, keys)
     forward, sizes = by_gradients(rest, right, shifts)
-    found = rest.transposed(right, shifts)
-    if isinstance(rest, NetworkAtRest):
-        forward, sizes = ([rest._in_order(_of_all_lines(rest, x))] for x in (forward, sizes))
-        found = rest._in_order(found)
+    forward, sizes = ([rest._in_order(_of_all_lines(rest, x))] for x in (forward, sizes))
+    found = rest._in_order(rest.transposed(right, shifts))
     whole = np.maximum(np.maximum(np.abs(forward[0]), sizes[0]), least(rest, keys))
     assert (np.abs(forward[0]) > 1e-11 * whole).any(axis=0).all()
     assert (np.abs(found - forward[0]) <= 1e-11 * whole).all()
@@ -101,8 +94,7 @@ def test_many_numbers_are_the_same_as_few(case: str, monkeypatch: pytest.MonkeyP
 def test_the_way_is_chosen_by_the_count(monkeypatch: pytest.MonkeyPatch) -> None:
     """One result at the end of a line depends on the four last nodes, of five unknowns each, but for the last spin."""
     rest = at_rest(as_scene_or_system(ON_A_BED), ["tension@end"])
-    assert isinstance(rest, CableAtRest)
-    assert [rest.gradients.pay_for(x) for x in (19, 20)] == [False, True]
+    assert [rest.gradients[0].pay_for(x) for x in (19, 20)] == [False, True]
     keys = 20 * SECTION[1:2]
     few = rest.by(keys[:1])
     monkeypatch.setattr(rest, "forward", None)
@@ -111,8 +103,7 @@ def test_the_way_is_chosen_by_the_count(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_a_result_of_the_whole_line_depends_on_all_its_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
     rest = at_rest(as_scene_or_system(ON_A_BED), ["contact_force"])
-    assert isinstance(rest, CableAtRest)
-    assert not rest.gradients.pay_for(400)
+    assert not rest.gradients[0].pay_for(400)
     few = rest.by(SECTION)
     monkeypatch.setattr(rest, "forward", None)
     monkeypatch.setattr(Gradients, "pay_for", lambda *_: True)

@@ -45,7 +45,7 @@ def test_far_nodes_do_not_count(case: str, monkeypatch: pytest.MonkeyPatch) -> N
 def test_what_is_of_the_whole_line_is_taken_from_it() -> None:
     rest = at_rest(hybrid.validate_scene(CASES["a bed"][0]), ["contact_force", "tension@0"])
     rest.by(SECTION)
-    assert rest.line._near is None
+    assert rest.lines[0]._near is None
 
 
 def test_the_curvature_that_fades_at_ends_goes_by_the_stiffness() -> None:

@@ -130,3 +130,15 @@ def test_the_command(tmp_path, monkeypatch):
     told = CliRunner().invoke(app, [*seek, "-o", "new.yaml"])
     assert told.exit_code == 0, told.output
     assert as_scene_or_system(tmp_path / "new.yaml").lines["east"].cable.length < 185.0
+
+
+def test_a_named_quantity_of_a_line_is_a_result():
+    """As of one cable; before, a network had results by the names of the program alone."""
+    tables = moored(BUOY, True)
+    tables["output"] = {"quantities": {"pull": {"kind": "vertical_force", "line": "east", "end": "start"}}}
+    keys = ["lines.east.sections[0].mass"]
+    of = ["east/pull", "east/reaction_start.z"]
+    found = hybrid.sensitivity(tables, of, keys)
+    ours, force = found
+    assert abs(ours.result) == pytest.approx(abs(force.result), rel=1e-9)
+    assert abs(ours.derivative) == pytest.approx(abs(force.derivative), rel=1e-6)

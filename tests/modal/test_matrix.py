@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.line_at_rest import displaced
+from hybrid.designs.sensitivity import at_rest
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.linear.matrices import linear_line
 from tests.solve.test_bed_of_depths import hill, mooring
@@ -74,9 +74,10 @@ SCENES = {
 @pytest.mark.parametrize("what", SCENES)
 def test_it_is_what_the_equations_change_by(what):
     made = SCENES[what]()
-    rest = CableAtRest(made, 1.0, ["tension@0"])
-    line, state, free = rest.line, rest.line.state.copy(), rest._free
+    rest = at_rest(made, ["tension@0"])
+    line, state = rest.lines[0], rest.lines[0].state.copy()
     linear = linear_line(line.joined(line.here), "cable", state, sticks=False, quick=False)
+    free = np.flatnonzero(rest._network.lines[0].free)
     K = (linear.stiffness + linear.by_layers).toarray()[free]
     chord, pull = np.linalg.norm(state.e, axis=1).min(), np.abs(state.T).max()
     steps, kinds = {0: 1e-5 * pull, 4: 1e-6}, free % SIZE

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.numbers import changed_scene
+from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.depths import Depths
 from tests.solve.test_bed_of_depths import PLANE, SLOPE, hill, mooring
 
@@ -43,11 +43,11 @@ def test_derivatives_on_a_hill_are_those_of_two_equilibria(model: str) -> None:
     """Of a line that lies on its side; without what the turning normal does they are off by up to a tenth."""
     of = ["tension@250", "position.z@30", "position.y@30", "reaction_end.x"]
     made = mooring(hill(), model=model)
-    rest = CableAtRest(made, 1.0, of)
+    rest = at_rest(made, of)
     for key in ("cable.sections[0].mass", "ends.end.position[0]", "environment.seabed.stiffness"):
         number = rest.number(key)
         ours, d = rest.by([key])[0], 1e-5 * number
-        more, less = (CableAtRest(changed_scene(made, key, number + x), 1.0, of).values for x in (d, -d))
+        more, less = (at_rest(changed_scene(made, key, number + x), of).values for x in (d, -d))
         np.testing.assert_allclose(ours, (more - less) / (2.0 * d), rtol=1.5e-5, err_msg=key)
 
 
