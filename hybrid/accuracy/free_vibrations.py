@@ -9,6 +9,7 @@ docs/errors.md
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from itertools import pairwise
 from math import pi
 from typing import NamedTuple
@@ -375,23 +376,29 @@ def _gauss(breaks: list[float], quiet: float, w: float) -> tuple[Floats, Floats]
     return np.concatenate([*times, [quiet]]), np.concatenate(weights)
 
 
+@cache
+def _factors(radius: float) -> tuple[Floats, Floats]:
+    """Angles of a step, rad, and the logs of factors at them, of a spectral radius."""
+    at = np.geomspace(1e-3, 1e3, 600)  # rad to a step
+    am, af = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
+    ga = 0.5 - am + af
+    be = 0.25 * (1.0 - am + af) ** 2
+    w2 = at**2
+    below = (1.0 - am) + w2 * (1.0 - af) * be
+    new = np.stack([-w2, -w2 * (1.0 - af), -am - w2 * (1.0 - af) * (0.5 - be)], axis=-1) / below[:, None]
+    one = np.ones_like(w2)
+    rows = [np.stack(x, axis=-1) for x in ((one, one, (0.5 - be) * one), (0 * one, one, (1.0 - ga) * one))]
+    matrix = np.stack([rows[0] + be * new, rows[1] + ga * new, new], axis=1)
+    roots = np.linalg.eigvals(matrix)
+    root = roots[np.arange(w2.size), roots.imag.argmax(axis=1)]
+    return at, np.log(np.abs(root)) + 1j * (np.abs(np.angle(root)) - at)
+
+
 class Factors:
     """By what generalized-alpha multiplies a free vibration in a step, over what the vibration itself does: its log."""
 
     def __init__(self, radius: float) -> None:
-        self._at = np.geomspace(1e-3, 1e3, 600)  # rad to a step
-        am, af = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
-        ga = 0.5 - am + af
-        be = 0.25 * (1.0 - am + af) ** 2
-        w2 = self._at**2
-        below = (1.0 - am) + w2 * (1.0 - af) * be
-        new = np.stack([-w2, -w2 * (1.0 - af), -am - w2 * (1.0 - af) * (0.5 - be)], axis=-1) / below[:, None]
-        one = np.ones_like(w2)
-        rows = [np.stack(x, axis=-1) for x in ((one, one, (0.5 - be) * one), (0 * one, one, (1.0 - ga) * one))]
-        matrix = np.stack([rows[0] + be * new, rows[1] + ga * new, new], axis=1)
-        roots = np.linalg.eigvals(matrix)
-        root = roots[np.arange(w2.size), roots.imag.argmax(axis=1)]
-        self._log = np.log(np.abs(root)) + 1j * (np.abs(np.angle(root)) - self._at)
+        self._at, self._log = _factors(radius)
 
     def of(self, angle: Floats) -> Floats:
         """Of steps of so many radians; of short ones as their cube."""

@@ -44,6 +44,7 @@ from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT
 from hybrid.simulation.restart import RemainingRun
 from hybrid.simulation.restore import refused
 from hybrid.simulation.run_sample import RunSample
+from hybrid.store.amend import may_be_amended
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.named_arrays import Tree
 from hybrid.store.stored_rows import remove_rows
@@ -123,6 +124,7 @@ class Passes:
             failed = str(error).splitlines()[0]
             if case.late_file is not None:
                 case.late_file.drop()
+                case.late_file = None
             emptied(target, error)
             compute = FinerResult(target, self._anew, self._finer, case.settle)
         if control.choice.kind != "catenary" or not failed:
@@ -171,7 +173,7 @@ class Passes:
         """The result, which nothing is to be done to but to add its errors."""
         case, target = self.case, self.target
         assert not isinstance(target, MemoryTarget)
-        if case.late_file is not None and not case.late_file.placed:
+        if case.late_file is not None and may_be_amended(case.late_file):
             return case.late_file
         case.late_file = None  # they go into the file alone
         return target

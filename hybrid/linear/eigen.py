@@ -107,7 +107,7 @@ def _nearest(A: sparse.csc_array, M: sparse.csc_array, shift: float, count: int)
     factors = splu(sparse.csc_array(A - shift * M))
     W = factors.solve(M @ np.random.default_rng(SEED).normal(size=(A.shape[0], BLOCK)))
     Q, MQ, _ = _orthonormal(W, M, 0.0)
-    H, check = np.zeros((0, 0)), 2 * count
+    H, check = np.zeros((0, 0)), 7 * count // 2  # where most have been found
     while True:
         known, size = len(H), Q.shape[1]
         W = factors.solve(MQ[:, known:])
@@ -140,11 +140,12 @@ def _orthonormal(W: Floats, M: sparse.csc_array, least: float) -> tuple[Floats, 
     sizes, axes = np.linalg.eigh(W.T @ MW)
     there = sizes > least * least
     roots = np.sqrt(sizes[there])
-    Q, R = W @ (axes[:, there] / roots), roots[:, None] * axes[:, there].T
+    parts, R = axes[:, there] / roots, roots[:, None] * axes[:, there].T
+    Q = W @ parts
     if roots.size and roots[0] < 1e-3 * roots[-1]:  # their directions have lost digits
         Q, MQ, again = _orthonormal(Q, M, 0.0)
         return Q, MQ, again @ R
-    return Q, M @ Q, R
+    return Q, MW @ parts, R
 
 
 def _banded(H: Floats) -> tuple[Floats, Floats]:

@@ -92,34 +92,28 @@ def _places(view: Observation) -> dict[tuple[int, int], list[tuple[int, int]]]:
     By how many cells they have and the end of the line that they reach to, -1 if none.
     """
     spans = np.array(view.grid.spans)
-    touches, last = view.depth > 0.0, (-1, -1, 0)
-    found = dict[tuple[int, int], list[tuple[int, int]]]()
-    seen = set[tuple[int, int, int]]()  # output, span, end
+    touches, found = view.depth > 0.0, dict[tuple[int, int], list[tuple[int, int]]]()
+    seen = np.zeros((2, view.columns, len(spans)), bool)
     for span, (begin, end) in enumerate(spans[:, :2].tolist()):
         cells = min(2 * REACH + 1, end - begin)
         for k, (node, beside, first) in enumerate(((begin, begin + 1, begin), (end, end - 1, end - cells))):
-            if cells < FEWEST or not np.isin(node, view.end_nodes):
-                continue
-            on_bed = np.flatnonzero(touches[node] | touches[beside]).tolist()
-            seen |= {(j, span, k) for j in on_bed}
-            if on_bed:
-                found.setdefault((cells, k), []).extend((first, j) for j in on_bed)
-    for j, cell in np.argwhere((touches[1:] != touches[:-1]).T).tolist():
-        span = int(np.searchsorted(spans[:, 0], cell, "right")) - 1
-        begin, end = spans[span, :2].tolist()
-        cells = min(2 * REACH + 1, end - begin)
-        if cell >= end or cells < FEWEST:  # between two lines
-            continue
-        if (j, span, 0) in seen and cell < begin + cells - WITHIN:
-            continue
-        if (j, span, 1) in seen and cell >= end - cells + WITHIN:
-            continue
-        if last[:2] == (j, span) and cell < last[2] + cells - WITHIN:
-            continue
-        first = min(max(cell - REACH, begin), end - cells)
-        found.setdefault((cells, -1), []).append((first, j))
-        last = j, span, first
-    return found
+            if cells >= FEWEST and np.isin(node, view.end_nodes):
+                on_bed = touches[node] | touches[beside]
+                seen[k, :, span] = on_bed
+                found.setdefault((cells, k), []).extend((first, j) for j in np.flatnonzero(on_bed).tolist())
+    output, cell = np.nonzero((touches[1:] != touches[:-1]).T)
+    span_of = np.searchsorted(spans[:, 0], cell, "right") - 1
+    begin, end = spans[span_of, :2].T
+    cells = np.minimum(2 * REACH + 1, end - begin)
+    near = [seen[0, output, span_of] & (cell < begin + cells - WITHIN)]
+    near += [seen[1, output, span_of] & (cell >= end - cells + WITHIN)]
+    wanted = (cell < end) & (cells >= FEWEST) & ~near[0] & ~near[1]  # beyond the end: between two lines
+    first, last = np.minimum(np.maximum(cell - REACH, begin), end - cells), (-1, -1, 0)
+    for j, c, span, a, n in np.transpose([output, cell, span_of, first, cells])[wanted].tolist():
+        if last[:2] != (j, span) or c >= last[2] + n - WITHIN:
+            found.setdefault((n, -1), []).append((a, j))
+            last = j, span, a
+    return {key: x for key, x in found.items() if x}
 
 
 def _of(x: Floats, at: NDArray[np.int64], output: NDArray[np.int64]) -> Floats:

@@ -61,9 +61,15 @@ def amend(
         if before is not None:
             target.before = before or None
         _add_to_arrays(target.contents, fields, blocks, others, done)
+        target.placed = False  # it may be there without them, because they took long
         target.place()
     else:
         change_complete(target, add)
+
+
+def may_be_amended(late: LateFile) -> bool:
+    """Whether a result that is in memory can be added to there; what was added before is taken back in its file."""
+    return AMENDED not in late.contents.attributes
 
 
 def amend_lines(

@@ -35,9 +35,8 @@ POINTS = 12
 # Newton's method ends where w changes by less than this part of its range, which shows in no curvature; every so many
 # rounds it goes half the way, since beside a hard bed it may swing between two answers; at most so many.
 CHANGE, HALF, ROUNDS = 1e-9, 6, 40
-W, SINKS, TENSION, STIFFNESS, LOAD, MAIN, BELOW, SECOND, PIVOT, FIRST, RIGHT, WORK = range(
-    12
-)  # rows of work, and how many
+# Rows of work, and how many.
+W, SINKS, TENSION, STIFFNESS, LOAD, MAIN, BELOW, SECOND, PER_LENGTH, PER_PIVOT, FIRST, RIGHT, WORK = range(13)
 
 
 class Windows(NamedTuple):
@@ -161,63 +160,76 @@ def clamp_of(x, y, k, hn):
 
 
 @inner
-def put_curvature(x, clamp, k):
-    """w'' at nodes; that at the last one stays."""
-    before = (x.w[1] - x.w[0]) / (x.s[1] - x.s[0])
+def put_curvature(x, clamp, p, k):
+    """w'' at nodes; that at the last one stays; p: 1/h."""
+    before = (x.w[1] - x.w[0]) * p[0]
     k[0] = clamp.k + (before - clamp.slope) * clamp.per
     for i in range(1, x.T.shape[0]):
-        after = (x.w[i + 1] - x.w[i]) / (x.s[i + 1] - x.s[i])
+        after = (x.w[i + 1] - x.w[i]) * p[i]
         k[i], before = (after - before) / (0.5 * (x.s[i + 1] - x.s[i - 1])), after
 
 
 @inner
-def put_band(x, clamp, a, b, c):
-    """A without the bed, of inner nodes; curvature is given at the ends, and bends there nothing."""
+def put_band(x, clamp, p, a, b, c):
+    """1/h, and A without the bed, of inner nodes; curvature is given at the ends, and bends there nothing."""
     n = x.T.shape[0]
     for i in range(n + 1):
         a[i], b[i], c[i] = 0.0, 0.0, 0.0
     for i in range(n):
-        p = 1.0 / (x.s[i + 1] - x.s[i])
-        a[i] += x.T[i] * p
-        a[i + 1] += x.T[i] * p
-        b[i] -= x.T[i] * p
+        p[i] = 1.0 / (x.s[i + 1] - x.s[i])
+        a[i] += x.T[i] * p[i]
+        a[i + 1] += x.T[i] * p[i]
+        b[i] -= x.T[i] * p[i]
         if i > 0:
-            l = 1.0 / (x.s[i] - x.s[i - 1])
-            each = x.EI[i] * 2.0 / (1.0 / l + 1.0 / p)
+            l, r = p[i - 1], p[i]
+            each = x.EI[i] * 2.0 / (1.0 / l + 1.0 / r)
             a[i - 1] += each * l * l
-            a[i] += each * (l + p) * (l + p)
-            a[i + 1] += each * p * p
-            b[i - 1] -= each * l * (l + p)
-            b[i] -= each * p * (l + p)
-            c[i - 1] = each * l * p
-    a[1] += x.EI[0] * clamp.per / (x.s[1] - x.s[0]) ** 2
+            a[i] += each * (l + r) * (l + r)
+            a[i + 1] += each * r * r
+            b[i - 1] -= each * l * (l + r)
+            b[i] -= each * r * (l + r)
+            c[i - 1] = each * l * r
+    a[1] += x.EI[0] * clamp.per * p[0] * p[0]
 
 
 @inner
 def correct(x, k, bed, work, part):
     """Go a part of a step of Newton's method; the largest change of w, m, of all of it."""
     n = x.T.shape[0]
-    q, a, b, c, D, L, z = work[LOAD], work[MAIN], work[BELOW], work[SECOND], work[PIVOT], work[FIRST], work[RIGHT]
-    before = pull(x, k, 0)
-    e = z[0] = L[0] = 0.0
-    D[0] = math.inf
+    q, a, b, c, h, G, L, z = (
+        work[LOAD],
+        work[MAIN],
+        work[BELOW],
+        work[SECOND],
+        work[PER_LENGTH],
+        work[PER_PIVOT],
+        work[FIRST],
+        work[RIGHT],
+    )  # G: 1/D
+    bent = x.EI[1] * k[1]
+    before = (x.T[0] * (x.w[1] - x.w[0]) - (bent - x.EI[0] * k[0])) * h[0]
+    e = second = z[0] = L[0] = 0.0
     for i in range(1, n):
-        after, half = pull(x, k, i), 0.5 * (x.s[i + 1] - x.s[i - 1])
+        bent, beside = x.EI[i + 1] * k[i + 1], bent
+        after, half = (x.T[i] * (x.w[i + 1] - x.w[i]) - (bent - beside)) * h[i], 0.5 * (x.s[i + 1] - x.s[i - 1])
         w, sinks = -x.w[i], x.sinks[i]
         p, stiff, _ = pressure(0.0, w, w, sinks, sinks, bed.stiffness, bed.damping, bed.onset)
-        second = c[i - 2] / D[i - 2] if i > 2 else 0.0
-        D[i] = a[i] + half * stiff - e * L[i - 1] - (c[i - 2] * second if i > 2 else 0.0)
-        z[i] = after - before + half * (q[i] + p) - L[i - 1] * z[i - 1] - (second * z[i - 2] if i > 2 else 0.0)
+        pivot, right = a[i] + half * stiff - e * L[i - 1], after - before + half * (q[i] + p) - L[i - 1] * z[i - 1]
+        if i > 2:
+            second = c[i - 2] * G[i - 2]
+            pivot -= c[i - 2] * second
+            right -= second * z[i - 2]
         e = b[i] - (c[i - 1] * L[i - 1] if i > 1 else 0.0)
-        L[i], before = e / D[i], after
+        G[i], z[i], before = 1.0 / pivot, right, after
+        L[i] = e * G[i]
     most = next_one = next_two = 0.0
     for j in range(1, n):
         i = n - j
-        change = z[i] / D[i]
+        change = z[i] * G[i]
         if j > 1:
             change -= L[i] * next_one
         if j > 2:
-            change -= c[i] / D[i] * next_two
+            change -= c[i] * G[i] * next_two
         x.w[i] += part * change
         if not abs(change) <= most:
             most = abs(change)
@@ -231,11 +243,11 @@ def balanced(x, clamp, bed, work, k):
     low = high = x.w[0]
     for i in range(x.w.shape[0]):
         low, high = min(low, x.w[i]), max(high, x.w[i])
-    put_band(x, clamp, work[MAIN], work[BELOW], work[SECOND])
-    put_curvature(x, clamp, k)
+    put_band(x, clamp, work[PER_LENGTH], work[MAIN], work[BELOW], work[SECOND])
+    put_curvature(x, clamp, work[PER_LENGTH], k)
     for count in range(ROUNDS):
         change = correct(x, k, bed, work, 0.5 if count % HALF == HALF - 1 else 1.0)
-        put_curvature(x, clamp, k)
+        put_curvature(x, clamp, work[PER_LENGTH], k)
         if change <= CHANGE * (high - low):
             return True
     return False
