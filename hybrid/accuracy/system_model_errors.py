@@ -15,7 +15,8 @@ from hybrid.accuracy.error_order import magnitude
 from hybrid.model.build import Model
 from hybrid.model.system import SystemModel, SystemResolution, build_system
 from hybrid.scene.analysis import CatenaryZone, Mesh, RodModel, RodZone, ZonesModel
-from hybrid.scene.system import JoinedLine, System
+from hybrid.scene.network import JoinedLine
+from hybrid.scene.system import System
 from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample
 from hybrid.store.reader import Result
 

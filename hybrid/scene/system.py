@@ -1,655 +1,443 @@
-"""Several lines that meet at points and bodies: a scene with `points` and `lines` in place of `cable` and `ends`.
-
-Each line is checked as a scene of its own, between the places where its two points are, or are first looked for.
-"""
+"""A scene of several lines, and what may contradict in it: between points, bodies and lines, and in each line alone."""
 
 from __future__ import annotations
 
+import heapq
 import math
-from collections.abc import Mapping, Sequence
-from functools import cached_property
-from itertools import accumulate, combinations, pairwise
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import chain, combinations
+from typing import Any
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import ValidationError, model_validator
 
-from hybrid.errors import SceneError
-from hybrid.scene.accuracy import USUAL, Accuracy, AskedAccuracy, of_unnamed_model
-from hybrid.scene.analysis import (
-    EVERY,
-    AdaptiveModel,
-    CatenaryModel,
-    Equilibrium,
-    Initial,
-    LineInitial,
-    Mesh,
-    Model,
-    OutputPoints,
-    Resolution,
-    RodModel,
-    Straight,
-    Time,
-    interval_of_outputs,
-    size_of_output,
-)
-from hybrid.scene.attachments import Attachment
-from hybrid.scene.base import (
-    Finding,
-    NonNegative,
-    Pair,
-    Positive,
-    Table,
-    Text,
-    Truth,
-    Whole,
-    refuse,
-    turned,
-    value_or_table,
-)
-from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
-from hybrid.scene.cable import Cable, Contact, Environment, Section
-from hybrid.scene.end_loads import GivenLoad
-from hybrid.scene.ends import Clamped, End, Ends, Guided, Pinned, Triple
-from hybrid.scene.lines_contact import LinesContact
-from hybrid.scene.motion_checks import Held, lasting_period, moved_in
-from hybrid.scene.motion_tables import Motion
-from hybrid.scene.obstacles import Obstacles
-from hybrid.scene.points import (
-    WINCH,
-    ClampedConnection,
-    Connections,
-    Failure,
-    Fairlead,
-    FixedPoint,
-    FreePoint,
-    GuidedPoint,
-    Name,
-    Point,
-)
-from hybrid.scene.quantities import Quantities
-from hybrid.scene.schema import Scene, missing_time
-from hybrid.scene.system_checks import system_findings
-
-# Of the length of a line: how far a free point may be looked for from the other one.
-REACHED = 0.95
+from hybrid.scene.analysis import Equilibrium
+from hybrid.scene.base import Finding, Place, refuse
+from hybrid.scene.bodies import FixedBody, FreeBody
+from hybrid.scene.checks import elevation_has_waves
+from hybrid.scene.combinations import holds_rod, refused, tables_of
+from hybrid.scene.ends import Clamped, Ends, Free
+from hybrid.scene.motion_checks import motion_findings
+from hybrid.scene.motion_tables import TURNS, Motion
+from hybrid.scene.network import JoinedLine, Network
+from hybrid.scene.plane import TYPED, plane_of
+from hybrid.scene.points import ClampedConnection, Fairlead, FixedPoint, FreePoint, GuidedPoint
+from hybrid.scene.quantities import of_several_lines
+from hybrid.scene.schema import Scene
+from hybrid.scene.start_checks import SAME_LENGTH
+from hybrid.scene.suggestions import nearest
+from hybrid.scene.ways import farthest, moving_key, shift, smaller
 
 
-class _JoinedPin(Pinned):
-    """The end of a line at a point that is free, or on a free body, or that it may break from, held where that is
-
-    first.
-    """
-
-    @property
-    def is_placed(self) -> bool:
-        return False
-
-
-class _CarriedPin(Pinned):
-    """A line that is clamped to a free point, before the axes of this are known: other lines may give them."""
-
-    @property
-    def gives_axes(self) -> bool:
-        return True
-
-
-class _KnottedPin(_JoinedPin):
-    """The same of a free point, without a swivel."""
-
-    @property
-    def is_twisted_against(self) -> bool:
-        return True
-
-
-class _JoinedClamp(Clamped):
-    """The same of an end that is clamped there."""
-
-    @property
-    def is_placed(self) -> bool:
-        return False
-
-
-class LineFailure(Failure):
-    """When and where a line breaks from a point; its end is free from then on."""
-
-    end: Literal["start", "end"] = Field(default="end", description="the end that breaks: at s = 0, or at s = length")
-
-
-class JoinedLine(Table):
-    """A line from one point to another, with s = 0 at `start`."""
-
-    instead: ClassVar[Mapping[str, str]] = WINCH
-
-    start: Name = Field(description="name of the point at s = 0")
-    end: Name = Field(description="name of the point at s = length")
-    connections: Connections = Field(
-        default=Connections(), description="how its ends are connected to the points; absent: they turn freely"
-    )
-    sections: tuple[Section, ...] = Field(min_length=1, description="sections in order from s = 0 on")
-    attachments: tuple[Attachment, ...] = Field(
-        default=(), description="floats, clumps and modules on the line, in any order"
-    )
-    model: Model | None = Field(
-        default=None,
-        description="rod, catenary, zones of both that stay, or adaptive; absent: rod where it bends, else catenary",
-    )
-    mesh: Mesh | None = Field(default=None, description="how the line is cut into cells; absent: chosen")
-    resolution: Resolution | None = Field(
-        default=None, description="how fine the cells are that the program places; absent: as the accuracy asks"
-    )
-    contact: Contact = Field(
-        default=Contact(), description="whether the line touches itself in a run, as of one cable, and its friction"
-    )
-    accuracy: AskedAccuracy | None = Field(
-        default=None, description="how wrong the result of this line may be; absent: as `accuracy` of the system"
-    )
-    initial: LineInitial = Field(
-        default=Equilibrium(),
-        description="straight or along a polyline, as of one cable, where all lines start so, or the shape that the "
-        "search of the equilibrium starts from: guess, or points, a polyline that is shifted to the first places of "
-        "its ends; absent: hung between these",
-    )
-    break_at: LineFailure | None = Field(
-        default=None,
-        description="when the line breaks from the point at one of its ends, at a time or after the first step with so "
-        "large a tension there; absent: never",
-    )
-
-    @property
-    def cable(self) -> Cable:
-        """What the line is made of."""
-        return Cable(sections=self.sections, attachments=self.attachments)
-
-    @property
-    def chosen_model(self) -> Model:
-        """The model that is given, or the one that stands for none."""
-        if self.model is not None:
-            return self.model
-        return RodModel() if all(x.weakest_bending for x in self.sections) else CatenaryModel()
-
-    @model_validator(mode="after")
-    def _ends_apart(self) -> JoinedLine:
-        if self.start == self.end:
-            refuse([Finding(("end",), f"a point other than {self.start}, where the line starts", "name another point")])
-        return self
-
-
-def _placed(initial: Initial, start: Triple | None) -> Initial:
-    """A first shape that begins where its first point is, whether an end is held or not."""
-    begins = isinstance(initial, Straight) and initial.origin is None
-    return initial.model_copy(update={"origin": start}) if begins else initial
-
-
-def _between(initial: Initial, ends: Mapping[str, End]) -> Initial:
-    """A first shape whose ends are where the points are first, the rest in between shifted along."""
-    if isinstance(initial, Straight) or initial.points is None:
-        return initial
-    points = initial.points
-    way = [0.0, *accumulate(math.dist(a, b) for a, b in pairwise(points))]
-    gaps = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
-    for k, key in enumerate(("start", "end")):
-        place = ends[key].first_position
-        if place is not None:
-            x, y, z = points[-k]
-            gaps[k] = place[0] - x, place[1] - y, place[2] - z
-    moved = []
-    for point, s in zip(points, way, strict=True):
-        part = s / way[-1]
-        x, y, z = (p + (1.0 - part) * a + part * b for p, a, b in zip(point, *gaps, strict=True))
-        moved.append((x, y, z))
-    return initial.model_copy(update={"points": tuple(moved)})
-
-
-DEFAULT_POINTS = 101  # output points of a line that says nothing of them
-LinePoints = Annotated[
-    Annotated[Whole, Field(ge=2), Tag("<value>")] | Annotated[dict[Name, OutputPoints], Tag("<table>")],
-    Discriminator(value_or_table),
-]
-
-
-class SystemOutput(Table):
-    """What is kept."""
-
-    every: Positive | None = Field(default=None, description=EVERY)
-    points: LinePoints = Field(
-        default=DEFAULT_POINTS,
-        description="points along each line, evenly over its length, its ends included, or by name of the line its "
-        "number or a list of arc lengths, of others 101; those of `history`, point loads, changes of section and "
-        "joints are added [m]",
-    )
-    history: dict[Name, Annotated[tuple[NonNegative, ...], Field(min_length=1)]] = Field(
-        default={}, description="by name of the line: arc lengths that plots follow over time [m]"
-    )
-    elevation: tuple[Pair, ...] | None = Field(
-        default=None, min_length=1, description="places [x, y] at which the elevation of the sea is recorded [m]"
-    )
-    quantities: Quantities = Field(
-        default={},
-        description="further quantities over time by name: forces and angles at ends, touchdown, layback, clearance",
-    )
-    exact: Truth = Field(
-        default=False,
-        description="steps end at outputs; else an output within a step is interpolated in time, to second order",
-    )
-    criteria: Truth = Field(
-        default=False, description="also write the criteria of lines whose zones move, as fields over time and s"
-    )
-    errors: Truth | None = Field(
-        default=None,
-        description="estimate how wrong the result is, by mesh and time step; absent: where an accuracy is asked",
-    )
-
-    def points_of(self, line: str) -> int | tuple[float, ...]:
-        """How many points are kept of a line, or their arc lengths [m]."""
-        return self.points.get(line, DEFAULT_POINTS) if isinstance(self.points, dict) else self.points
-
-
-class System(Table):
+class System(Network):
     """Several lines, the points where they meet, what acts on them, and what is asked."""
-
-    instead: ClassVar[Mapping[str, str]] = {
-        "ends": "a scene of several lines has points, at which its lines end",
-        "model": "each line has its own: lines.NAME.model",
-        "mesh": "each line has its own: lines.NAME.mesh",
-        "initial": "each line has its own: lines.NAME.initial",
-        "resolution": "each line has its own: lines.NAME.resolution",
-        "solver": "leave it out: every scene is solved by elimination",
-    }
-
-    title: Text = Field(default="", description="a line for people; it heads plots and reports")
-    environment: Environment = Field(default=Environment(), description="what acts on the lines from outside")
-    points: dict[Name, Point] = Field(min_length=1, description="points by name: where lines end, are held, and meet")
-    bodies: dict[Name, RigidBody] = Field(
-        default={}, description="rigid bodies by name, with fairleads among the points"
-    )
-    lines: dict[Name, JoinedLine] = Field(min_length=1, description="lines by name, each between two points")
-    contact: LinesContact | None = Field(
-        default=None,
-        description="which lines touch each other, with what friction; absent: in runs with a step and without "
-        "accuracy all that have diameters, from where they come near each other",
-    )
-    obstacles: Obstacles = Field(
-        default={},
-        description="obstacles by name, fixed or moving, that every line touches: planes, spheres, cylinders, boxes, "
-        "tori, sheaves, meshes of triangles",
-    )
-    time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
-    accuracy: AskedAccuracy | None = Field(
-        default=None,
-        description="how wrong the result of each line may be: its cells and the time steps follow from it, unless "
-        "they are given; parts are of how far each line moves, and of its own tensions",
-    )
-    output: SystemOutput = Field(default=SystemOutput(), description="what is kept")
-    dimension: Literal[2, 3] | None = Field(
-        default=None,
-        description="2: all lines lie in one plane, refused if they do not, and stopped where something leaves it; "
-        "several lines are computed in space whatever is said here [-]",
-    )
-
-    @property
-    def line_names(self) -> tuple[str, ...]:
-        """Names of the lines; none where the one line has no name."""
-        return tuple(self.lines)
-
-    @property
-    def motions(self) -> list[Motion]:
-        """How points and bodies are moved."""
-        held = (getattr(x, "motion", None) for x in (*self.points.values(), *self.bodies.values()))
-        return [x for x in held if x is not None]
-
-    @property
-    def length(self) -> float:
-        """Unstretched length of the longest line [m]."""
-        return max(x.cable.length for x in self.lines.values())
-
-    def key_of(self, name: str) -> str:
-        """The key of the table that says what a line is made of."""
-        return f"lines.{name}"
-
-    @property
-    def adaptive(self) -> tuple[str, ...]:
-        """Names of the lines whose zones move."""
-        return tuple(name for name, line in self.lines.items() if isinstance(line.model, AdaptiveModel))
-
-    @property
-    def slack_becomes_rod(self) -> bool:
-        """Whether a line is a catenary that stands for no model: should it go slack, the run begins anew with rods."""
-        return any(x.model is None and x.chosen_model.kind == "catenary" for x in self.lines.values())
-
-    @property
-    def starts_as_placed(self) -> bool:
-        """Whether the motion starts where the scene has lines, points and bodies, at rest, and not in equilibrium."""
-        return any(not isinstance(line.initial, Equilibrium) for line in self.lines.values())
-
-    def searched(self) -> System:
-        """The same, whose shapes at the start are those from which the equilibrium is searched for."""
-        if not self.starts_as_placed:
-            return self
-        lines = {
-            name: line.model_copy(update={"initial": Equilibrium(points=getattr(line.initial, "points", None))})
-            for name, line in self.lines.items()
-        }
-        return self.model_copy(update={"lines": lines})
-
-    @property
-    def free(self) -> tuple[str, ...]:
-        """Names of the points that are free and at which lines meet, in order."""
-        return tuple(x for x in self.points if isinstance(self.points[x], FreePoint) and not self.is_free_end(x))
-
-    @property
-    def free_bodies(self) -> dict[str, FreeBody]:
-        """The bodies that are free, by name, in order."""
-        return {name: body for name, body in self.bodies.items() if isinstance(body, FreeBody)}
-
-    @property
-    def surfaces(self) -> Obstacles:
-        """The obstacles, and behind them the shapes of bodies, by name."""
-        shapes = {key: x for name, body in self.bodies.items() for key, x in body.surface(name).items()}
-        return {**self.obstacles, **shapes} if shapes else self.obstacles
-
-    @property
-    def shaped(self) -> tuple[str, ...]:
-        """Names of the bodies that lines touch."""
-        return tuple(name for name, body in self.free_bodies.items() if body.shape is not None)
-
-    @property
-    def touching_pairs(self) -> list[tuple[str, str]]:
-        """Names of lines that touch each other, two each."""
-        if self.contact is None:
-            return []
-        return list(combinations(self.lines, 2)) if self.contact.between is None else list(self.contact.between)
-
-    def first_place(self, point: str) -> Triple:
-        """Where a point is held at rest, or first looked for [m]; not of a free end that says nothing of it."""
-        place = self._known_place(point)
-        assert place is not None
-        return place
-
-    def _known_place(self, point: str) -> Triple | None:
-        """The same; None: the first shape of the line has it."""
-        found = self.points[point]
-        if isinstance(found, Fairlead):
-            return self.bodies[found.body].place(found.place)
-        return found.position if isinstance(found, FixedPoint) else getattr(found, "initial_guess", None)
-
-    @property
-    def guesses(self) -> dict[str, Triple]:
-        """Where the points that are joined are first looked for, by name [m]."""
-        return {name: self.first_place(name) for name in self.points if self.is_joined(name)}
-
-    def body_of(self, point: str) -> FixedBody | FreeBody | None:
-        """The body that a point is on; None: it is on none."""
-        found = self.points[point]
-        return self.bodies[found.body] if isinstance(found, Fairlead) else None
-
-    def is_free_end(self, point: str) -> bool:
-        """Whether a point is that end of one line which its place does not hold: free with no other line, or guided."""
-        found = self.points[point]
-        return isinstance(found, GuidedPoint) or (isinstance(found, FreePoint) and len(self.lines_at(point)) == 1)
-
-    def is_held(self, point: str) -> bool:
-        """Whether the place of a point is known: it is fixed, or on a body that is."""
-        return isinstance(self.points[point], FixedPoint) or isinstance(self.body_of(point), FixedBody)
-
-    def is_joined(self, point: str) -> bool:
-        """Whether a point moves by what pulls there, and is more than the end of a line: a knot, or on a free body."""
-        return not self.is_held(point) and not self.is_free_end(point)
-
-    def may_leave(self, name: str, end: Literal["start", "end"]) -> bool:
-        """Whether an end of a line moves by what pulls there, or may once something has broken."""
-        point = getattr(self.lines[name], end)
-        weak = getattr(self.points[point], "break_at", None) is not None
-        return weak or self.breaks(name, end) or self.is_joined(point)
-
-    def lines_at(self, point: str) -> list[tuple[str, Literal["start", "end"]]]:
-        """Names of the lines that meet at a point, each with the end that does; those that break there come last."""
-        lines, meeting = self._meetings
-        if lines is not self.lines:  # those that this was copied from
-            self.__dict__.pop("_meetings")
-            _, meeting = self._meetings
-        return [*meeting.get(point, ())]
-
-    @cached_property
-    def _meetings(self) -> tuple[dict[str, JoinedLine], dict[str, list[tuple[str, Literal["start", "end"]]]]]:
-        """The lines, and `lines_at` of every point where one ends."""
-        found: dict[str, list[tuple[str, Literal["start", "end"]]]] = {}
-        for name, line in self.lines.items():
-            found.setdefault(line.start, []).append((name, "start"))
-            found.setdefault(line.end, []).append((name, "end"))
-        return self.lines, {point: sorted(ends, key=lambda at: self.breaks(*at)) for point, ends in found.items()}
-
-    def breaks(self, name: str, end: str) -> bool:
-        """Whether a line may break from the point at an end."""
-        failure = self.lines[name].break_at
-        return failure is not None and failure.end == end
-
-    def clamp(self, name: str, end: str) -> ClampedConnection | None:
-        """How a line is clamped at an end; None: it turns freely."""
-        found = getattr(self.lines[name].connections, end)
-        return found if isinstance(found, ClampedConnection) else None
-
-    def clamped_at(self, point: str) -> list[tuple[str, Literal["start", "end"]]]:
-        """Names of the lines that are clamped at a point, each with the end that is."""
-        return [at for at in self.lines_at(point) if self.clamp(*at) is not None]
-
-    def moments_on(self, point: str) -> tuple[GivenLoad, ...]:
-        """Moments that are given to a free point."""
-        found = self.points[point]
-        return found.moments if isinstance(found, FreePoint) else ()
-
-    @property
-    def rigid(self) -> tuple[str, ...]:
-        """Names of the free points to which lines are clamped."""
-        return tuple(name for name in self.free if self.clamped_at(name))
-
-    def direction(self, name: str, end: str) -> tuple[Triple, Triple | None] | None:
-        """Inertial directions in which a line is clamped at rest, or first: its tangent and its material axis a1.
-
-        None: it turns freely, or is clamped to a free point, whose axes are not known here, or is guided.
-        """
-        held = self.clamp(name, end)
-        point = getattr(self.lines[name], end)
-        if held is None or held.tangent is None or isinstance(self.points[point], FreePoint | GuidedPoint):
-            return None
-        body = self.body_of(point)
-        if body is None:
-            return held.tangent, held.normal
-        turn = body.rotation if isinstance(body, FixedBody) else body.initial_rotation
-        return turned(turn, held.tangent), None if held.normal is None else turned(turn, held.normal)
-
-    def carried(self, name: str) -> tuple[str, ...]:
-        """Ends (`start`, `end`) at which a line carries the free point, its mass and loads: the first line does."""
-        line = self.lines[name]
-        return tuple(
-            key
-            for key in ("start", "end")
-            if isinstance(self.points[point := getattr(line, key)], FreePoint)
-            and not self.is_free_end(point)
-            and self.lines_at(point)[0] == (name, key)
-        )
-
-    def scene_of(
-        self, name: str, carrying: Sequence[str] = (), places: Mapping[str, Triple] | None = None,
-        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: Scene | None = None,
-    ) -> Scene:  # fmt: skip
-        """A line between the places where its points are, or are first looked for, as a scene of its own.
-
-        carrying: ends at which the free point is a body of the line, not a place that is held.  places: of the points
-        that are joined [m], wherever they are; None: where the scene has them, and what is wrong with the line is a
-        ValidationError of pydantic.  directions: as of `direction` by end, in place of those.  scene: of the line with
-        its points where the scene has them, if it is known.
-        """
-        if places is not None or directions is not None:
-            return self._scene_of(name, carrying, places, directions, scene)
-        known, key = self._known_scenes, (name, tuple(carrying))
-        if key not in known:
-            known[key] = self._scene_of(name, carrying)
-        return known[key]
-
-    @property
-    def _known_scenes(self) -> dict[tuple[str, tuple[str, ...]], Scene]:
-        """Scenes of lines that have been made, by line and ends that carry: to validate one takes 2 ms."""
-        tables, known = self._made_scenes
-        if any(getattr(self, name) is not table for name, table in tables.items()):  # of what this was copied from
-            self.__dict__.pop("_made_scenes")  # older pydantic lets nothing be deleted of what is frozen
-            _, known = self._made_scenes
-        return known
-
-    @cached_property
-    def _made_scenes(self) -> tuple[dict[str, Any], dict[tuple[str, tuple[str, ...]], Scene]]:
-        """The tables of this system, and `_known_scenes`."""
-        return {name: getattr(self, name) for name in type(self).model_fields}, {}
-
-    def _scene_of(
-        self, name: str, carrying: Sequence[str], places: Mapping[str, Triple] | None = None,
-        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: Scene | None = None,
-    ) -> Scene:  # fmt: skip
-        """As `scene_of`, made anew."""
-        line = self.lines[name]
-        first = self._places(line)
-        ends: dict[str, End] = {}
-        for key in ("start", "end"):
-            point, body = self.points[getattr(line, key)], self.body_of(getattr(line, key))
-            held = self.direction(name, key) if directions is None else directions.get(key)
-            place, motion, payout = first[key], None, getattr(line.connections, key).payout
-            if self.is_free_end(getattr(line, key)):
-                ends[key] = self._free_end(name, key, place)
-                continue
-            if isinstance(point, FixedPoint):
-                place, motion = point.position, point.motion
-                if held is None and motion is not None and self.clamped_at(getattr(line, key)):
-                    motion = motion if motion.file is not None else without_turns(motion)
-            elif isinstance(body, FixedBody):  # that it turns as well is for the model
-                motion = body.shift
-            elif places is not None:
-                place = places[getattr(line, key)]
-            assert place is not None
-            if key in carrying and isinstance(point, FreePoint):
-                ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
-            elif held is None:
-                tied = self.clamp(name, key)
-                carried = _CarriedPin if tied is not None else Pinned
-                joined = _KnottedPin if tied is not None and not tied.swivel else _JoinedPin
-                kind = joined if self.may_leave(name, key) else carried
-                ends[key] = kind(position=place, motion=motion, payout=payout)
-            else:
-                clamp = getattr(line.connections, key)
-                ends[key] = (_JoinedClamp if self.may_leave(name, key) else Clamped)(
-                    position=place, tangent=held[0], normal=held[1], swivel=clamp.swivel,
-                    turns=0.0 if carrying else clamp.turns,  # a first shape is that of the line with no point
-                    bend_stiffness=clamp.bend_stiffness, motion=motion, payout=payout,
-                )  # fmt: skip
-        initial = _placed(line.initial, first["start"]) if self.starts_as_placed else _between(line.initial, ends)
-        tables: dict[str, Any] = {"ends": Ends(**ends), "initial": initial}
-        if places is not None:
-            return (scene or self.scene_of(name)).model_copy(update=tables)
-        tables |= {
-            "environment": self.environment, "cable": line.cable, "model": line.chosen_model, "mesh": line.mesh,
-            "resolution": line.resolution, "contact": self._contact_of(name), "obstacles": self.surfaces,
-            "accuracy": self._accuracy_of(line),
-        }  # fmt: skip
-        if self.time is not None:
-            tables["time"] = self.time
-        if scene is not None:
-            return scene.model_copy(update=tables)
-        tables["title"] = f"{self.title}, line {name}" if self.title else f"line {name}"
-        given: dict[str, Any] = {"points": self.output.points_of(name), "errors": self.output.errors}
-        given["every"] = self.output_interval if self.time is not None else self.output.every
-        given["history"] = self.output.history.get(name)
-        given["criteria"] = self.output.criteria and (name in self.adaptive or not self.adaptive)  # none: each says so
-        tables["output"] = {key: value for key, value in given.items() if value is not None}
-        return Scene.model_validate(tables)
-
-    def _free_end(self, name: str, key: Literal["start", "end"], near: Triple | None) -> End:
-        """The end of a line at a point that is no more than that; near: as of `FreePoint.only_end`."""
-        point, initial = self.points[getattr(self.lines[name], key)], self.lines[name].initial
-        if isinstance(point, GuidedPoint):
-            held = self.clamp(name, key)
-            assert held is not None
-            assert held.tangent is not None
-            return Guided(
-                tangent=held.tangent, normal=held.normal, turns=held.turns, force=point.force, motion=point.motion
-            )
-        assert isinstance(point, FreePoint)
-        if isinstance(initial, Equilibrium) and (initial.direction is not None or initial.guess == "straight"):
-            near = None  # the search starts from a line straight in a direction
-        return point.only_end(near)
-
-    def _contact_of(self, name: str) -> Contact:
-        """Contact of a line with itself, which knows whether it rubs on others."""
-        own = self.lines[name].contact
-        touches = self.contact is not None and any(name in pair for pair in self.touching_pairs)
-        return own.beside_others(self.contact.friction) if self.contact is not None and touches else own
-
-    def checked_scene(self, name: str) -> Scene:
-        """The scene of a line as `scene_of`, checked anew; ValidationError of pydantic: what is wrong with it."""
-        return self._scene_of(name, ())
-
-    def know_scene(self, name: str, scene: Scene) -> None:
-        """Make the scene of a line from that of a system that differs in numbers alone, without checking it again."""
-        self._known_scenes[name, ()] = self._scene_of(name, (), scene=scene)
-
-    def _accuracy_of(self, line: JoinedLine) -> Accuracy | None:
-        """What is asked of a line: of one that names no model no curvature, because nobody has asked for a rod."""
-        asked = line.accuracy or self.accuracy
-        if asked is None and self.time is not None and self.time.controlled and self.time.tolerance is None:
-            asked = Accuracy(all=USUAL)
-        if asked is None or line.model is not None:
-            return asked
-        return of_unnamed_model(asked, any(x.pipe is not None and x.pipe.max_stress for x in line.sections))
-
-    def _places(self, line: JoinedLine) -> dict[str, Triple | None]:
-        """Where the points of a line are first [m], a free one no farther from the other than the line is long; None:
-
-        a free end that is where the first shape of the line has it.
-        """
-        names = {"start": line.start, "end": line.end}
-        places = {key: self._known_place(name) for key, name in names.items()}
-        start, end = places["start"], places["end"]
-        if start is None or end is None:
-            return places
-        distance = math.dist(start, end)
-        part = REACHED * line.cable.length / distance if distance > 0.0 and not self.starts_as_placed else 1.0
-        for key, (x, y, z), (a, b, c) in (("end", end, start), ("start", start, end)):
-            if part < 1.0 and not self.is_held(names[key]):
-                places[key] = (a + part * (x - a), b + part * (y - b), c + part * (z - c))
-                break
-        return places
-
-    @property
-    def points_kept(self) -> int:
-        """How many places along all lines are kept at every output, but for those that are added."""
-        kept = (self.output.points_of(name) for name in self.lines)
-        return sum(x if isinstance(x, int) else len(x) for x in kept)
-
-    @property
-    def lasting_period(self) -> float:
-        """The shortest period of waves and motions [s]; infinity: there is none."""
-        given = (*self.points.values(), *self.bodies.values())
-        motions = [(getattr(x, "motion", None), getattr(x, "position", None)) for x in given]
-        moved = [Held(motion, place, (1.0, 0.0, 0.0)) for motion, place in motions if motion is not None]
-        return lasting_period([*moved_in(None, self.obstacles), *((x, x.motion) for x in moved)], self.environment)
-
-    @property
-    def output_interval(self) -> float:
-        """Time between two outputs [s]."""
-        return interval_of_outputs(self.output.every, self.require_time(), self.lasting_period, self.size_of_output)
-
-    @property
-    def size_of_output(self) -> int:
-        """Bytes of an output in the file, roughly."""
-        time, asked = self.time, self.output.errors
-        wanted = self.accuracy is not None or (time is not None and time.controlled)
-        return size_of_output(self.points_kept, wanted if asked is None else asked)
-
-    def require_time(self) -> Time:
-        """The `time` table; SceneError if there is none."""
-        if self.time is None:
-            raise SceneError([missing_time(self)])
-        return self.time
 
     @model_validator(mode="after")
     def _lines_join_points(self) -> System:
         for findings in system_findings(self):
             refuse(findings)
         return self
+
+
+def system_findings(system: Network) -> Iterator[Iterator[Finding]]:
+    """What contradicts in a system, in groups: of the first one with findings no later one makes sense."""
+    yield _unknown_names(system)
+    yield _refused_combinations(system)
+    yield chain(_lonely_points(system), () if system.starts_as_placed else floating_groups(system))
+    yield _start_findings(system)
+    yield connection_findings(system)
+    yield _touching_findings(system)
+    yield chain.from_iterable(_body_findings(system, name) for name in system.bodies)
+    yield chain.from_iterable(_moment_findings(system, name) for name in system.points)
+    yield chain.from_iterable(_line_findings(system, name) for name in system.lines)
+    yield _in_a_plane(system)
+    yield travel_findings(system)
+    yield elevation_has_waves(system.output, system.environment)
+    yield of_several_lines(system.output.quantities, system.lines, system.environment.seabed is not None)
+
+
+def _refused_combinations(system: Network) -> Iterator[Finding]:
+    yield from dict.fromkeys(x for tables in tables_of(system) for x in refused(tables))
+
+
+def _unknown_names(system: Network) -> Iterator[Finding]:
+    for name, line in system.lines.items():
+        for key in ("start", "end"):
+            yield from _unknown(getattr(line, key), system.points, ("lines", name, key), "point")
+    for name, point in system.points.items():
+        if isinstance(point, Fairlead):
+            yield from _unknown(point.body, system.bodies, ("points", name, "body"), "body")
+    for i, pair in enumerate(system.contact.between or () if system.contact is not None else ()):
+        for k, name in enumerate(pair):
+            yield from _unknown(name, system.lines, ("contact", "between", i, k), "line")
+        if pair[0] == pair[1]:
+            expected = "two lines; whether a line touches itself is asked by lines.NAME.contact"
+            yield Finding(("contact", "between", i), expected, "name another line, or leave the pair out")
+    points = system.output.points
+    for key, names in (("history", system.output.history), ("points", points if isinstance(points, dict) else {})):
+        for name in names:
+            yield from _unknown(name, system.lines, ("output", key, name), "line")
+
+
+def _lonely_points(system: Network) -> Iterator[Finding]:
+    for name, point in system.points.items():
+        if not system.lines_at(name):
+            kind = "a free point" if isinstance(point, FreePoint) else "a point"
+            expected = f"{kind} at which a line starts or ends"
+            yield Finding(
+                ("points", name), expected, f"leave it out, or let a line end there: `end: {name}`", "no line"
+            )
+        elif isinstance(point, GuidedPoint):
+            yield from _guided_findings(system, name)
+        elif isinstance(point, FreePoint) and point.initial_guess is None and not system.is_free_end(name):
+            expected = "three numbers [x, y, z], in m, from where the equilibrium of the lines that meet here is sought"
+            yield Finding(("points", name, "initial_guess"), expected, "add `initial_guess: [x, y, z]` (m)", "nothing")
+        elif isinstance(point, FreePoint) and all(system.breaks(*at) for at in system.lines_at(name)):
+            line, _ = system.lines_at(name)[0]
+            expected = f"a line at point {name} that does not break there and carries what is left"
+            fix = "leave it out of one of them, or let it break at its other end"
+            yield Finding(("lines", line, "break_at"), expected, fix)
+    on = {point.body for point in system.points.values() if isinstance(point, Fairlead)}
+    for name in system.bodies:
+        if name not in on and name not in system.shaped:
+            fix = f"add a point `{{body: {name}, place: [0, 0, 0]}}` and a line to it, or leave the body out"
+            yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
+
+
+def _guided_findings(system: Network, name: str) -> Iterator[Finding]:
+    """What is wrong with a guided point: one line is clamped there, in a direction of the world."""
+    (line, end), *others = system.lines_at(name)
+    if others:
+        expected = "free, because a guided point is the end of one line, and several end here"
+        yield Finding(("points", name, "kind"), expected, "clamp the lines to each other: `kind: free`", "guided")
+    held, at = system.clamp(line, end), ("lines", line, "connections", end)
+    if held is None or held.tangent is None:
+        expected = f"the direction in which point {name} holds the line"
+        yield Finding((*at, "tangent"), expected, "add `tangent: [0, 0, 1]`", "nothing")
+        return
+    wrong = [key for key in ("swivel", "bend_stiffness", "payout") if getattr(held, key) not in (None, False)]
+    for key in wrong:
+        expected = f"nothing, because point {name} is guided: without a `normal` it lets the line spin"
+        yield Finding((*at, key), expected, "leave it out")
+
+
+def floating_groups(system: Network) -> Iterator[Finding]:
+    """Free points and bodies from which no way along lines leads to what is fixed: none of them has an equilibrium."""
+    ways = [{x.start, x.end} for x in system.lines.values()]
+    ways += [{p, f"body {x.body}"} for p, x in system.points.items() if isinstance(x, Fairlead)]
+    held = {name for name, point in system.points.items() if isinstance(point, FixedPoint)}
+    fluid = system.environment.fluid
+    if system.environment.seabed is not None or (fluid is not None and fluid.surface is not None):  # may bear a line
+        alone = [x for x in system.lines.values() if system.is_free_end(x.start) and system.is_free_end(x.end)]
+        held |= {p for x in alone for p in (x.start, x.end)}  # each of them is judged by itself
+    held |= {f"body {name}" for name, body in system.bodies.items() if isinstance(body, FixedBody)}
+    while more := {p for way in ways if way & held for p in way} - held:
+        held |= more
+    for name, point in system.points.items():
+        if name not in held and isinstance(point, FreePoint):
+            expected = "a free point that lines join to a fixed one, at least by way of others"
+            yield Finding(("points", name), expected, "make one of these points `kind: fixed`", "nothing holds it")
+    for name in system.bodies:
+        if f"body {name}" not in held and name not in system.shaped:
+            expected = "a free body that lines join to what is fixed, at least by way of other points"
+            yield Finding(("bodies", name), expected, "let one of its lines end at a fixed point", "nothing holds it")
+
+
+def _start_findings(system: Network) -> Iterator[Finding]:
+    """Lines of which some start in equilibrium and others do not, and a velocity that points do not have."""
+    placed = [name for name, line in system.lines.items() if not isinstance(line.initial, Equilibrium)]
+    for name, line in system.lines.items() if placed else ():
+        if isinstance(line.initial, Equilibrium):
+            expected = f"straight or points, because line {placed[0]} starts so, and nothing is in equilibrium then"
+            fix = "say so of every line; points and bodies start at rest where initial_guess has them"
+            yield Finding(("lines", name, "initial"), expected, fix, "equilibrium")
+        elif any(getattr(line.initial, "velocity", None) or ()) and any(map(system.is_joined, (line.start, line.end))):
+            expected = "rest, because the points of the line start at rest"
+            yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
+
+
+def _touching_findings(system: Network) -> Iterator[Finding]:
+    """Lines that touch others have a diameter, and there are others."""
+    if system.contact is not None and len(system.lines) == 1:
+        expected = "nothing, because there is one line; whether it touches itself is asked by lines.NAME.contact"
+        yield Finding(("contact",), expected, "leave it out")
+    for name in dict.fromkeys(x for pair in system.touching_pairs for x in pair):
+        for i, section in enumerate(system.lines[name].sections):
+            if section.diameter is None:
+                expected = "a number > 0, in m, which lines that touch each other keep apart (contact)"
+                yield Finding(("lines", name, "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
+
+
+def _body_findings(system: Network, name: str) -> Iterator[Finding]:
+    """What is wrong with the motion of a body, or with what is given to act on it."""
+    body, still = system.bodies[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
+    if isinstance(body, FreeBody):
+        in_water = [key for key in ("volume", "hydrostatics", "damping", "added_mass", "members") if getattr(body, key)]
+        if in_water and system.environment.fluid is None:
+            expected = f"a fluid, because body {name} has {in_water[0]}"
+            yield Finding(("environment",), expected, "add `fluid: {density: 1025}`", "no fluid")
+    joined = (x for x in system.lines.values() for p in (x.start, x.end) if system.body_of(p) is body)
+    line = next(joined, next(iter(system.lines.values())))
+    if name in system.shaped and name in system.obstacles:
+        expected = f"a name that no obstacle has, because body {name} has a shape"
+        yield Finding(("obstacles", name), expected, "name the one or the other differently")
+    ends = Ends(start=still, end=body.end) if isinstance(body, FreeBody) else None
+    if isinstance(body, FixedBody):
+        moved = Clamped(position=body.position, tangent=(1.0, 0.0, 0.0), motion=body.motion)
+        ends = Ends(start=moved, end=Free())
+    yield from _load_findings(system, ends, line, ("bodies", name))
+
+
+def _moment_findings(system: Network, name: str) -> Iterator[Finding]:
+    """What is wrong with the moment on a free point."""
+    point, still = system.points[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
+    if isinstance(point, FreePoint) and point.moment is not None:
+        ends, (line, _) = Ends(start=still, end=Free(moment=point.moment)), system.lines_at(name)[0]
+        yield from _load_findings(system, ends, system.lines[line], ("points", name))
+
+
+def _load_findings(system: Network, ends: Ends | None, line: JoinedLine, at: Place) -> Iterator[Finding]:
+    """What is wrong with motions and loads of ends that stand for what is at another place of the system."""
+    tables = {"ends": ends, "time": system.time, "cable": line.cable, "environment": system.environment}
+    for found in motion_findings(tables):
+        where = (*at, *found.at[2:]) if found.at[:1] == ("ends",) else found.at
+        yield Finding(where, found.expected, found.fix, found.given)
+
+
+def _line_findings(system: Network, name: str) -> Iterator[Finding]:
+    """What is wrong with a line and its points, each under its own key of the system."""
+    wrong: dict[Finding, None] = {}  # each once
+    for carrying in ((), *((key,) for key in system.carried(name))):
+        try:
+            scene = system.scene_of(name, carrying)
+            wrong |= dict.fromkeys(motion_findings({key: getattr(scene, key) for key in Scene.model_fields}))
+        except ValidationError as error:
+            for each in error.errors(include_url=False):
+                at = tuple(x for x in each["loc"] if not str(x).startswith("<"))
+                for found in (each.get("ctx") or {}).get("findings", ()):
+                    wrong[Finding((*at, *found.at), found.expected, found.fix, found.given)] = None
+        if wrong:
+            break
+    yield from (_of_system(system, name, found) for found in wrong)
+
+
+def _in_a_plane(system: Network) -> Iterator[Finding]:
+    """What leaves the plane of all lines."""
+    scenes = {name: system.scene_of(name, system.carried(name)) for name in system.lines if system.dimension == 2}
+    tables = [(x.environment, x.ends, x.initial) for x in scenes.values()]
+    found = {
+        _of_system(system, name, each): None
+        for name, x in scenes.items()
+        for each in plane_of(x.environment, x.cable, x.ends, x.initial, TYPED, tables)[1]
+    }
+    yield from found
+
+
+def _of_system(system: Network, name: str, found: Finding) -> Finding:
+    line, at = system.lines[name], found.at
+    if at[:1] == ("obstacles",):  # which are those of all lines
+        carried = len(at) > 1 and at[1] in system.shaped
+        return replace(found, at=("bodies", at[1], "shape", *at[2:])) if carried else found
+    if at[:1] == ("cable",):
+        at = ("lines", name, *at[1:])
+    elif at[:1] in (("model",), ("mesh",), ("resolution",), ("initial",)) or (
+        at[:1] == ("accuracy",) and line.accuracy is not None
+    ):
+        at = ("lines", name, *at)
+    elif at[:2] == ("output", "history") or (at[:2] == ("output", "points") and len(at) > 2):
+        at = (*at[:2], name, *at[2:])
+    elif at[:1] == ("accuracy",):
+        expected = f"{found.expected}, in line {name}"
+        return Finding(at, expected, f"{found.fix}; or give the other lines an `accuracy` of their own", found.given)
+    elif at[:1] == ("ends",) and len(at) > 1:
+        point = getattr(line, str(at[1]))
+        rest = at[2:]
+        if rest[:1] in (("normal",), ("turns",), ("payout",)):
+            at = ("lines", name, "connections", *at[1:])
+            words = (x.replace("ends.", f"lines.{name}.connections.") for x in (found.expected, found.fix))
+            expected, fix = (x.replace("cable.", f"lines.{name}.") for x in words)
+            return Finding(at, expected, fix, found.given)
+        if rest[:1] == ("tangent",):
+            at = ("lines", name, "connections", str(at[1]), *rest)
+            return Finding(at, found.expected, found.fix, found.given)
+        if isinstance(system.points[point], FreePoint) and rest:
+            rest = ({"position": "initial_guess", "thrust": "force"}.get(str(rest[0]), rest[0]), *rest[1:])
+        at = ("points", point, *rest)
+        if isinstance(found_point := system.points[point], Fairlead):
+            moved = rest[:1] == ("motion",)
+            at = ("bodies", found_point.body, *rest) if moved else ("points", point, "place")
+    given = f"of line {name}: {found.given}" if found.given else None
+    return Finding(at, found.expected.replace("ends.", "line's "), found.fix, given)
+
+
+def _unknown(name: str, known: Mapping[str, Any], at: Place, what: str) -> Iterator[Finding]:
+    if name not in known:
+        tables = {"point": "points", "body": "bodies", "line": "lines"}[what]
+        expected = f"the name of a {what}: {', '.join(known) or 'there is none'}"
+        fix = nearest(name, dict.fromkeys(known, "")) or f"add `{name}: ...` to {tables}"
+        yield Finding(at, expected, fix)
+
+
+# --- how the ends of lines are connected ---------------------------------------------------------
+
+
+def connection_findings(system: Network) -> Iterator[Finding]:
+    """What is wrong with the connections of a system of lines."""
+    for name in system.lines:
+        for key in ("start", "end"):
+            held = system.clamp(name, key)
+            if held is not None:
+                yield from _clamp_findings(system, name, key, held)
+            payout = getattr(system.lines[name].connections, key).payout
+            if payout is not None and isinstance(system.points[getattr(system.lines[name], key)], FreePoint):
+                fix = "make the point `kind: fixed`, or the fairlead of a body"
+                expected = "nothing, because a winch stands on a fixed point or on a body"
+                yield Finding(("lines", name, "connections", key, "payout"), expected, fix)
+    for name, point in system.points.items():
+        if isinstance(point, FixedPoint) and point.motion is not None and not system.clamped_at(name):
+            for turn in (x for x in point.motion.harmonics() if x in TURNS):
+                fix = "leave it out, or clamp a line there: `connections: {end: {tangent: [0, 0, 1]}}`"
+                expected = "no rotation, because lines turn freely at a point"
+                yield Finding(("points", name, "motion", turn), expected, fix)
+        elif isinstance(point, FreePoint):
+            yield from _rigid_point_findings(system, name)
+
+
+def _clamp_findings(system: Network, name: str, key: str, held: ClampedConnection) -> Iterator[Finding]:
+    line, point = system.lines[name], getattr(system.lines[name], key)
+    at = ("lines", name, "connections", key)
+    if not (system.is_held(point) or holds_rod(line.chosen_model, key, line.cable.length)):
+        expected = "pinned, because this end of the line is a catenary, which has no moment"
+        yield Finding(at, expected, "give `bending_stiffness` to all sections, and `model: rod`", "clamped")
+    if held.tangent is None and not isinstance(system.points[point], FreePoint):
+        yield Finding((*at, "tangent"), "the direction of the line at this end", "add `tangent: [0, 0, 1]`", "nothing")
+
+
+def _rigid_point_findings(system: Network, name: str) -> Iterator[Finding]:
+    """What is wrong with lines that are clamped to a free point."""
+    here, point = system.clamped_at(name), system.points[name]
+    if not here:
+        takes = system.is_free_end(name) and isinstance(point, FreePoint) and not point.is_body
+        if isinstance(point, FreePoint) and point.moment is not None and not takes:
+            expected = "nothing, because all lines turn freely at this point: nothing there takes a moment"
+            fix = "leave it out, or clamp two lines there: `connections: {end: clamped}` of one, `{start: clamped}`"
+            yield Finding(("points", name, "moment"), expected, fix)
+        return
+    line, key = here[0]
+    at = ("lines", line, "connections", key)
+    held = [system.clamp(*x) for x in here]
+    if len(here) == 1:
+        expected = f"another line that is clamped at point {name}, because a free point alone holds no direction"
+        yield Finding(at, expected, "clamp a second line there, or none, or make the point `kind: guided`", "one line")
+    elif all(x is not None and x.bend_stiffness == 0.0 for x in held):
+        expected = f"a line at point {name} without bend_stiffness 0: nothing holds the direction of the point"
+        yield Finding((*at, "bend_stiffness"), expected, "leave it out for one of them", "0")
+    elif len(here) > 2 or any(x is not None and x.tangent is not None for x in held):
+        for (line, key), x in zip(here, held, strict=True):
+            if x is not None and x.tangent is None:
+                expected = f"the direction of the line in axes of point {name}, the same for all lines there"
+                where = ("lines", line, "connections", key, "tangent")
+                yield Finding(where, expected, "add `tangent: [1, 0, 0]`, and fitting ones to the others", "nothing")
+
+
+# --- how far points that are held may be from each other -----------------------------------------
+
+
+def travel_findings(system: Network) -> Iterator[Finding]:
+    """Points that are, or move, farther from another than all lines between them are long, at the utmost strain."""
+    fails = [*system.lines.values(), *(x for x in system.points.values() if isinstance(x, FixedPoint | Fairlead))]
+    breaks = any(x.break_at is not None for x in fails)  # what is broken reaches anywhere
+    duration = system.time.duration if system.time is not None and not breaks else 0.0
+    placed = {name: system.first_place(name) for name in system.points if system.is_held(name)}
+    motions = {name: _motion(system, name) for name in placed}
+    beside = _neighbours(system)
+    for name, other, reach, between in _held_pairs(placed, motions, beside):
+        if not between or _beside(system, name, other):
+            continue
+        most = reach * (1.0 + SAME_LENGTH)
+        distance, t = farthest((placed[name], placed[other]), (motions[name], motions[other]), duration, most)
+        if distance <= most:
+            continue
+        motion, long = motions[name], sum(system.lines[x].cable.length for x in between)
+        lines = f"line {between[0]}" if len(between) == 1 else f"lines {', '.join(reversed(between))}"
+        expected = f"at most {reach:.8g} m from point {other}, as far as {lines} of {long:.8g} m may reach (max_strain)"
+        key = moving_key(motion) if motion is not None and t > 0.0 else ""
+        moved = shift(motion, t)
+        at = ", ".join(f"{x + by:.6g}" for x, by in zip(placed[name], moved, strict=True))
+        far = f"{distance:.8g} m from point {other}"
+        if key:
+            fix, given = f"longer lines, or {smaller(key)}", f"motion to [{at}] at t = {t:.6g} s, {far}"
+            yield Finding(("points", name, "motion", key), expected, fix, given)
+        else:
+            yield Finding(("points", name), expected, "longer lines, or points that are nearer", f"[{at}], {far}")
+        return
+
+
+def _motion(system: Network, name: str) -> Motion | None:
+    """The motion of a fixed point, if tables move it."""
+    point = system.points[name]
+    motion = point.motion if isinstance(point, FixedPoint) else None
+    return motion if motion is not None and moving_key(motion) else None
+
+
+def _beside(system: Network, a: str, b: str) -> bool:
+    """Whether a point is on a body that moves as is known, whose motion is not followed here."""
+    bodies = [system.body_of(x) for x in (a, b)]
+    return any(isinstance(x, FixedBody) and x.motion is not None for x in bodies)
+
+
+# Points beside each point: how far (m) they may be from it at most, and the line between them, if it is one.
+Neighbours = Mapping[str, list[tuple[str, float, tuple[str, ...]]]]
+
+
+def _neighbours(system: Network) -> Neighbours:
+    """Points beside each point, along a line or on the same free body."""
+    beside: dict[str, list[tuple[str, float, tuple[str, ...]]]] = {name: [] for name in system.points}
+    for key, line in system.lines.items():
+        if line.connections.start.payout is not None or line.connections.end.payout is not None:
+            continue
+        far = line.cable.length if line.cable.inextensible else line.cable.reach
+        beside[line.start].append((line.end, far, (key,)))
+        beside[line.end].append((line.start, far, (key,)))
+    on: dict[str, list[tuple[str, Fairlead]]] = {}
+    for name, x in system.points.items():
+        if isinstance(x, Fairlead) and system.is_joined(name):
+            on.setdefault(x.body, []).append((name, x))
+    for same in on.values():
+        for (a, one), (b, two) in combinations(same, 2):
+            apart = math.dist(one.place, two.place)
+            beside[a].append((b, apart, ()))
+            beside[b].append((a, apart, ()))
+    return beside
+
+
+def _held_pairs(
+    placed: Mapping[str, Any], motions: Mapping[str, Motion | None], beside: Neighbours
+) -> Iterator[tuple[str, str, float, tuple[str, ...]]]:
+    """Each two points that are held and that lines or bodies join: the one that moves, if one does, the other, how far
+
+    (m) it may be, and the lines between them.  In the order of the scene.
+    """
+    order = {name: i for i, name in enumerate(placed)}
+    ways = {name: _reaches(beside, name) for name in placed}
+    for a, i in order.items():
+        for b in sorted((x for x in ways[a] if order.get(x, -1) > i), key=order.__getitem__):
+            name, other = (a, b) if motions[a] is not None else (b, a)
+            reach, between = ways[name][other]
+            yield name, other, reach, between
+
+
+def _reaches(beside: Neighbours, begin: str) -> Mapping[str, tuple[float, tuple[str, ...]]]:
+    """How far (m) each point may at most be from one that is held, along lines and bodies that are free, and which
+
+    lines these are.
+    """
+    reach: dict[str, tuple[float, tuple[str, ...]]] = {}
+    queue: list[tuple[float, str, tuple[str, ...]]] = [(0.0, begin, ())]
+    while queue:
+        far, name, lines = heapq.heappop(queue)
+        if name not in reach:
+            reach[name] = far, lines
+            for other, more, by in beside[name]:
+                heapq.heappush(queue, (far + more, other, lines + by))
+    return reach

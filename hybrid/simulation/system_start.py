@@ -19,8 +19,7 @@ from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
-from hybrid.scene.system_checks import floating_groups
+from hybrid.scene.system import System, floating_groups
 from hybrid.simulation.blended import blended_text, note_drawn, rotate_ends_in
 from hybrid.simulation.contact_start import refuse_start_in_obstacles
 from hybrid.simulation.diagnostics import borne_strain

@@ -23,10 +23,11 @@ from hybrid.model.system import SystemModel, build_system
 from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.bodies import FixedBody, FreeBody, HeldBody
 from hybrid.scene.body_shapes import BodyShape
+from hybrid.scene.network import JoinedLine
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.suggestions import nearest
-from hybrid.scene.system import JoinedLine, System
+from hybrid.scene.system import System
 from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.system_contact import refuse_within_itself
 from hybrid.simulation.system_contact_equilibrium import contacts_of

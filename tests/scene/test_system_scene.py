@@ -9,9 +9,10 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene.bodies import FixedBody, FreeBody, Hydrostatics
+from hybrid.scene.network import JoinedLine, SystemOutput
 from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
 from hybrid.scene.read import parse_either, scene_text
-from hybrid.scene.system import JoinedLine, System, SystemOutput
+from hybrid.scene.system import System
 
 PAGE = Path(__file__).parents[2] / "docs" / "scene.md"
 TEXT = """\
