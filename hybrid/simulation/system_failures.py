@@ -68,6 +68,7 @@ class Failures:
     def _break(self, k: int, why: str) -> None:
         run, x = self._run, self.all[k]
         line, end = x.ends[0]
+        run.output_due()
         if run.payout is not None:
             run.payout.let_go(x.ends)
         before, states, energy = run.model.models, run.state.lines, 0.0

@@ -755,7 +755,8 @@ class SystemRun:
         self.loop.restart()
 
     def _arrive(self, stop: float, step: float) -> None:
-        """What is due at a stop (s): other loads, and an output."""
+        """What is due at a stop (s): an output, which is of the moment before, and other loads."""
+        self.output_due()
         if falls_on(stop, self._breaks, step):
             self.ends_of_now()
             self.loaded = self.t
@@ -765,6 +766,9 @@ class SystemRun:
             self.leg = (stop, 0)
         if self.system.output.exact or self.resolution.one.ends:
             self.leg = (stop, 0)
+
+    def output_due(self) -> None:
+        """Make the output that is due now, if one is: before loads, or what holds lines, become others."""
         if self.loop.due:
             self._attach()
             self._output()
