@@ -410,7 +410,7 @@ def test_buoy_follows_an_irregular_sea() -> None:
     assert chain.min() == pytest.approx(-178, rel=0.3)
     end = result.touchdown[late, 1]
     assert 32 < end.min() < 34 and 38 < end.max() < 40
-    assert result.events[0].kind == "static friction neglected"
+    assert "static friction neglected" not in {event.kind for event in result.events}
 
 
 def event_times(result: hybrid.Result, kind: str) -> list[float]:

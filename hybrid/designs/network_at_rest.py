@@ -122,7 +122,7 @@ class NetworkAtRest(OfScene):
         SceneError, ComputationError: as of `hybrid.sensitivity`.
         """
         wanted = [parse_result_of(scene, x) for x in of]
-        self.scene, system, resolution, self._form = _network_of(scene)
+        self.scene, system, resolution, self._form = _network_of(scene.without_friction())
         refuse_use(self.scene, "derivatives", given="hybrid sensitivity")
         finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
         resolution = replace(resolution, lines=finely)

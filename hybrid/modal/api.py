@@ -150,7 +150,7 @@ def _found(asked: Scene | System, cells: float, count: int, near: float | None, 
 
     They are more than `count`: what nothing holds is told apart from them, such as lines that turn about their axis.
     """
-    rest = equilibrium_of(asked, cells)
+    rest = equilibrium_of(asked, cells, sticks)
     network = linear_network(rest.solver, rest.states, rest.names, sticks, touching=rest.touching)
     count += 2 + len(rest.names) + 3 * network.bodies
     eigen = lowest_modes(network, count, None if near is None else 2.0 * math.pi / near)
@@ -165,13 +165,14 @@ def _found(asked: Scene | System, cells: float, count: int, near: float | None, 
     return _Found(network, eigen, rest.points, rest.bodies, axes, touched, together, sheaves)
 
 
-def equilibrium_of(asked: Scene | System, cells: float = 1.0) -> Rest:
+def equilibrium_of(asked: Scene | System, cells: float = 1.0, friction: bool = True) -> Rest:
     """The equilibrium on the usual mesh, or on one whose cells are so many times as long.
 
-    SceneError: the scene is refused; ComputationError: there is none.
+    friction: whether that settles where the scene says nothing of it.  SceneError: the scene is refused;
+    ComputationError: there is no equilibrium.
     """
     at_rest: Any = _network_at_rest if asked.line_names else _cable_at_rest
-    found: Rest = at_rest(asked, cells)
+    found: Rest = at_rest(asked if friction else asked.without_friction(), cells)
     return found
 
 

@@ -56,7 +56,7 @@ def response(scene: SceneLike | System, friction: bool = True, check: float | No
     """
     asked = as_scene_or_system(scene)
     refuse_use(asked, "response")
-    rest = equilibrium_of(asked)
+    rest = equilibrium_of(asked, friction=friction)
     refuse_motions(rest.models, rest.names)
     omegas = frequencies_of(rest.models, [x.members.sea.waves for x in rest.floats if x.members is not None])
     if not omegas.size:

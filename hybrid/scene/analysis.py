@@ -122,12 +122,14 @@ class Equilibrium(Table):
         "inertial frame [m]",
     )
 
-    friction: Annotated[Literal["neglected", "settled"], Renamed({"left_out": "neglected"})] = Field(
-        default="neglected",
+    friction: Annotated[Literal["neglected", "settled"] | None, Renamed({"left_out": "neglected"})] = Field(
+        default=None,
         description="on a seabed and on obstacles with friction: neglected (the equilibrium without it, where there is "
-        "one, which is one with it as well), or settled (guess auto or catenary: laid there in still water without "
-        "tension, then pulled tight against friction; a given shape, or where that fails: the line comes to rest from "
-        "its first shape)",
+        "one, which is one with it as well: of a line that was laid under tension), or settled (guess auto or "
+        "catenary: laid there in still water without tension, then pulled tight against friction; a given shape, or "
+        "where that fails: the line comes to rest from its first shape); absent: settled on a bed with guess auto "
+        "or catenary, but neglected, with an event that says so, of a line that lies on obstacles, is paid out, may "
+        "touch a line, a body or what moves, or is not found so",
     )
 
     @model_validator(mode="after")
@@ -141,6 +143,13 @@ class Equilibrium(Table):
             expected = f"nothing, because a direction is for a straight guess and guess is {self.guess}"
             refuse([Finding(("direction",), expected, "leave direction out, or use guess: straight")])
         return self
+
+
+def without_friction(initial: Straight | Points | Equilibrium) -> Straight | Points | Equilibrium:
+    """The same with friction neglected, unless the scene says how it settles."""
+    if initial.kind != "equilibrium" or initial.friction is not None:
+        return initial
+    return initial.model_copy(update={"friction": "neglected"})
 
 
 _Shape = (

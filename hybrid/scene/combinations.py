@@ -348,7 +348,7 @@ ESTIMATED = Feature("estimated errors, accuracy, steps that it chooses", "accura
                     _either(CHOSEN_STEPS, ACCURACY, ERRORS))  # fmt: skip
 SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "initial.friction",
                            _asks("initial", "friction",
-                                 lambda x: getattr(x, "friction", "neglected") != "neglected"))  # fmt: skip
+                                 lambda x: getattr(x, "friction", None) == "settled"))  # fmt: skip
 
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))

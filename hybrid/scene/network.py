@@ -32,6 +32,7 @@ from hybrid.scene.analysis import (
     Time,
     interval_of_outputs,
     size_of_output,
+    without_friction,
 )
 from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import (
@@ -320,6 +321,11 @@ class Network(Table):
     def starts_as_placed(self) -> bool:
         """Whether the motion starts where the scene has lines, points and bodies, at rest, and not in equilibrium."""
         return any(not isinstance(line.initial, Equilibrium) for line in self.lines.values())
+
+    def without_friction(self) -> Self:
+        """The same whose equilibrium neglects friction, unless the scene says how it settles."""
+        lines = {k: x.model_copy(update={"initial": without_friction(x.initial)}) for k, x in self.lines.items()}
+        return self.model_copy(update={"lines": lines})
 
     def searched(self) -> Self:
         """The same, whose shapes at the start are those from which the equilibrium is searched for."""

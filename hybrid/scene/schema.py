@@ -34,6 +34,7 @@ from hybrid.scene.analysis import (
     interval_of_outputs,
     size_of_output,
     usual_model,
+    without_friction,
 )
 from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
 from hybrid.scene.base import Table, Text, Vector, refuse
@@ -255,6 +256,10 @@ class Scene(Table):
         time, asked = self.time, self.output.errors
         wanted = self.accuracy is not None or (time is not None and time.controlled)
         return size_of_output(self.points_kept, wanted if asked is None else asked)
+
+    def without_friction(self) -> Scene:
+        """The same whose equilibrium neglects friction, unless the scene says how it settles."""
+        return self.model_copy(update={"initial": without_friction(self.initial)})
 
     def require_time(self) -> Time:
         """The `time` table; SceneError if the scene has none."""

@@ -27,7 +27,15 @@ from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, Clock
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION, SOIL
+from hybrid.kernels.state.forces import (
+    FRICTION,
+    OBSTACLES,
+    PLANAR,
+    SEABED,
+    SELF_CONTACT,
+    SELF_FRICTION,
+    SOIL,
+)
 from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RIDES
 from hybrid.kernels.state.report import BEND, TWIST_NODE
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, ends_in, state_in
@@ -242,7 +250,7 @@ class Diagnostics:
         """What a static solution leaves open."""
         self.found_by(found.pushed, found.slack, found.state)
         if not found.with_friction:
-            self.friction_neglected(found.state, "initial")
+            self.friction_neglected(found.state, "initial", not_settled=found.not_settled)
         if self._model.line.bits & SELF_FRICTION and found.touch.any():
             text = "this equilibrium is the one without friction where the line touches itself"
             where = f"{text}: a run with damping that comes to rest in contact has it"
@@ -263,10 +271,11 @@ class Diagnostics:
             text = f"the stability of this equilibrium is not judged, because {why}"
             self.events.event(0.0, 0.0, self._model.length, "stability not judged", text)
 
-    def friction_neglected(self, state: State, key: str, shares: bool = False) -> None:
+    def friction_neglected(self, state: State, key: str, shares: bool = False, not_settled: str = "") -> None:
         """Of an equilibrium without friction that touches what has some; key: of the scene, that asks for it.
 
         shares: whether the line touches others.  Beside these, and what moves, friction settles in a motion alone.
+        not_settled: why it has not where the scene leaves that to the program.
         """
         line = self._model.line
         on = rubs_on(line, self._model.sea.values, self._model.ends.values.held, state)
@@ -275,7 +284,11 @@ class Diagnostics:
         text = f"this equilibrium is the one without friction {' and '.join(on)}: "
         if shares or line.moved.size:
             text += "a run with damping that comes to rest has it"
+        elif not_settled:
+            text += f"none was found that is pulled tight from where the line lay without tension ({not_settled})"
         else:
+            if self._model.payout is not None or line.bits & SELF_CONTACT:
+                text += "what is paid out or forms loops was laid under tension; "
             text += f"say `{key}: {{kind: equilibrium, friction: settled}}` for one that lies where it was laid"
         self.events.event(0.0, 0.0, self._model.length, "static friction neglected", text)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -10,7 +11,7 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
 from hybrid.kernels.mesh.zone_criteria import twist_of_rods
-from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, OBSTACLES, PLANAR
+from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, OBSTACLES, PLANAR, SELF_CONTACT
 from hybrid.kernels.state.state import Line, State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
@@ -24,7 +25,7 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.contact_equilibrium import settled_from, with_contact
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.slack_bends import slack_remedy
-from hybrid.solve.flaws import behind_obstacles, overstretched_cell, passed_obstacles
+from hybrid.solve.flaws import ON_BED, behind_obstacles, overstretched_cell, passed_obstacles, rubs_on
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import PUSHED, Equilibrium, Search, solve_statics
 
@@ -62,7 +63,7 @@ def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
 def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
     """Equilibrium of a line that nothing keeps from passing through itself."""
     try:
-        found = _by_coarser(scene, model, t) or _statics(scene, model, t)
+        found = _as_laid(scene, model, t)
         count_turns(scene, model, t, found.state)
         return found
     except ComputationError as failed:
@@ -142,7 +143,15 @@ def solve_like(model: Model, t: float, start: State, like: Equilibrium) -> Equil
     """The equilibrium near a start, found as another one was: with friction on the bed, or in contact with itself."""
     if like.touch.size:
         return settled_from(model, t, start, near=True)
-    return solve_model(model, t, start, Search("start" if like.with_friction else ""))
+    if like.with_friction and not like.pulled:
+        return solve_model(model, t, start, Search("start"))
+    found = solve_model(model, t, start, Search())
+    if not like.pulled:
+        return replace(found, not_settled=like.not_settled)
+    try:  # travel is of the size of strains, which other cells do not keep
+        return pulled_from(found, lambda: solve_model(model, t, found.state, Search("pull")))
+    except ComputationError as failed:
+        return replace(found, not_settled=failed.outcome.cause)
 
 
 def _untwisted(model: Model, line: Line, start: State) -> State:
@@ -152,8 +161,38 @@ def _untwisted(model: Model, line: Line, start: State) -> State:
     return out
 
 
-def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:
-    search = Search(settling(scene), quick, model.slack == "warn" and not quick, model.other_starts)
+def _as_laid(scene: Scene, model: Model, t: float) -> Equilibrium:
+    """Equilibrium with friction that has settled as the scene says; as it says nothing, that is where it can."""
+    way = settling(scene, model)
+    try:
+        found = _by_coarser(scene, model, t) or _statics(scene, model, t, "start" if way == "start" else "")
+    except ComputationError:
+        if way != "pull":
+            raise
+        return _statics(scene, model, t, "start")
+    on = rubs_on(model.line, model.sea.values, model.ends.values.held, found.state)
+    if found.with_friction or not (way == "pull" or (way == "usual" and on == [ON_BED])):
+        return found
+    try:
+        return pulled_from(found, lambda: _statics(scene, model, t, "pull", start=found.state))
+    except ComputationError as failed:
+        if way == "usual":
+            return replace(found, not_settled=failed.outcome.cause)
+        return _statics(scene, model, t, "start")
+
+
+def pulled_from(found: Equilibrium, pull: Callable[[], Equilibrium]) -> Equilibrium:
+    """The equilibrium with friction that a pull leads to from one without it, with what is known of that."""
+    laid = pull()
+    how = f"{laid.path[-1]}, {PUSHED}" if found.pushed else laid.path[-1]
+    return replace(laid, path=(*found.path[:-1], *laid.path[:-1], how), iterations=found.iterations + laid.iterations)
+
+
+def _statics(
+    scene: Scene, model: Model, t: float, settle: str = "", quick: bool = False, start: State | None = None
+) -> Equilibrium:
+    """The equilibrium by the ways of `Search`, from the start of the model or another."""
+    search = Search(settle, quick, model.slack == "warn" and not quick, model.other_starts)
 
     def keeps_turns(state: State) -> bool:
         try:
@@ -182,7 +221,7 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
         node = next((node for _, node in others), -1)
         return (Outcome.BURIED, node) if node >= 0 else (Outcome.OK, -1)
 
-    solve = partial(solve_model, model, t, model.start)
+    solve = partial(solve_model, model, t, model.start if start is None else start)
     if lies and model.start_shape in (HUNG, GIVEN):
         try:
             return solve(search._replace(refused=elsewhere))
@@ -194,15 +233,24 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
 
 def _settles(scene: Scene, model: Model, t: float) -> bool:
     """Whether friction holds the cable where it starts, so that no other start will do."""
-    return bool(model.line.bits & FRICTION) and (bool(settling(scene)) or not model.ends.at(t).held.any())
+    return bool(model.line.bits & FRICTION) and (settling(scene, model) == "start" or not model.ends.at(t).held.any())
 
 
-def settling(scene: Scene) -> str:
-    """How friction is to settle, as of `Search`: a shape that the scene gives is where the line was laid."""
-    asked = scene.initial
-    if not isinstance(asked, StaticStart) or asked.friction != "settled":
+def settling(scene: Scene, model: Model, touches: bool = False) -> str:
+    """How friction is to settle, as of `Search`: a shape that the scene gives is where the line was laid.
+
+    "usual": as "pull" on a bed alone, where that leads anywhere, else not, which a scene has that says nothing of it.
+    What is paid out was laid under tension; and friction of what moves or touches other lines (touches) is not known in
+    equilibria.
+    """
+    asked, line = scene.initial, model.line
+    if not line.bits & FRICTION or not isinstance(asked, StaticStart) or asked.friction == "neglected":
         return ""
-    return "pull" if asked.points is None and asked.guess in ("auto", "catenary") else "start"
+    hangs = asked.points is None and asked.guess in ("auto", "catenary")
+    if asked.friction == "settled":
+        return "pull" if hangs else "start"
+    meets = touches or line.moved.size or line.bits & SELF_CONTACT
+    return "usual" if hangs and not meets and model.payout is None else ""
 
 
 def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:

@@ -250,7 +250,9 @@ class LineResult:
         line = self.model.line
         self.diagnostics.found_by(found.pushed, slack_cell(x, state), state)
         if self.number not in found.with_friction:
-            self.diagnostics.friction_neglected(state, f"lines.{self.name}.initial", self.shares)
+            self.diagnostics.friction_neglected(
+                state, f"lines.{self.name}.initial", self.shares, found.not_settled.get(self.number, "")
+            )
         touches = found.settled and bool(self.books.touch[:1].any())
         if line.bits & SELF_FRICTION and touches:
             text = f"this equilibrium is the one without friction where {self._touched}"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from hybrid.simulation.equilibrium import count_turns, equilibrium_of, settling,
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
+from hybrid.solve.flaws import ON_BED, rubs_on
 from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
@@ -60,8 +62,9 @@ def equilibrium_of_system(system: System, model: SystemModel, t: float, friction
             return _keep_turns(model, t, _each_alone(system, model, t))
         found = solve_with_contact(model, joined_lines(model, t), numbers, lambda: _starts(system, model))
         _keep_turns(model, t, found)
-        if friction:
-            found = _with_friction(model, t, found, numbers)
+        if friction and not found.settled:
+            first = SystemState([x.start for x in model.models], model.body_places)
+            found = _with_friction(model, t, found, numbers, _ways(model), first)
         if not any(body.members for body in model.bodies):
             return found
         part, before = 1.0, None
@@ -112,18 +115,28 @@ def solve_from(
         return _keep_turns(model, t, _together(model, t, [solve_like(x, t, state, like) for x, state, like in each]))
     if found.settled:
         return _keep_turns(model, t, settle(model, lines, bodies, start, near=True))
-    if found.with_friction:
-        ways = dict.fromkeys(found.with_friction, "start")
-        return _keep_turns(model, t, settled_with_friction(lines, len(model.free), bodies, ways, found, start))
-    return _keep_turns(model, t, solve_system_statics(lines, len(model.free), bodies, iter([(name, start)])))
+    ways, why = {k: way for k, way in _ways(model).items() if k in found.with_friction}, found.not_settled
+    if "start" in ways.values():  # where the lines were laid, which nothing else leads to
+        ways = dict.fromkeys(ways, "start")
+    else:
+        found = solve_system_statics(lines, len(model.free), bodies, iter([(name, start)]))
+        found = _keep_turns(model, t, replace(found, not_settled=why))
+    return _with_friction(model, t, found, bodies, ways, start)
+
+
+def _ways(model: SystemModel) -> dict[int, str]:
+    """How friction of the bed settles (`settling`), by number of the lines of which it does."""
+    touching = set(model.touching.lines) if model.touching is not None else set()
+    each = enumerate(zip(model.names, model.models, strict=True))
+    found = {k: settling(model.scenes[name], x, k in touching or model.rides.size > 0) for k, (name, x) in each}
+    return {k: way for k, way in found.items() if way}
 
 
 def _are_alone(model: SystemModel, friction: bool) -> bool:
     """Whether each line is joined to nothing that moves and asks for no contact: what it finds, no other line knows."""
     joined = bool(model.free or len(model.body_places)) or model.touching is not None
     touches = any(x.line.bits & SELF_CONTACT for x in model.models)
-    settles = not friction and any(settling(model.scenes[name]) for name in model.names)
-    return not (joined or touches or settles)
+    return not (joined or touches or (not friction and _ways(model)))
 
 
 def _each_alone(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
@@ -154,22 +167,32 @@ def _together(model: SystemModel, t: float, found: Sequence[Equilibrium]) -> Sys
     why = "a damped motion with contact, without friction, led there" if touches else ""
     return SystemEquilibrium(
         states, path, sum(x.iterations for x in found), max(x.residual for x in found), solver, touches, why, rubs,
-        tuple(found),
+        tuple(found), {k: x.not_settled for k, x in enumerate(found)},
     )  # fmt: skip
 
 
-def _with_friction(model: SystemModel, t: float, found: SystemEquilibrium, bodies: Floats) -> SystemEquilibrium:
-    """The equilibrium in which friction on the bed has settled, of lines whose scene asks for that."""
-    ways = {
-        k: way
-        for k, (name, x) in enumerate(zip(model.names, model.models, strict=True))
-        if x.line.bits & FRICTION and (way := settling(model.scenes[name]))
-    }
-    if not ways or found.settled:
+def _with_friction(
+    model: SystemModel, t: float, found: SystemEquilibrium, bodies: Floats, ways: Mapping[int, str], first: SystemState
+) -> SystemEquilibrium:
+    """The equilibrium in which friction has settled from one without it, in these ways (`settling`) of lines.
+
+    first: from where lines come to rest where a scene asks for that.  LineFailed: none is found where one is asked for.
+    """
+    lines, asked = joined_lines(model, t), {k: way for k, way in ways.items() if way != "usual"}
+    here = [(x.line, x.sea, x.ends.held, state) for x, state in zip(lines, found.state.lines, strict=True)]
+    ways = {k: way for k, way in ways.items() if k in asked or rubs_on(*here[k]) == [ON_BED]}
+    if not ways:
         return found
-    first = SystemState([x.start for x in model.models], model.body_places)
-    lines = joined_lines(model, t)
-    return _keep_turns(model, t, settled_with_friction(lines, len(model.free), bodies, ways, found, first))
+    try:
+        laid = settled_with_friction(lines, len(model.free), bodies, ways, found, first)
+        return _keep_turns(model, t, replace(laid, not_settled=found.not_settled))
+    except LineFailed as failed:
+        if len(asked) == len(ways):
+            raise
+        why = {**found.not_settled, **dict.fromkeys(ways.keys() - asked.keys(), failed.outcome.cause)}
+    if asked:
+        found = _keep_turns(model, t, settled_with_friction(lines, len(model.free), bodies, asked, found, first))
+    return replace(found, not_settled=why)
 
 
 def _keep_turns(model: SystemModel, t: float, found: SystemEquilibrium) -> SystemEquilibrium:

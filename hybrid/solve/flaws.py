@@ -127,6 +127,9 @@ def on_obstacles(line: Line, sea: Sea, state: State) -> np.ndarray:
     return depths_in_obstacles(sea, state.r, line.s, met) > -TOUCHING
 
 
+ON_BED = "on the seabed"
+
+
 def rubs_on(line: Line, sea: Sea, held: np.ndarray, state: State) -> list[str]:
     """On what with friction a line lies, in words, at other nodes than ends (2,) that are held, which no friction
     moves."""
@@ -134,7 +137,7 @@ def rubs_on(line: Line, sea: Sea, held: np.ndarray, state: State) -> list[str]:
     free[[0, -1]] = held == 0
     bed = line.bits & SEABED and (sea.friction.any() or (sea.soil.size and sea.soil[LATERAL] > 0.0))
     if bed and (planes_under(sea, state.r)[1][free] > 0.0).any():
-        found.append("on the seabed")
+        found.append(ON_BED)
     if line.bits & OBSTACLES and on_obstacles(line, sea, state)[sea.obstacles[:, MU] > 0.0][:, free].any():
         found.append("on obstacles")
     return found

@@ -53,6 +53,7 @@ MOST_FALLS = 16
 # friction follows it up again where it is not found at once.
 STILLED = ((0.0,), (0.8, 0.6, 0.4, 0.2, 0.1, 0.0))
 GROWING = (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
+PULLED = "pulled tight against friction"
 LIMP = 1e-3  # part of the bending stiffness there
 
 
@@ -70,11 +71,17 @@ class Equilibrium:
     judged: bool  # False when its stability could not be judged (an end moment, or `blurred`)
     blurred: bool = False  # True when round-off of the bending of very short cells hides whether it buckles
     touch: Floats = field(default_factory=lambda: np.zeros(0))  # (N+1,) N/m, where the line touches itself
+    not_settled: str = ""  # why friction has not settled where a scene leaves that to the program
 
     @property
     def pushed(self) -> bool:
         """Whether it, or one on fewer cells that it was found from, is beside an equilibrium that is not stable."""
         return PUSHED in self.path[-1]
+
+    @property
+    def pulled(self) -> bool:
+        """Whether it was pulled tight from where it lay without tension."""
+        return self.path[-1].startswith(PULLED)
 
     @property
     def summary(self) -> str:
@@ -114,6 +121,7 @@ class _Solver:
         for still in (new.v, new.a, new.vd, new.w, new.wa, new.wd, new.sheave):
             still[:] = 0.0
         limits = Limits(REACH * self.length, self.scale, MOST_TURNING if turning else MOST_ITERATIONS)
+        kept: State | None = None
         for _ in range(BALANCING):
             self.work.u[:], new.soil[:] = 0.0, 0.0
             if line.bits & FRICTION:
@@ -129,9 +137,15 @@ class _Solver:
             if outcome != Outcome.OK or line is not self.line or sea is not None:
                 break
             # Newton stops by turns and tensions; a very stiff seabed makes much force of little way
-            if self.is_balanced(ends, new):
+            out_of_balance = self.prove(ends, new)
+            if not self.is_balanced(new, out_of_balance):
+                outcome, where = Outcome.NOT_CONVERGED, int(self.work.report[RESIDUAL_NODE])
+            elif kept is not None or not line.bits & FRICTION:
                 break
-            outcome, where = Outcome.NOT_CONVERGED, int(self.work.report[RESIDUAL_NODE])
+            else:  # friction that sticks is stiff: one more round, of which nothing is lost
+                kept = new.copy()
+        if kept is not None and outcome != Outcome.OK:
+            outcome, new = Outcome.OK, kept
         if outcome == Outcome.OK:
             tension, cell = lowest_tension(line, self.sea, new)
             if not tension > self.floor:
@@ -159,9 +173,9 @@ class _Solver:
         self.total += iterations
         return rest
 
-    def is_balanced(self, ends: Ends, state: State) -> bool:
-        """Whether what is out of balance at the nodes is round-off of the forces."""
-        return self.prove(ends, state) <= BALANCED * (float(np.abs(state.T).max()) + self.scale)
+    def is_balanced(self, state: State, residual: float) -> bool:
+        """Whether a largest residual force (N) is round-off of the forces in a state."""
+        return residual <= BALANCED * (float(np.abs(state.T).max()) + self.scale)
 
     def prove(self, ends: Ends, state: State) -> float:
         """Largest force out of balance at a node, N; infinity when it cannot be told."""
@@ -267,32 +281,25 @@ def _in_still_water(smooth: _Solver, ends: Ends, state: State) -> State | None:
     return None
 
 
-def _pulled(
-    smooth: _Solver, rough: _Solver, roads: Iterator[tuple[str, Outcome, int, State]], ends: Ends
-) -> Iterator[tuple[str, Outcome, int, State]]:
-    """Laid where it touches, without tension, along the equilibrium without friction, then pulled tight against it.
+def _pulled(smooth: _Solver, rough: _Solver, ends: Ends, state: State) -> Iterator[tuple[str, Outcome, int, State]]:
+    """Laid where it touches, without tension, along an equilibrium without friction, then pulled tight against it.
 
     A line that a current acts on is laid in still water: what lies is held by friction before the current comes, and
     the shape in the current without friction would be that of a line that has been swept along the bed.
     """
-    for how, outcome, where, state in roads:
-        if outcome != Outcome.OK:
-            yield f"without friction, {how}", outcome, where, state
-            continue
-        calm = _in_still_water(smooth, ends, state) if is_in_current(smooth.line, smooth.sea) else None
-        place = f"where it lay without tension{' in still water' if calm is not None else ''}"
-        rest = laid_without_tension(smooth.line, smooth.sea, ends, state if calm is None else calm)
-        rough.total += smooth.total
-        yield f"pulled tight against friction from {place}", *rough.newton(rough.line, ends, rest)
-        if calm is not None:
-            for part in GROWING:
-                outcome, where, rest = rough.newton(rough.line, ends, rest, sea=with_current(rough.sea, part))
-                if outcome != Outcome.OK:
-                    break
-            else:
-                outcome, where, rest = rough.newton(rough.line, ends, rest)
-            yield f"pulled tight against friction from {place}, while the current grows", outcome, where, rest
-        return
+    calm = _in_still_water(smooth, ends, state) if is_in_current(smooth.line, smooth.sea) else None
+    place = f"where it lay without tension{' in still water' if calm is not None else ''}"
+    rest = laid_without_tension(smooth.line, smooth.sea, ends, state if calm is None else calm)
+    rough.total += smooth.total
+    yield f"{PULLED} from {place}", *rough.newton(rough.line, ends, rest)
+    if calm is not None:
+        for part in GROWING:
+            outcome, where, rest = rough.newton(rough.line, ends, rest, sea=with_current(rough.sea, part))
+            if outcome != Outcome.OK:
+                break
+        else:
+            outcome, where, rest = rough.newton(rough.line, ends, rest)
+        yield f"{PULLED} from {place}, while the current grows", outcome, where, rest
 
 
 def _attempts(
@@ -348,7 +355,7 @@ class Search(NamedTuple):
     """How an equilibrium is searched, and which one counts.
 
     settle: on a bed with friction, "start": let it come to rest from the start and try nothing else, "pull": pull it
-    tight from where it would lie without tension along the equilibrium without friction, else the same; quick: try
+    tight from where it would lie without tension along the equilibrium without friction, which is the start; quick: try
     nothing but Newton from the start; take_slack: whether a slack solution will do; others: further starts with their
     names; refused: why a state in balance is not the one that is sought, and its cell or node; the next way is tried
     then.
@@ -402,8 +409,8 @@ def solve_statics(
         if not (settle and rubs):
             yield from ((smooth, road) for road in (islice(plain, 1) if quick else plain))
         elif settle == "pull":
-            yield from ((rough, road) for road in _pulled(smooth, rough, plain, ends))
-        if rubs and (settle or not quick):
+            yield from ((rough, road) for road in _pulled(smooth, rough, ends, start))
+        if rubs and settle != "pull" and (settle or not quick):
             yield rough, _settled(rough, ends, start, shape)
 
     for solver, (how, reached, where, state) in roads():
@@ -423,7 +430,8 @@ def solve_statics(
     ):  # what says most about the line comes first
         for outcome, _, state in failed:
             # what a continuation has left on its way is not balanced
-            if outcome == worst == Outcome.SLACK and search.take_slack and smooth.is_balanced(ends, state):
+            slack = outcome == worst == Outcome.SLACK and search.take_slack
+            if slack and smooth.is_balanced(state, smooth.prove(ends, state)):
                 return _found(smooth, ends, state, path)
         for outcome, where, state in failed:
             if outcome == worst:

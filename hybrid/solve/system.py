@@ -753,7 +753,7 @@ class SystemSolver:
                 still[:] = 0.0
         new.bodies[:, V:] = 0.0
         taken = SystemTaken(Outcome.NOT_CONVERGED, 0, np.inf, -1, -1, np.inf)
-        iterations, kept = 0, None
+        iterations, kept, rubs = 0, None, any(x.line.bits & FRICTION for x in self.lines)
         for _ in range(BALANCING):
             taken = self.newton_round(new)
             iterations += taken.iterations
@@ -763,9 +763,9 @@ class SystemSolver:
             taken = SystemTaken(taken.outcome, iterations, taken.correction, taken.line, taken.where, proof)
             if not self.is_balanced(new, proof):
                 taken = replace(taken, outcome=Outcome.NOT_CONVERGED)
-            elif kept is not None or not self.in_contact() or self.is_balanced(new, CLOSER * proof):
+            elif kept is not None or (not rubs and (not self.in_contact() or self.is_balanced(new, CLOSER * proof))):
                 break
-            else:  # contact is stiff: one more round, of which nothing is lost
+            else:  # contact, and friction that sticks, are stiff: one more round, of which nothing is lost
                 kept = taken, new.copy()
         if kept is not None and taken.outcome != Outcome.OK:
             taken, new = kept

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +49,8 @@ class SystemEquilibrium:
     unjudged: str = ""  # where settled: why it is not known that it would stay
     with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction on the bed took part
     alone: tuple[Equilibrium, ...] = ()  # of each line where all are joined to nothing that moves: found one by one
+    # By number of those that leave friction to the program, why it did not.
+    not_settled: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def pushed(self) -> bool:
@@ -127,20 +129,21 @@ def settled_with_friction(
 
     ways: "pull": laid without tension along the equilibrium without friction (`found`), or where a current acts along
     that in still water, then pulled tight, all such lines together; "start", and where that fails: at rest after a
-    damped motion from the first shapes.  LineFailed.
+    damped motion from the first shapes; "usual" for all: pulled tight, and nothing else.  LineFailed.
     """
     kept = [x.line.bits & ~WAVES & ~(0 if k in ways else FRICTION) for k, x in enumerate(lines)]
     rough = [x._replace(line=x.line._replace(bits=bits)) for x, bits in zip(lines, kept, strict=True)]
     solver, path, total = SystemSolver(rough, points, bodies), list(found.path), found.iterations
     attempts: list[tuple[str, Callable[[], SystemState]]] = []
-    if all(way == "pull" for way in ways.values()):
+    if "start" not in ways.values():
         calm = _in_still_water(rough, points, bodies, found.state)
         how = f"pulled tight against friction from where lines lay without tension{' in still water' if calm else ''}"
         attempts.append((how, lambda: _laid(solver, ways, calm or found.state)))
         if calm is not None:
             grown = f"{how}, while the current grows"
             attempts.append((grown, lambda: _grown(rough, points, bodies, _laid(solver, ways, calm))))
-    attempts.append(("settled with friction from the first shapes", lambda: _stuck(solver, points, ways, first)))
+    if set(ways.values()) != {"usual"}:
+        attempts.append(("settled with friction from the first shapes", lambda: _stuck(solver, points, ways, first)))
     failed = list[tuple[SystemTaken, SystemState]]()
     for how, start in attempts:
         taken, states = solver.newton(start())

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hybrid
+from hybrid.errors import ComputationError, Outcome
+from hybrid.scene.analysis import RodModel
+from hybrid.solve.system_statics import LineFailed
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 MU, WEIGHT, EA = 0.8, 1000.0, 6.0e8
+NEGLECTED = {"kind": "equilibrium", "friction": "neglected"}
 
 
 def chain(length: float = 700.0, stiffness: float = EA, cells: int = 1400, **changes: Any) -> dict[str, Any]:
@@ -60,7 +66,7 @@ def test_tension_falls_by_mu_w_where_the_line_slides() -> None:
 def test_lateral_place_is_that_of_the_equilibrium_without_friction() -> None:
     """What does not stretch has no travel: settled and neglected friction give the same line."""
     settled = static(chain(stiffness=None, cells=200))
-    plain = static(chain(stiffness=None, cells=200, initial={"kind": "equilibrium"}))
+    plain = static(chain(stiffness=None, cells=200, initial=NEGLECTED))
     assert np.abs(settled.position - plain.position).max() < 1e-9
     assert settled.tension == pytest.approx(plain.tension, rel=1e-9)
 
@@ -101,13 +107,13 @@ def verdicts(result: hybrid.Result) -> list[tuple[str, str]]:
 
 def test_a_run_is_as_doubtful_as_the_equilibrium_that_it_starts_from() -> None:
     """Friction is missing in both, or in neither; a chain that hangs free misses none."""
-    neglected = with_a_limit(initial={"kind": "equilibrium"})
+    neglected = with_a_limit(initial=NEGLECTED)
     doubt = [("not verified", "static friction neglected")]
     assert verdicts(static(neglected)) == verdicts(hybrid.run(hybrid.validate_scene(neglected))) == doubt
     settled = with_a_limit()
     for result in (static(settled), hybrid.run(hybrid.validate_scene(settled))):
         assert not any("friction" in why for _, why in verdicts(result))
-    hangs = with_a_limit(initial={"kind": "equilibrium"})
+    hangs = with_a_limit(initial=NEGLECTED)
     hangs["environment"]["seabed"]["z"] = -200.0
     hangs["cable"]["sections"][0]["axial_stiffness"] = EA
     found = static(hangs)
@@ -115,7 +121,7 @@ def test_a_run_is_as_doubtful_as_the_equilibrium_that_it_starts_from() -> None:
 
 
 def test_the_friction_of_several_lines_settles_by_the_key_that_is_named() -> None:
-    scene = as_lines(with_a_limit(initial={"kind": "equilibrium"}))
+    scene = as_lines(with_a_limit(initial=NEGLECTED))
     line = hybrid.static(scene).lines["chain"]
     (event,) = [x for x in line.events if x.kind == "static friction neglected"]
     assert "say `lines.chain.initial: {kind: equilibrium, friction: settled}`" in event.text
@@ -152,19 +158,23 @@ def test_a_line_of_several_has_the_friction_of_the_cable(model: str) -> None:
     assert "static friction neglected" not in {event.kind for event in line.events}
 
 
-def test_a_buoy_on_lines_with_settled_friction_stays_where_it_is() -> None:
-    """Soft lines slide: tension falls by mu w along the bed, to nothing at the anchors; without friction it does not."""
+def buoy(friction: str | None) -> dict[str, Any]:
+    """A buoy on three soft legs of chain; friction: None leaves it to the program."""
     (section,) = chain(length=430.0, stiffness=5e6)["cable"]["sections"]
     feet = {f"foot{k}": {"position": [400 * math.cos(2.1 * k), 400 * math.sin(2.1 * k), 0]} for k in range(3)}
     buoy = {"initial_guess": [0, 0, 85], "mass": 2e5, "volume": 560.0, "drag_area": 20, "force": [3e4, 0, 0]}
-    line = {"end": "buoy", "sections": [section], "mesh": {"cells": 100}, "model": "catenary"}
-    scene = {
+    initial = {"kind": "equilibrium"} | ({"friction": friction} if friction else {})
+    line = {"end": "buoy", "sections": [section], "mesh": {"cells": 100}, "model": "catenary", "initial": initial}
+    return {
         "environment": chain()["environment"], "points": feet | {"buoy": buoy},
-        "lines": {f"leg{k}": line | {"start": foot, "initial": {"kind": "equilibrium", "friction": "settled"}}
-                  for k, foot in enumerate(feet)},
+        "lines": {f"leg{k}": line | {"start": foot} for k, foot in enumerate(feet)},
         "time": {"duration": 10.0, "step": 0.1}, "output": {"every": 5.0, "points": 101},
     }  # fmt: skip
-    found = hybrid.run(scene)
+
+
+def test_a_buoy_on_lines_with_settled_friction_stays_where_it_is() -> None:
+    """Soft lines slide: tension falls by mu w along the bed, to nothing at the anchors; without friction it does not."""
+    found = hybrid.run(buoy(None))
     place = found["points/buoy/position"]
     assert np.abs(place - place[0]).max() < 1e-7
     for leg in found.lines.values():
@@ -172,9 +182,94 @@ def test_a_buoy_on_lines_with_settled_friction_stays_where_it_is() -> None:
         low, high = np.searchsorted(leg.tension[0], [0.1 * leg.tension[0].max(), 0.3 * leg.tension[0].max()])
         slope = np.diff(leg.tension[0][low:high]) / np.diff(leg.s[low:high])
         assert leg.tension[0, 0] < 1e-3 * leg.tension[0].max() and slope == pytest.approx(MU * WEIGHT, rel=1e-4)
-    for each in scene["lines"].values():  # type: ignore[attr-defined]
-        each["initial"] = {"kind": "equilibrium"}
-    assert min(leg.tension[-1].min() for leg in hybrid.static(scene).lines.values()) > 5e4
+    assert min(leg.tension[-1].min() for leg in hybrid.static(buoy("neglected")).lines.values()) > 5e4
+
+
+def anchored(friction: str | None, **changes: Any) -> dict[str, Any]:
+    """A chain of 430 m at an anchor; friction: None leaves it to the program."""
+    scene = chain(length=430.0, cells=86, output={"every": 20.0, "points": 87}, **changes)
+    scene["initial"] = {"kind": "equilibrium"} | ({"friction": friction} if friction else {})
+    return scene
+
+
+def test_friction_settles_where_a_scene_says_nothing_of_it() -> None:
+    """Of a cable and of a line, to the bit as where it is asked for; a limit is judged."""
+    asked, silent = anchored("settled"), anchored(None)
+    silent["cable"]["sections"][0]["max_tension"] = 1e7
+    for found, other in (
+        (static(asked), static(silent)),
+        (hybrid.static(as_lines(asked)).lines["chain"], hybrid.static(as_lines(silent)).lines["chain"]),
+    ):
+        np.testing.assert_array_equal(other.tension, found.tension)
+        assert other.tension[0, 0] < 0.1 * other.tension[0, -1] and not other.events
+        assert [x.verdict for x in other.verdicts().limits] == ["within"]
+
+
+@pytest.mark.long
+def test_a_chain_that_is_pulled_out_comes_to_its_settled_friction() -> None:
+    """From slack on the bed, in 300 s; without friction the anchor has fifteen times as much (docs/theory.md, 6)."""
+    settled, neglected = (np.ravel(static(anchored(x)).tension) for x in (None, "neglected"))
+    scene = anchored(None, time={"duration": 320.0, "step": 0.2})
+    scene["environment"]["seabed"]["damping"] = 1e3
+    scene["cable"]["sections"][0]["drag"] = {"normal": 1.2, "tangential": 0.1}
+    end = scene["ends"]["end"]
+    end["position"][0] -= 12.0
+    end["motion"] = {"travel": {"by": [12.0, 0, 0], "over": 300}}
+    pulled = hybrid.run(hybrid.validate_scene(scene)).tension[-1]
+    assert settled == pytest.approx(pulled, rel=0.03) and settled[-1] == pytest.approx(pulled[-1], rel=1e-5)
+    assert neglected[0] > 15.0 * pulled[0]
+
+
+@pytest.mark.long
+def test_a_chain_that_a_winch_lays_under_tension_keeps_it() -> None:
+    """100 m of it, with the tension at the top that the whole has there without friction: nothing slides."""
+    neglected = np.ravel(static(anchored("neglected")).tension)
+    scene = anchored(None, time={"duration": 300.0, "step": 0.1})
+    scene["environment"]["seabed"]["damping"] = 1e3
+    (section,), end = scene["cable"]["sections"], scene["ends"]["end"]
+    section["length"], scene["mesh"]["cells"] = 430.0 - 100.0 / (1.0 + neglected[0] / EA), 66
+    end["position"][0] = 0.936 * 430.0 - 100.0
+    end["motion"] = {"travel": {"by": [100.0, 0, 0], "over": 250}}
+    winch = {"tension": float(neglected[-1]), "inertia": 3000.0, "damping": 3000.0, "max_rate": 3.0, "ramp": 5.0}
+    end["payout"] = {"longest": 431.0, "winch": winch}
+    laid = hybrid.run(hybrid.validate_scene(scene)).tension[-1]
+    assert laid[0] == pytest.approx(neglected[0], rel=0.01)
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_friction_that_cannot_settle_is_neglected_with_a_word(several: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No equilibrium is found where a pull leads: of a cable, and of legs of a buoy, it is that without friction."""
+
+    def fails(*_: Any) -> Any:
+        raise (LineFailed(0, Outcome.NOT_CONVERGED, None, 0.0, "") if several else failed)
+
+    failed = ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "")
+    of = (lambda x: next(iter(hybrid.static(buoy(x)).lines.values()))) if several else (lambda x: static(anchored(x)))
+    plain = of("neglected")
+    name = "system_start.settled_with_friction" if several else "equilibrium.pulled_from"
+    monkeypatch.setattr(f"hybrid.simulation.{name}", fails)
+    found = of(None)
+    np.testing.assert_array_equal(found.tension, plain.tension)
+    (event,) = [x for x in found.events if x.kind == "static friction neglected"]
+    assert "none was found that is pulled tight" in event.text and "did not converge" in event.text
+
+
+def test_what_is_paid_out_was_laid_under_tension() -> None:
+    scene = anchored(None)
+    scene["ends"]["end"]["payout"] = {"longest": 440.0, "rate": 0.1, "ramp": 5.0}
+    found = static(scene)
+    assert found.tension.min() > 0.5 * found.tension.max()
+    (event,) = [x for x in found.events if x.kind == "static friction neglected"]
+    assert "paid out" in event.text
+
+
+def test_zones_that_move_keep_the_travel_since_a_line_was_laid() -> None:
+    """Travel is of the size of strains, which other cells lose: the anchor had 178 N, for 56 with rods everywhere."""
+    scene = hybrid.load_scene(
+        EXAMPLES / "irregular_sea.yaml", ["initial={kind: equilibrium, friction: settled}", "mesh.cells=400"]
+    )
+    zones, rods = hybrid.static(scene), hybrid.static(scene.model_copy(update={"model": RodModel(kind="rod")}))
+    assert zones.tension[0, 0] == pytest.approx(rods.tension[0, 0], rel=0.02)
 
 
 PIPE = {"kind": "cylinder", "axis": [0, 1, 0], "at": [18, 0, 6.5], "radius": 0.5, "friction": 0.3}
@@ -201,7 +296,7 @@ def test_friction_is_neglected_where_something_lies_that_has_some(
         "end": {"kind": "pinned", "position": [25, 0, 15]},
     }
     scene: dict[str, Any] = {"cable": {"sections": [section]}, "ends": ends, "obstacles": {"pipe": PIPE | changes}}
-    scene |= {"initial": "equilibrium", "model": "catenary", "mesh": {"cells": 120}}
+    scene |= {"initial": NEGLECTED, "model": "catenary", "mesh": {"cells": 120}}
     if bed is not None:
         scene["environment"] = {"seabed": {"z": bed, "stiffness": 1e4, "friction": 0.5}}
     found = hybrid.static(hybrid.validate_scene(scene))
