@@ -1,4 +1,4 @@
-"""What parts of cells make of a line beside edges of contact with the bed: the balance across it, solved anew.
+"""The balance across the bed beside edges of contact is solved anew on parts of cells.
 
     (T w')' - (EI w'')'' + q + P(-w, -dw/dt) = 0
 
