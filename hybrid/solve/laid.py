@@ -16,9 +16,9 @@ from hybrid.solve.flaws import on_obstacles
 def laid_without_tension(line: Line, sea: Sea, ends: Ends, state: State) -> State:
     """A copy of an equilibrium whose stretches on the bed and on obstacles have their unstretched length, without
 
-    friction yet.  A stretch keeps its path, and its place at a held end that lies there, too; one without such an end
-    keeps the place of its middle.  The displacement of a node from here is the travel that friction opposes
-    (docs/theory.md, T17b).
+    friction yet.  A stretch keeps its path, and its place at a held end that lies there, too; one without such an end,
+    or with two, keeps the place of its middle.  The displacement of a node from here is the travel that friction
+    opposes (docs/theory.md, T17b).
     """
     laid, cells = state.copy(), line.h.size
     laid.slip[:] = 0.0
@@ -29,13 +29,12 @@ def laid_without_tension(line: Line, sea: Sea, ends: Ends, state: State) -> Stat
     touches[cells] |= bool(ends.held[1]) and bool(touches[cells - 1])
     shortening = (line.h / np.linalg.norm(state.e, axis=1) - 1.0)[:, None] * state.e
     for first, last in _stretches(touches):
-        kept = (last - first) // 2
-        if last == cells and ends.held[1]:
-            kept = last - first
-        if first == 0 and ends.held[0]:
-            kept = 0
         shift = np.vstack([np.zeros(3), np.cumsum(shortening[first:last], axis=0)])
-        laid.r[first : last + 1] += shift - shift[kept]
+        count, held = last - first, (first == 0 and ends.held[0], last == cells and ends.held[1])
+        kept = 0.5 * (shift[count // 2] + shift[(count + 1) // 2])  # of the middle, between two nodes if need be
+        if any(held) and not all(held):
+            kept = shift[0 if held[0] else count]
+        laid.r[first : last + 1] += shift - kept
     for k in np.flatnonzero(ends.held):
         laid.r[-k] = state.r[-k]
     laid.e[:] = np.diff(laid.r, axis=0)

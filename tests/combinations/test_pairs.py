@@ -89,7 +89,7 @@ def refused_as_cable(tables: Tables) -> bool:
 REFUSED_AS_NETWORK = {("body", "two stiffnesses"), ("soil", "two stiffnesses"), ("soil", "curved")}
 # m, where steps that follow the motion begin anew after an end is let go: as long as their tolerance lets them differ.
 BY_STEPS = {("release", "chosen steps"): 1e-4}
-# Of the energy of stretch, of pairs with soil: Newton's method converges linearly where a node turns from one branch of it to the
+# Of the energy of stretch, with soil: Newton's method converges linearly where a node turns from one branch of it to the
 # other, to its tolerance and not far below. Over steps that is 7e-9 of the length, as little as positions may differ by.
 IN_SOIL = 5e-6
 # m, where cells to a layer are placed by a coarse run: what that is computed otherwise by moves nodes.
@@ -136,7 +136,7 @@ def differ(names: Sequence[str], said: Callable[[Tables], Tables]) -> str:
     placed = "layers" in names
     rest = BY_CELLS / LENGTH if placed else 1e-9
     allowed = BY_STEPS.get(tuple(names), BY_CELLS if placed else 20.0 * TOLERANCE * LENGTH) / LENGTH
-    loose, in_soil = placed or "torque of tension" in names, "soil" in names and len(names) > 1
+    loose, in_soil = placed or "torque of tension" in names, "soil" in names
     stretch = 1e-2 if tuple(names) in BY_STEPS else 1e-4 if loose else IN_SOIL if in_soil else 1e-6
     good = apart[0] < rest and apart.max() < allowed and energy < stretch
     return "" if good else f"{names}: {apart[0]:.2g}, {apart.max():.2g} of the length, {energy:.2g} of the energy"
