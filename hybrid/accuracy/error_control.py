@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.accuracy.budget import Budget
-from hybrid.accuracy.error_estimate import Estimate
+from hybrid.accuracy.error_estimate import NOTHING, Estimate
 from hybrid.accuracy.error_order import COARSER
 from hybrid.accuracy.error_statistics import (
     LARGEST,
@@ -135,6 +135,7 @@ class ErrorController:
     rubs: bool = False  # whether obstacles on which the line may lie have friction
     times: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) s, of the outputs of a result
     budget: Budget | None = None  # of all results; None: there is no limit
+    held: bool = True  # whether friction may hold the line here or there, so that its tension jumps
     stopped: str = ""  # why it is refined no further although it misses what is asked; empty: more would not help
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
     first: Resolution | None = None  # that the runs to compare with are for; the result may be finer
@@ -185,12 +186,13 @@ class ErrorController:
         return {x: left for x, left in self.estimate.not_converged.items() if not self._is_round_off(x)}
 
     def _is_round_off(self, name: str) -> bool:
-        """Whether runs differ in a quantity by no more than numbers of this scene do by round-off."""
+        """Whether runs differ in a quantity by no more than round-off, or without friction by what nobody asks for."""
         assert self.estimate is not None
         raw, unit = RAW.get(name, name), {"bending_moment": "N m", "curvature": "1/m", "position": "m"}.get(name, "N")
         least = self.asked.round_off(unit) if self.asked is not None else 0.0
         values = self.estimate.run.values[raw]
-        return self.estimate.changes[raw][0] <= max(least, ROUND_OFF_OF * float(np.abs(np.asarray(values)).max()))
+        part = ROUND_OFF_OF if self.held else NOTHING
+        return self.estimate.changes[raw][0] <= max(least, part * float(np.abs(np.asarray(values)).max()))
 
     def _irregular_note(self) -> list[tuple[str, str]]:
         """What is judged of an irregular motion, and how far the result may be off in what is not."""

@@ -29,6 +29,7 @@ from hybrid.model.resolution import (
     first_resolution,
     follows_curvature,
     is_irregular,
+    may_be_held,
     mesh_is_free,
     requested_accuracy,
     rubs_on_obstacles,
@@ -193,7 +194,7 @@ class Passes:
         self.control = ErrorController(
             requested_accuracy(scene), free_in(scene), True, case.sample, compute, case.beside, is_irregular(scene),
             choice, compute.settle, from_rest, rubs_on_obstacles(scene), np.array([0.0, *times]),
-            Budget(len(times), case.points.s.size),
+            Budget(len(times), case.points.s.size), may_be_held(scene),
         )  # fmt: skip
         return self.control
 

@@ -41,6 +41,7 @@ from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
     Resolution,
     is_irregular,
+    may_be_held,
     mesh_is_free,
     requested_accuracy,
     rubs_on_obstacles,
@@ -136,7 +137,7 @@ class SystemPasses:
                 requested_accuracy(scene), free_in(scene)._replace(steps=self._steps_free), moves, _elsewhere,
                 _elsewhere, irregular=moves and is_irregular(scene),
                 from_rest=not (moves and system.starts_as_placed), rubs=rubs_on_obstacles(scene),
-                times=np.array([0.0, *times]),
+                times=np.array([0.0, *times]), held=may_be_held(scene),
             )
             for name, scene in self.scenes.items()
         }  # fmt: skip

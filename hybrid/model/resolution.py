@@ -381,6 +381,12 @@ def rubs_on_obstacles(scene: Scene) -> bool:
     return any(x.friction for x in scene.obstacles.values())
 
 
+def may_be_held(scene: Scene) -> bool:
+    """Whether friction of a bed or an obstacle may hold a line here or there."""
+    bed = scene.environment.seabed
+    return rubs_on_obstacles(scene) or (bed is not None and bool(bed.friction or bed.soil))
+
+
 def wants_errors(scene: Scene) -> bool:
     """Whether the error of the result is estimated."""
     if scene.output.errors is not None:

@@ -244,3 +244,12 @@ def test_a_loose_accuracy_of_a_slack_bend_is_cheap_and_not_wrong(several: bool) 
         assert off < line.attributes["error_total_position"] + fine.attributes["error_total_position"] < part * 60.0
         assert off < 0.5 * part * 60.0 and line.attributes["cells"] < fine.attributes["cells"]
         assert "missed" not in {x.verdict for x in line.verdicts().accuracy}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("several", [False, True])
+def test_tension_that_changes_by_little_is_no_doubt_where_nothing_holds_the_line(several: bool) -> None:
+    """By 0.3 % of the largest (root mean square), twice; of a line on a bed with friction that is a doubt."""
+    found = hybrid.run(s_tether(several, "5%", 120.0))
+    line = found.lines["one"] if several else found
+    assert {x.verdict for x in line.verdicts().accuracy} == {"met"}
