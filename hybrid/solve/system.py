@@ -252,7 +252,8 @@ class SystemSolver:
 
     def regroup(self) -> dict[str, Any]:
         """Solve lines with what they have been found near, and others by themselves: as of `take_turns`."""
-        self._group()
+        if any(self._mixes):  # else groups stay, and what was made of their tables
+            self._group()
         return self._bind_turns()
 
     def take_line(self, number: int, line: Line) -> None:
