@@ -166,9 +166,10 @@ class Estimate:
     def _shorter_for(self, fast: RunSample, slow: RunSample, name: str) -> float:
         """The same for what steps make of an output.
 
-        What they make of a vibration that lasts adds up: it goes by all steps.
+        What they make of a vibration that lasts adds up: it goes by all steps, where there are more of these.
         """
-        return fast.steps / max(slow.steps, 1) if name in self.shares_mixed else self._shorter(fast, slow)
+        of_all = fast.steps / max(slow.steps, 1)
+        return of_all if name in self.shares_mixed and of_all > LEAST_RATIO else self._shorter(fast, slow)
 
     def show_steps(self, fast: RunSample) -> None:
         """Take a run on the cells of the coarser one in shorter steps, where that in longer steps shows nothing."""

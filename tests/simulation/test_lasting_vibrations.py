@@ -82,6 +82,17 @@ def test_what_cells_and_steps_make_of_it_is_not_taken_apart():
     assert not regular.shares_mixed
 
 
+def test_errors_are_finite_where_shorter_steps_are_no_more_steps_in_all():
+    """Steps that follow may be shorter mostly, and as many as before: a figure was infinite, and the run stopped."""
+    result, coarse, rough, coarsest = (vibrating(*x, 0.1) for x in ((1.0, 80), (0.5, 40), (0.5, 20), (0.25, 20)))
+    even, uneven = np.linspace(0.25, 10.0, 40), np.append(np.linspace(0.5, 9.5, 19), np.linspace(9.6, 10.0, 21))
+    even, uneven = (np.column_stack([t, t, t]) for t in (even, uneven))
+    coarse, rough = replace(coarse, forces=even), replace(rough, forces=uneven, steps=coarse.steps)
+    estimate = Estimate(result, coarse, rough, coarsest)
+    assert estimate.shares_mixed == {"position"}
+    assert np.isfinite(estimate.errors.largest("total", "position"))
+
+
 def test_forces_after_a_shock_fall_slowly_anyway():
     """Their order is 1 to 1.5: the suspension at 0.1 % took 13 529 steps where 6044 do, and 70 s where 10 s."""
     runs = [vibrating(*x, 0.1) for x in ((1.0, 80), (0.5, 40), (0.5, 20), (0.25, 20))]
