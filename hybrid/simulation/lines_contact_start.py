@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from hybrid.kernels.contact.self_contact_law import OUTER
 from hybrid.kernels.junctions.lines_distance import JOINT
@@ -16,17 +15,15 @@ from hybrid.model.lines_contact import touching_among
 from hybrid.model.self_reach import contact_bits
 from hybrid.scene.schema import Scene
 from hybrid.simulation.lines_contact import PASSED, pair_text
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.self_watch import diameters
 from hybrid.simulation.system_contact_equilibrium import crossings, energy_between
-
-if TYPE_CHECKING:
-    from hybrid.simulation.system_run import SystemRun
 
 Pair = tuple[int, int]
 BEGINS = "contact begins"
 
 
-def lines_near(run: SystemRun) -> list[Pair]:
+def lines_near(run: RunOfLines) -> list[Pair]:
     """Lines, two each, between which contact begins now, after an event; others that are near are let pass.
 
     These are lines that already are in each other, or in themselves, or are pressed on each other beside what both are
@@ -50,7 +47,7 @@ def lines_near(run: SystemRun) -> list[Pair]:
     return begun
 
 
-def _may_begin(run: SystemRun, pair: Pair) -> bool:
+def _may_begin(run: RunOfLines, pair: Pair) -> bool:
     """Whether two lines are in each other nowhere, nor in themselves, nor touch by ends that are joined to the same.
 
     Ends that are held, or moved, are joined to one thing where they would touch each other.
@@ -78,7 +75,7 @@ def _ends_beside(model: Model, node: int) -> list[int]:
     return [k for k in (0, 1) if abs(float(s[node] - s[-k])) <= reach]
 
 
-def touch_each_other(run: SystemRun, pairs: Iterable[Pair]) -> None:
+def touch_each_other(run: RunOfLines, pairs: Iterable[Pair]) -> None:
     """Give a run models of which these lines touch each other, two each, and no others; its solver has to follow."""
     before, touching = run.model.touching, touching_among(run.system, run.model.scenes, pairs)
     now = touching.lines if touching is not None else ()
@@ -98,7 +95,7 @@ def touch_each_other(run: SystemRun, pairs: Iterable[Pair]) -> None:
     run.model = replace(run.model, models=tuple(models), touching=touching)
 
 
-def touching_now(run: SystemRun) -> set[Pair]:
+def touching_now(run: RunOfLines) -> set[Pair]:
     """Lines whose contact began by itself, two each, that touch in the state that was looked at last; a line that
 
     touches itself beside others, twice.
@@ -109,7 +106,7 @@ def touching_now(run: SystemRun) -> set[Pair]:
     return {(min(a, b), max(a, b)) for (a, _), (b, _) in shared.points_between()}
 
 
-def given_up_text(run: SystemRun, dt: float) -> str:
+def given_up_text(run: RunOfLines, dt: float) -> str:
     """Text of the event of contact that lets no step of dt (s) lead on."""
     assert run.solver.shared is not None
     return (
@@ -118,7 +115,7 @@ def given_up_text(run: SystemRun, dt: float) -> str:
     )
 
 
-def note_crossings(run: SystemRun) -> None:
+def note_crossings(run: RunOfLines) -> None:
     """An event for every two lines that the search for the equilibrium has passed through each other."""
     if run.found is None:
         return

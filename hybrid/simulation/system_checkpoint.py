@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
@@ -17,17 +18,50 @@ from hybrid.scene.obstacles import files_of as obstacle_files
 from hybrid.scene.system import System
 from hybrid.simulation.lines_contact_start import touch_each_other
 from hybrid.simulation.restore import program, refused, resolution_tree
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.system_contact import let_touch
+from hybrid.simulation.system_failures import Failures
+from hybrid.simulation.system_points import Rotations
+from hybrid.simulation.system_quantities import SystemQuantities
+from hybrid.simulation.system_zones import SystemZones
 from hybrid.simulation.transient_checkpoint import FIRST_REPORT, FIRST_WORKS, zoning_of_today
+from hybrid.simulation.vibration_steps import VibrationsOfLines
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import matched
 
-if TYPE_CHECKING:
-    from hybrid.simulation.system_run import SystemRun
+if TYPE_CHECKING:  # what a run without winches does not load
+    from hybrid.simulation.system_payout import SystemPayout
 
 
-def checkpoint(run: SystemRun) -> dict[str, Any]:
+class KeptRun(RunOfLines, Protocol):
+    """A run with all that its checkpoint keeps."""
+
+    failures: Failures
+    quantities: SystemQuantities
+    rotations: Rotations
+    vibrations: VibrationsOfLines
+    criterion: UserCriterion | None
+    leg: tuple[float, int]
+    cpu: float  # s
+    changed: int
+    dry: set[str]
+    overlaps: set[str]
+    under: dict[str, float]
+
+    @property
+    def zones(self) -> SystemZones | None: ...
+
+    @property
+    def payout(self) -> SystemPayout | None: ...
+
+    @property
+    def interval(self) -> float: ...
+
+    def stand_at(self, t: float, steps: int, last_step: float, last_rho: float, interval: float) -> None: ...
+
+
+def checkpoint(run: KeptRun) -> dict[str, Any]:
     """What the next steps depend on, between two steps, with no output waiting: named arrays and plain values."""
     lines = {
         line.name: line.checkpoint(work, run.t) | {"state": state._asdict(), "rho": float(line.books.clock.last_rho)}
@@ -52,7 +86,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
+def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
     """Go on as `checkpoint` has written, with a run that was made for it.  ValueError: that cannot be."""
     if "broken" in saved:  # not in files of an earlier program
         if not isinstance(saved["broken"], list):
@@ -108,7 +142,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
             line.impose_now()
 
 
-def _begun(run: SystemRun) -> list[list[int]]:
+def _begun(run: KeptRun) -> list[list[int]]:
     """Lines that touch each other because they have come near, two each."""
     touching = run.model.touching if run.system.contact is None else None
     return [list(x) for x in touching.pairs] if touching is not None else []
@@ -167,7 +201,7 @@ def zones_of_today(zones: Any) -> Any:
     }  # fmt: skip
 
 
-def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
+def set_state(run: KeptRun, found: Mapping[str, Any]) -> None:
     """Be as when `checkpoint` was called, of a run with the same things broken, without a look at its form."""
     run.stand_at(found["t"], found["steps"], found["last"], found["rho"], found["interval"])
     run.loaded = found["loaded"]
@@ -198,7 +232,7 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
         run.payout.lengthen()
 
 
-def content(run: SystemRun) -> dict[str, Any]:
+def content(run: KeptRun) -> dict[str, Any]:
     """What the writer keeps of a checkpoint."""
     resolution = {name: resolution_tree(x) for name, x in run.resolution.lines.items()}
     asks = run.criterion is not None

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.contact_start import GIVEN_UP, given_up
 from hybrid.simulation.lines_contact import PASSED, pair_text
 from hybrid.simulation.lines_contact_start import given_up_text, lines_near, touch_each_other, touching_now
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.self_watch import deepest_text, diameters
 from hybrid.simulation.system_contact_equilibrium import energy_between, touches_alone
 from hybrid.solve.contact_statics import contact_energy
@@ -28,9 +28,6 @@ from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.system_statics import LineFailed
 from hybrid.store.partners import meeting_text
-
-if TYPE_CHECKING:
-    from hybrid.simulation.system_run import SystemRun
 
 # Diameters by which ways from a joint to where lines that lie along each other meet differ at most.
 ALONG = 2.0
@@ -78,7 +75,7 @@ def _refuse_within_others(
     raise SceneError([Complaint("contact", given, expected, fix)])
 
 
-def begin_where_near(run: SystemRun) -> None:
+def begin_where_near(run: RunOfLines) -> None:
     """Contact is computed from now on of lines that are near themselves in the state from which a run begins."""
     step = run.resolution.one.step
     for line, state in zip(run.lines, run.state.lines, strict=True):
@@ -86,7 +83,7 @@ def begin_where_near(run: SystemRun) -> None:
     begin_contact(run)
 
 
-def begin_contact(run: SystemRun) -> None:
+def begin_contact(run: RunOfLines) -> None:
     """Contact is computed from now on of lines that have come near themselves; those within themselves go on without.
 
     Nothing moves; energy that contact has at once is booked as that of a change of zones.
@@ -110,13 +107,13 @@ def begin_contact(run: SystemRun) -> None:
         _go_on(run, begun, "where contact of the line with itself begins")
 
 
-def end_contact(run: SystemRun, numbers: Sequence[int]) -> None:
+def end_contact(run: RunOfLines, numbers: Sequence[int]) -> None:
     """Contact is computed no longer of lines of these numbers, until they come near themselves again."""
     let_touch(run, numbers, touch=False)
     _go_on(run, numbers, "where contact of the line with itself ends")
 
 
-def begin_between(run: SystemRun) -> bool:
+def begin_between(run: RunOfLines) -> bool:
     """Contact is computed from now on of lines that have come near each other; whether any begins."""
     pairs = lines_near(run)
     if not pairs:  # they are let pass
@@ -128,7 +125,7 @@ def begin_between(run: SystemRun) -> bool:
     return True
 
 
-def _change_pairs(run: SystemRun, pairs: Iterable[tuple[int, int]], after: str) -> None:
+def _change_pairs(run: RunOfLines, pairs: Iterable[tuple[int, int]], after: str) -> None:
     """These lines, two each, touch each other from now on, and no others."""
     numbers = set(run.model.touching.lines) if run.model.touching is not None else set()
     touch_each_other(run, pairs)
@@ -136,7 +133,7 @@ def _change_pairs(run: SystemRun, pairs: Iterable[tuple[int, int]], after: str) 
     _go_on(run, sorted(numbers), after)
 
 
-def _go_on(run: SystemRun, numbers: Sequence[int], after: str) -> None:
+def _go_on(run: RunOfLines, numbers: Sequence[int], after: str) -> None:
     """Another solver, for lines of these numbers that touch themselves, or each other, now, or no longer.
 
     The energy of contact that comes or goes so is booked.
@@ -150,7 +147,7 @@ def _go_on(run: SystemRun, numbers: Sequence[int], after: str) -> None:
         run.lines[k].books.work[0, ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
 
 
-def gives_up_contact(run: SystemRun, dt: float) -> bool:
+def gives_up_contact(run: RunOfLines, dt: float) -> bool:
     """No step of dt (s) leads on: as simulation.contact_start.gives_up_contact, of all lines that touch themselves."""
     numbers = []
     for line in run.lines:
@@ -166,7 +163,7 @@ def gives_up_contact(run: SystemRun, dt: float) -> bool:
     return _gives_up_pairs(run, dt) or bool(numbers)
 
 
-def _gives_up_pairs(run: SystemRun, dt: float) -> bool:
+def _gives_up_pairs(run: RunOfLines, dt: float) -> bool:
     """The same of lines that touch each other because they have come near: those that touch now are let pass."""
     touches = touching_now(run)
     if not touches:
@@ -182,7 +179,7 @@ def _gives_up_pairs(run: SystemRun, dt: float) -> bool:
     return True
 
 
-def let_touch(run: SystemRun, numbers: Iterable[int], touch: bool = True) -> None:
+def let_touch(run: RunOfLines, numbers: Iterable[int], touch: bool = True) -> None:
     """Give a run models of lines that touch themselves, or no longer; its solver has still to follow."""
     models = [*run.model.models]
     for k in numbers:
@@ -194,7 +191,7 @@ def let_touch(run: SystemRun, numbers: Iterable[int], touch: bool = True) -> Non
     run.model = replace(run.model, models=tuple(models))
 
 
-def renew_solver(run: SystemRun, after: str) -> None:
+def renew_solver(run: RunOfLines, after: str) -> None:
     """Another solver in mid-motion, for lines that have changed; after: what, for the text of a failure."""
     run.gather_events()  # in the order in which they happen
     bodies, work = run.solver.bodies.copy(), run.solver.body_work.copy()
@@ -204,7 +201,7 @@ def renew_solver(run: SystemRun, after: str) -> None:
     _evaluate_forces(run, after)
 
 
-def go_on_as_attached(run: SystemRun, after: str) -> None:
+def go_on_as_attached(run: RunOfLines, after: str) -> None:
     """Go on with the same solver and states in mid-motion, for lines that have changed; after: as of `renew_solver`."""
     run.gather_events()
     turns = run.loop.turns
@@ -213,7 +210,7 @@ def go_on_as_attached(run: SystemRun, after: str) -> None:
     run.loop.stand_after_change()
 
 
-def _evaluate_forces(run: SystemRun, after: str) -> None:
+def _evaluate_forces(run: RunOfLines, after: str) -> None:
     for model in run.model.models:
         model.ends.at(run.t)
         model.sea.at(run.t)
@@ -223,7 +220,7 @@ def _evaluate_forces(run: SystemRun, after: str) -> None:
         raise LineFailed(taken.line, taken.outcome, run.t, None, after)
 
 
-def tell_meetings(run: SystemRun) -> None:
+def tell_meetings(run: RunOfLines) -> None:
     """An event for every two lines that have met, when they do first."""
     told = run.met
     shared: SharedContact | None = run.solver.shared
@@ -235,7 +232,7 @@ def tell_meetings(run: SystemRun) -> None:
         run.recorder.event(t, 0.0, 0.0, "lines touch", text)
 
 
-def _side_by_side(run: SystemRun, joined: NDArray[np.int64], a: int, b: int, s: float, other: float) -> bool:
+def _side_by_side(run: RunOfLines, joined: NDArray[np.int64], a: int, b: int, s: float, other: float) -> bool:
     """Whether two lines that met at s and other (m) of them lay along each other all the way from a common joint.
 
     They did where both places are as far from it along the lines, and one of the lines is straight up to there.
@@ -253,7 +250,7 @@ def _side_by_side(run: SystemRun, joined: NDArray[np.int64], a: int, b: int, s: 
     return False
 
 
-def tell_passages(run: SystemRun) -> None:
+def tell_passages(run: RunOfLines) -> None:
     """An event for every two lines that have met without contact, when they do first.
 
     Of lines that lie along each other from what both are joined to there is nothing to tell, as at the start.

@@ -6,8 +6,6 @@ end of a line and its clamp goes with the clamp, and the twist of catenary zones
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hybrid.kernels.junctions.bodies import DONE, SPRING, W
@@ -15,10 +13,8 @@ from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import NO_TURN
 from hybrid.model.failure import Weakness, after_failure, weaknesses
 from hybrid.simulation.releases import elastic
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.joined import SystemState
-
-if TYPE_CHECKING:
-    from hybrid.simulation.system_run import SystemRun
 
 SAME_TIME = 1e-6  # of a step: a time so near is now
 
@@ -26,7 +22,7 @@ SAME_TIME = 1e-6  # of a step: a time so near is now
 class Failures:
     """What may break in a run, and what has."""
 
-    def __init__(self, run: SystemRun) -> None:
+    def __init__(self, run: RunOfLines) -> None:
         self._run = run
         self.all = weaknesses(run.system)
         self.broken: list[int] = []  # numbers in `all`, in the order in which they broke

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from hybrid.adapt.manager import Change
 from hybrid.model.build import Model
 from hybrid.simulation.kind_changes import LineKinds, carries_all, copy_into
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.zone_switching import ZoneSwitching
-
-if TYPE_CHECKING:
-    from hybrid.simulation.system_run import SystemRun
 
 
 class SystemKinds:
     """Changes of kinds in the lines of a run, with the solver, the states and the books that it has now."""
 
-    def __init__(self, run: SystemRun) -> None:
+    def __init__(self, run: RunOfLines) -> None:
         self._run, self._solver, self._turns = run, run.solver, run.loop.turns
         self._lines: dict[int, LineKinds] = {}
 
     @staticmethod
-    def apply(run: SystemRun, switched: Sequence[ZoneSwitching]) -> bool:
+    def apply(run: RunOfLines, switched: Sequence[ZoneSwitching]) -> bool:
         """Whether zones of these lines can change so between two steps of a run whose solver is attached."""
         attached = run.solver.turns is not None and run.solver.turns is run.loop.turns
         alone = run.payout is None and run.shared is None and not run.solver.meets

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from hybrid.kernels.junctions.bodies import DONE, SPRING
 from hybrid.kernels.state.forces import SELF_CONTACT
@@ -13,10 +12,8 @@ from hybrid.model.release import unclamped, without_hold
 from hybrid.model.self_reach import touching
 from hybrid.model.system import SystemModel, build_system
 from hybrid.scene.system import System
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.zone_switching import on_layout
-
-if TYPE_CHECKING:
-    from hybrid.simulation.system_run import SystemRun
 
 # Tables of a system in which loads and motions stand.
 LOADED = ("environment", "points", "bodies")
@@ -69,7 +66,7 @@ def _line_as(name: str, now: Model, later: Model, system: System, t: float) -> M
     return replace(later, line=line)
 
 
-def change_loads_of_lines(run: SystemRun, system: System) -> None:
+def change_loads_of_lines(run: RunOfLines, system: System) -> None:
     """Other loads, and other motions of points and bodies, from now on; lines stay what they are and where they are."""
     run.ends_of_now()
     for line in run.lines:

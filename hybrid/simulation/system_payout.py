@@ -24,12 +24,12 @@ from hybrid.model.system import SystemModel
 from hybrid.simulation.failure import winch_text
 from hybrid.simulation.payout import Before, PayingOut
 from hybrid.simulation.payout_zones import PaidZones, moving_zones
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.system_contact import renew_solver
 from hybrid.solve.joined import SystemState
 from hybrid.solve.system_statics import LineFailed
 
 if TYPE_CHECKING:
-    from hybrid.simulation.system_run import SystemRun
     from hybrid.solve.system import SystemSolver
     from hybrid.solve.system_steps import SystemSteps
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 class SystemPayout:
     """The lengths of all lines of a run that are paid out."""
 
-    def __init__(self, run: SystemRun) -> None:
+    def __init__(self, run: RunOfLines) -> None:
         """Of a run whose model is that of t = 0; it gets lines with the nodes that a winch makes."""
         self._run = run
         self.zones: dict[int, PaidZones] = {}  # of those whose zones move

@@ -177,7 +177,7 @@ class SystemRun:
 
             self.payout = SystemPayout(self)
         reels = self.payout.lines if self.payout is not None else {}
-        self.lines = [
+        self.lines: list[LineResult] = [
             LineResult(k, name, scene, model, self.found, state, len(self.times), target, pending, reels.get(k))
             for k, (name, scene, model, state) in enumerate(
                 zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
@@ -206,7 +206,7 @@ class SystemRun:
         self.overlaps: set[str] = set()  # and what has been said to be in each other
         self.under: dict[str, float] = {}  # depth (m) of points that have been said to be pulled under it
         self.failures = Failures(self)
-        self.zones = SystemZones(self, managers) if managers and moves else None
+        self.zones = SystemZones(self, managers, self.payout) if managers and moves else None
         self.loaded = 0.0  # s, loads that have stopped by then act no more
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps

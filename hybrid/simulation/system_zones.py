@@ -35,6 +35,7 @@ from hybrid.simulation.initial_zones import (
     zones_without_equilibrium,
 )
 from hybrid.simulation.payout_zones import PaidZones
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.system_cells import equilibrium_on_cells, following
 from hybrid.simulation.system_contact import go_on_as_attached, renew_solver
 from hybrid.simulation.system_contact_equilibrium import nearness_in
@@ -49,7 +50,6 @@ from hybrid.store.named_arrays import matched
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
     from hybrid.simulation.system_payout import SystemPayout
-    from hybrid.simulation.system_run import SystemRun
     from hybrid.solve.system_steps import SystemSteps
 
 HELD = (
@@ -203,7 +203,7 @@ class _LineZones:
         self.pending: Change | None = None
         self.paid: PaidZones | None = None  # of a line that is paid out
 
-    def follow(self, run: SystemRun, phase: int, t: float, end: float, old: State, new: State) -> None:
+    def follow(self, run: RunOfLines, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
         self.counts.phase, self.clock.now, self.clock.try_end = phase, t, end
         model = self.switching.model
@@ -214,7 +214,7 @@ class _LineZones:
         )  # fmt: skip
         follow_zones(self.switching.table.numbers)
 
-    def bind(self, run: SystemRun, loop: SystemSteps) -> Table:
+    def bind(self, run: RunOfLines, loop: SystemSteps) -> Table:
         """What follows the zones within the compiled steps of a loop."""
         model, (even, odd) = self.switching.model, loop.turns
         self.switching.table.bind(
@@ -233,7 +233,9 @@ class SystemZones:
     around every try, contact after every step, and outputs of criteria are written before the next one.
     """
 
-    def __init__(self, run: SystemRun, managers: Mapping[int, DomainManager]) -> None:
+    def __init__(
+        self, run: RunOfLines, managers: Mapping[int, DomainManager], payout: SystemPayout | None = None
+    ) -> None:
         every = run.resolution.one.every
         self._run = run
         # (L,) J, of each line with itself and others, after the last accepted step
@@ -241,8 +243,8 @@ class SystemZones:
         self.lines = [_LineZones(k, run.model.models[k], x, every) for k, x in managers.items()]
         for k, x in managers.items():
             run.lines[k].manager = x
-        if run.payout is not None:
-            self._pay(run.payout)
+        if payout is not None:
+            self._pay(payout)
         self._rescues, self._rescued = 0, 0  # of the step that is tried, after so many
         self._compiled = all(x.switching.compiled for x in self.lines)
         self._kinds: SystemKinds | None = None  # of cells that stay, with the solver of now

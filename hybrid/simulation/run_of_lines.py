@@ -1,0 +1,109 @@
+"""What parts of a run of lines may ask of it, and have it do: contact, failures, loads that change, payout.
+
+A part names this and no run, so that the run stands above all of its parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Protocol
+
+import numpy as np
+
+from hybrid.adapt.manager import Change
+from hybrid.kernels.state.state import Floats, Line
+from hybrid.model.system import SystemModel, SystemResolution
+from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
+from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.lines_contact import LinesWatch
+from hybrid.simulation.system_lines import LineResult
+from hybrid.solve.joined import SystemState
+from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.system import SystemSolver
+from hybrid.solve.system_statics import SystemEquilibrium
+from hybrid.solve.system_steps import SystemSteps
+from hybrid.store.array_recorder import ArrayRecorder
+from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.writer import Recorder
+
+
+class MovingZones(Protocol):
+    """Zones that move: what has changed in the lines they are of."""
+
+    def change_line(self, number: int, change: Callable[[Line], Line]) -> None: ...
+
+    def release(self, ends: Iterable[tuple[int, int]]) -> None: ...
+
+    def take_loads(self) -> None: ...
+
+    def switch(self, number: int, change: Change, here: np.ndarray | None = ...) -> None: ...
+
+    def go_on(self, after: str = ...) -> None: ...
+
+
+class PaidLines(Protocol):
+    """Lines that are paid out."""
+
+    def let_go(self, ends: Iterable[tuple[int, int]]) -> None: ...
+
+    def take_models(self, model: SystemModel) -> SystemModel: ...
+
+
+class RunOfLines(Protocol):
+    """A run between two steps; what is writable here, parts change, and the solver follows (`make_solver`)."""
+
+    system: System
+    model: SystemModel
+    state: SystemState
+    other: SystemState  # after the next step
+    solver: SystemSolver
+    loop: SystemSteps
+    lines: list[LineResult]
+    scenes: list[Scene]
+    resolution: SystemResolution
+    loaded: float  # s, loads that have stopped by then act no more
+    rest: Floats  # bodies when the motion began
+    shared: SharedContact | None  # contact of lines with each other
+    watch: LinesWatch | None  # over lines between which no contact is computed
+    met: set[tuple[int, int]]  # lines that have been said to touch
+    passed: set[tuple[int, int]]  # and to pass through each other
+    let_pass: set[tuple[int, int]]  # of lines that may meet, those between which contact is not computed
+    found: SystemEquilibrium | None
+
+    @property
+    def zones(self) -> MovingZones | None: ...
+
+    @property
+    def payout(self) -> PaidLines | None: ...
+
+    @property
+    def recorder(self) -> Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder: ...
+
+    @property
+    def t(self) -> float: ...
+
+    @property
+    def steps(self) -> int: ...
+
+    @property
+    def last_step(self) -> float: ...
+
+    @property
+    def last_rho(self) -> float: ...
+
+    def start_from(self, bodies: Floats) -> None: ...
+
+    def make_solver(self) -> None: ...
+
+    def take_other(self) -> None: ...
+
+    def ends_of_now(self) -> None: ...
+
+    def restart_steps(self) -> None: ...
+
+    def watch_lines(self) -> None: ...
+
+    def gather_events(self) -> None: ...
+
+    def output_due(self) -> None: ...
