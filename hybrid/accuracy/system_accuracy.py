@@ -35,7 +35,6 @@ from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bendi
 from hybrid.accuracy.system_samples import compared, extremes_of, sample_of, touch_unasked
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
-from hybrid.model.mesh_grading import SAMPLES
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
@@ -53,7 +52,7 @@ from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import scene_text
 from hybrid.scene.system import System
 from hybrid.simulation.layer_mesh import layered_lines, shown_lines
-from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution, with_survey
+from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points, survey_resolution, with_survey
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import kept_resolution, refused, resolution_from, resolution_tree
@@ -271,7 +270,9 @@ class SystemPasses:
             coarse = SystemResolution({name: replace(x, every=1) for name, x in coarse.lines.items()})
         coarse = shown_lines(self.system, coarse, self.moves)
         self._expect(first, coarse)
-        points = POINTS if all(x.grading is None for x in coarse.lines.values()) else SAMPLES
+        model = build_system(self.system, resolution=coarse)
+        places = {name: survey_points(x, coarse.lines[name]) for name, x in zip(model.names, model.models, strict=True)}
+        points = {name: tuple(s.tolist()) for name, s in places.items()}
         output = self.system.output.model_copy(update={"points": points, "quantities": {}})
         changed: dict[str, Any] = {"output": output}
         if self.moves:
@@ -284,16 +285,14 @@ class SystemPasses:
             runs = self._record(coarse, None, PRE_RUN, system=asked)
         except ComputationError:
             return first
-        model, out = build_system(self.system, resolution=coarse), dict(first.lines)
+        out = dict(first.lines)
         for name in free:
             scene, of_line = self.scenes[name], model.models[model.names.index(name)]
-            paid = of_line.payout if self.moves else None
-            longest, at_start = (None, False) if paid is None else (paid.longest, not paid.side)
-            s = output_points(asked.scene_of(name), longest, at_start).s
-            out_at_first = (s >= 0.0) & (s <= scene.length)
+            s = output_points(asked.scene_of(name)).s  # point loads are among them, too
+            here = np.abs(s[:, None] - places[name]).argmin(axis=0)
             found = runs[name].values
-            values = {x: np.asarray(found[x])[:, out_at_first] for x in ("curvature", "tension", "position")}
-            survey = Survey.of(scene, first.lines[name], of_line, s[out_at_first], values)
+            values = {x: np.asarray(found[x])[:, here] for x in ("curvature", "tension", "position")}
+            survey = Survey.of(scene, first.lines[name], of_line, places[name], values)
             out[name] = with_survey(first.lines[name], scene, survey)
         return SystemResolution(out)
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.combinations.networks import both, differences, events_differ
-from tests.combinations.pairs import CLAMP, DRAG, END, START, WATER, scene_of
+from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, scene_of
 from tests.problems import tables_with
 
 FREE = {"kind": "free", "force": [40, 3, 30]}
@@ -15,7 +15,7 @@ GUIDED = {"kind": "guided", "tangent": [1, 0.1, 0.2], "normal": [0, 1, 0], "forc
 STIFF = {"cable.sections.0.bending_stiffness": 2e3}
 TURNED = {"motion": {"pitch": {"amplitude": 2.0, "period": 1.0}, "ramp": 0.5}}
 THROWN = {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0.2], "velocity": [0, 1, 3]}
-# Each with one thing that an end of a cable has: how many events it has.
+# Each with one thing that a cable has, and points, lines or their pre-runs had otherwise or not at all.
 SCENES: dict[str, dict[str, Any]] = {
     "a free end with a force, in water": {END: FREE, "environment.fluid": WATER} | DRAG,
     "a moment at a free end": {START: CLAMP, END: FREE | {"moment": [0, 50, 10]}} | STIFF,
@@ -24,6 +24,7 @@ SCENES: dict[str, dict[str, Any]] = {
     "thrown, both ends free": {START: {"kind": "free"}, END: {"kind": "free"}, "initial": THROWN},
     "a clamp beside a catenary": {START: CLAMP, "model": "catenary"},
     "arc lengths of outputs": {"output.points": [0.0, 3.1, 12.0], "output.history": [5.0]},
+    "cells to a layer beside a clump": FEATURES["clump"][0] | FEATURES["layers"][0],
     "zones that move": {"model": {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[4, 8]]}},
 }
 
