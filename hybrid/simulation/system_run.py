@@ -598,7 +598,8 @@ class SystemRun:
         """
         end = self.system.require_time().duration if until is None else until
         given = [*(m.ends.breaks for m in self.model.models), self.model.breaks]
-        self._breaks = sorted({x for each in (*given, self.failures.times) for x in each if x < end})
+        self._jumps = sorted({x for each in given for x in each if x < end})
+        self._breaks = sorted({*self._jumps, *(x for x in self.failures.times if x < end)})
         outputs = [x for x in self.times if x < end] if self.system.output.exact else []
         last = self.times[-1] if until is None else until
         steps = [x for x in self.resolution.one.ends if x < end]
@@ -757,14 +758,13 @@ class SystemRun:
     def _arrive(self, stop: float, step: float) -> None:
         """What is due at a stop (s): an output, which is of the moment before, and other loads."""
         self.output_due()
-        if falls_on(stop, self._breaks, step):
+        if falls_on(stop, self._jumps, step):
             self.ends_of_now()
             self.loaded = self.t
             for model in self.model.models:
                 model.ends.set_loads(self.t)
             self.restart_steps()
-            self.leg = (stop, 0)
-        if self.system.output.exact or self.resolution.one.ends:
+        if self.system.output.exact or self.resolution.one.ends or falls_on(stop, self._breaks, step):
             self.leg = (stop, 0)
 
     def output_due(self) -> None:

@@ -6,6 +6,7 @@ from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
+import yaml
 
 import hybrid
 from hybrid import Result, Scene
@@ -22,6 +23,7 @@ INSTANTS = ("_t_max", "_t_min", "_at_max", "_at_min", "_t", "times")
 SLOW = 0.05  # m/s or rad/s
 SMALL = 1e-3  # of F, or of FL
 UNITS_OF_WORK = ("J", "W", "N m")
+GRAVITY = 9.81  # m/s2
 
 
 class Difference(NamedTuple):
@@ -50,7 +52,9 @@ def both(tables: dict[str, Any], rest: bool = False) -> tuple[Result, Result]:
 def differences(cable: Result, network: Result, same: float = SAME) -> list[Difference]:
     """Datasets that differ by more than `same` of their scale, the worst first, and events."""
     line, found = network.lines[LINE], list[Difference]()
-    force = float(np.abs(cable["tension"]).max())
+    sections = yaml.safe_load(cable.scene_text)["cable"]["sections"]
+    weight = GRAVITY * sum(x["mass"] * x["length"] for x in sections)
+    force = max(float(np.abs(cable["tension"]).max()), weight)  # a line that falls has hardly any tension
     length = float(cable["mesh/s"][-1])
     for name in sorted({*cable.names} & {*line.names}):
         if name in NUMERICS or name.endswith(INSTANTS) or name.startswith("events/"):

@@ -84,11 +84,6 @@ def refused_as_cable(tables: Tables) -> bool:
 
 # --- computed ------------------------------------------------------------------------------------
 
-# Of a system the search is not pushed off an equilibrium in which it would turn over, or comes to one in soil out of which
-# a rod with a direction would turn: refused, with the reason.
-REFUSED_AS_NETWORK = {("body", "two stiffnesses"), ("soil", "two stiffnesses"), ("soil", "curved")}
-# m, where steps that follow the motion begin anew after an end is let go: as long as their tolerance lets them differ.
-BY_STEPS = {("release", "chosen steps"): 1e-4}
 # Of the energy of stretch, with soil: Newton's method converges linearly where a node turns from one branch of it to the
 # other, to its tolerance and not far below. Over steps that is 7e-9 of the length, as little as positions may differ by.
 IN_SOIL = 5e-6
@@ -126,8 +121,7 @@ def differ(names: Sequence[str], said: Callable[[Tables], Tables]) -> str:
     one, two = as_it_stands(tuple(names)), answer(other)
     if isinstance(one, str) or isinstance(two, str):
         told = [x if isinstance(x, str) else "computed" for x in (one, two)]
-        refused = said is as_network and tuple(names) in REFUSED_AS_NETWORK
-        return "" if told[0] == told[1] or (refused and told[0] == "computed") else f"{names}: {told}"
+        return "" if told[0] == told[1] else f"{names}: {told}"
     there = one.position
     if said is turned:
         there = (there @ turned_and_mirrored().T)[:, ::-1]
@@ -135,9 +129,9 @@ def differ(names: Sequence[str], said: Callable[[Tables], Tables]) -> str:
     energy = np.abs(two["energy/stretch"] - one["energy/stretch"]).max() / one["energy/stretch"].max()
     placed = "layers" in names
     rest = BY_CELLS / LENGTH if placed else 1e-9
-    allowed = BY_STEPS.get(tuple(names), BY_CELLS if placed else 20.0 * TOLERANCE * LENGTH) / LENGTH
+    allowed = (BY_CELLS if placed else 20.0 * TOLERANCE * LENGTH) / LENGTH
     loose, in_soil = placed or "torque of tension" in names, "soil" in names
-    stretch = 1e-2 if tuple(names) in BY_STEPS else 1e-4 if loose else IN_SOIL if in_soil else 1e-6
+    stretch = 1e-4 if loose else IN_SOIL if in_soil else 1e-6
     good = apart[0] < rest and apart.max() < allowed and energy < stretch
     return "" if good else f"{names}: {apart[0]:.2g}, {apart.max():.2g} of the length, {energy:.2g} of the energy"
 

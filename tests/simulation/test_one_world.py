@@ -25,6 +25,7 @@ SCENES: dict[str, dict[str, Any]] = {
     "a clamp beside a catenary": {START: CLAMP, "model": "catenary"},
     "arc lengths of outputs": {"output.points": [0.0, 3.1, 12.0], "output.history": [5.0]},
     "cells to a layer beside a clump": FEATURES["clump"][0] | FEATURES["layers"][0],
+    "let go, with steps that follow": FEATURES["release"][0] | FEATURES["chosen steps"][0] | {"time.duration": 0.3},
     "zones that move": {"model": {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[4, 8]]}},
 }
 
