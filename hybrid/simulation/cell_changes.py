@@ -32,6 +32,7 @@ from hybrid.kernels.mesh.zone_switch import AFTER, BEFORE, NUMBERS, begin_switch
 from hybrid.kernels.mesh.zone_transfer import Match, Transfer
 from hybrid.kernels.run import following_run as f
 from hybrid.kernels.run.run import run as steps
+from hybrid.kernels.run.system import begin_line
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, sample_size
 from hybrid.kernels.state.forces import REMEMBERS
@@ -68,6 +69,7 @@ class CellChanges:
     """Changes of the cells of a run (`Transient`), and of what is rod."""
 
     alone = True  # whether cells change without a return to Python
+    by_parity: tuple[Table, Table] | None = None  # of one of several lines: its tables in steps of all, even and odd
 
     def __init__(self, owner: Transient) -> None:
         """Room for all; `adopt` before the first change."""
@@ -218,14 +220,34 @@ class CellChanges:
         def for_sides(blank: Any, values: Any) -> list[Shaped]:
             return [Shaped(Table(blank), partial(on_new, values, k)) for k in both]
 
+        def in_odd(k: int, m: int) -> dict[str, Any]:
+            found = in_run(k, m)
+            return found | {"old": found["new"], "new": found["old"]}
+
         lines, kinds = for_sides(blank_line_job, line_job), for_sides(blank_kinds_job, kinds_job)
         of_run, of_zones = for_sides(blank_job, in_run), for_sides(blank_zone_job, in_zones)
+        of_odd = for_sides(blank_job, in_odd) if owner.of_many else []
         switches = [Shaped(Table(blank_switch_job), partial(switch_job, *pair)) for pair in pairs]
         renews = [Shaped(Table(blank_renew_job), partial(renew_job, *pair)) for pair in pairs]
         of_itself = for_sides(blank_itself_job, in_itself) if self._watch is not None else []
         self._lines = lines
-        self._tables = layouts, kinds, of_run, of_zones, of_itself, switches, renews  # what is bound there stays alive
+        # what is bound there stays alive
+        self._tables = layouts, kinds, of_run, of_odd, of_zones, of_itself, switches, renews
         self._bind_following(layouts, lines, kinds, of_run, of_zones, of_itself, switches, renews)
+        self._bind_calls(
+            of_odd,
+            {
+                "lay_out": (lay_out, layouts[0]),
+                "clear": (clear_state, renews[0].table),
+                "line": (fill_line, lines[0].table),
+                "begin": (begin_switch, switches[0].table),
+                "kinds": (fill_kinds, kinds[0].table),
+                "end": (end_switch, switches[0].table),
+                "renew": (renew, renews[0].table),
+                "before_forces": (before_forces, self._run.table),
+                "after_forces": (after_forces, self._run.table),
+            },
+        )
 
     def _bind_following(
         self, layouts: list[Table], lines: list[Shaped], kinds: list[Shaped], of_run: list[Shaped],
@@ -246,7 +268,8 @@ class CellChanges:
             tree = self._on.itself.tree.__array_interface__["data"][0]
             self._at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
         numbers: dict[str, Any] = {
-            "calls": self._calls, "at": self._at, "clock": run.clock, "counts": run.count, "outputs": run.books.outputs,
+            "calls": self._calls, "at": self._at, "clock": run.clock, "own": run.books.clock, "counts": run.count,
+            "outputs": run.books.outputs,
             "work": run.books.work, "zone_clock": zones.clock, "zone_counts": zones.counts, "numbers": self._numbers,
             "run": run.table.numbers, "run_places": in_run, "in_run": stacked(of_run, in_run),
             "zones": self._switching.table.numbers, "zone_places": in_zones, "in_zones": stacked(of_zones, in_zones),
@@ -257,17 +280,23 @@ class CellChanges:
             "here": zones.here, "waiting": self._waiting, "places": self._places,
         }  # fmt: skip
         self._following.bind(**numbers)
-        at, samples = self._at, self._on.samples.__array_interface__["data"][0]
-        at.room, at.room_size, at.most_rows = samples, self._on.samples.size, self._on.rows
-        at.task = run.table.part("task").start
-        at.samples_at = int(np.flatnonzero(of_run[0].numbers[0] == samples).item())
-        calls = {
-            "lay_out": (lay_out, layouts[0]), "clear": (clear_state, renews[0].table),
-            "line": (fill_line, lines[0].table), "begin": (begin_switch, switches[0].table),
-            "kinds": (fill_kinds, kinds[0].table), "end": (end_switch, switches[0].table),
-            "renew": (renew, renews[0].table), "before_forces": (before_forces, run.table),
-            "after_forces": (after_forces, run.table), "steps": (steps, run.table),
-        }  # fmt: skip
+        self._at.task = run.table.part("task").start
+        samples = self._on.samples.__array_interface__["data"][0]
+        self._samples_at = np.flatnonzero(of_run[0].numbers[0] == samples)
+
+    def _bind_calls(self, of_odd: list[Shaped], calls: dict[str, tuple[Any, Any]]) -> None:
+        """Addresses of what a change calls; of_odd: of one of several lines, what its table of odd steps gets."""
+        at, run, on = self._at, self._run, self._on
+        if self.by_parity is not None:
+            even, odd = self.by_parity
+            places = of_odd[0].places(IN_RUN)
+            in_odd = np.array([x.numbers[:, places] for x in of_odd])
+            self._following.bind(even=even.numbers, odd=odd.numbers, in_odd=in_odd)
+            calls, at.of_many = calls | {"books": (begin_line, run.table)}, 1
+        else:
+            at.room, at.room_size, at.most_rows = on.samples.__array_interface__["data"][0], on.samples.size, on.rows
+            at.samples_at = int(self._samples_at.item())
+            calls = calls | {"steps": (steps, run.table)}
         for name, (kernel, table) in calls.items():
             setattr(self._calls, name, kernel.address(table.numbers))
 

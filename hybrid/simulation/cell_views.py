@@ -51,9 +51,9 @@ class CellViews:
         self.sides = Side(most, base), Side(most, base)
         self._kept = Room(Packed(lambda n: blank_kept(n, marked, some)), most)
         self._sea, self._work = Room(seas, most), Room(works, most)
-        size = sample_size(most, True)
-        self.rows = max(1, min(ROWS, MOST_SAMPLED // size))
-        self.samples = np.zeros(self.rows * size)
+        size = 0 if owner.of_many else sample_size(most, True)
+        self.rows = max(1, min(ROWS, MOST_SAMPLED // max(size, 1)))
+        self.samples = np.zeros(self.rows * size)  # those of one of several lines are in rows of the most cells
         self.watched = owner.itself is not None and owner.itself.on
         self.itself: Itself = blank_itself(np.zeros(most))
         self._turn = np.zeros((0, 3))
@@ -136,13 +136,13 @@ class CellViews:
         return found
 
     def books(self, cells: int) -> Books:
+        own = self._view(self._kept, cells)._asdict() | {"base": self.base}
         size, used = sample_size(cells, True), int(self._at.used)
-        rows = min(self.rows, (self.samples.size - used) // size)
-        samples = self.samples[used : used + rows * size].reshape(rows, size)
-        kept = self._view(self._kept, cells)
+        if not self._owner.of_many:
+            rows = min(self.rows, (self.samples.size - used) // size)
+            own["samples"] = self.samples[used : used + rows * size].reshape(rows, size)
         if not self._binding:
-            return self._run.books._replace(samples=samples, base=self.base, **kept._asdict())
+            return self._run.books._replace(**own)
         if (size, cells) not in self._views:
-            found = self._run.books._replace(samples=samples, base=self.base, **kept._asdict())
-            self._views[size, cells] = found
+            self._views[size, cells] = self._run.books._replace(**own)
         return self._views[size, cells]

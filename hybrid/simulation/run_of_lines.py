@@ -11,7 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from hybrid.adapt.manager import Change
-from hybrid.kernels.state.state import Floats, Line
+from hybrid.kernels.state.state import Floats, Line, Work
+from hybrid.model.build import Model
 from hybrid.model.system import SystemModel, SystemResolution
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -91,6 +92,11 @@ class RunOfLines(Protocol):
 
     @property
     def last_rho(self) -> float: ...
+
+    @property
+    def asks_quantities(self) -> bool: ...
+
+    def adopt_cells(self, number: int, model: Model, work: Work) -> None: ...
 
     def start_from(self, bodies: Floats) -> None: ...
 

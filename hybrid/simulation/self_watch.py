@@ -275,7 +275,7 @@ class LineWatch:
         """watch: what is known of the line so far, which goes on on the cells of `model`."""
         self._watch, self._model = watch, model
         self._job: Table | None = None
-        self._running: Table | None = None  # of the steps of a run
+        self.running: Table | None = None  # of the steps of a run
         self._address, self.is_bent = 0, False
         if watch.on:
             watch.renew(model)
@@ -304,21 +304,25 @@ class LineWatch:
             line=model.line, ends=model.ends.values, old=states[0], new=states[1], clock=clock, counts=counts,
             itself=self._watch.itself,
         )  # fmt: skip
-        self._running = job
+        self.running = job
         if self.is_bent:
             self._address = watch_itself.address(job.numbers)
         return {"itself": self._address if self.is_bent else UNBENT, "itself_table": job.numbers}
 
+    def adopt_cells(self, model: Model) -> None:
+        """Go on with a line of other cells, of which steps know."""
+        self._model, self._job = model, None
+
     def take(self, model: Model) -> None:
         """Go on with a line of the same cells."""
         self._model = model
-        for job in (self._job, self._running):
+        for job in (self._job, self.running):
             if job is not None:
                 job.bind(line=model.line)
 
     def bends(self) -> tuple[int, dict[str, Any]]:
         """A line of a run is bent, so that every step looks from now on: bits of the last, and its job."""
-        self.is_bent, job = True, self._running
+        self.is_bent, job = True, self.running
         assert job is not None
         self._address = watch_itself.address(job.numbers)
         return int(watch_itself(job.numbers)), {"itself": self._address}

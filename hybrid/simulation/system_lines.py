@@ -69,6 +69,8 @@ from hybrid.store.records import PENDING
 from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:
+    from hybrid.kernels.machine.binding import Table
+    from hybrid.simulation.lines_cells import LineCells
     from hybrid.simulation.payout import PayingOut
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
@@ -135,6 +137,9 @@ class Waiting(NamedTuple):
 class LineResult:
     """What is recorded of one line."""
 
+    cells: LineCells | None = None  # what changes cells without Python
+    _sampled: Sequence[Output] = ()  # of several meshes, of which `output` is still to be told
+
     def __init__(
         self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
         outputs: int, target: Target | None = None, pending: str = "", paying: PayingOut | None = None,
@@ -151,7 +156,7 @@ class LineResult:
         self._moves = outputs > 0
         self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None)
         self.envelope = Envelope(scene, model, self._moves, found is not None and found.settled)
-        self._marked = marked_places(scene, model)
+        self.marked = marked_places(scene, model)
         self.envelope.itself.on &= target is not None or bool(model.line.bits & MAY_TOUCH)
         self._itself = LineWatch(self.envelope.itself, model)
         self.nears_itself = self.parts_itself = False  # whether contact with itself has to begin, or to end
@@ -183,7 +188,7 @@ class LineResult:
 
     def _blank_books(self, begin: Floats) -> Books:
         """The same for the cells of now; begin: (N+1, 3) m, from where displacements count."""
-        line, marks = self.model.line, marks_on(self.model.line.s, self._marked)
+        line, marks = self.model.line, marks_on(self.model.line.s, self.marked)
         nodes, marked = line.s.size, np.flatnonzero(marks)
         right = np.arange(nodes)
         right[marked] = nodes + np.arange(marked.size)
@@ -202,9 +207,10 @@ class LineResult:
 
     @property
     def sample_size(self) -> int:
-        """Numbers of an output of the line as it is."""
-        line, varies, touches = self.model.line, self.model.layout is not None, self.books.touch.size > 0
-        return sample_size(line.h.size, varies, len(line.torsion), touches, line.moved.size, sampled_size(line))
+        """Numbers of an output of the line, of the most cells that it may have."""
+        line, layout, touches = self.model.line, self.model.layout, self.books.touch.size > 0
+        more = len(line.torsion), touches, line.moved.size, sampled_size(line)
+        return sample_size(line.h.size if layout is None else int(layout.starts[-1]), layout is not None, *more)
 
     def make_room(self, rows: int) -> None:
         """Room for so many samples of the line as it is; what is there is gone."""
@@ -290,9 +296,10 @@ class LineResult:
         self.envelope.itself.tell_again(t, dt, self.events.event)
 
     @property
-    def _outputs_join(self) -> bool:
+    def outputs_join(self) -> bool:
         """Whether outputs wait though the cells that they are of change, because these follow the curvature."""
         follows = self._moves and self.paying is None and not self.touches and follows_curvature(self.scene)
+        follows = follows and self.shown is None
         return follows and may_be_joined(self.observer, self.model.line)
 
     def follow(self, model: Model, other_cells: bool = False) -> None:
@@ -302,7 +309,7 @@ class LineResult:
         """
         if model is self.model:
             return
-        if not (other_cells and self._outputs_join):
+        if not (other_cells and self.outputs_join):
             self.write_down()
         self.model, first = model, self.observer.first_energy
         self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
@@ -331,13 +338,24 @@ class LineResult:
 
     def around(self, work: Work) -> Around:
         """What changes of kinds have to know of the line."""
-        return Around(work, self.books, self.envelope, self._marked, self.envelope.itself.itself.cells)
+        return Around(work, self.books, self.envelope, self.marked, self.envelope.itself.itself.cells)
 
     def take_kinds(self, model: Model) -> None:
         """Go on with other kinds of the same cells, in the same arrays, after what waited has been recorded."""
         self.model = model
         self.diagnostics.follow(model)
         self._itself.take(model)
+
+    def adopt_cells(self, model: Model) -> None:
+        """Go on with other cells, which steps have changed to with the books, of which some outputs may wait."""
+        self.model = model
+        self.diagnostics.follow(model)
+        self._itself.adopt_cells(model)
+
+    @property
+    def watch_table(self) -> Table | None:
+        """Of what looks how near the line comes to itself in steps; None: nothing does."""
+        return self._itself.running
 
     # --- steps and outputs --------------------------------------------------------------------------
 
@@ -375,12 +393,21 @@ class LineResult:
             raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]), detail)
 
     def sampled(self, count: int) -> Batch:
-        """The outputs that steps have sampled, as many as there are in the buffer; in arrays of their own."""
-        line, books = self.model.line, self.books
-        varies = self.model.layout is not None
-        sizes = line.h.size, self.held, varies, len(line.torsion), books.touch.shape[1], line.moved.size
-        kept = slip_size(line), bool(line.bits & REMEMBERS)
-        return batch_of_rows(books.samples[:count].copy(), *sizes, *kept)[0]
+        """The outputs that steps have sampled, as many as there are in the buffer; in arrays of their own.
+
+        Of several meshes: their ends alone; `output` has the rest.
+        """
+        rows = self.books.samples[:count].copy()
+        if self.cells is not None and self.cells.waits:
+            self._sampled, ends = self.cells.outputs(rows)
+            return ends
+        return self.batch_of(rows, self.model.cells)
+
+    def batch_of(self, rows: Floats, cells: int) -> Batch:
+        """Rows (n, size) of samples of the line on so many cells, as views."""
+        line, varies = self.model.line, self.model.layout is not None
+        sizes = cells, self.held, varies, len(line.torsion), self.books.touch.shape[1], line.moved.size
+        return batch_of_rows(rows, *sizes, slip_size(line), bool(line.bits & REMEMBERS))[0]
 
     def state_now(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
         """The state at t (s), now, as an output that is made of it."""
@@ -392,7 +419,10 @@ class LineResult:
         """Record states."""
         if self.shown is not None:
             self.shown(batch)
-        if self._outputs_join:
+        if self._sampled:
+            self._aside.put(self.model, self._sampled)
+            self._sampled = ()
+        elif self.outputs_join:
             self._aside.put(self.model, outputs_in(batch, self.model.line, self.model.zones))
         else:
             self._waiting.append(batch)

@@ -20,8 +20,9 @@ from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
 from hybrid.kernels.machine.cache import cache_folder
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import SELF_CONTACT
-from hybrid.kernels.state.state import Floats, Moves, state_for
+from hybrid.kernels.state.state import Floats, Moves, Work, state_for
 from hybrid.kernels.step.accept import MANY
+from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
 from hybrid.model.plan import SAME_STOP, equal_steps, output_times
 from hybrid.model.system import SystemResolution, build_system
@@ -537,6 +538,19 @@ class SystemRun:
             line.make_room(rows)
         self.loop.make_room(rows, len(solver.body_work))
 
+    @property
+    def asks_quantities(self) -> bool:
+        """Whether quantities by name are among the outputs, which are found of one mesh at a time."""
+        return bool(self.quantities.fields)
+
+    def adopt_cells(self, number: int, model: Model, work: Work) -> None:
+        """Go on with other cells of a line, which steps have changed to."""
+        models, line = [*self.model.models], self.lines[number]
+        models[number] = model
+        self.model = replace(self.model, models=tuple(models))
+        self.solver.adopt_cells(number, model.line, model.sea.values, work, line.books)
+        line.adopt_cells(model)
+
     def take_other(self) -> None:
         """Room for the state after the next step, of lines as they are now."""
         self.other = self.state.copy()
@@ -632,6 +646,8 @@ class SystemRun:
             self._between = False
             self._attach()
             code = loop.go()
+            if self.zones is not None:
+                self.zones.sync()
             self.state, self.other = loop.states
             if code in (b.TRYING, b.TRIED, b.STEPPED, b.FAILED) or loop.is_half_full:
                 self._record_samples()  # of lines as they were until now

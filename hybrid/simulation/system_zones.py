@@ -34,6 +34,7 @@ from hybrid.simulation.initial_zones import (
     on_fewer,
     zones_without_equilibrium,
 )
+from hybrid.simulation.lines_cells import LineCells
 from hybrid.simulation.payout_zones import PaidZones
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.system_cells import equilibrium_on_cells, following
@@ -202,6 +203,7 @@ class _LineZones:
         clock.letting_go = LETTING_GO * manager.pace
         self.pending: Change | None = None
         self.paid: PaidZones | None = None  # of a line that is paid out
+        self.cells: LineCells | None = None  # what changes its cells without Python
 
     def follow(self, run: RunOfLines, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
@@ -267,12 +269,32 @@ class SystemZones:
             loop.follow([])
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
             return
+        loop.hold_zones([x.switching.table for x in self.lines])
         loop.follow([x.bind(run, loop) for x in self.lines])
         mine = [run.lines[x.number] for x in self.lines]
         if run.shared is not None or any(x.contact is not None for x in mine):
             loop.counts.asks |= b.ASK_STEPS
         if any(x.observer.writes_criteria for x in mine):
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_STEPS
+        for x in self.lines:
+            self._change_by_itself(x, not loop.counts.asks & b.ASK_BEFORE)
+        loop.change_cells([x.cells.job if x.cells is not None else None for x in self.lines])
+
+    def _change_by_itself(self, x: _LineZones, may: bool) -> None:
+        """Let cells of a line change without Python from now on, where that can be."""
+        run, line = self._run, self._run.lines[x.number]
+        if x.cells is None or not x.cells.fits(x.switching):
+            x.cells = None
+            if may and not run.loop.counts.samples and LineCells.may_change(run, x.number, x.switching):
+                x.cells = LineCells(run, x.number, x.switching)
+                x.cells.adopt()
+            line.cells = x.cells
+
+    def sync(self) -> None:
+        """Python knows of the cells of now."""
+        for x in self.lines:
+            if x.cells is not None:
+                x.cells.sync()
 
     def look_ahead(self) -> None:
         """Criteria know how near lines come to themselves and each other, by the contact that the solver has now."""
@@ -407,6 +429,12 @@ class SystemZones:
     def _change(self, changes: Sequence[tuple[_LineZones, Change]]) -> None:
         """Carry out changes of lines, in their arrays where that can be."""
         run = self._run
+        for x, change in changes:
+            if x.cells is not None:
+                booked = x.cells.change() if change.same else x.cells.change_zones(change)
+                x.cells.sync()
+                note_change(run.lines[x.number].events, x.switching.manager, run.t, change, booked)
+        changes = [(x, change) for x, change in changes if x.cells is None]
         if not changes:
             return
         if not SystemKinds.apply(run, [x.switching for x, _ in changes]):

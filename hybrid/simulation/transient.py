@@ -75,6 +75,8 @@ class StepFailed(Exception):
 class Transient:
     """A cable in motion."""
 
+    of_many = False  # whether its line is one of several
+
     def __init__(
         self,
         scene: Scene,

@@ -39,7 +39,7 @@ from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.forces import FRICTION, WAVES
 from hybrid.kernels.state.obstacle_rows import FREE, MOVES
 from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
-from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, State, Work, state_for
+from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, State, Work, state_for
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, Limits, Task
 from hybrid.kernels.step.step import friction_axes
@@ -237,10 +237,13 @@ class SystemSolver:
             if self._touched:
                 self._together.touch(*self._touched)
 
+    @property
+    def mixes(self) -> bool:
+        """Whether a line may come near what is free, with which it is then solved."""
+        return any(self._mixes)
+
     def find_near(self, now: SystemState, t: float) -> None:
         """Find which lines are near what is free in the state of now, t (s), and solve these with it from now on."""
-        if not any(self._mixes):
-            return
         self._bind_states(0, now, now)
         for x in self.lines:
             carry_obstacles(t, t, x.sea)
@@ -260,6 +263,24 @@ class SystemSolver:
         """A line is in other arrays from now on."""
         self.lines = tuple(x._replace(line=line) if k == number else x for k, x in enumerate(self.lines))
         self.bind_line(number, line=line)
+
+    def tables_by_itself(self, number: int) -> tuple[Table, Table, Table]:
+        """Jobs of a line that is solved by itself: of that, and of steps of even and of odd parity."""
+        even, odd = self._tables[number]
+        return self._lone_tables[number], even, odd
+
+    def limits_by_itself(self, number: int) -> Limits:
+        """What Newton's method works with in a line that is solved by itself."""
+        return Limits(REACH * self.lines[number].length, self.lines[number].scale, MOST_OF_STEP)
+
+    def marcher_of(self, number: int) -> int:
+        """Address of the kernel that solves a step of a line."""
+        return self._solver
+
+    def adopt_cells(self, number: int, line: Line, sea: Sea, work: Work, books: Books) -> None:
+        """A line is in other arrays from now on, of which its jobs know."""
+        self.lines = tuple(x._replace(line=line, sea=sea) if k == number else x for k, x in enumerate(self.lines))
+        self.work[number], self.books[number] = work, books
 
     def _room_to_meet(self) -> dict[str, Any]:
         """Room of lines that touch the bodies that carry obstacles."""

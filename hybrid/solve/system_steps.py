@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import WORK
 from hybrid.kernels.junctions.members_water import stir_members
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_step import follow_zones
+from hybrid.kernels.run.following_run import ask_cells, change_cells
 from hybrid.kernels.run.system import book_system_step, solve_system
 from hybrid.kernels.run.system_run import (
     CUT_LINE,
@@ -20,6 +22,7 @@ from hybrid.kernels.run.system_run import (
     SLACK_LINE,
     TURNED_LINE,
     blank_steps_job,
+    run_lines,
     run_system,
     sample_system,
 )
@@ -60,10 +63,10 @@ class SystemSteps:
         self._log, self.seen = np.zeros((0, 0, len(b.LOG))), np.zeros(0, np.int64)
         self._solver: SystemSolver | None = None
         self._first: np.ndarray | None = None  # a job of the solver, until the kernels of its steps are known
-        self._waves, self._is_new = (
-            0,
-            True,
-        )  # whether nobody knows which lines are near what is free in the state of now
+        self._waves = 0
+        self._is_new = True  # whether nobody knows which lines are near what is free in the state of now
+        self._followed = np.zeros((0, 0), np.int64)  # jobs of zones
+        self._changes = False  # whether cells of some line change in compiled steps
         clock = self.clock
         clock.rho, clock.allowed, clock.tolerance, clock.error_ratio = rho, np.inf, 1.0, 1.0
         self.controlled = largest > 0.0
@@ -135,10 +138,40 @@ class SystemSteps:
         """After steps of even and odd parity this kernel looks whether lines have met; 0: none does."""
         self._job.bind(watched_even=even, watched_odd=odd, watcher=watcher)
 
+    def hold_zones(self, zones: Sequence[Table]) -> None:
+        """Let tables of kernels.mesh.zone_step stand where steps have them, in place of those before."""
+        rows = self._followed
+        if len(rows) == len(zones) and all(x.numbers.base is rows for x in zones):
+            return
+        self._followed = np.zeros((len(zones), len(zones[0].numbers)), np.int64)
+        for row, table in zip(self._followed, zones, strict=True):
+            table.move(row)
+
     def follow(self, zones: Sequence[Table]) -> None:
         """These tables of kernels.mesh.zone_step follow zones of lines from now on; none: Python does."""
-        tables = np.array([x.numbers for x in zones]) if zones else np.zeros((0, 0), np.int64)
-        self._job.bind(followed=tables, follower=follow_zones.address(tables[0]) if zones else 0)
+        self.change_cells([])
+        if not zones:
+            self._job.bind(followed=np.zeros((0, 0), np.int64), follower=0)
+            return
+        self.hold_zones(zones)
+        due = np.zeros(len(zones), np.int64)
+        self._job.bind(followed=self._followed, follower=follow_zones.address(self._followed[0]), due=due)
+
+    def change_cells(self, lines: Sequence[NDArray[np.int64] | None]) -> None:
+        """These tables of kernels.run.following_run change cells of lines that `follow` has, where there is one."""
+        known = [x for x in lines if x is not None]
+        self._changes = bool(known)
+        if not known:
+            self._job.bind(changer=0)
+            return
+        tables = np.array([np.zeros_like(known[0]) if x is None else x for x in lines])
+        self._job.bind(
+            changed=tables,
+            changes=np.array([x is not None for x in lines], np.int64),
+            asker=ask_cells.address(known[0]),
+            changer=change_cells.address(known[0]),
+            runner=run_system.address(self._job.numbers),
+        )
 
     def pay(self, lines: np.ndarray, payer: int) -> None:
         """These tables (W, ..) of kernels.reel.reel change the lengths of lines from now on, by pay_out at `payer`."""
@@ -182,11 +215,11 @@ class SystemSteps:
             self._job.bind(solver=solve_system.address(self._first), book=book_system_step.address(self._first))
             self._first = None
         assert self._solver is not None
-        if self._is_new:
+        if self._is_new and self._solver.mixes:
             self._solver.find_near(self.states[0], float(self.clock.now))
             self._job.bind(**self._solver.regroup())
-            self._is_new = False
-        while (code := int(run_system(self._job.numbers))) == REGROUP:
+        self._is_new, go = False, run_lines if self._changes else run_system
+        while (code := int(go(self._job.numbers))) == REGROUP:
             self._job.bind(**self._solver.regroup())
         return code
 

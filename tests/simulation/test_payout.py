@@ -589,7 +589,9 @@ def test_outputs_looked_at_together_are_those_looked_at_one_by_one(model: str, m
     together = hybrid.run(scene)
     calls = []
     record = TimeLoop._record_aside
-    monkeypatch.setattr(TimeLoop, "_record_aside", lambda loop: (calls.append(len(loop._aside.waiting)), record(loop))[1])
+    monkeypatch.setattr(
+        TimeLoop, "_record_aside", lambda loop: (calls.append(len(loop._aside.waiting)), record(loop))[1]
+    )
     again = hybrid.run(scene)
     assert max(calls) > 5  # nodes enter about every 3 s, with six outputs between
     monkeypatch.setattr(Transient, "pays_out", False)

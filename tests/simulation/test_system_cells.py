@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from bits import FEW_STEPS, Stopping, differences
 from test_payout_cells import pinned
 from test_system_contact_zones import alone
@@ -16,10 +17,14 @@ from test_system_zones import ROPE, SEA, mooring, slackening, stepped_again
 
 import hybrid
 import hybrid.simulation.system_run
+from hybrid.simulation.lines_cells import LineCells
+from hybrid.solve.system_steps import SystemSteps
+from tests.said import line_of, said
 from tests.validation.test_validation_lines_contact import force_between, lowered
 
 Tables = dict[str, Any]
 SHARE = 0.05
+TOUCHDOWN = Path(__file__).parents[2] / "examples" / "touchdown.yaml"
 FOLLOWS = {"kind": "adaptive", "curvature_error": SHARE}
 
 
@@ -52,6 +57,29 @@ def test_a_system_of_one_line_has_the_cells_of_the_cable() -> None:
     assert np.abs(rope.tension - cable.tension).max() < 1e-7 * cable.tension.max()
     assert np.abs(rope.curvature - cable.curvature).max() < 1e-7 * cable.curvature.max()
     assert np.isclose(rope["work/zones"][-1], cable["work/zones"][-1], rtol=1e-6)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "model", [FOLLOWS | {"force_rod": [[0, 250]]}, FOLLOWS | {"hold_time": 2.0}], ids=["rod", "zones"]
+)
+def test_cells_change_without_python_as_those_of_a_cable(model: Tables, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a line that is joined to nothing that moves: steps go on through changes, and outputs of all cells wait."""
+    tables = yaml.safe_load(TOUCHDOWN.read_text()) | {
+        "model": model, "mesh": {"cells": 24}, "time": {"duration": 8.0, "step": 0.1}, "output": {"every": 0.1},
+    }  # fmt: skip
+    calls, go = [], SystemSteps.go
+    monkeypatch.setattr(SystemSteps, "go", lambda steps: (calls.append(1), go(steps))[1])
+    cable, whole = hybrid.run(said(tables, network=False)), hybrid.run(said(tables, network=True))
+    line, compiled = line_of(whole), len(calls)
+    assert cells(line) == cells(cable) and len({*cells(cable)}) > 3
+    assert [(e.t, e.kind) for e in line.events] == [(e.t, e.kind) for e in cable.events]
+    for name in ("position", "tension", "curvature", "work/zones", "energy/bending", "envelope/tension_max"):
+        assert np.abs(line[name] - cable[name]).max() <= 1e-9 * np.abs(cable[name]).max(), name
+    assert np.array_equal(whole["points/end/position"], line.position[:, -1])
+    monkeypatch.setattr(LineCells, "may_change", lambda run, number, switching: False)
+    hybrid.run(said(tables, network=True))
+    assert compiled <= 0.7 * (len(calls) - compiled)
 
 
 @pytest.mark.long

@@ -51,6 +51,10 @@ class Table:
         other._take(self, room)
         return other
 
+    def move(self, room: NDArray[np.int64]) -> None:
+        """Have the numbers in `room` from now on."""
+        room[:], self.numbers = self.numbers, room
+
     def _take(self, other: Table, room: NDArray[np.int64]) -> None:
         """The same as in another one, the numbers in `room`."""
         self._places, self._sizes, self._bound = other._places, other._sizes, {**other._bound}

@@ -41,6 +41,7 @@ class FollowingCalls(NamedNumbers, number=np.int64):
     renew: int
     before_forces: int
     after_forces: int
+    books: int  # of kernels.run.system.begin_line, for one of several lines
 
 
 class FollowingPlaces(NamedNumbers, number=np.int64):
@@ -60,6 +61,7 @@ class FollowingPlaces(NamedNumbers, number=np.int64):
     waiting: int  # lines whose outputs wait; places of their nodes; numbers of their samples
     placed: int
     used: int
+    of_many: int  # 1 for one of several lines, whose outputs all stand in rows of the most cells, `used` of them aside
     boxes_at: int  # where the table of kernels.contact.self_distance has the rows of its tree
 
 
@@ -73,6 +75,7 @@ class FollowingJob(NamedTuple):
     calls: FollowingCalls
     at: FollowingPlaces
     clock: Clock  # of the run
+    own: Clock  # and of the line, which is another one where there are several
     counts: b.Counts
     outputs: Floats
     work: Floats
@@ -82,6 +85,9 @@ class FollowingJob(NamedTuple):
     run: Numbers  # table of the run
     run_places: Numbers  # of those of its numbers that follow the cells
     in_run: NDArray[np.int64]  # (2 sides, 3, run_places.size)
+    even: Numbers  # of one of several: likewise its tables in steps from states of even parity, and of odd
+    odd: Numbers
+    in_odd: NDArray[np.int64]  # likewise of those
     zones: Numbers  # likewise of the table of zones
     zone_places: Numbers
     in_zones: NDArray[np.int64]
@@ -106,8 +112,8 @@ def blank_following_job() -> FollowingJob:
     """A job with the types that every one has."""
     z, few, pairs, sides = np.zeros, np.zeros(1, np.int64), np.zeros((1, 3), np.int64), np.zeros((2, 3, 1), np.int64)
     return FollowingJob(
-        FollowingCalls(), FollowingPlaces(), b.Clock(), b.Counts(), z(0), z((2, b.WORKS)),
-        ZoneClock(), ZoneFlags(), z(NUMBERS), few, few, sides, few, few, sides, few, few, sides,
+        FollowingCalls(), FollowingPlaces(), b.Clock(), b.Clock(), b.Counts(), z(0), z((2, b.WORKS)),
+        ZoneClock(), ZoneFlags(), z(NUMBERS), few, few, sides, few, few, sides, few, few, sides, few, few, sides,
         z((2, 1), np.int64), few, sides, few, sides, few, sides, few, sides, z(1, bool), pairs, few,
     )  # fmt: skip
 
@@ -164,7 +170,11 @@ def put_all(job):
     if job.itself_places.shape[0] > 0:
         put_at(job.in_itself[k], job.itself_places, m, job.itself)
         job.itself[job.at.boxes_at] = boxes(m)
-    put_samples(job, m)
+    if job.at.of_many != 0:
+        put_at(job.in_run[k], job.run_places, m, job.even)
+        put_at(job.in_odd[k], job.run_places, m, job.odd)
+    else:
+        put_samples(job, m)
 
 
 @inner
@@ -178,11 +188,15 @@ def end_change(job):
     call(calls.renew, job.renewed)
     at.side, at.cells, at.changes = 1 - k, m, at.changes + 1
     put_all(job)
+    job.own.now = job.clock.now
     call(calls.before_forces, job.run)
     job.run[at.task] = ASSEMBLY
     call_solver(calls.solver, job.run)
     job.run[at.task] = RUN
     call(calls.after_forces, job.run)
+    if calls.books != 0:
+        call(calls.books, job.run)
+        job.clock.previous = job.clock.now
     job.work[0, b.ZONES] += job.numbers[AFTER] - job.numbers[BEFORE]
 
 
@@ -269,6 +283,42 @@ def leave(job):
 def leave_cells(table):
     """`leave`."""
     leave(read(table))
+
+
+@inner
+def keep_rows(job):
+    """The outputs that have been sampled of one of several lines wait where they are, with the places of its nodes."""
+    at, some = job.at, job.counts.samples - job.at.used
+    if some > 0:
+        row = job.waiting[at.waiting]
+        row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, some, at.cells
+        for i in range(job.here.shape[0]):
+            if job.here[i]:
+                job.places[at.placed] = i
+                at.placed += 1
+        at.used += some
+        at.waiting += 1
+
+
+@kernel
+def ask_cells(table):
+    """Whether nothing but the cells of one of several lines is to change, and they may without Python, as a number."""
+    job = read(table)
+    at, zones = job.at, job.zone_clock
+    if at.alone == 0 or job.zone_counts.cells_due == 0 or zones.loudest > 1.0 or job.clock.now >= zones.next_review:
+        return 0
+    room = at.waiting < job.waiting.shape[0] and at.placed + at.cells + 1 <= job.places.shape[0]
+    return 1 if job.counts.samples == at.used or (at.may_wait != 0 and room) else 0
+
+
+@kernel
+def change_cells(table):
+    """Other cells of one of several lines, after outputs within the last step."""
+    job = read(table)
+    keep_rows(job)
+    begin_change(job)
+    end_change(job)
+    return 1
 
 
 @kernel

@@ -308,6 +308,29 @@ def note_quantities(table, job, t):
 
 
 @inner
+def begin_books_of(table, job, t):
+    """Powers and extremes of a line as it is, of which the report is known; t: s, now."""
+    line, new, books, report = job.line, job.new, job.books, job.work.report
+    find_powers(line, job.ends, books.velocity, new, report, books.power[0])
+    keep_report(books, report)
+    impose_now(job.ends, books.imposed)
+    if books.extremes.shape[1] > 0:
+        first_strains(line, job.ends, new, books)
+        note_extremes(line, job.sea, job.ends, new, books, t)
+    note_quantities(table, job, t)
+
+
+@kernel
+def begin_line(table):
+    """Books of a line in other cells, with a report of its first state, as which both count from here."""
+    job = read(table)
+    for i in range(job.new.bed.shape[0]):
+        for k in range(3):
+            job.new.bed[i, k] = job.old.bed[i, k]
+    begin_books_of(table, job, job.books.clock.now)
+
+
+@inner
 def begin_books(tables, joints, t):
     """Powers of the states as they are, what the seabed stores, and extremes where they are kept; t: s, now."""
     for l in range(tables.shape[0]):
@@ -326,13 +349,7 @@ def begin_books(tables, joints, t):
         move_joints(job, joints[l, START], joints[l, END])
         if job.reel != 0:
             call_reel(job.reel, job.reel_table)
-        find_powers(line, job.ends, books.velocity, new, report, books.power[0])
-        keep_report(books, report)
-        impose_now(job.ends, books.imposed)
-        if books.extremes.shape[1] > 0:
-            first_strains(line, job.ends, new, books)
-            note_extremes(line, sea, job.ends, new, books, t)
-        note_quantities(tables[l], job, t)
+        begin_books_of(tables[l], job, t)
 
 
 @inner

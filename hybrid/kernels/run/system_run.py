@@ -61,6 +61,8 @@ from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, pass
 LINE, CUT_LINE, TURNED_LINE, SLACK_LINE = range(4)
 # What a call returns beside codes of kernels.state.books: lines are to be solved with others, or by themselves, from now on.
 REGROUP = 16
+# What `run_system` returns beside codes of kernels.state.books: zones are due, of lines whose cells change without Python.
+CELLS_DUE = 32
 # Of `limits`: the reach of Newton's method, m; its iterations at most; the arm by which moments on bodies are compared
 # with forces, m.
 OF_REACH, OF_ITERATIONS, OF_ARM = 0, 1, 2
@@ -92,6 +94,9 @@ class StepsJob(NamedTuple):
     watched_even: NDArray[np.int64]  # of a kernels.junctions.lines_distance.LinesJob, after a step of `even`
     watched_odd: NDArray[np.int64]
     followed: NDArray[np.int64]  # (Z, ..) tables of kernels.mesh.zone_step.ZoneJob, with this clock and these counts
+    due: NDArray[np.int64]  # (Z,) whether they ask for something after the last step
+    changed: NDArray[np.int64]  # (Z, ..) tables of kernels.run.following_run.FollowingJob, of lines whose cells follow
+    changes: NDArray[np.int64]  # (Z,) 1 where there is one
     paid: NDArray[np.int64]  # (W, ..) likewise of kernels.reel.reel.ReelJob, of lines that are paid out
     beside: NDArray[np.int64]  # of a kernels.run.system_tangents.SystemTangents
     solver: int = 0  # address of kernels.run.system.solve_system
@@ -103,6 +108,11 @@ class StepsJob(NamedTuple):
     stirrer: int = 0  # of kernels.junctions.members_water.stir_members; 0: no body has members
     watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
     follower: int = 0  # of kernels.mesh.zone_step.follow_zones; 0: no zones move, or Python follows them
+    runner: int = (
+        0  # of run_system, and of kernels.run.following_run.ask_cells and change_cells; 0: Python changes cells
+    )
+    asker: int = 0
+    changer: int = 0
     payer: int = 0  # of kernels.reel.payout.pay_out; 0: lines keep their lengths
     tangents: int = 0  # of kernels.run.system_tangents.follow_system; 0: none are followed
 
@@ -120,7 +130,7 @@ def blank_steps_job() -> StepsJob:
     return StepsJob(
         none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
         np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
-        none, none, lone, lone, none,
+        none, none, lone, none, lone, none, lone, none,
     )  # fmt: skip
 
 
@@ -273,10 +283,23 @@ def follow_lines(steps):
     if steps.follower == 0:
         return 0
     for k in range(steps.followed.shape[0]):
-        due |= call_follower(steps.follower, steps.followed[k])
+        steps.due[k] = call_follower(steps.follower, steps.followed[k])
+        due |= steps.due[k]
         allowed = min(allowed, clock.allowed)
     clock.allowed = allowed  # which each writes after a step
     return due
+
+
+@inner
+def change_lines(steps):
+    """Other cells for all lines that ask for these and for nothing else; 0: Python has to look, and none has changed."""
+    for k in range(steps.due.shape[0]):
+        if steps.due[k] != 0 and (steps.changes[k] == 0 or call_watch(steps.asker, steps.changed[k]) == 0):
+            return 0
+    for k in range(steps.due.shape[0]):
+        if steps.due[k] != 0:
+            call_watch(steps.changer, steps.changed[k])
+    return 1
 
 
 @inner
@@ -398,6 +421,8 @@ def between_steps(steps, table):
         if is_due(steps, -1) and call_sample(steps.sampler, table) == 0:
             return PAUSED
         counts.phase = END_STEP
+        if steps.changer != 0 and counts.notices == ZONES_DUE and not counts.asks & ASK_STEPS:
+            return CELLS_DUE
         if counts.notices != 0 or counts.asks & ASK_STEPS:
             return STEPPED
     if counts.phase == END_STEP:
@@ -480,3 +505,19 @@ def run_system(table):
             accept(steps, system)
             if steps.finder != 0 and is_grouped_otherwise(system):
                 return REGROUP
+
+
+@kernel
+def run_lines(table):
+    """`run_system`, with other cells for lines that ask for nothing else.
+
+    These write to tables that steps take as constant, so steps are called by their address.
+    """
+    steps = read_steps(table)
+    while True:
+        code = call_watch(steps.runner, table)
+        if code != CELLS_DUE:
+            return code
+        if change_lines(steps) == 0:
+            return STEPPED
+        steps.counts.notices = 0
