@@ -6,6 +6,7 @@ that it needs.  docs/zone_rules.md
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import ceil, isinf
 
@@ -25,13 +26,17 @@ from hybrid.model.model_costs import (
 )
 from hybrid.model.resolution import Resolution, for_motion, model_is_free, wants_survey
 from hybrid.model.run_time import foretold_steps
-from hybrid.scene.schema import AdaptiveModel
+from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.system import System
 from hybrid.simulation.case import Case
 from hybrid.simulation.initial_zones import HOLD
 from hybrid.simulation.layer_mesh import layered, survey_of
-from hybrid.simulation.mesh_survey import lack_along, with_survey
+from hybrid.simulation.mesh_survey import Survey, lack_along, with_survey
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.zone_switching import LONGEST_IN_PACE, READY
+
+# Why a line may be no catenary that has come near itself in a pre-run.
+NEAR = "it comes near itself, and contact of catenaries alone is not asked for"
 
 
 def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
@@ -42,28 +47,47 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     if survey is None:
         failed = ModelChoice("rod", "the pre-run that would show what others cost failed")
         return failed, replace(resolution, grading=coarse.grading)
+    near = NEAR if case.came_near_itself else ""
+    choice, resolution = choice_of(scene, case.scene, survey, resolution, near)
+    if choice.kind != "rod":
+        case.scene = with_model(scene, choice.kind)
+    return choice, resolution
+
+
+def choice_of(
+    scene: Scene, rods: Scene, survey: Survey, resolution: Resolution, near: str
+) -> tuple[ModelChoice, Resolution]:
+    """The model that costs least, and how finely it is computed first, by a pre-run of rods.
+
+    scene: as it was asked; rods: of the pre-run; near: why the line may be no catenary, beside what its scene says.
+    """
     resolution = with_survey(resolution, scene, survey)
     model, demand = survey.model, survey.demand
     gradings: dict[str, Grading] = {"rod": survey.grading(), "catenary": survey.grading_of_catenary}
     gradings["adaptive"] = gradings["rod"]
     found = ratios(scene, model, demand, resolution.zones * model.length, lack_along(scene, survey))
-    rods, catenaries = (gradings[kind].count(0.0, model.length, resolution.fineness) for kind in ("rod", "catenary"))
-    near = "it comes near itself, and contact of catenaries alone is not asked for" if case.came_near_itself else ""
+    cells, catenaries = (gradings[kind].count(0.0, model.length, resolution.fineness) for kind in ("rod", "catenary"))
     why_not = structural(scene, model.cable) or near or no_catenary(found, demand.s)
     of_zones = rods_of_zones(model, demand, found, gradings["rod"])
-    each = costs(scene, model, rods, catenaries, of_zones, why_not, _steps_of_zones(case, model, resolution))
+    each = costs(scene, model, cells, catenaries, of_zones, why_not, _steps_of_zones(rods, model, resolution))
     kind = cheapest(each).kind
-    if kind != "rod":
-        case.scene = with_model(scene, kind)
     return ModelChoice(kind, reasons(each)), replace(resolution, grading=gradings[kind])
 
 
-def _steps_of_zones(case: Case, model: Model, resolution: Resolution) -> float:
+def with_models(system: System, kinds: Mapping[str, str]) -> System:
+    """The same with models of these kinds for lines by name, as of `with_model`."""
+    scenes = {name: with_model(system.scene_of(name), kind) for name, kind in kinds.items()}
+    changes = {name: {"model": x.model, "accuracy": x.accuracy} for name, x in scenes.items()}
+    lines = {name: x.model_copy(update=changes.get(name, {})) for name, x in system.lines.items()}
+    return system.model_copy(update={"lines": lines}) if kinds else system
+
+
+def _steps_of_zones(scene: Scene, model: Model, resolution: Resolution) -> float:
     """Steps of zones that move for one of rods: those that follow the motion are no longer than zones let them be."""
-    time, longest = case.scene.require_time(), LONGEST_IN_PACE * READY * HOLD * model.time_scale
+    time, longest = scene.require_time(), LONGEST_IN_PACE * READY * HOLD * model.time_scale
     if resolution.local is None or isinf(longest):
         return 1.0
-    rods = foretold_steps(case.scene, model, resolution, ceil(time.duration / resolution.step))
+    rods = foretold_steps(scene, model, resolution, ceil(time.duration / resolution.step))
     return max(1.0, time.duration / longest / rods)
 
 

@@ -231,11 +231,11 @@ def _has_joints(scene: Scene) -> bool:
     return len({zone.kind for zone in zone_plans(scene)}) > 1
 
 
-def emptied(target: Target, error: ComputationError) -> None:
-    """Drop what a run has left that failed and is made again with another model."""
+def emptied(target: Target, error: ComputationError | None = None) -> None:
+    """Drop what a run has left that is made again with another model; error: with which it failed."""
     if isinstance(target, io.BytesIO):
         target.seek(0)
         target.truncate()
     left = [target, target.with_suffix(".snapshot.npz")] if isinstance(target, Path) else []
-    for path in [*left, *([] if error.snapshot is None else [error.snapshot])]:
+    for path in [*left, *([] if error is None or error.snapshot is None else [error.snapshot])]:
         path.unlink(missing_ok=True)

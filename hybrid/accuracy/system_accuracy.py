@@ -24,7 +24,8 @@ from hybrid.accuracy.error_estimate import Estimate
 from hybrid.accuracy.error_report import accuracy_figures, effort, error_fields, known
 from hybrid.accuracy.error_statistics import statistics_of
 from hybrid.accuracy.finer_result import NOT_KEPT, Replacement, is_no_better, not_kept_text
-from hybrid.accuracy.passes import free_in
+from hybrid.accuracy.model_choice import NEAR, choice_of, with_models
+from hybrid.accuracy.passes import emptied, free_in
 from hybrid.accuracy.refinement import (
     COSTLY_ACCURACY,
     WORTH_WRITING,
@@ -35,6 +36,7 @@ from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bendi
 from hybrid.accuracy.system_samples import compared, extremes_of, sample_of, touch_unasked
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
+from hybrid.model.model_costs import NAMED, ModelChoice
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
@@ -42,6 +44,7 @@ from hybrid.model.resolution import (
     is_irregular,
     may_be_held,
     mesh_is_free,
+    model_is_free,
     requested_accuracy,
     rubs_on_obstacles,
     wants_errors,
@@ -50,6 +53,7 @@ from hybrid.model.resolution import (
 from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import scene_text
+from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.scene.system import System
 from hybrid.simulation.layer_mesh import layered_lines, shown_lines
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points, survey_resolution, with_survey
@@ -127,28 +131,39 @@ class SystemPasses:
         self.system, self.target, self.moves = system, target, moves
         self._replacement = Replacement(target)
         self.reporter, self.interrupted = reporter, interrupted
-        self.scenes = {name: system.scene_of(name) for name in system.lines}
         time = system.time
         self._steps_free = moves and time is not None and time.controlled and time.tolerance is None
-        times = output_times(next(iter(self.scenes.values()))) if moves else []
-        self.controls = {
-            name: LineController(
-                requested_accuracy(scene), free_in(scene)._replace(steps=self._steps_free), moves, _elsewhere,
-                _elsewhere, irregular=moves and is_irregular(scene),
-                from_rest=not (moves and system.starts_as_placed), rubs=rubs_on_obstacles(scene),
-                times=np.array([0.0, *times]), held=may_be_held(scene),
-            )
-            for name, scene in self.scenes.items()
-        }  # fmt: skip
+        self.scenes, self.controls = dict[str, Scene](), dict[str, LineController]()
+        self._use_models({})
         # Of lines, stretches (m) that were rod at any output: of the last run to compare with, and of the result.
         self._compared_rods, self._result_rods = dict[str, Stretches](), dict[str, Stretches]()
         # Whether a line has touched itself in a result: then lines may in runs to compare with; and whether they could.
         self._touches = self._compared_touching = False
+        self._touching = set[str]()  # lines that have touched themselves in the last run to compare with
         points = sum(output_points(scene).s.size for scene in self.scenes.values())
-        self._budget = Budget(len(times), points) if moves else None
+        self._budget = Budget(len(self._times), points) if moves else None
         self._costs: list[float] = []  # s of processor time, of all runs
         self._notes: list[tuple[str, str]] = []  # events of the system
         self._begin = clock.process_time()
+
+    @property
+    def _times(self) -> list[float]:
+        """Of outputs, s."""
+        return output_times(next(iter(self.scenes.values()))) if self.moves else []
+
+    def _use_models(self, choices: Mapping[str, ModelChoice]) -> None:
+        """Go on with other models of lines, by name, and controls of their errors."""
+        system = self.system = with_models(self.system, {name: x.kind for name, x in choices.items()})
+        self.scenes = {name: system.scene_of(name) for name in system.lines}
+        self.controls = {
+            name: LineController(
+                requested_accuracy(scene), free_in(scene)._replace(steps=self._steps_free), self.moves, _elsewhere,
+                _elsewhere, irregular=self.moves and is_irregular(scene), choice=choices.get(name, NAMED),
+                from_rest=not (self.moves and system.starts_as_placed), rubs=rubs_on_obstacles(scene),
+                times=np.array([0.0, *self._times]), held=may_be_held(scene),
+            )
+            for name, scene in self.scenes.items()
+        }  # fmt: skip
 
     # --- runs -----------------------------------------------------------------------------------
 
@@ -158,13 +173,32 @@ class SystemPasses:
         if first is None:
             first = self.surveyed(SystemResolution.first(self.system))
             self._expect(first)
-            resolution, result = self._first_result(first)
+            try:
+                resolution, result = self._first_result(first)
+            except ComputationError as error:
+                if not self._rods_instead({error.line_name: str(error).splitlines()[0]}):
+                    raise
+                emptied(self.target, error)
+                resolution, result = self._first_result(self.surveyed(SystemResolution.first(self.system)))
         else:
             assert source is not None and result is not None
             resolution = kept_resolution(self.system, source)
             self._spend(result)
             self._compare(first)
         self._refine(resolution, result)
+        if self._rods_instead({name: x.model_misses for name, x in self.controls.items() if x.model_misses}):
+            emptied(self.target)
+            self._replacement = Replacement(self.target)
+            self._refine(*self._first_result(self.surveyed(SystemResolution.first(self.system))))
+
+    def _rods_instead(self, failed: Mapping[str, str]) -> bool:
+        """Rods for lines that were chosen to be catenaries, and why that failed; whether there is one."""
+        names = [name for name, x in self.controls.items() if name in failed and x.choice.kind == "catenary"]
+        tried = "catenaries, which cost less, were tried: "
+        if names:
+            choices = {name: x.choice for name, x in self.controls.items() if x.choice.kind}
+            self._use_models(choices | {name: ModelChoice("rod", tried + failed[name]) for name in names})
+        return bool(names)
 
     def _first_result(self, first: SystemResolution) -> tuple[SystemResolution, Samples]:
         """The first result, of cells half as long where on these, or those to compare with, no equilibrium is found."""
@@ -243,6 +277,7 @@ class SystemPasses:
         self._costs.append(clock.process_time() - begin)
         if target is not None:
             return self._samples(target, run.resolution, self._costs[-1])
+        self._touching = {x.name for x in run.lines if x.touches}
         recorders = {x.name: x.recorder for x in run.lines}
         self._compared_rods = {n: x.rods for n, x in recorders.items() if isinstance(x, ComparisonRecorder)}
         return {x.name: compared(x, run, self._costs[-1]) for x in run.lines}
@@ -270,7 +305,9 @@ class SystemPasses:
             coarse = SystemResolution({name: replace(x, every=1) for name, x in coarse.lines.items()})
         coarse = shown_lines(self.system, coarse, self.moves)
         self._expect(first, coarse)
-        model = build_system(self.system, resolution=coarse)
+        moving = [name for name in free if isinstance(self.scenes[name].model, AdaptiveModel)]
+        rods = with_models(self.system, dict.fromkeys(moving, "rod"))  # which alone show what zones leave out of a bend
+        model = build_system(rods, resolution=coarse)
         places = {name: survey_points(x, coarse.lines[name]) for name, x in zip(model.names, model.models, strict=True)}
         points = {name: tuple(s.tolist()) for name, s in places.items()}
         output = self.system.output.model_copy(update={"points": points, "quantities": {}})
@@ -281,11 +318,13 @@ class SystemPasses:
             changed["output"] = output.model_copy(update={"every": every})
             changed["time"] = self.system.require_time().model_copy(update={"duration": until})
         try:
-            asked = self.system.model_copy(update=changed)
+            asked = rods.model_copy(update=changed)
             runs = self._record(coarse, None, PRE_RUN, system=asked)
         except ComputationError:
+            failed = ModelChoice("rod", "the pre-run that would show what others cost failed")
+            self._use_models({name: failed for name in free if self._leaves_model(name)})
             return first
-        out = dict(first.lines)
+        out, choices = dict(first.lines), dict[str, ModelChoice]()
         for name in free:
             scene, of_line = self.scenes[name], model.models[model.names.index(name)]
             s = output_points(asked.scene_of(name)).s  # point loads are among them, too
@@ -293,8 +332,19 @@ class SystemPasses:
             found = runs[name].values
             values = {x: np.asarray(found[x])[:, here] for x in ("curvature", "tension", "position")}
             survey = Survey.of(scene, first.lines[name], of_line, places[name], values)
-            out[name] = with_survey(first.lines[name], scene, survey)
+            if self._leaves_model(name):
+                near = NEAR if name in self._touching else ""
+                choices[name], out[name] = choice_of(scene, rods.scene_of(name), survey, first.lines[name], near)
+            else:
+                out[name] = with_survey(first.lines[name], scene, survey)
+        if choices:
+            self._use_models(choices)
         return SystemResolution(out)
+
+    def _leaves_model(self, name: str) -> bool:
+        """Whether the model of a line is still to be chosen."""
+        open_yet = self.moves and self._criterion is None and not self.controls[name].choice.kind
+        return open_yet and model_is_free(self.scenes[name])
 
     def _expect(self, first: SystemResolution, coarse: SystemResolution | None = None) -> None:
         """Tell the progress which passes are to come; coarse: of a pre-run that is still to be computed."""

@@ -16,6 +16,7 @@ from hybrid.model.build import build
 from hybrid.model.model_costs import CHOSEN, Cost, cheapest
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.simulation.case import Case
+from tests.said import both_ways, line_of, said
 
 TAUT = {
     "environment": {"fluid": {"density": 1025}},
@@ -31,24 +32,26 @@ CLAMPED = TAUT | {"ends": TAUT["ends"] | {"start": {"kind": "clamped", "position
 
 
 def chosen(result: hybrid.Result) -> str:
-    (text,) = (e.text for e in result.events if e.kind == CHOSEN)
+    (text,) = (e.text for e in line_of(result).events if e.kind == CHOSEN)
     return text
 
 
 def kind_of(result: hybrid.Result) -> str:
-    return str(hybrid.parse_scene(result.scene_text).model.kind)
+    return str(hybrid.parse_scene(line_of(result).scene_text).model.kind)
 
 
-def test_catenaries_where_they_cost_less_and_nothing_asks_for_rods(monkeypatch):
+@both_ways
+def test_catenaries_where_they_cost_less_and_nothing_asks_for_rods(monkeypatch, network):
     monkeypatch.setattr(model_choice, "cheapest", lambda found: next(x for x in found if x.kind == "catenary"))
-    result = hybrid.run(TAUT)
+    result = hybrid.run(said(TAUT, network))
     assert "no choice" not in chosen(result) and "µs of processor time per step" in chosen(result)
     assert kind_of(result) == "catenary"
     assert "accuracy missed" not in {e.kind for e in result.events}
 
 
-def test_rods_where_catenaries_are_no_choice():
-    result = hybrid.run(CLAMPED)
+@both_ways
+def test_rods_where_catenaries_are_no_choice(network):
+    result = hybrid.run(said(CLAMPED, network) | {"dimension": None})
     assert kind_of(result) == "rod"
     assert "rods everywhere" in chosen(result) and "an end is clamped" in chosen(result)
 
@@ -63,9 +66,10 @@ def test_rods_are_the_same_as_asked_for(tmp_path, free):
     assert found and all("event" in x or "scene" in x for x in found), found
 
 
+@both_ways
 @pytest.mark.long
 @pytest.mark.parametrize("in_file", [False, True])
-def test_rods_after_catenaries_that_fail(tmp_path, monkeypatch, in_file):
+def test_rods_after_catenaries_that_fail(tmp_path, monkeypatch, in_file, network):
     """A line that is slackened, of which the criteria are not asked: rods, and why."""
     monkeypatch.setattr(model_choice, "no_catenary", lambda found, s: "")
     monkeypatch.setattr(
@@ -73,21 +77,23 @@ def test_rods_after_catenaries_that_fail(tmp_path, monkeypatch, in_file):
     )
     slackened = {"travel": {"by": [-30, 0, 0], "over": 4}}
     end = TAUT["ends"]["end"] | {"motion": slackened}
-    result = hybrid.run(TAUT | {"ends": TAUT["ends"] | {"end": end}}, tmp_path / "run.h5" if in_file else None)
+    scene = said(TAUT | {"ends": TAUT["ends"] | {"end": end}}, network)
+    result = hybrid.run(scene, tmp_path / "run.h5" if in_file else None)
     assert kind_of(result) == "rod"
     assert "were tried" in chosen(result)
     assert result.status == "complete"
     assert [x.name for x in tmp_path.iterdir() if x.suffix != ".lock"] == ["run.h5"] * in_file
 
 
-def test_rods_after_catenaries_that_leave_out_too_much(monkeypatch):
+@both_ways
+def test_rods_after_catenaries_that_leave_out_too_much(monkeypatch, network):
     monkeypatch.setattr(model_choice, "no_catenary", lambda found, s: "")
     monkeypatch.setattr(model_choice, "structural", lambda scene, cable: "")
     monkeypatch.setattr(
         model_choice, "cheapest", lambda found: next((x for x in found if x.kind == "catenary"), found[0])
     )
     stiff = {"sections": [TAUT["cable"]["sections"][0] | {"bending_stiffness": 2000}]}
-    result = hybrid.run(CLAMPED | {"cable": stiff})
+    result = hybrid.run(said(CLAMPED | {"cable": stiff}, network))
     assert kind_of(result) == "rod"
     assert "leaving bending out makes" in chosen(result)
 
