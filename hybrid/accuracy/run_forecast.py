@@ -263,12 +263,12 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     """The same of several lines: their first steps, as often as all runs would take them."""
     if found.cells > MOST_CELLS or not is_warm(kernels_of(system)):
         return found
-    from hybrid.simulation.system_run import SystemRun
+    from hybrid.simulation.system_run import Recording, SystemRun
     from hybrid.solve.system_statics import LineFailed
 
     time, begin = system.require_time(), clock.process_time()
     try:
-        run = SystemRun(system, None, "", moves=True)
+        run = SystemRun(system, None, "", moves=True, recording=Recording(planes=True))
         run.begin_motion()
         first = [x.T.copy() for x in run.state.lines]
         begun = clock.process_time()

@@ -33,6 +33,7 @@ from hybrid.model.initial_shape import dead_loads, hung
 from hybrid.model.lines_contact import MEETS, Touching, beside_others, that_may_meet, touching_of
 from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
 from hybrid.model.payout_law import said_of_line
+from hybrid.model.plane import WHAT
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
@@ -201,16 +202,17 @@ def build_system(
     models = [_beside_others(x) if k in may_meet else x for k, x in enumerate(models)]
     if _takes_current(system, models):
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
+    ends = [(x.start, x.end) for x in system.lines.values()]
+    joints = tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends)
+    models = [_in_space(system, x, held) for x, held in zip(models, joints, strict=True)]
     if system.dimension == 2:
-        models = _kept_in_plane(system, models)
+        models = _kept_in_plane(system, models, joints)
     known = maker.known
     for name, body in system.bodies.items():
         if isinstance(body, FixedBody) and name not in known:
             known[name] = KnownMotion(body, models[0].sea)
-    ends = [(x.start, x.end) for x in system.lines.values()]
     return SystemModel(
-        tuple(system.lines), tuple(models), free, system.rigid,
-        tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends), places, made, maker.bodies,
+        tuple(system.lines), tuple(models), free, system.rigid, joints, places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
         tuple(_turns_of(x.connections) for x in system.lines.values()), touching, may_meet, rides=rides,
@@ -229,12 +231,36 @@ def with_surfaces(system: System, models: Sequence[Model], bodies: Sequence[Body
     return models
 
 
-def _kept_in_plane(system: System, models: Sequence[Model]) -> list[Model]:
+def _in_space(system: System, model: Model, joints: tuple[int, int]) -> Model:
+    """The model of a line, without its plane where it is not computed in that; joints: of `SystemModel`."""
+    if max(joints) >= 0:
+        why = "it is joined to what moves with it"
+    elif model.layout is not None or model.payout is not None:
+        why = "its zones or its length change, beside other lines"
+    elif system.dimension == 3:
+        why = "dimension: 3"
+    else:
+        return model
+    entries = (replace(e, on=False, why=why) if e.what == WHAT and e.on else e for e in model.contents)
+    return replace(model, plane=None, contents=tuple(entries))
+
+
+def _kept_in_plane(system: System, models: Sequence[Model], joints: Sequence[tuple[int, int]]) -> list[Model]:
     """The models, whose lines must not leave the plane in which all of them are."""
     scenes = [system.scene_of(name, system.carried(name)) for name in system.lines]
     tables = [(x.environment, x.ends, x.initial) for x in scenes]
     plane, _ = plane_of(scenes[0].environment, scenes[0].cable, scenes[0].ends, scenes[0].initial, TYPED, tables)
-    return [replace(x, kept_in=np.array(plane.normal)) for x in models]
+    axes = np.array([plane.p, plane.q, plane.normal])
+    flat = Entry(WHAT, True, f"dimension: 2; {plane.text()}")
+    found = []
+    for x, scene, held in zip(models, scenes, joints, strict=True):
+        moves = max(held) >= 0 or x.layout is not None or x.payout is not None
+        if moves or scene.obstacles or scene.contact.self:
+            found.append(replace(x, kept_in=axes[2]))
+        else:
+            contents = tuple(flat if e.what == WHAT else e for e in x.contents)
+            found.append(replace(x, kept_in=axes[2], plane=axes, contents=contents))
+    return found
 
 
 def first_places(system: System, made: Sequence[BodyModel]) -> tuple[tuple[str, ...], Floats, Floats]:

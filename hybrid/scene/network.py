@@ -284,7 +284,8 @@ class Network(Table):
     dimension: Literal[2, 3] | None = Field(
         default=None,
         description="2: all lines lie in one plane, refused if they do not, and stopped where something leaves it; "
-        "several lines are computed in space whatever is said here [-]",
+        "lines that are joined to nothing are computed in it, others in space; absent: each such line in the plane in "
+        "which it lies, if any [-]",
     )
 
     @property

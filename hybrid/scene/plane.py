@@ -23,7 +23,7 @@ from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, Unif
 # What a scene that insists on a plane may leave it by, as a part of a vector's or the cable's length: the last of the
 # digits that people write.  A scene that does not insist is in a plane to round-off or not at all.
 TYPED, EXACT = 1e-6, 1e-9
-# Of the length: how far a line may be from its plane that is computed in space, where obstacles or several lines are.
+# Of the length: how far a line may be from its plane that is computed in space: beside obstacles, or joined to others.
 OUT = 1e-5
 # A witness that is this close (a sine) to those before it does not define the plane.
 SAYS_NOTHING = 1e-3

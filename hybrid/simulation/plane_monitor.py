@@ -10,19 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from hybrid.errors import IN_SPACE
 from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.kernels.step.accept import GROWN
 from hybrid.model.build import Model
 from hybrid.model.plane import in_space, leaves_plane, planar, untwist
-from hybrid.scene.schema import Scene
 from hybrid.solve.plane_stability import on_nodes, scaled, seed
-from hybrid.solve.run import CompiledRun
 
 # Of the length: how far the push displaces a cable that goes on in space: a hundred times what an equilibrium may be
 # out of the plane, and nothing that anybody would see.
@@ -38,11 +37,22 @@ NO_NODES: Floats = np.zeros(0)
 Note = Callable[[int, str, str], None]
 
 
+class CarriesPush(Protocol):
+    """What makes the steps of a line, and carries a push out of its plane along with them."""
+
+    @property
+    def clock(self) -> Clock: ...
+    @property
+    def push(self) -> Floats: ...
+    def carry(self, pushes: tuple[Floats, Floats]) -> None: ...
+
+
 class PlaneMonitor:
     """Watches a motion in a plane, for as long as it is in one."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.insists = scene.dimension == 2
+    def __init__(self, insists: bool) -> None:
+        """insists: whether the scene asks for two dimensions."""
+        self.insists = insists
         self.speed = 0.0  # m/s, of a push when it is given; 0: none is carried along
         self.real = False  # whether the push is what a line that has come back was off its plane
         self._s: Floats = NO_NODES  # m, nodes that it is carried on
@@ -68,7 +78,7 @@ class PlaneMonitor:
         self.speed = model.length / model.time_scale
         return model
 
-    def attach(self, run: CompiledRun, line: Line) -> None:
+    def attach(self, run: CarriesPush, line: Line) -> None:
         """Carry the push along with a (new) line of a run, in proportion to s."""
         away = self.comes_back and self.home is not None and not self.speed
         run.clock.near_plane = BACK * line.s[-1] if away else 0.0
@@ -83,17 +93,17 @@ class PlaneMonitor:
         if self.speed:
             self._s = line.s
 
-    def _give(self, run: CompiledRun, push: Floats, s: Floats) -> None:
+    def _give(self, run: CarriesPush, push: Floats, s: Floats) -> None:
         started = float(run.clock.push_start) if self._s.size else 0.0
         run.carry((push, np.zeros_like(push)))
         self._s, run.clock.push_start = s, started
 
-    def renew(self, run: CompiledRun) -> None:
+    def renew(self, run: CarriesPush) -> None:
         """Give the push anew: it has died."""
         run.push[:] = seed(self._s, self.speed)
         run.clock.push_start, self.real = 0.0, False
 
-    def must_leave(self, run: CompiledRun, note: Note) -> bool:
+    def must_leave(self, run: CarriesPush, note: Note) -> bool:
         """Whether the motion has to go on in space, after a step in which the push had grown too large."""
         grown = float(run.clock.push_grown)
         fast = "faster than the step can follow" if np.isinf(grown) else f"by a factor of {grown:.0f}"
@@ -109,7 +119,7 @@ class PlaneMonitor:
             note(where, "out of plane", f"{text}; {IN_SPACE}, pushed by {HANDED_ON:g} of its length{back}")
         return True
 
-    def leave(self, model: Model, run: CompiledRun, state: State) -> Model:
+    def leave(self, model: Model, run: CarriesPush, state: State) -> Model:
         """The model in space; the state gets the push."""
         assert self.speed and model.plane is not None
         known = self.real and bool(np.abs(run.push[:, 0]).max() < FARTHEST * model.length)
@@ -127,7 +137,7 @@ class PlaneMonitor:
         self.speed, self._s, self.home, self.real = 0.0, NO_NODES, model.plane, False
         return replace(model, line=in_space(model.line), plane=None)
 
-    def come_back(self, model: Model, run: CompiledRun, state: State) -> Model | None:
+    def come_back(self, model: Model, run: CarriesPush, state: State) -> Model | None:
         """The model in the plane, and the state projected on it; None: its rods are twisted.
 
         What was across the plane becomes the push when the run has the model (`push_on`).
@@ -156,7 +166,7 @@ class PlaneMonitor:
         torque = float((line.kb[:, 2] * between).max())
         return bool(angle.max() > UNTWISTED or torque * np.pi > 2.0 * model.tension_scale * BACK * model.length)
 
-    def push_on(self, run: CompiledRun, model: Model) -> None:
+    def push_on(self, run: CarriesPush, model: Model) -> None:
         """Carry along what was across the plane; about where that comes to HANDED_ON of the length it leaves again."""
         self._give(run, self._across, model.line.s)
         least = BACK * model.length / model.time_scale
@@ -164,14 +174,14 @@ class PlaneMonitor:
         begun = BACK * GROWN / HANDED_ON  # by how much a push that was given at the start would have grown by now
         run.clock.push_start = 0.5 * float(model.line.mass @ speeds**2) / begun**2
 
-    def checkpoint(self, run: CompiledRun) -> dict[str, Any] | None:
+    def checkpoint(self, run: CarriesPush) -> dict[str, Any] | None:
         """The push, its energy when it was given, and whether it is of a line that has come back."""
         if not self.speed:
             return None
         pair, energy = np.array([run.push, run.push]), float(run.clock.push_start)
         return {"pair": pair, "unit": self.speed, "energy": energy, "led": True, "real": self.real}
 
-    def restore(self, saved: Mapping[str, Any], run: CompiledRun) -> None:
+    def restore(self, saved: Mapping[str, Any], run: CarriesPush) -> None:
         """Go on as `checkpoint` has written; ValueError where that cannot be."""
         if not saved["unit"] > 0.0:
             raise ValueError("a push of no size")

@@ -17,6 +17,7 @@ from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.obstacles import files_of as obstacle_files
 from hybrid.scene.system import System
 from hybrid.simulation.lines_contact_start import touch_each_other
+from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.restore import program, refused, resolution_tree
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.system_contact import let_touch
@@ -51,6 +52,8 @@ class KeptRun(RunOfLines, Protocol):
 
     @property
     def zones(self) -> SystemZones | None: ...
+    @property
+    def planes(self) -> LonePlanes | None: ...
 
     @property
     def payout(self) -> SystemPayout | None: ...
@@ -79,6 +82,7 @@ def checkpoint(run: KeptRun) -> dict[str, Any]:
         "changes": run.changed,
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
         "zones": run.zones.checkpoint() if run.zones is not None else {},
+        "planes": run.planes.checkpoint() if run.planes is not None else {},
         "passed": sorted(list(x) for x in run.passed), "met": sorted(list(x) for x in run.met),
         "let_pass": sorted(list(x) for x in run.let_pass), "between": _begun(run),
         **({} if run.payout is None else {"payout": run.payout.checkpoint()}),
@@ -93,7 +97,7 @@ def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
             raise ValueError("broken: numbers of what has broken were expected")
         run.failures.again(saved["broken"])
     # It took members as at the first guess, and rotations were within half a turn of 0.
-    older: dict[str, Any] = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "changes": 0}
+    older: dict[str, Any] = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "planes": {}, "changes": 0}
     older |= {"cuts": run.loop.cuts(), "vibrations": {}, "rotations": run.rotations.last}
     older |= {key: [] for key in ("passed", "met", "let_pass", "between")}
     complete = "interval" in saved  # else steps ended at outputs
@@ -111,7 +115,7 @@ def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
         run.payout.restore(saved["payout"])
     if run.zones is not None or run.payout is not None or near or between:
         run.make_solver()
-    unbounded = "dry", "overlaps", "under", "broken", "control", "vibrations"
+    unbounded = "dry", "overlaps", "under", "broken", "control", "vibrations", "planes"
     template = checkpoint(run) | dict.fromkeys(unbounded)
     as_there_are = "contact", "between", "let_pass", "met", "passed", "payout"
     template |= dict.fromkeys(name for name in as_there_are if name in template)
@@ -135,6 +139,8 @@ def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
     if not (0.0 <= found["leg"][0] <= found["t"] and found["leg"][1] >= 0 and found["steps"] >= 0):
         raise ValueError(f"leg: a time up to {found['t']:g} s was expected")
     run.start_from(found["rest"])
+    if run.planes is not None:
+        run.planes.restore_planes(found["planes"])
     run.make_solver()
     set_state(run, found)
     if not complete:
@@ -226,6 +232,8 @@ def set_state(run: KeptRun, found: Mapping[str, Any]) -> None:
             getattr(state, name)[:] = values
         line.books.clock.last_rho = mine["rho"]
         line.restore(mine, work, run.t, x.joints)
+    if run.planes is not None:
+        run.planes.restore_pushes(found["planes"])
     if run.zones is not None:
         run.zones.restore(found["zones"])
     if run.payout is not None:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from time import process_time as clock_now
@@ -40,6 +41,7 @@ from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.lines_contact import LinesWatch, shared_of
 from hybrid.simulation.lines_contact_start import note_crossings
+from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.pair_forces import fields_of_pairs, values_of_pairs
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
@@ -61,6 +63,7 @@ from hybrid.simulation.system_contact import (
     end_contact,
     gives_up_contact,
     refuse_within_itself,
+    renew_solver,
     tell_meetings,
     tell_passages,
 )
@@ -102,7 +105,8 @@ class Recording(NamedTuple):
 
     kept: whether a file gets checkpoints; source: the result to go on with, from its checkpoint, in place of a start;
     found: what was found before the run, for whoever goes on with its file; pending: what is to come when it is
-    complete (store.records); notes: events (kind, text) of the whole of the run; begun: called behind the first output.
+    complete (store.records); notes: events (kind, text) of the whole of the run; begun: called behind the first output;
+    planes: whether lines that are joined to nothing are computed in the planes in which they lie.
     """
 
     kept: bool = False
@@ -111,6 +115,7 @@ class Recording(NamedTuple):
     pending: str = ""
     notes: Sequence[tuple[str, str]] = ()
     begun: Callable[[SystemRun], None] | None = None
+    planes: bool = False
 
 
 ALONE = Recording()
@@ -130,7 +135,7 @@ class SystemRun:
         for, or the checkpoint says; criterion: one more for zones that move (adapt.user_criterion); changes: loads and
         motions of these systems hold from some time on.
         """
-        kept, source, found, pending, notes, self._begun = recording
+        kept, source, found, pending, notes, self._begun, planes = recording
         self._before, self._pending, self._notes = found or {}, pending, notes
         end = system.require_time().duration if moves else 0.0
         self.changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < end]
@@ -188,6 +193,7 @@ class SystemRun:
             for line in self.lines:
                 line.diagnostics.begin()
         self.shared: SharedContact | None = None  # contact of lines with each other
+        self.planes = LonePlanes(self, self.loop.counts, system.dimension == 2) if planes and moves else None
         self.met: set[tuple[int, int]] = set()  # lines that have been said to touch
         self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
         self.passed: set[tuple[int, int]] = set()  # and those that have been said to
@@ -499,9 +505,12 @@ class SystemRun:
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         for line, x in zip(self.lines, lines, strict=True):
             line.held = np.minimum(x.ends.held, 1)
+        lines = lines if self.planes is None else self.planes.on(lines)
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
+        if self.planes is not None:
+            self.planes.attach(self.solver)
         if self.payout is not None:
             self.payout.bind(self.solver)
         if self.watch is not None:
@@ -568,6 +577,8 @@ class SystemRun:
         time = self.system.require_time()
         if self.found is None:
             begin_as_placed(self.model, self.scenes, self.state, [line.events for line in self.lines])
+        if self.planes is not None:
+            self.planes.begin()
         self.make_solver()
         if self.found is None:
             refuse_within_itself(self.model, self.solver.lines, self.state, True, AT_START)
@@ -743,7 +754,10 @@ class SystemRun:
 
     def _after_step(self, step: float) -> None:
         """What a step has flagged, zones, contact that begins or ends, and what breaks; step: s, the usual one."""
-        loop, t, solver = self.loop, self.t, self.solver
+        loop, t = self.loop, self.t
+        if self.planes is not None:
+            self.planes.after_step(partial(renew_solver, self))
+        solver = self.solver
         for line, new, old, work in zip(self.lines, self.state.lines, self.other.lines, solver.work, strict=True):
             if seen := int(loop.seen[line.number]):
                 line.look_at_itself(solver, seen, t, self.last_step, new)
@@ -926,7 +940,8 @@ def run_system(
 
     name: of the pass; resolution, recording, criterion, changes: as of `SystemRun`.
     """
-    run = SystemRun(system, target, text, True, resolution, recording._replace(kept=True), criterion, changes)
+    recording = recording._replace(kept=True, planes=recording.begun is None)  # what is followed beside is in space
+    run = SystemRun(system, target, text, True, resolution, recording, criterion, changes)
     reporter.begin(name, run.resolution.one)
     run.record_motion(reporter, interrupted)
     return run

@@ -236,7 +236,7 @@ def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
                 x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens,
                 model.rides, borne_strain(x) if x.line.bits & OBSTACLES else np.zeros(0),
                 x.payout is not None or x.layout is not None,
-                x.payout is not None and x.payout.holds_tension and max(joints) >= 0,
+                x.payout is not None and x.payout.holds_tension,
             )
         )  # fmt: skip
     return lines

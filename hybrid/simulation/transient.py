@@ -124,7 +124,7 @@ class Transient:
             model = self.payout.on(model, model.length)
             self.paid_zones = PaidZones(scene, self.payout, switching) if switching is not None else None
         self._set_control(resolution)
-        self.plane_monitor = PlaneMonitor(scene)
+        self.plane_monitor = PlaneMonitor(scene.dimension == 2)
         self.may_come_back = switching is None and correction is None and self.payout is None
         self.plane_monitor.comes_back = self.may_come_back
         self.changes = 0  # of the scene, so far

@@ -34,7 +34,12 @@ class JoinedLine(NamedTuple):
     rides: NDArray[np.int64] = np.zeros(0, np.int64)  # (M,) bodies that carry obstacles, -1: none does; empty: no body
     borne: Floats = np.zeros(0)  # (N,) strain that cells bear, of a line that may lie on obstacles; empty: of no other
     keeps_pace: bool = False  # whether its zones or its length follow the steps with the spectral radius of all lines
-    lengthens: bool = False  # whether its winch holds a tension and an end is joined: its length is an unknown of all
+    winds: bool = False  # whether its winch holds a tension, which takes factors of its equations that serve again
+
+    @property
+    def lengthens(self) -> bool:
+        """Whether its length is an unknown of all lines: its winch holds a tension, and an end is joined."""
+        return self.winds and max(self.joints) >= 0
 
 
 class SystemState(NamedTuple):

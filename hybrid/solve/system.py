@@ -33,10 +33,10 @@ from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH
-from hybrid.kernels.run.run import in_space
+from hybrid.kernels.run.run import in_plane, in_space
 from hybrid.kernels.run.system import JUNCTIONS, book_system_step, solve_system
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.forces import FRICTION, WAVES
+from hybrid.kernels.state.forces import FRICTION, PLANAR, WAVES
 from hybrid.kernels.state.obstacle_rows import FREE, MOVES
 from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, State, Work, state_for
@@ -93,7 +93,7 @@ def _room(x: JoinedLine, touches: bool = False) -> Work:
 class SystemSolver:
     """Solves for all lines of a system at once; owns the work arrays, not the states.
 
-    It works in space: a line whose plane is known must not be marked as planar.
+    It works in space, but for steps of lines that are joined to nothing and are marked as planar.
     """
 
     def __init__(
@@ -142,6 +142,7 @@ class SystemSolver:
         self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in range(len(lines))]
         self._solver = in_space.address(self._numbers[0, 0])
         self._rooms = self._make_rooms()
+        self._pushes: dict[int, list[Floats]] = {}  # out of planes, of states of even parity and of odd, by line
         self._together = self._all = JointJobs(self._rooms, self._numbers, range(len(lines)))
         self.lone: list[int] = []
         self.joined = list(range(len(lines)))
@@ -157,9 +158,10 @@ class SystemSolver:
         self._group()
 
     def _keeps(self, number: int, x: JoinedLine) -> bool:
-        """Whether all factors of a line may serve again: for contact, bodies, sheaves, and winches of joined lines."""
+        """Whether all factors of a line may serve again: for contact, bodies, sheaves and winches."""
         beside = bool(self._rides.size or self._sheaves or any(each.lengthens for each in self.lines))
-        return number in self._touching_lines or (beside and (self._mixes[number] or self._near[number] < 0))
+        mixes = beside and (self._mixes[number] or self._near[number] < 0)
+        return x.winds or mixes or number in self._touching_lines
 
     def _make_rooms(self) -> Rooms:
         """What jobs of the lines work in."""
@@ -208,7 +210,8 @@ class SystemSolver:
             moved = line.moved.copy()
             moved[moved == FREE] = MOVES
             found["line"] = line._replace(moved=moved)
-        if (work := values.get("work")) is not None and not (number in self._contacts or work.torsion.known.size):
+        serve = number in self._contacts or self.lines[number].winds
+        if (work := values.get("work")) is not None and not (serve or work.torsion.known.size):
             found["work"] = work._replace(X=work.X[: self.lines[number].line.s.size * ROW])
         for name in {"old", "new"} & {*values}:
             found[name] = values[name]._replace(sheave=NO_SHEAVES)
@@ -255,8 +258,7 @@ class SystemSolver:
 
     def regroup(self) -> dict[str, Any]:
         """Solve lines with what they have been found near, and others by themselves: as of `take_turns`."""
-        if any(self._mixes):  # else groups stay, and what was made of their tables
-            self._group()
+        self._group()
         return self._bind_turns()
 
     def take_line(self, number: int, line: Line) -> None:
@@ -382,14 +384,38 @@ class SystemSolver:
             contact.follow(old.lines[k], new.lines[k])
         for k, table in self._lone_tables.items():
             table.bind(**self._by_itself(k, {"old": old.lines[k], "new": new.lines[k]}))
+            self._bind_pushes(k)
         numbers, mixes = self._all.jobs[0].numbers, any(self._mixes)
         return {
             "even": numbers, "odd": self._all.jobs[1].numbers,
             "joined_even": self._together.jobs[0].numbers, "joined_odd": self._together.jobs[1].numbers,
             "joined": np.array(self.joined, np.int64), "lone": self.lone_numbers,
-            "lone_lines": np.array(self.lone, np.int64), "marcher": self._solver,
+            "lone_lines": np.array(self.lone, np.int64), "marchers": np.array(self._marchers(), np.int64),
             "leader": lead_lone.address(numbers) if mixes else 0, "finder": find_near.address(numbers) if mixes else 0,
         }  # fmt: skip
+
+    def _marchers(self) -> list[int]:
+        """Addresses of the kernels that solve steps of the lines that are solved by themselves."""
+        return [
+            in_plane.address(table.numbers) if self.lines[k].line.bits & PLANAR else self._solver
+            for k, table in self._lone_tables.items()
+        ]
+
+    def carry(self, number: int, pushes: list[Floats]) -> None:
+        """Carry a push out of its plane along with a line: (N+1, 4) of states of even parity, and of odd."""
+        self._pushes[number] = pushes
+        self._bind_pushes(number)
+
+    def _bind_pushes(self, number: int) -> None:
+        if number in self._pushes and number in self._lone_tables:
+            was, now = self._pushes[number]
+            self._lone_tables[number].bind(was=was, now=now)
+
+    def exchange_pushes(self) -> None:
+        """What belongs to states of odd parity does so to those of even from now on."""
+        for number, pushes in self._pushes.items():
+            pushes.reverse()
+            self._bind_pushes(number)
 
     def _bind_states(self, parity: int, old: SystemState, new: SystemState) -> None:
         for tables, a, b in zip(self._tables, old.lines, new.lines, strict=True):
@@ -597,7 +623,8 @@ class SystemSolver:
             state.vd[:] = HEAVY * work.x[:, 1:4]
             state.a[:] = state.vd
             state.T[:] += work.x[1:, 0]
-            turning = (x.line.spin == 1) & (x.line.polar > 0)  # a spin without inertia has no acceleration
+            # a spin without inertia has no acceleration, and none is in a plane
+            turning = (x.line.spin == 1) & (x.line.polar > 0) & (not x.line.bits & PLANAR)
             state.wd[turning] = HEAVY * work.x[:-1, 4][turning]
             state.wa[:] = state.wd
         return self.forces_in_motion(states, t)

@@ -82,6 +82,8 @@ class SystemSteps:
         now, then = self.states
         if self._solver is solver and solver.turns is self._states and now is state and then is other:
             return False
+        if counts.parity:
+            solver.exchange_pushes()
         counts.parity, self._states, self._solver = 0, (state, other), solver
         lines = len(solver.lines)
         if len(self.seen) != lines:
@@ -112,6 +114,8 @@ class SystemSteps:
     def stand_after_change(self) -> None:
         """The state of now is the first of the two, of lines that have changed: of the step before nothing is known."""
         assert self._solver is not None
+        if self.counts.parity:
+            self._solver.exchange_pushes()
         self.clock.previous, self.counts.parity = self.clock.now, 0
         self.worked[0] = self._solver.body_work
 

@@ -115,9 +115,9 @@ def test_one_line_is_the_cable(model: str, waves: bool, bed: bool) -> None:
     points = {"low": {"position": [0, 0, -60.0]}, "top": {"position": [90, 0, -1.0], "motion": HEAVE}}
     lines = {"a": {"start": "low", "end": "top", "model": model, "mesh": {"cells": 12}, "sections": sections}}
     ends = {x: {"kind": "pinned"} | point for x, point in zip(("start", "end"), points.values(), strict=True)}
-    same = {"environment": water(waves, bed)} | OUTPUT
+    same = {"environment": water(waves, bed), "dimension": 3} | OUTPUT
     cable = {"cable": {"sections": sections}, "ends": ends, "model": model, "mesh": {"cells": 12}} | same
-    cable |= {"initial": "equilibrium", "dimension": 3}
+    cable |= {"initial": "equilibrium"}
     of_line = ["drag.normal", "mass", "length"]
     both = []
     for tables, of, place, end in (

@@ -51,7 +51,7 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.accept import note_cuts
+from hybrid.kernels.step.accept import note_cuts, watch_push
 from hybrid.kernels.step.job import call_follower, call_solver, read
 from hybrid.kernels.step.newton import ADDRESS, CUT_SHORT, GAIN, OK, SLACK, STEP, TURNED_TOO_FAR, ask_contact
 from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, passes, take_past
@@ -78,6 +78,7 @@ class StepsJob(NamedTuple):
     joined: NDArray[np.int64]  # (J,) their numbers
     lone: NDArray[np.int64]  # (L - J, ..) jobs of the others, their task RUN
     lone_lines: NDArray[np.int64]  # (L - J,) and their numbers
+    marchers: NDArray[np.int64]  # (L - J,) addresses of the kernels that solve their steps
     clock: Clock  # of all lines
     counts: Counts
     limits: Floats  # (3,) above
@@ -100,7 +101,6 @@ class StepsJob(NamedTuple):
     paid: NDArray[np.int64]  # (W, ..) likewise of kernels.reel.reel.ReelJob, of lines that are paid out
     beside: NDArray[np.int64]  # of a kernels.run.system_tangents.SystemTangents
     solver: int = 0  # address of kernels.run.system.solve_system
-    marcher: int = 0  # of the kernel that solves a step of one line
     leader: int = 0  # of kernels.junctions.lone_lines.lead_lone; 0: no line can come near what is free
     finder: int = 0  # and of find_near
     book: int = 0  # of book_system_step
@@ -128,7 +128,7 @@ def blank_steps_job() -> StepsJob:
     clock, counts = Clock(), Counts()
     lone = np.zeros((1, 1), np.int64)
     return StepsJob(
-        none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
+        none, none, none, none, none, lone, none, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
         np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
         none, none, lone, none, lone, none, lone, none,
     )  # fmt: skip
@@ -213,7 +213,7 @@ def try_lone(steps, system):
         own.now, own.try_end, own.rho = clock.now, clock.try_end, clock.rho
         own.step_before, own.rho_before = clock.last_dt, own.last_rho
         job.books.counts.most_iterations, job.books.counts.taken = steps.counts.most_iterations, steps.counts.taken
-        outcome, it, left, where = call_solver(steps.marcher, steps.lone[j])
+        outcome, it, left, where = call_solver(steps.marchers[j], steps.lone[j])
         if outcome == CUT_SHORT:
             outcome, steps.counts.is_cut = OK, 1
         if outcome == OK and gains(job, clock):
@@ -382,6 +382,10 @@ def accept(steps, system):
     flags, first = note_cuts(clock, counts, dt), 0
     if steps.joined.shape[0] > 0:
         first = steps.joined[0]
+    for j in range(steps.lone.shape[0]):
+        job = read(steps.lone[j])
+        if job.was.shape[0] > 0:
+            job.books.counts.notices |= watch_push(job.books.clock, job.work.report)
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
         report, row = job.work.report, steps.log[counts.rows, l]

@@ -1,0 +1,130 @@
+"""Lines of a network that are joined to nothing and lie in a plane: computed there, as one cable is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_lone_lines import BALL, SPANS, scene
+from test_plane import swinging
+from test_plane_again import storm
+from test_system_contact import HOSE
+
+import hybrid
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.scene.short_form import network_of
+from hybrid.solve.system import SystemSolver
+
+Tables = dict[str, Any]
+
+
+@pytest.fixture
+def flat(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
+    """Numbers of the lines whose steps are made in a plane, of each solver of a motion."""
+    found: list[list[int]] = []
+    take_turns = SystemSolver.take_turns
+
+    def noted(solver: SystemSolver, states: Any) -> dict[str, Any]:
+        found.append([k for k in solver.lone if solver.lines[k].line.bits & PLANAR])
+        return take_turns(solver, states)
+
+    monkeypatch.setattr(SystemSolver, "take_turns", noted)
+    return found
+
+
+def as_network(tables: Any) -> hybrid.System:
+    return network_of(hybrid.validate_scene(tables))
+
+
+def same(network: Any, cable: Any, part: float = 1e-9) -> None:
+    """The only line of a network moves as a cable."""
+    (line,) = network.lines.values()
+    for key in ("position", "velocity", "tension", "energy/kinetic", "work/end", "envelope/tension_max"):
+        scale = np.nanmax(np.abs(cable[key]))
+        assert np.nanmax(np.abs(line[key] - cable[key])) <= part * scale, key
+
+
+@pytest.mark.parametrize("dimension", [None, 2, 3])
+def test_a_line_in_a_plane_is_the_cable(dimension: int | None, flat: list[list[int]]) -> None:
+    """In a vertical plane of any direction; where nothing is said, in its plane."""
+    tables = swinging(0.8, 0.0, dimension)
+    network, cable = hybrid.run(as_network(tables)), hybrid.run(tables)
+    assert flat == [[] if dimension == 3 else [0]]
+    same(network, cable)
+    (line,) = network.lines.values()
+    np.testing.assert_array_equal(line["steps/iterations"], cable["steps/iterations"])
+
+
+def test_only_what_is_joined_to_nothing_is_computed_in_a_plane(flat: list[list[int]]) -> None:
+    """A pendant with a body goes on in space, and lines that may touch a shape; lines that no plane holds do, too."""
+    points = {name: BALL["points"][name] for name in ("top", "eye")}
+    hanging = {"points": points, "lines": {"pendant": BALL["lines"]["pendant"]}}
+    hanging["bodies"] = {"ball": {k: x for k, x in BALL["bodies"]["ball"].items() if k != "shape"}}
+    still = {name: {"position": point["position"]} for name, point in SPANS["points"].items()}
+    tables = scene(hanging, SPANS | {"points": still | {"b1": SPANS["points"]["b1"]}}, duration=0.1)
+    hybrid.run(tables)
+    assert flat[-1] == [1]  # an end of line b sways across
+    hybrid.run(tables | {"bodies": BALL["bodies"]})
+    assert flat[-1] == []
+
+
+def test_other_loads_may_take_a_line_out_of_its_plane(flat: list[list[int]], tmp_path: Path) -> None:
+    """A current across it from 2 s on: the same motion, but for the push by which it leaves, as computed in space."""
+    across = ["environment.fluid.current=[0.4, -0.3, 0]"]
+    found = []
+    for dimension in (None, 3):
+        tables = swinging(0.8, 0.0, dimension) | {"time": {"duration": 2.0, "step": 0.05}}
+        path = tmp_path / f"{dimension}.h5"
+        hybrid.run(as_network(tables), path, progress=False).close()
+        found.append(hybrid.resume(path, until=4.0, settings=across, progress=False).lines["cable"])
+    assert [0] in flat and flat[-1] == []
+    normal = np.array([0.8, -0.6, 0.0])
+    assert np.abs(found[1].position[-1] @ normal).max() > 0.1
+    assert np.abs(found[0].position - found[1].position).max() < 1e-3
+
+
+def test_a_line_that_comes_near_itself_leaves_its_plane(flat: list[list[int]]) -> None:
+    """As a cable does, to touch itself in space."""
+    closer = {"travel": {"by": [1.19, 0.0, 0.0], "over": 1.5}}
+    tables = {
+        "cable": {"sections": [HOSE]}, "model": "rod", "mesh": {"cells": 40}, "initial": "equilibrium",
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": closer},
+                 "end": {"kind": "pinned", "position": [1.2, 0, 0]}},
+        "time": {"duration": 1.6, "step": 0.01}, "output": {"every": 0.1},
+    }  # fmt: skip
+    network, cable = hybrid.run(as_network(tables)), hybrid.run(tables)
+    for x in (network, cable):
+        assert [e.kind for e in x.events].count("out of plane") == 1
+    assert flat[0] == [0] and flat[-1] == []
+    touched = [x["energy/self_contact"].max() for x in (network.lines["cable"], cable)]
+    assert touched[0] == pytest.approx(touched[1], rel=1e-3) and touched[1] > 0.0
+
+
+@pytest.mark.long
+def test_a_line_leaves_its_plane_and_comes_back_as_the_cable(flat: list[list[int]]) -> None:
+    """A mooring line in a storm buckles at 118 s and lies in its plane again at 283 s."""
+    network, cable = (hybrid.run(x) for x in (as_network(storm(300.0)), storm(300.0)))
+    assert [x for k, x in enumerate(flat) if x != flat[k - 1] or not k] == [[0], [], [0]]
+    texts = [
+        [e.text.removeprefix("line cable: ") for e in x.events if e.kind == "out of plane"] for x in (network, cable)
+    ]
+    assert texts[0] == texts[1] and len(texts[1]) == 1
+    (line,) = network.lines.values()
+    in_plane = [np.abs(x.position[:, :, 1]).max(axis=1) == 0.0 for x in (line, cable)]
+    np.testing.assert_array_equal(*in_plane)
+    calm = cable.t < 115.0
+    scale = np.abs(cable.position).max()
+    assert np.abs(line.position - cable.position)[calm].max() <= 1e-9 * scale
+
+
+@pytest.mark.long
+def test_it_is_resumed_bit_for_bit(tmp_path: Path) -> None:
+    """From its plane, from space, and from the plane again."""
+    whole = hybrid.run(as_network(storm(300.0)), tmp_path / "whole.h5", progress=False)
+    hybrid.run(as_network(storm(100.0)), tmp_path / "part.h5", progress=False).close()
+    for until in (200.0, 290.0, 300.0):
+        found = hybrid.resume(tmp_path / "part.h5", until=until)
+    for key in ("position", "tension", "envelope/tension_max", "work/end"):
+        np.testing.assert_array_equal(found.lines["cable"][key], whole.lines["cable"][key], err_msg=key)
