@@ -354,8 +354,9 @@ class SystemSolver:
         for k, begin in zip(found.lines, found.begins.tolist(), strict=True):
             self.bind_line(k, contact=found.beside)
             shared[k] = found.last, begin
-        for table, numbers in zip(self._tables[found.last], both, strict=True):
-            table.bind(contact=found.call, contact_table=numbers)
+        for own in (self._tables, self._joined_tables):
+            for table, numbers in zip(own[found.last], both, strict=True):
+                table.bind(contact=found.call, contact_table=numbers)
         tables[found.last] = one
 
     def keep_books(self, books: Sequence[Books]) -> None:
