@@ -72,6 +72,11 @@ def planar(line: Line, plane: Floats) -> Line:
     return line._replace(bits=line.bits | PLANAR, plane=plane)
 
 
+def as_kept(line: Line, plane: Floats | None, kept_in: Floats | None) -> Line:
+    """The line in the plane where its scene asks for that, as it is found at rest; plane, kept_in: of its model."""
+    return line if plane is None or kept_in is None else planar(line, plane)
+
+
 def in_space(line: Line) -> Line:
     """The line, to be computed in space."""
     return line._replace(bits=line.bits & ~PLANAR)

@@ -43,6 +43,7 @@ from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model
 from hybrid.model.first_state import HUNG
 from hybrid.model.obstacles import CELLS_PER_RADIUS
+from hybrid.model.plane import as_kept
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.scene.plane import OUT
@@ -255,12 +256,7 @@ class Diagnostics:
             text = "this equilibrium is the one without friction where the line touches itself"
             where = f"{text}: a run with damping that comes to rest in contact has it"
             self.events.event(0.0, 0.0, self._model.length, "static friction neglected", where)
-        model = self._model
-        line, sea, ends = model.line, model.sea.values, model.ends.values
-        judged = line if found.with_friction else line._replace(bits=line.bits & ~FRICTION)
-        if line.bits & PLANAR and not is_stable(judged, sea, ends, found.state, model.length, model.tension_scale):
-            text = "this equilibrium holds within the plane alone: in space (`dimension: 3`) the cable would leave it"
-            self.note(0.0, int(np.argmin(found.state.T)), "out of plane", text)
+        self.within_plane(found.state, found.with_friction)
         if not found.judged:
             why = "an end moment is not conservative"
             if found.blurred:
@@ -291,6 +287,15 @@ class Diagnostics:
                 text += "what is paid out or forms loops was laid under tension; "
             text += f"say `{key}: {{kind: equilibrium, friction: settled}}` for one that lies where it was laid"
         self.events.event(0.0, 0.0, self._model.length, "static friction neglected", text)
+
+    def within_plane(self, state: State, with_friction: bool) -> None:
+        """An event where an equilibrium that the scene wants in a plane holds within that alone."""
+        model = self._model
+        line, sea, ends = as_kept(model.line, model.plane, model.kept_in), model.sea.values, model.ends.values
+        judged = line if with_friction else line._replace(bits=line.bits & ~FRICTION)
+        if line.bits & PLANAR and not is_stable(judged, sea, ends, state, model.length, model.tension_scale):
+            text = "this equilibrium holds within the plane alone: in space (`dimension: 3`) the cable would leave it"
+            self.note(0.0, int(np.argmin(state.T)), "out of plane", text)
 
     def found_by(self, pushed: bool, slack: int, state: State) -> None:
         """An equilibrium beside one that is not stable, or with a slack catenary cell (-1: none)."""

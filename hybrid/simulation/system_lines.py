@@ -255,6 +255,7 @@ class LineResult:
         """
         line = self.model.line
         self.diagnostics.found_by(found.pushed, slack_cell(x, state), state)
+        self.diagnostics.within_plane(state, self.number in found.with_friction)
         if self.number not in found.with_friction:
             self.diagnostics.friction_neglected(
                 state, f"lines.{self.name}.initial", self.shares, found.not_settled.get(self.number, "")

@@ -15,6 +15,7 @@ from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats
+from hybrid.model.plane import as_kept
 from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FixedBody
@@ -144,7 +145,8 @@ def _each_alone(system: System, model: SystemModel, t: float) -> SystemEquilibri
     found = []
     for k, (name, x) in enumerate(zip(model.names, model.models, strict=True)):
         try:
-            found.append(equilibrium_of(model.scenes[name], x, t))
+            kept = replace(x, line=as_kept(x.line, x.plane, x.kept_in))
+            found.append(equilibrium_of(model.scenes[name], kept, t))
         except ComputationError as failed:
             detail = failed.detail.replace("ends.", f"lines.{name}.connections.")
             raise LineFailed(k, failed.outcome, None, failed.s, detail, first=failed.first) from None
