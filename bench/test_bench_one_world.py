@@ -55,17 +55,14 @@ class _Exception(NamedTuple):
     why: str
 
 
-CHOSEN = _Exception(("",), np.inf, "a pre-run chooses the model of a cable, and of a network none")
+ESTIMATED = _Exception(("errors/", EVENTS), np.inf, "figures of a network are estimated otherwise")
 CHANGED = _Exception(("envelope/", "steps/repeats"), 2e-2, "extremes of steps after which cells or zones have changed")
 # By part of the name of a scene, or of the digests: the first counts.
 EXCEPTIONS: dict[str, _Exception] = {
-    "touchdown, follows": CHANGED,
-    "cells that follow + release": CHANGED,
-    "cells that follow + points": CHANGED,
     "zones that move + release": CHANGED,
-    "steps that follow the motion": CHOSEN,
-    "rest of touchdown, 1%": CHOSEN,
-    "errors of fixed steps": _Exception(("errors/", EVENTS), np.inf, "figures of a network are estimated otherwise"),
+    "steps that follow the motion": ESTIMATED,
+    "rest of touchdown, 1%": ESTIMATED,
+    "errors of fixed steps": ESTIMATED,
     "an end that is let go": _Exception(("",), 1e-6, "the start after it, to round-off, which the jerk lets grow"),
     "rest of table_with_turns": _Exception((EVENTS,), 0.0, "the cable says the same twice"),
     "contact/trefoil": _Exception(("",), 1e-1, "contact begins in mid-motion from accelerations that differ"),

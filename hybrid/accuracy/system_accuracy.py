@@ -36,7 +36,7 @@ from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bendi
 from hybrid.accuracy.system_samples import compared, extremes_of, sample_of, touch_unasked
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
-from hybrid.model.model_costs import NAMED, ModelChoice
+from hybrid.model.model_costs import NAMED, REST, ModelChoice
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
@@ -300,6 +300,8 @@ class SystemPasses:
         free = [name for name, scene in self.scenes.items() if wants_survey(scene)]
         if not free:
             return first
+        if not self.moves and (chosen := [x for x in free if model_is_free(self.scenes[x], moves=False)]):
+            self._use_models(dict.fromkeys(chosen, ModelChoice("rod", REST)))
         coarse = SystemResolution({name: survey_resolution(x) for name, x in first.lines.items()})
         if not self.moves:
             coarse = SystemResolution({name: replace(x, every=1) for name, x in coarse.lines.items()})

@@ -13,7 +13,7 @@ import hybrid
 from hybrid.accuracy import model_choice
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.build import build
-from hybrid.model.model_costs import CHOSEN, Cost, cheapest
+from hybrid.model.model_costs import CHOSEN, REST, Cost, cheapest
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.simulation.case import Case
 from tests.said import both_ways, line_of, said
@@ -54,6 +54,12 @@ def test_rods_where_catenaries_are_no_choice(network):
     result = hybrid.run(said(CLAMPED, network) | {"dimension": None})
     assert kind_of(result) == "rod"
     assert "rods everywhere" in chosen(result) and "an end is clamped" in chosen(result)
+
+
+@both_ways
+def test_rods_at_rest(network):
+    result = hybrid.static(said(TAUT | {"accuracy": "1%"}, network))
+    assert kind_of(result) == "rod" and REST in chosen(result)
 
 
 @pytest.mark.parametrize("free", [{}, {"model": "adaptive"}], ids=["no model", "adaptive"])
