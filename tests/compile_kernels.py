@@ -61,9 +61,7 @@ BY_TABLE = {
         junctions.joined_sheaves.spin_sheaves junctions.body_contact.meet_bodies""",
 }
 
-IN_TESTS = {
-    "plane": "watch.tangents.follow_in_plane", "space": "watch.tangents.follow_in_space run.system_run.sample_system",
-}  # fmt: skip
+IN_TESTS = {"plane": "run.system_tangents.follow_system", "space": "run.system_run.sample_system"}
 
 
 def main(half: str, for_tests: bool) -> None:

@@ -23,7 +23,7 @@ from hybrid.designs.network_tangents import NetworkOthers
 from hybrid.designs.numbers import at_a_bound, number_of, scene_with, size_of
 from hybrid.designs.peaks import over_time, peaks, smoothed
 from hybrid.designs.replay import Course, course_of, replay, with_outputs
-from hybrid.designs.tangents import Others, Seen, Unfollowed, has_two_sides, step_of
+from hybrid.designs.tangents import Seen, Unfollowed, has_two_sides, step_of
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
@@ -140,14 +140,18 @@ def followed(
     pairs: scenes with more of each number by a step, and with less of those that are to be seen from both sides.
     smooth: as of `Motion`, with all peaks of each result in turn, so that W is more.
     """
-    each_step, more = any(x.over == "t" for x in wanted), Motion.more(wanted) if smooth else None
+    each_step, more = (
+        any(x.over == "t" for x in wanted),
+        Motion.more(wanted) if smooth and not asked.line_names else None,
+    )
     own = with_outputs(asked, course, each_step=each_step)
     scenes: list[Any] = [tuple(x and with_outputs(x, course, each_step=each_step) for x in pair) for pair in pairs]
-    kind: Any = NetworkOthers if own.line_names else Others
-    others: Others | NetworkOthers = kind(own, scenes, steps, course.lines, more)
+    others = NetworkOthers(own, scenes, steps, course.lines, more)
     base = Motion(asked, wanted, course, smooth=smooth, begun=others.begin)
-    names = {line: sorted({x.name for x in wanted if x.line == line}) for line in {x.line for x in wanted}}
-    here, *beside = [[base.beside(x, wanted) for x in each] for each in others.results(names)]
+    of = dict(zip(own.lines, asked.lines, strict=True))  # of lines of the network, their names in the scene
+    names = {line: sorted({x.name for x in wanted if x.line == name}) for line, name in of.items()}
+    found = others.results({line: x for line, x in names.items() if x})
+    here, *beside = [[base.beside({of[k]: x for k, x in y.items()}, wanted) for y in each] for each in found]
     slopes = [(x[0] - (x[1:] or here)[0]) / (h * len(x)) for x, h in zip(beside, steps, strict=True)]
     return base, np.array(slopes), others.errors
 
@@ -240,7 +244,7 @@ class Motion:
         self._cables = {k: x.cable for k, x in scene.lines.items()}
         each_step = any(x.over == "t" for x in wanted)
         with replay(scene, course, finer, more, each_step, begun) as result:
-            lines: dict[str, Any] = dict(result.each_line())
+            lines: dict[str, Any] = dict(zip(scene.lines, result.lines.values(), strict=True))
             self.steps = {name: np.array(x["steps/t"]) for name, x in lines.items()}
             self.zones = {name: list(_zones(x)) for name, x in lines.items()}
             self.begin = {name: np.array(x.position[0]) for name, x in lines.items()}

@@ -9,8 +9,8 @@ those at bodies turn with these (designs.bodies_at_rest).  A cable is the networ
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -76,18 +76,6 @@ def _network_of(scene: Any) -> tuple[Any, System, SystemResolution, ShortForm | 
     return case.scene, network_of(case.scene), resolution, short_form(case.scene)
 
 
-@contextmanager
-def _said_of(form: ShortForm | None) -> Iterator[None]:
-    """What fails within of the network of a cable is said of the cable."""
-    try:
-        yield
-    except ComputationError as error:
-        if form is None:
-            raise
-        detail = form.text(error.detail).removeprefix("the cable; ")
-        raise ComputationError(error.outcome, error.t, error.s, detail, error.snapshot, error.first) from None
-
-
 def parse_result_of(scene: Scene | System, text: str) -> tuple[str, Wanted]:
     """The line and the parts of a result such as `east/tension@end`, `max hose/curvature`; SceneError: it is none.
 
@@ -126,7 +114,7 @@ class NetworkAtRest(OfScene):
         refuse_use(self.scene, "derivatives", given="hybrid sensitivity")
         finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
         resolution = replace(resolution, lines=finely)
-        with _said_of(self._form):
+        with nullcontext() if self._form is None else self._form.said():
             run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
         assert run.found is not None
         self._system, self._names, self._outputs = system, run.model.names, dict[str, Output]()

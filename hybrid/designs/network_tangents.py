@@ -1,7 +1,7 @@
-"""Tangents along the steps of a run of several lines: what its results answer to numbers of the scene.
+"""Tangents along the steps of a run: what its results answer to numbers of the scene, in one run for all numbers.
 
-As of one cable (hybrid.designs.tangents), of all lines together, with the points and bodies that they are joined to
-(kernels.run.system_tangents).
+Of all lines together (hybrid.designs.tangents), with the points and bodies that they are joined to
+(kernels.run.system_tangents).  A cable is the network of one line.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.designs.replay import at_nodes
 from hybrid.designs.tangents import (
     AT_START,
     MOST_SAMPLED,
@@ -95,8 +96,11 @@ class NetworkOthers:
         self, system: System, scenes: Sequence[tuple[System, System | None]], steps: Sequence[float],
         lines: Mapping[str, Resolution], more: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
-        """system: of the run; scenes, lines: as of `tangents.Others`; more: of it alone."""
-        self._system = system
+        """system: of the run; scenes: with more of each number by a step, and with less (None: it is not looked at);
+
+        lines: how finely, by name; more: arc lengths of outputs beside nodes, of one line; None: as the scene asks.
+        """
+        self._system, self._more = system, more
         self._scenes, self._steps, self._resolution = list(scenes), list(steps), SystemResolution(lines)
         self._models = [build_system(more, self._resolution) for more, _ in scenes]
         self.sizes = np.zeros((len(scenes), len(lines), TANGENT_SIZES))
@@ -119,7 +123,10 @@ class NetworkOthers:
         cells = sum(sample_size(x.line.h.size) for x in self._model.models)
         if run.loop.outputs.size * len(self._others) * cells > MOST_SAMPLED:
             raise Unfollowed("outputs of so many numbers do not fit into memory")
-        self._rest()
+        if run.found is None:
+            self._place()
+        else:
+            self._rest()
         reports = self._accelerate()
         self._follow(reports)
         for l, line in enumerate(run.lines):
@@ -140,6 +147,15 @@ class NetworkOthers:
         return _Other(model, lines, joined_lines(model, 0.0), tangents, np.zeros((len(base.body_places), TANGENTS)), h)
 
     # --- the start --------------------------------------------------------------------------------------
+
+    def _place(self) -> None:
+        """Tangents of lines that start as they are placed, between ends that are held or free."""
+        for other in self._others:
+            for tangent, base, more in zip(other.tangents, self._model.models, other.model.models, strict=True):
+                if base.start.v.any() and not base.line.ck.all():
+                    raise Unfollowed("an inextensible line moves at first")
+                for name in ("r", "v", "T", "w"):
+                    getattr(tangent.rate, name)[:] = (getattr(more.start, name) - getattr(base.start, name)) / other.h
 
     def _rest(self) -> None:
         """Tangents of the equilibrium that the run begins with."""
@@ -313,7 +329,10 @@ class NetworkOthers:
     # --- what is found ----------------------------------------------------------------------------------
 
     def results(self, names: Mapping[str, Sequence[str]]) -> list[tuple[Mapping[str, Seen], ...]]:
-        """As of `tangents.Others`, by line.  Unfollowed."""
+        """Results by name at all outputs of lines, of the scene itself, then of every number of the scenes with more of
+
+        it, and with less.  Unfollowed.
+        """
         run = self._run
         if run.model is not self._model or (self._found != [run.steps, 0]).any():
             raise Unfollowed("a line, or what acts on it, becomes another one in the run")
@@ -343,6 +362,9 @@ class NetworkOthers:
         for l, batch in batches.items():
             name, x = model.names[l], model.models[l]
             scene = system.scene_of(name, system.carried(name), system.guesses)
+            if self._more is not None:
+                output = scene.output.model_copy(update={"points": at_nodes(x.line.s, self._more)})
+                scene = scene.model_copy(update={"output": output})
             observer = observer_of(scene, x, True)
             observer = observer.on(line_like(x, self._model.models[l]), x.sea.values, x.zones, x.hinges)
             observer = observer.of(names[name])
@@ -355,14 +377,15 @@ def refuse_system(run: SystemRun) -> None:
     model, what = run.model, dict[str, bool]()
     for x in model.models:
         what |= {text: there or what.get(text, False) for text, there in unknown_of(x).items()}
+    what["loads change in the run"] |= bool(model.breaks)
     found = run.found
     refuse_what(
         what
         | {
-            "lines start as they are placed": found is None,
+            "lines start as they are placed": found is None and len(model.body_places) > 0,
             "lines touch each other": (found is not None and found.settled) or run.shared is not None,
             "zones move": run.zones is not None, "line is paid out": run.payout is not None,
-            "connections may break": bool(run.failures.all), "loads change in the run": bool(model.breaks),
+            "connections may break": bool(run.failures.all),
             "a line is clamped to what turns with it": bool(model.seats[:, :, TURNS].any()),
             "a body has a shape": bool(model.rides.size),
             "a body has members": bool((run.solver.bodies[:, PIECES] > 0.0).any()),

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.accuracy.api import run
-from hybrid.designs.numbers import AnyScene
 from hybrid.kernels.state.state import Floats
-from hybrid.model.build import build, places_of
+from hybrid.model.build import places_of
 from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.output_points import NEAR
 from hybrid.model.resolution import Resolution, accuracy_of, first_resolution
 from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.schema import Scene
+from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.scene.system import System
-from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import kept_resolution, resolution_from
 from hybrid.simulation.system_run import Recording, run_system
@@ -31,9 +31,8 @@ from hybrid.store.hdf5_file import opened
 from hybrid.store.reader import Result, open_result, written_result
 
 
-@dataclass(frozen=True)
-class Course:
-    """How a run is replayed: how finely each line is computed, by name, with places of its nodes.
+class Course(NamedTuple):
+    """How a run is replayed: how finely each line is computed, by name in the network, with places of its nodes.
 
     scene: as it was computed: the model of one cable is that which the run has chosen.
     """
@@ -45,107 +44,38 @@ class Course:
         """How finely lines are computed; finer: on cells and in steps half as long."""
         return {k: _halved(x) for k, x in self.lines.items()} if finer else self.lines
 
-    @classmethod
-    def first(cls, scene: Any) -> Course:
-        """Of a run that has yet to show nothing."""
-        raise NotImplementedError
-
-    @classmethod
-    def kept(cls, scene: Any, path: Path) -> Course:
-        """Of a run of a scene that is in a file."""
-        raise NotImplementedError
-
-    def applied(self, scene: Any) -> Any:
-        """A scene with other numbers, as it is computed in a replay: its errors are not estimated."""
-        raise NotImplementedError
-
-    def places(self) -> Mapping[str, tuple[float, ...]]:
-        """Places of the nodes of every line, m."""
-        raise NotImplementedError
-
-    def points(self, scene: Any, more: Sequence[float], finer: bool) -> dict[str, Any]:
-        """What `output` says for outputs at nodes and more arc lengths, m; empty: they are as the scene asks."""
-        return {}
-
-    def record(self, scene: Any, target: MemoryTarget, finer: bool, begun: Callable[..., None] | None) -> None:
-        """Compute a scene, as it is in a replay, into memory; begun: called with the run at its start."""
-        raise NotImplementedError
+    def network(self, scene: Any) -> System:
+        """The network that computes a scene with other numbers in a replay; its errors are not estimated."""
+        made = scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})
+        if not scene.line_names:
+            made = network_of(made.model_copy(update={"model": self.scene.model}))
+        elif scene.output.errors:  # lines pass each other as where these are estimated
+            made = made.model_copy(update={"contact": passing_each_other(self.scene).contact})
+        found: System = made.model_copy(update={"dimension": 3})  # tangents know no plane of a line
+        return found  # runs of several lines estimate no errors by themselves
 
 
-class _CourseOfCable(Course):
-    """Of a cable, until the loop of several lines computes it too."""
-
-    @classmethod
-    def first(cls, scene: Scene) -> Course:
-        return cls(scene, {"": first_resolution(scene)})
-
-    @classmethod
-    def kept(cls, scene: Scene, path: Path) -> Course:
-        with opened(path) as file:
-            return cls(scene, {"": resolution_from(read_checkpoint(file).resolution, scene)})
-
-    def applied(self, scene: Scene) -> Scene:
-        output = scene.output.model_copy(update={"errors": False})
-        return scene.model_copy(update={"output": output, "model": self.scene.model})
-
-    def places(self) -> Mapping[str, tuple[float, ...]]:
-        return {"": places_of(build(self.scene, self.lines[""], spare=False), self.scene)}
-
-    def points(self, scene: Scene, more: Sequence[float], finer: bool) -> dict[str, Any]:
-        nodes = build(self.applied(scene), self.at(finer)[""], spare=False).line.s
-        return {"points": at_nodes(scene, nodes, more)}
-
-    def record(self, scene: Scene, target: MemoryTarget, finer: bool, begun: Callable[..., None] | None) -> None:
-        Case(scene, None).record(self.at(finer)[""], target, begun=begun)
-
-
-class _CourseOfLines(Course):
-    """Of lines with names."""
-
-    @classmethod
-    def first(cls, scene: System) -> Course:
-        return cls(scene, SystemResolution.first(scene).lines)
-
-    @classmethod
-    def kept(cls, scene: System, path: Path) -> Course:
-        return cls(scene, kept_resolution(scene, path).lines)
-
-    def applied(self, scene: System) -> System:
-        changed: dict[str, Any] = {"output": scene.output.model_copy(update={"errors": None})}
-        if scene.output.errors:  # lines pass each other as where these are estimated
-            changed["contact"] = passing_each_other(self.scene).contact
-        return scene.model_copy(update=changed)  # runs of several lines estimate none by themselves
-
-    def places(self) -> Mapping[str, tuple[float, ...]]:
-        scene, model = self.scene, build_system(self.scene, SystemResolution(self.lines))
-        scenes = {name: scene.scene_of(name, scene.carried(name), scene.guesses) for name in model.names}
-        return {name: places_of(x, scenes[name]) for name, x in zip(model.names, model.models, strict=True)}
-
-    def record(self, scene: System, target: MemoryTarget, finer: bool, begun: Callable[..., None] | None) -> None:
-        run_system(
-            scene, target, scene_text(scene), ProgressReporter(None, scene.require_time().duration), lambda: False,
-            resolution=SystemResolution(self.at(finer)), recording=Recording(begun=begun),
-        )  # fmt: skip
-
-
-def course_of(scene: Scene | System) -> Course:
+def course_of(scene: Any) -> Course:
     """Of a run of a scene: it is made where what it does tells how finely, for steps, accuracy and cells of a layer."""
-    kind: type[Course] = _CourseOfLines if scene.line_names else _CourseOfCable
     if not _is_open(scene):
-        return _with_nodes(kind.first(scene))
+        first = SystemResolution.first(scene).lines if scene.line_names else {LINE: first_resolution(scene)}
+        return _with_nodes(Course(scene, first))
     with tempfile.TemporaryDirectory(prefix="hybrid-replay-") as room:
         path = Path(room) / "run.h5"
         run(scene, path).close()
         with open_result(path) as result:
-            computed = parse_either(result.scene_text)[0]
+            computed: Any = parse_either(result.scene_text)[0]
             part = next(x for _, x in result.each_line())
             ends = tuple(np.array(part["steps/t"], float).tolist())
-        course = kind.kept(computed, path)
-    found = course.lines
+        if scene.line_names:
+            found = dict(kept_resolution(computed, path).lines)
+        else:
+            with opened(path) as file:
+                found = {LINE: resolution_from(read_checkpoint(file).resolution, computed)}
     if any(x.local is not None for x in found.values()):
         longest = float(np.diff([0.0, *ends]).max())
         found = {k: replace(x, local=None, later=0.0, step=longest, ends=ends) for k, x in found.items()}
-    return _with_nodes(replace(course, lines={k: replace(x, follow=False) for k, x in found.items()}))
+    return _with_nodes(Course(computed, {k: replace(x, follow=False) for k, x in found.items()}))
 
 
 def replay(
@@ -159,39 +89,47 @@ def replay(
     more, each_step: as of `with_outputs`; begun: as of `Course.record`.
     SceneError, ComputationError: as of `hybrid.run`.
     """
-    target = MemoryTarget()
-    course.record(with_outputs(scene, course, more, each_step, finer), target, finer, begun)
+    network, target = with_outputs(scene, course, more, each_step, finer), MemoryTarget()
+    with nullcontext() if scene.line_names else short_form(course.scene).said():
+        run_system(
+            network, target, scene_text(network), ProgressReporter(None, scene.require_time().duration), lambda: False,
+            resolution=SystemResolution(course.at(finer)), recording=Recording(begun=begun),
+        )  # fmt: skip
     return written_result(target)
 
 
 def with_outputs(
-    scene: AnyScene, course: Course, more: Sequence[float] | None = None, each_step: bool = False, finer: bool = False
-) -> AnyScene:
-    """A scene as it is computed in a replay.
+    scene: Scene | System, course: Course, more: Sequence[float] | None = None, each_step: bool = False,
+    finer: bool = False,
+) -> System:  # fmt: skip
+    """The network that computes a scene in a replay.
 
     more: of one cable: outputs are at its nodes and these arc lengths, m; None: where the scene asks for them;
     each_step: there are outputs at every step, or about as often where steps are not equal, in place of when the scene
     asks for them.
     """
-    first, output = next(iter(course.lines.values())), dict[str, Any]()
+    first, output, network = next(iter(course.lines.values())), dict[str, Any](), course.network(scene)
     if each_step:
         output["every"] = float(np.median(np.diff([0.0, *first.ends]))) if first.ends else first.step
-    output |= course.points(scene, more, finer) if more is not None else {}
-    applied = course.applied(scene)
-    out: AnyScene = applied.model_copy(update={"output": applied.output.model_copy(update=output)})
-    return out
+    if more is not None and not scene.line_names:
+        (model,) = build_system(network, SystemResolution(course.at(finer))).models
+        output["points"] = {LINE: at_nodes(model.line.s, more)}
+    return network.model_copy(update={"output": network.output.model_copy(update=output)})
 
 
-def at_nodes(scene: Scene, nodes: Floats, more: Sequence[float]) -> tuple[float, ...]:
+def at_nodes(nodes: Floats, more: Sequence[float]) -> tuple[float, ...]:
     """Output points, m: nodes and more, of which those that round-off alone tells apart are one."""
     points = np.unique([*nodes, *more])
-    return tuple(points[np.append(True, np.diff(points) > NEAR * scene.length)].tolist())
+    return tuple(points[np.append(True, np.diff(points) > NEAR * nodes[-1])].tolist())
 
 
 def _with_nodes(course: Course) -> Course:
     """With the places of the nodes of every line."""
-    places = course.places()
-    return replace(course, lines={k: replace(x, places=places[k]) for k, x in course.lines.items()})
+    network = course.network(course.scene)
+    model = build_system(network, SystemResolution(course.lines))
+    scenes = {name: network.scene_of(name, network.carried(name), network.guesses) for name in model.names}
+    places = {name: places_of(x, scenes[name]) for name, x in zip(model.names, model.models, strict=True)}
+    return course._replace(lines={k: replace(x, places=places[k]) for k, x in course.lines.items()})
 
 
 def _halved(resolution: Resolution) -> Resolution:

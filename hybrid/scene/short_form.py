@@ -16,12 +16,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from pydantic import ValidationError
 
-from hybrid.errors import Complaint, SceneError
+from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.scene.analysis import CatenaryModel, Output
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.combinations import value_at
@@ -73,6 +74,15 @@ class ShortForm:
             message = re.sub(rf"\b{re.escape(dotted(there))}\b", dotted(here), message)
         message = re.sub(rf"\bline {LINE}\b", "the cable", message)
         return re.sub(r"\bpoint (start|end)\b", r"ends.\1", message)
+
+    @contextmanager
+    def said(self) -> Iterator[None]:
+        """What fails within, of the network, is said of the cable."""
+        try:
+            yield
+        except ComputationError as error:
+            detail = self.text(error.detail).removeprefix("the cable; ")
+            raise ComputationError(error.outcome, error.t, error.s, detail, error.snapshot, error.first) from None
 
     def finding(self, found: Finding) -> Finding:
         """What is wrong with the network, of the scene."""

@@ -137,7 +137,8 @@ def test_a_replay_is_the_run_and_its_derivatives_those_of_short_steps(model, mes
     """
     open_ = {"time": {"duration": 8.0}, "accuracy": "1%", "mesh": mesh}
     scene = hybrid.validate_scene({k: x for k, x in (on_the_bed(model) | open_).items() if x is not None})
-    with hybrid.run(scene) as asked, replay(scene, course_of(scene)) as again:
+    with hybrid.run(scene) as asked, replay(scene, course_of(scene)) as whole:
+        again = whole.lines["cable"]
         np.testing.assert_array_equal(asked["steps/t"], again["steps/t"])
         assert np.abs(asked.position - again.position).max() < 1e-6
         assert np.abs(asked.tension - again.tension).max() < 1e-5 * asked.tension.max()
@@ -159,7 +160,7 @@ def test_cells_of_a_layer_are_those_of_the_run_that_laid_them():
     scene = hybrid.validate_scene(scene)
     course = course_of(scene)
     with hybrid.run(scene) as asked, replay(scene, course) as again:
-        np.testing.assert_allclose(asked.mesh[0].s, again.mesh[0].s, atol=1e-9)
+        np.testing.assert_allclose(asked.mesh[0].s, again.lines["cable"].mesh[0].s, atol=1e-9)
     found = in_motion(scene, ["max curvature@end"], ["cable.sections[0].bending_stiffness"])
     assert found.derivatives[0, 0] * 2e3 / found.values[0] == pytest.approx(-0.5, abs=0.1)  # as sqrt(T/EI)
     assert found.errors[0, 0] < 1e-4 * abs(found.derivatives[0, 0])
@@ -186,7 +187,7 @@ def test_steps_that_are_divided_are_no_neighbours(monkeypatch):
     def shorter(asked, course, *more):
         part = 0.5 if asked.cable.sections[0].mass > 5.0 else 1.0
         lines = {key: replace(x, step=part * x.step) for key, x in course.lines.items()}
-        return plain(asked, replace(course, lines=lines), *more)
+        return plain(asked, course._replace(lines=lines), *more)
 
     def unfollowed(*_):
         raise Unfollowed("nothing")

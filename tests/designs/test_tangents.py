@@ -18,8 +18,10 @@ from hybrid.designs.in_motion import (
     parse_history,
     size_of,
 )
+from hybrid.designs.network_tangents import NetworkOthers
 from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.designs.replay import course_of
+from hybrid.designs.tangents import Unfollowed
 from tests.designs.test_in_motion import heaved, on_the_bed
 
 OF = ["max tension@240", "last tension@100", "std position.z@150", "max velocity.z@200", "t=3.31 tension@120"]
@@ -89,6 +91,19 @@ def test_zones_that_stay() -> None:
     agree(on_the_bed() | {"model": zones, "mesh": None}, OF, KEYS)
 
 
+def test_a_line_that_starts_as_it_is_placed() -> None:
+    """Free at its end: the tangents of the first shape are those of the places that it is given."""
+    section = {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e6, "bending_stiffness": 50.0, "diameter": 0.03}
+    tables = {
+        "cable": {"sections": [section]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
+        "initial": {"kind": "straight", "direction": [1, 0, 0.2]}, "model": "rod", "mesh": {"cells": 20},
+        "time": {"duration": 0.8, "step": 0.02, "rho_inf": 0.5},
+    }  # fmt: skip
+    of = ["last tension@20", "last position.z@20"]
+    agree(tables, of, [f"{SECTION}.mass", "environment.gravity"])
+
+
 def test_a_phase_that_is_nothing() -> None:
     """A part of a degree would be lost in the rounding of places: angles are changed by parts of a radian."""
     tables, key = on_the_bed(), "ends.end.motion.heave.phase"
@@ -156,14 +171,21 @@ def test_loads_that_change_are_noticed() -> None:
 
 
 @pytest.mark.long
-def test_numbers_that_are_not_followed_are_differenced_beside_those_that_are() -> None:
-    """A place that turns the plane of the line; in the order asked for."""
-    tables = on_the_bed()
+def test_numbers_that_are_not_followed_are_differenced_beside_those_that_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if a place made another line; in the order asked for."""
+    plain, tables = NetworkOthers._other, on_the_bed()
+
+    def other(self: NetworkOthers, model: Any, k: int, h: float) -> Any:
+        if abs(model.models[0].ends.at(0.0).position[1, 1]) > 0.0:
+            raise Unfollowed("the number is not followed")
+        return plain(self, model, k, h)
+
+    monkeypatch.setattr(NetworkOthers, "_other", other)
     tables["time"]["duration"] = 1.0
     scene, of = hybrid.validate_scene(tables), ["last tension@150"]
     keys = [f"{SECTION}.mass", "ends.end.position[1]", "environment.gravity"]
     found = in_motion(scene, of, keys)
-    assert found.ways == (TANGENTS, f"{DIFFERENCES}: the number moves the plane of the line", TANGENTS)
+    assert found.ways == (TANGENTS, f"{DIFFERENCES}: the number is not followed", TANGENTS)
     for key, row, errors in zip(keys, found.derivatives, found.errors, strict=True):
         alone = in_motion(scene, of, [key])
         np.testing.assert_array_equal(row, alone.derivatives[0])

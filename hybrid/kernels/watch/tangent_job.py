@@ -57,7 +57,7 @@ class OtherLine(NamedTuple):
 
 
 class TangentJob(NamedTuple):
-    """Arguments of `tangents.follow_in_plane` and `follow_in_space`."""
+    """A line of a run and those beside it (kernels.run.system_tangents)."""
 
     line: Line
     sea: Sea  # that of the run, but with room of its own for what an assembly writes

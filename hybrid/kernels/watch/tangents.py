@@ -14,20 +14,17 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.block_elimination_plane import solve_again_planar
-from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, spin_about, sub
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.end_motion import ends_at, sea_at
 from hybrid.kernels.laws.water import wave_kinematics
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.march.left_over import left_over_in_space
 from hybrid.kernels.march.left_over_plane import left_over_in_plane
 from hybrid.kernels.state.forces import ROTARY, STIFFNESS_DAMPING, WAVES
 from hybrid.kernels.state.report import ASSEMBLED
 from hybrid.kernels.step.accept import keep_past
-from hybrid.kernels.step.generalized_alpha import scheme
 from hybrid.kernels.step.sampling import sample_step
 from hybrid.kernels.watch.tangent_job import (
     ALONE,
@@ -40,13 +37,11 @@ from hybrid.kernels.watch.tangent_job import (
     SECOND_R,
     SECOND_T,
     STEPS,
-    read_job,
-    read_other,
 )
 from hybrid.kernels.watch.wave_slopes import wave_slopes, waves_beside
 
 # A second correction that is less than this part of all tangents is left out, behind so many steps that have two.
-ENOUGH, JUDGED = 5e-7, 10
+ENOUGH, JUDGED = 4e-7, 10
 # Of a step: an output so near to its end is its end.
 ON_STEP = 1e-6
 
@@ -299,36 +294,6 @@ def stay_held(job, x):
 
 
 @inner
-def correct_tangent(plane, space, job, other, s, here, there_old, there):
-    """Put the other line at the tangents of the end of a step, and correct these by what its equations leave over."""
-    work, b = other.work, other.left
-    leave_over(plane, space, job, other, s, here, there_old, there)
-    if space is not None:
-        solve_again(job.work.X, job.work.W, b, work.x)
-    if plane is not None:
-        solve_again_planar(plane, job.work.X, b, work.x)
-    stay_held(job, work.x)
-    correct_rates(space, work.x, s, other.rates, other.spin)
-
-
-@inner
-def solve_tangent(plane, space, job, other, s, here, there_old, there):
-    """Correct the tangents of the end of a step."""
-    sizes, wanted, r, T, before_r, before_T = other.sizes, is_wanted(other.books), 0.0, 0.0, 0.0, 0.0
-    count = (2 if needs_two(sizes) else 1) + (1 if wanted else 0)
-    for k in range(count):
-        correct_tangent(plane, space, job, other, s, here, there_old, there)
-        before_r, before_T = r, T
-        r, T = largest_correction(other.work.x)
-        if k == 1:
-            sizes[SECOND_R], sizes[SECOND_T] = max(sizes[SECOND_R], r), max(sizes[SECOND_T], T)
-    if count > 1:
-        note_left(r, T, before_r, before_T, wanted, other.rates, sizes)
-    sizes[STEPS] += 1.0
-    sizes[ALONE] = 1.0 if count == 1 else 0.0
-
-
-@inner
 def turn_over(was, now, spin_was, spin_now):
     """What was now is before the step."""
     for i in range(was.r.shape[0]):
@@ -380,18 +345,6 @@ def end_other(plane, space, job, other, s, new, there_old, there, report):
 
 
 @inner
-def advance(plane, space, job, other, s, old, new, report):
-    """The other line from the beginning of the last step of the run to its end; report: of the step."""
-    there_old, there = other.even, other.odd
-    if job.counts.parity == 0:  # the run is in its even state
-        there_old, there = other.odd, other.even
-    begin_other(space, job, other, s, there_old)
-    carry_spins(plane, space, other, old, new, there_old, there)
-    solve_tangent(plane, space, job, other, s, new, there_old, there)
-    end_other(plane, space, job, other, s, new, there_old, there, report)
-
-
-@inner
 def keep_own(plane, space, job, s, old, new):
     """What the equations of the line of the run leave over at the end of a step, and whether it began where the one
 
@@ -410,30 +363,3 @@ def keep_own(plane, space, job, s, old, new):
         left_over_in_space(job.line, job.sea, job.ends, old.r, new, s.cv, s.ca, job.own, job.left)
     if plane is not None:
         left_over_in_plane(job.line, job.sea, job.ends, old.r, new, s.cv, s.ca, job.own, job.left)
-
-
-@inner
-def follow(plane, space, job):
-    """All other lines through the last step of the run."""
-    old, new = job.even, job.odd
-    if job.counts.parity == 0:
-        old, new = job.odd, job.even
-    clock = job.clock
-    s = scheme(clock.last_rho, clock.step_before, clock.rho_before, clock.last_dt)
-    keep_own(plane, space, job, s, old, new)
-    for p in range(job.tables.shape[0]):
-        advance(plane, space, job, read_other(job.tables[p]), s, old, new, job.work.report)
-    return 0
-
-
-@kernel
-def follow_in_plane(table):
-    """Tangents of a line in a plane through the last step of its run; table: of a TangentJob.  Returns 0."""
-    job = read_job(table)
-    return follow(job.line.plane, None, job)
-
-
-@kernel
-def follow_in_space(table):
-    """The same of a line in space."""
-    return follow(None, 1, read_job(table))
