@@ -27,10 +27,11 @@ from hybrid.linear.eigen import BELOW, lowest_modes
 from hybrid.linear.excitation import frequencies_of
 from hybrid.linear.loaded_line import LoadedLine
 from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_at_rest, sparse_rows
-from hybrid.linear.rest import CABLE, Rest, line_at_rest, system_at_rest
+from hybrid.linear.rest import Rest, line_at_rest, system_at_rest
 from hybrid.model.system import SystemResolution
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.schema import Scene
+from hybrid.scene.short_form import LINE
 from hybrid.scene.system import System
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.simulation.static_case import StaticCase
@@ -114,7 +115,7 @@ def of_cable(scene: Scene, result: RunSample) -> LostBy:
     if result.touches:
         return {}
     found = lost_vibrations(scene, lambda: line_at_rest(StaticCase(scene), result.resolution), result.forces[:, 0])
-    return found.get(CABLE, {})
+    return found.get(LINE, {})
 
 
 def of_system(system: System, resolution: SystemResolution, times: Floats) -> Mapping[str, LostBy]:

@@ -15,15 +15,12 @@ from hybrid.model.lines_contact import Touching
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemModel, SystemResolution
 from hybrid.scene.read import scene_text
+from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.scene.system import System
-from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import static_system
-from hybrid.solve.joined import JoinedLine, SystemState
-from hybrid.solve.system import NO_BODIES, SystemSolver
-from hybrid.solve.system_contact_statics import touching_solver
-
-CABLE = "cable"  # name of the line of a scene of one
+from hybrid.solve.joined import SystemState
+from hybrid.solve.system import SystemSolver
 
 
 @dataclass(frozen=True)
@@ -45,16 +42,9 @@ class Rest:
 
 
 def line_at_rest(case: StaticCase, resolution: Resolution) -> Rest:
-    """One line, as a system of one; ComputationError: there is no equilibrium."""
-    model, found = case.at_rest(resolution)
-    x = JoinedLine(
-        model.line, model.sea.at(np.inf), model.ends.at(np.inf), model.length, model.tension_scale, -np.inf, (-1, -1)
-    )  # fmt: skip
-    touching = None
-    if found.touch.size:
-        solver = touching_solver([x], 0, NO_BODIES, lambda: ([contact_of(model)], None))
-        touching = TouchingLines(solver, np.full((1, 1), case.scene.contact.friction))
-    return Rest(SystemSolver([x], 0), SystemState([found.state]), (CABLE,), (model,), touching=touching)
+    """Of a cable; ComputationError: there is no equilibrium."""
+    with short_form(case.scene).said():
+        return system_at_rest(network_of(case.scene), SystemResolution({LINE: resolution}))
 
 
 def system_at_rest(system: System, resolution: SystemResolution) -> Rest:
