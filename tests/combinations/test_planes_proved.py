@@ -11,6 +11,7 @@ import pytest
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
 from tests.combinations.pairs import Tables, as_network, seen_by
+from tests.problems import tables_with
 
 LENGTH = 12.0
 SECTION: Tables = {
@@ -151,7 +152,7 @@ def test_a_line_that_touches_itself_in_a_plane_stays_in_it() -> None:
 OUT: list[tuple[Tables, str, float | None]] = [
     (over(axis=[0.4, 1, 0]), "", 0.0),
     (over("sphere", at=[4.0, 0.2, 0.9]), "", None),
-    (system(over(axis=[0.4, 1, 0])), "line one", 0.0),
+    (system(over(axis=[0.4, 1, 0])), "line cable", 0.0),
     (with_body(centre=[0.1, 0.1, -0.2]), "buoy leaves it", 0.0),
     (with_body(moment={"value": [3, 0, 0], "ramp": 0.5}), "buoy leaves it", 0.0),
 ]  # fmt: skip
@@ -169,7 +170,7 @@ def test_what_leaves_the_plane_stops(tables: Tables, words: str, since: float | 
 REFUSED: list[tuple[Tables, str]] = [
     (system(hung()) | {"environment": {"fluid": {"density": 1025, "current": [0.3, 0.1, 0]}}}, r"environment\.fluid"),
     (with_body() | {"points": with_body()["points"] | {"b": {"position": [9, 0.5, 1]}}}, r"points\.b\.position"),
-    (system(hung(cable={"sections": [SECTION | {"tension_torque": 1e-3}]})), "there is no torsion"),
+    (tables_with(system(hung()), {"lines.cable.sections": [SECTION | {"tension_torque": 1e-3}]}), "there is no torsion"),
 ]  # fmt: skip
 
 
