@@ -268,29 +268,30 @@ def test_a_step_of_lines_against_one_of_a_cable() -> None:
 
 
 def beside(what: str) -> dict[str, Any]:
-    """Ten lines, beside which there is nothing, a sheave under one of them, or contact of one with itself."""
+    """Ten lines, beside nothing, a drum under one of them (fixed, or a sheave), or contact of one with itself."""
     tables = legs(50, 10, "catenary", 30.0, 30.0)
-    if what == "sheave":  # on the bed, 200 m from the middle
+    if what in ("drum", "sheave"):  # on the bed, 200 m from the middle
         tables["obstacles"] = {"drum": {
             "kind": "sheave", "at": [250, 0, -99.5], "axis": [0, 1, 0], "radius": 1.0, "groove": 0.2, "rim": 0.1,
-            "stiffness": 1e4, "bearing": {"inertia": 100.0, "damping": 10.0},
+            "stiffness": 1e4,
         }}  # fmt: skip
+        if what == "sheave":
+            tables["obstacles"]["drum"]["bearing"] = {"inertia": 100.0, "damping": 10.0}
     elif what == "contact":
         tables["lines"]["l0"]["contact"] = {"self": True}
-    elif what == "winch":  # of one that ends at a weight
-        tables["points"]["a0"] = {"kind": "free", "initial_guess": [60, 0, -99], "mass": 5000.0}
-        winch = {"tension": 3e4, "inertia": 500.0, "damping": 500.0, "ramp": 8.0}
-        tables["lines"]["l0"]["connections"] = {"end": {"payout": {"longest": 450.0, "winch": winch}}}
     return tables
 
 
-def test_a_sheave_a_winch_or_contact_of_one_line_slows_no_other() -> None:
-    """The loop of ten lines, of which one has it: at most what that line costs is added to those of the others."""
-    for what in ("sheave", "winch", "contact"):
-        each = [[step_of(beside(x))[0] for x in ("nothing", what)] for _ in range(3)]
-        without, found = 1e6 * np.min(each, axis=0)
-        print(f"\n{what}: ten lines of 50 cells {without:.0f} us a step without it, {found:.0f} us with it", flush=True)
-        assert found < 1.8 * without
+def test_a_sheave_or_contact_of_one_line_slows_no_other() -> None:
+    """The loop of ten lines, of which one has it: at most what that line costs is added to those of the others.
+
+    A sheave against the same drum that is fixed, whose distance all lines find as well.
+    """
+    for what, without in (("sheave", "drum"), ("contact", "nothing")):
+        each = [[step_of(beside(x))[0] for x in (without, what)] for _ in range(3)]
+        before, found = 1e6 * np.min(each, axis=0)
+        print(f"\nten lines of 50 cells, {without}: {before:.0f} us a step; {what}: {found:.0f} us", flush=True)
+        assert found < 1.3 * before
 
 
 def test_many_lines() -> None:
