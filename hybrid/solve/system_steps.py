@@ -243,8 +243,8 @@ class SystemSteps:
         return bool(sample_system(self._job.numbers))
 
     def try_again(self) -> None:
-        """The try is made once more: what it was made with has changed."""
-        self.counts.repeats += 1
+        """The try is made once more, in the same length: what it was made with has changed."""
+        self.counts.wasted += self.counts.tries
         self.counts.phase = b.TRY
 
     def try_whole(self) -> None:

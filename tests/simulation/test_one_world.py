@@ -26,6 +26,14 @@ SCENES: dict[str, dict[str, Any]] = {
     "arc lengths of outputs": {"output.points": [0.0, 3.1, 12.0], "output.history": [5.0]},
     "cells to a layer beside a clump": FEATURES["clump"][0] | FEATURES["layers"][0],
     "let go, with steps that follow": FEATURES["release"][0] | FEATURES["chosen steps"][0] | {"time.duration": 0.3},
+    "falls on a hard bed, in steps that are cut": {
+        "environment.seabed": {"z": -0.2, "stiffness": 5e5, "damping": 5e3},
+        END: {"kind": "free"},
+        "initial": {"kind": "straight", "origin": [0, 0, 1.0], "direction": [1, 0, 0.02]},
+        START: {"kind": "pinned", "position": [0, 0, 1.0]},
+        "time": {"duration": 1.2, "step": 0.04},
+        "output": {"every": 0.2, "points": 13},
+    },
     "zones that move": {"model": {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[4, 8]]}},
 }
 

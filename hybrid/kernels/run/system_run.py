@@ -51,7 +51,7 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.accept import note_cuts, watch_push
+from hybrid.kernels.step.accept import note_cuts, settle, watch_push
 from hybrid.kernels.step.job import call_follower, call_solver, read
 from hybrid.kernels.step.newton import ADDRESS, CUT_SHORT, GAIN, OK, SLACK, STEP, TURNED_TOO_FAR, ask_contact
 from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, passes, take_past
@@ -415,6 +415,18 @@ def accept(steps, system):
 
 
 @inner
+def settle_lone(steps):
+    """After a step that was shortened: accelerations of lines by themselves, as of one line (kernels.step.accept)."""
+    clock, counts = steps.clock, steps.counts
+    for j in range(steps.lone.shape[0] if counts.repeats > 0 else 0):
+        job = read(steps.lone[j])
+        state = job.old
+        if counts.parity:
+            state = job.new
+        settle(job.line, state, clock.until - clock.begin)
+
+
+@inner
 def between_steps(steps, table):
     """The phases before a try; -1 when one is to be made, else what to return.
 
@@ -434,7 +446,10 @@ def between_steps(steps, table):
             return AT_STOP
         if is_due(steps, 1) and call_sample(steps.sampler, table) == 0:
             return PAUSED
-        counts.phase = BEGIN_STEP if counts.controlled or clock.now >= clock.until else TRY
+        counts.phase = TRY
+        if counts.controlled or clock.now >= clock.until:
+            settle_lone(steps)
+            counts.phase = BEGIN_STEP
     if counts.phase == BEGIN_STEP:
         if not clock.now < clock.stop:
             return AT_STOP

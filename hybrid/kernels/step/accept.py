@@ -284,11 +284,18 @@ def end_step(line, state, clock, count):
     if not (count.controlled or clock.now >= clock.until):
         count.phase = TRY
         return
-    if count.repeats > 0 and line.bits & TOUCHES:
-        settle_impact(state, clock.until - clock.begin)
-    if count.repeats > 0 and line.bits & SELF_FRICTION:
-        settle_spins(state, clock.until - clock.begin)
+    if count.repeats > 0:
+        settle(line, state, clock.until - clock.begin)
     count.phase = BEGIN_STEP
+
+
+@inner
+def settle(line, state, dt):
+    """After a step of dt that was shortened: accelerations that would undo or multiply what a line has of speeds."""
+    if line.bits & TOUCHES:
+        settle_impact(state, dt)
+    if line.bits & SELF_FRICTION:
+        settle_spins(state, dt)
 
 
 @inner
