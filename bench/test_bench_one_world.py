@@ -48,7 +48,7 @@ EVENTS = "events"  # stands for their kinds, as if they were a dataset
 
 
 class _Exception(NamedTuple):
-    """What of a scene may differ, and why: move 4 and others of one world are to come."""
+    """What of a scene may differ, and why."""
 
     datasets: tuple[str, ...]  # how their names begin
     by: float  # of their scale; infinite: they may be of other sizes
@@ -63,7 +63,6 @@ EXCEPTIONS: dict[str, _Exception] = {
     "steps that follow the motion": ESTIMATED,
     "rest of touchdown, 1%": ESTIMATED,
     "errors of fixed steps": ESTIMATED,
-    "an end that is let go": _Exception(("",), 1e-6, "the start after it, to round-off, which the jerk lets grow"),
     "rest of table_with_turns": _Exception((EVENTS,), 0.0, "the cable says the same twice"),
     "contact/trefoil": _Exception(("",), 1e-1, "contact begins in mid-motion from accelerations that differ"),
 }
