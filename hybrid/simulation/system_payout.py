@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.reel.payout import iterate, pay_out, stand_among
+from hybrid.kernels.reel.payout import iterate, iterate_with_others, pay_out, stand_among
 from hybrid.kernels.reel.reel import ReelJob
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
@@ -61,7 +61,8 @@ class SystemPayout:
             numbers = x.table.numbers
             joined = solver.lines[k].joints[x.plan.side] >= 0
             asked = iterate.address(numbers) if joined or x.asks(solver.lines[k].line) else 0
-            solver.bind_line(k, reel=stand_among.address(numbers), reel_table=numbers, iterated=asked)
+            with_others = iterate_with_others.address(numbers) if asked else 0
+            solver.wind(k, asked, reel=stand_among.address(numbers), reel_table=numbers, iterated=with_others)
 
     def _job(self, solver: SystemSolver, k: int) -> dict[str, Any]:
         """What changes the length of a line, whose state of now is that before a step and after it."""

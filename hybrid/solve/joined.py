@@ -36,11 +36,6 @@ class JoinedLine(NamedTuple):
     keeps_pace: bool = False  # whether its zones or its length follow the steps with the spectral radius of all lines
     winds: bool = False  # whether its winch holds a tension, which takes factors of its equations that serve again
 
-    @property
-    def lengthens(self) -> bool:
-        """Whether its length is an unknown of all lines: its winch holds a tension, and an end is joined."""
-        return self.winds and max(self.joints) >= 0
-
 
 class SystemState(NamedTuple):
     """All that a system knows of itself at a time: the states of its lines, and (B, STATE) of its free bodies."""

@@ -122,6 +122,10 @@ class SystemSolver:
         self._near[together] = -1
         self._alone = np.zeros(len(lines), np.int64)
         self._mixes = [bool(self._rides.size or self._sheaves) and near == 0 for near in self._near]
+        # Winches whose lengths may be unknowns of all lines; iterations of lines with winches that are by themselves.
+        each = zip(lines, self._near, self._mixes, strict=True)
+        self._winches = sum(x.winds and bool(near < 0 or mixes) for x, near, mixes in each)
+        self._wound: dict[int, int] = {}
         self.work = [_room(x, self._keeps(k, x)) for k, x in enumerate(lines)]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
@@ -159,7 +163,7 @@ class SystemSolver:
 
     def _keeps(self, number: int, x: JoinedLine) -> bool:
         """Whether all factors of a line may serve again: for contact, bodies, sheaves and winches."""
-        beside = bool(self._rides.size or self._sheaves or any(each.lengthens for each in self.lines))
+        beside = bool(self._rides.size or self._sheaves or self._winches)
         mixes = beside and (self._mixes[number] or self._near[number] < 0)
         return x.winds or mixes or number in self._touching_lines
 
@@ -187,7 +191,7 @@ class SystemSolver:
         rooms = Rooms(shared, of_lines, own, apart | {"rides": self._rides, "phase": self._phase}, begins, {}, {})
         if self._rides.size:
             rooms.meeting.update(self._room_to_meet())
-        if self._sheaves or any(x.lengthens for x in lines):
+        if self._sheaves or self._winches:
             rooms.spinning.update(self._room_to_spin())
         return rooms
 
@@ -201,11 +205,18 @@ class SystemSolver:
             for table in self._joined_tables[number]:
                 table.bind(**values)
 
+    def wind(self, number: int, alone: int, **values: Any) -> None:
+        """Put values in the jobs of a line that is paid out; alone: what its iterations call where it is by itself."""
+        self._wound[number] = alone
+        self.bind_line(number, **values)
+
     def _by_itself(self, number: int, values: dict[str, Any]) -> dict[str, Any]:
         """The same for a line that is solved by itself: what is free moves as told, and no factors serve again."""
-        if not self._mixes[number]:
-            return values
         found = {**values}
+        if "iterated" in values:
+            found["iterated"] = self._wound.get(number, 0)
+        if not self._mixes[number]:
+            return found
         if (line := values.get("line")) is not None:
             moved = line.moved.copy()
             moved[moved == FREE] = MOVES
@@ -227,7 +238,7 @@ class SystemSolver:
         for k, numbers in zip(self.lone, self.lone_numbers, strict=True):
             x, table = self.lines[k], self._tables[k][0].again(numbers)
             task = Task(RUN, limits=Limits(REACH * x.length, x.scale, MOST_OF_STEP))
-            table.bind(task=task, **self._by_itself(k, {"line": x.line, "work": self.work[k]}))
+            table.bind(task=task, **self._by_itself(k, {"line": x.line, "work": self.work[k], "iterated": 0}))
             self._lone_tables[k] = table
         self._together, self._joined_tables = self._all, dict(enumerate(self._tables))
         if self.lone:
@@ -306,12 +317,11 @@ class SystemSolver:
     def _room_to_spin(self) -> dict[str, Any]:
         """Room of sheaves that lines turn, and of winches that give of joined lines what keeps their tension."""
         nodes, bodies = sum(x.line.s.size for x in self.lines), len(self.bodies)
-        winches = sum(x.lengthens for x in self.lines)
         return {
             "gaps": np.zeros_like(self._gaps), "phase": self._phase, "asked": self._asked,
             "marks": np.zeros(nodes, np.int64), "kept": np.zeros((nodes, SIZE)), "moved": np.zeros((bodies, 6)),
-            "turned": np.zeros((self._sheaves, bodies, 6)), "lengthened": np.zeros((winches, nodes, SIZE)),
-            "drawn": np.zeros((winches, bodies, 6)),
+            "turned": np.zeros((self._sheaves, bodies, 6)), "lengthened": np.zeros((self._winches, nodes, SIZE)),
+            "drawn": np.zeros((self._winches, bodies, 6)),
         }  # fmt: skip
 
     def _touch(self) -> None:

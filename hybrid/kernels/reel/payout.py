@@ -325,20 +325,8 @@ def correct_length(job, change):
 
 
 @inner
-def is_of_joined(ends):
-    """Whether an end of the line moves by what pulls there: with the lengths that its winch gives, too."""
-    return ends.held[0] == JOINED or ends.held[1] == JOINED
-
-
-@kernel
-def iterate(table):
-    """What an iteration of Newton's method does before it assembles its equations, and after it has eliminated them.
-
-    Nodes that ride with the fairlead have the inertia, the drag, the added mass and the friction of the material that
-    they pass; a winch that holds a tension corrects the length, and the equations with it.  That of a joined line is
-    corrected with all lines (kernels.junctions.joined_winches), and then changes its length.
-    """
-    job = read(table)
+def ride_and_wind(job, waits):
+    """As `iterate`; waits: whether the length is corrected with all lines."""
     line, reel, clock = job.line, job.reel, job.clock
     numbers, winch, stage, t = reel.numbers, reel.winch, reel.stage, clock.try_end
     state = job.old if job.counts.parity else job.new
@@ -370,7 +358,7 @@ def iterate(table):
         carried += line.mass[node(line, reel, j)] * math.sqrt(dot(slope, slope))
     stiff = (winch.inertia + carried) * winch.ca + steep * winch.cv
     c, before = cell(line, reel, g), n if end_of(reel) else 1
-    if is_of_joined(job.ends):
+    if waits:
         stage.lengthens, stage.grows_at, stage.pulls_at = WAITS, c + 1.0, float(before)
         stage.puts, stage.out_of_balance, stage.alone = by_length(line, state, winch, c), taken - pull, stiff
         return 0
@@ -385,6 +373,25 @@ def iterate(table):
     else:
         job.X[at] += answer * change
     return 0
+
+
+@kernel
+def iterate(table):
+    """What an iteration of Newton's method does before it assembles its equations, and after it has eliminated them.
+
+    Nodes that ride with the fairlead have the inertia, the drag, the added mass and the friction of the material that
+    they pass; a winch that holds a tension corrects the length, and the equations with it.
+    """
+    return ride_and_wind(read(table), False)
+
+
+@kernel
+def iterate_with_others(table):
+    """The same of a line that one Newton solves with others: the length is corrected with all of these
+
+    (kernels.junctions.joined_winches), and then changes.
+    """
+    return ride_and_wind(read(table), True)
 
 
 @kernel
