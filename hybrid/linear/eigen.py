@@ -19,6 +19,8 @@ MORE = 4
 BELOW = 1e-3
 # Two w^2 are as good as equal below this relative difference.
 SAME = 1e-7
+# Below this their shapes are any of those between them, by round-off.
+EQUAL = 1e-10
 # Networks with fewer unknowns that have mass than so many times the modes that are wanted are decomposed whole.
 DENSE = 2
 # Vectors that are followed together: modes of a line come in pairs of one frequency, of its two planes, and a twist may
@@ -62,7 +64,20 @@ def lowest_modes(network: LinearNetwork, count: int, near: float | None = None) 
     if near is not None:
         away = np.abs(np.sqrt(np.maximum(squares, 0.0)) - near)
         chosen = np.sort(np.argsort(away)[:count])
-    return Eigen(squares[chosen], vectors[:, chosen], missed)
+    return Eigen(squares[chosen], _turned_apart(squares[chosen], vectors[:, chosen]), missed)
+
+
+def _turned_apart(squares: Floats, vectors: Floats) -> Floats:
+    """Modes of equal w^2, turned among themselves: the first has all of the unknown that moves most, and so on."""
+    out = vectors.copy()
+    same = np.abs(np.diff(squares)) <= EQUAL * np.maximum(np.abs(squares[1:]), np.abs(squares[:-1]))
+    for k in np.flatnonzero(same):
+        stop = k + 2
+        while stop < len(squares) and same[stop - 1]:
+            stop += 1
+        row = out[np.argmax(np.einsum("ij,ij->i", out[:, k:stop], out[:, k:stop])), k:stop]
+        out[:, k:stop] = out[:, k:stop] @ np.linalg.qr(row[:, None], mode="complete")[0]
+    return out
 
 
 def _proved(A: sparse.csc_array, M: sparse.csc_array, shift: float, count: int) -> tuple[Floats, Floats]:

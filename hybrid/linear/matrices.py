@@ -61,6 +61,7 @@ class LinearLine:
     stiffness: sparse.csr_array
     mass: sparse.csr_array
     standing: sparse.csr_array  # the part of it at ends that are joined: of the free point, of clumps and floats there
+    carried: tuple[sparse.csr_array, ...]  # the same at a start and an end that are free, and joined to nothing
     free: np.ndarray
     net: Floats  # (2, 3) N, that each end passes to what it is joined to
     turned: Floats  # (2, 3, 5 (N+1)) N, N m, .. what turns of an end's frame do, from the left; zeros: it carries none
@@ -165,7 +166,9 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
     rows_at_rest(line, x, ends, state, (0.0, high), more)
     mass = (more - base) / (high - ANCHOR)
     base -= ANCHOR * mass
-    standing = _at_joined_ends(line, x, ends, state, high, more)
+    standing = _at_ends([k for k in (0, 1) if joined[k]], line, x, ends, state, high, more)
+    tips = [not held[k] and not joined[k] for k in (0, 1)]
+    carried = [_at_ends([k] if tips[k] else [], line, x, ends, state, high, more) for k in (0, 1)]
     K, M = sparse_rows(base), sparse_rows(mass)
     if quick:  # what turns freely about its axis is a motion that costs nothing; at rest springs keep it where it is
         K = K - sparse.diags_array(_spin_springs(line))
@@ -187,16 +190,19 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
         if x.seats[k, TURNS] != 0.0:
             turned[k], moments[k] = by_turn(line, x, ends, state, k)
     return LinearLine(
-        name, line, state, K, M, sparse_rows(standing), free.ravel(), forces, turned, moments, layers
+        name, line, state, K, M, sparse_rows(standing), tuple(map(sparse_rows, carried)), free.ravel(), forces, turned,
+        moments, layers,
     )  # fmt: skip
 
 
-def _at_joined_ends(line: Line, x: JoinedLine, ends: Ends, state: State, ca: float, rows: Floats) -> Floats:
-    """Block rows of the mass that stands at ends that are joined, by the rows of the line with c_a (1/s^2)."""
-    if max(x.joints) < 0:
+def _at_ends(
+    which: Sequence[int], line: Line, x: JoinedLine, ends: Ends, state: State, ca: float, rows: Floats
+) -> Floats:
+    """Block rows of the mass that stands at these ends (0, 1), by the rows of the line with c_a (1/s^2)."""
+    if not which:
         return np.zeros_like(rows)
     mass, point, added = line.mass.copy(), line.point_mass.copy(), line.point_added.copy()
-    for at in (-k for k in (0, 1) if x.joints[k] >= 0):
+    for at in (-k for k in which):
         mass[at] -= point[at]
         point[at] = added[at] = 0.0
     bare = np.zeros_like(rows)

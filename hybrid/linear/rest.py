@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemModel, SystemResolution
+from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
 from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.scene.system import System
@@ -39,12 +41,13 @@ class Rest:
     floats: tuple[BodyModel, ...] = ()
     touching: TouchingLines | None = None
     may_touch: Touching | None = None
+    tips: Mapping[tuple[str, int], str] = field(default_factory=dict)  # points that are one end (0, 1) alone
 
 
 def line_at_rest(case: StaticCase, resolution: Resolution) -> Rest:
     """Of a cable; ComputationError: there is no equilibrium."""
     with short_form(case.scene).said():
-        return system_at_rest(network_of(case.scene), SystemResolution({LINE: resolution}))
+        return replace(system_at_rest(network_of(case.scene), SystemResolution({LINE: resolution})), tips={})
 
 
 def system_at_rest(system: System, resolution: SystemResolution) -> Rest:
@@ -61,8 +64,18 @@ def system_at_rest(system: System, resolution: SystemResolution) -> Rest:
     touching = TouchingLines(found, friction_between(model)) if run.found.settled else None
     return Rest(
         solver, run.state, tuple(model.names), model.models, tuple(model.free), bodies, model.bodies, touching,
-        model.touching,
+        model.touching, _tips(system, model),
     )  # fmt: skip
+
+
+def _tips(system: System, model: SystemModel) -> dict[tuple[str, int], str]:
+    """Free points that are the end (0, 1) of one line alone, by that."""
+    ends = [
+        ((name, k), getattr(system.lines[name], key)) for name in model.names for k, key in enumerate(("start", "end"))
+    ]
+    joints = [joint for pair in model.joints for joint in pair]
+    free = {name for name, point in system.points.items() if isinstance(point, FreePoint)}
+    return {end: point for (end, point), joint in zip(ends, joints, strict=True) if joint < 0 and point in free}
 
 
 def friction_between(model: SystemModel) -> Floats:

@@ -102,6 +102,7 @@ class _Found:
     touched: tuple[str, ...]  # obstacles and bodies that lines lie on
     together: tuple[str, ...]  # lines that touch each other, or themselves
     sheaves: tuple[str, ...]  # which lines turn
+    tips: Mapping[tuple[str, int], str]  # as of `Rest`
 
 
 def modes(scene: SceneLike | System, count: int = 10, near: float | None = None, friction: bool = True) -> Modes:
@@ -162,7 +163,7 @@ def _found(asked: Scene | System, cells: float, count: int, near: float | None, 
     touched = tuple(dict.fromkeys(obstacle_of(x, rest) for x in touches if x.obstacle))
     together = tuple(dict.fromkeys(name_of(x, rest) for x in touches if not x.obstacle))
     sheaves = tuple(names[k] for k in network.touching.sheaves)
-    return _Found(network, eigen, rest.points, rest.bodies, axes, touched, together, sheaves)
+    return _Found(network, eigen, rest.points, rest.bodies, axes, touched, together, sheaves, rest.tips)
 
 
 def equilibrium_of(asked: Scene | System, cells: float = 1.0, friction: bool = True) -> Rest:
@@ -240,6 +241,10 @@ class _Shape:
         network = self.found.network
         for x in network.lines:
             part, name, mass = self.parts[x.name], f"{x.name} " if several else "", x.mass - x.standing
+            for k, carried in enumerate(x.carried):
+                if point := self.found.tips.get((x.name, k)):
+                    mass = mass - carried
+                    out[f"point {point}"] = float(part.ravel() @ (carried @ part.ravel()))
             for word, moved in _directions(x, part).items():
                 out[name + word] = float(moved.ravel() @ (mass @ moved.ravel()))
         first = network.size - 3 * network.points - 6 * network.bodies

@@ -204,7 +204,7 @@ def build_system(
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
     ends = [(x.start, x.end) for x in system.lines.values()]
     joints = tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends)
-    models = [_in_space(system, x, held) for x, held in zip(models, joints, strict=True)]
+    models = [_in_space(system, name, x, held) for name, x, held in zip(system.lines, models, joints, strict=True)]
     if system.dimension == 2:
         models = _kept_in_plane(system, models, joints)
     known = maker.known
@@ -231,10 +231,14 @@ def with_surfaces(system: System, models: Sequence[Model], bodies: Sequence[Body
     return models
 
 
-def _in_space(system: System, model: Model, joints: tuple[int, int]) -> Model:
+def _in_space(system: System, name: str, model: Model, joints: tuple[int, int]) -> Model:
     """The model of a line, without its plane where it is not computed in that; joints: of `SystemModel`."""
+    line = system.lines[name]
+    carriers = [x for x in map(system.body_of, (line.start, line.end)) if isinstance(x, FixedBody)]
     if max(joints) >= 0:
         why = "it is joined to what moves with it"
+    elif any(x.motion != x.shift for x in carriers):
+        why = "a body that turns moves its end"
     elif model.layout is not None or model.payout is not None:
         why = "its zones or its length change, beside other lines"
     elif system.dimension == 3:

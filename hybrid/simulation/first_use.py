@@ -61,22 +61,37 @@ def _kernels_of_cable(scene: Scene, static: bool) -> list[str]:
 
     Whether it is computed in a plane follows from the scene; rarely its first shape leaves the plane.
     """
-    beside = _beside_solver(scene, static)
-    tables = scene.environment, scene.cable, scene.ends, scene.initial
-    leaves = plane_of(*tables, TYPED if scene.dimension == 2 else EXACT)[1]
-    in_space = scene.dimension == 3 or bool(scene.contact.self or scene.obstacles or leaves)
+    beside, in_space = _beside_solver(scene, static), _is_in_space(scene, scene.dimension)
     solvers = [SOLVER[in_space]]
     if scene.dimension is None and not in_space and MODEL_ERROR in beside:
         solvers.insert(0, SOLVER[1])  # what leaving bending out does is followed in space
-    turned = any(load.what == "moment" for end in scene.ends.both for load in end.loads)
-    rests = static or isinstance(scene.initial, Equilibrium)
-    more = [STABILITY] if rests and not in_space and _has_rods(scene) and not turned else []
+    more = [STABILITY] if not in_space and _is_judged(scene, static) else []
     return [*solvers, *beside, *more, *([TOUCHING] if scene.contact.self else [])]
+
+
+def _is_in_space(scene: Scene, dimension: int | None) -> bool:
+    """Whether a line is not computed in a plane, whatever it does."""
+    tables = scene.environment, scene.cable, scene.ends, scene.initial
+    leaves = plane_of(*tables, TYPED if dimension == 2 else EXACT)[1]
+    return dimension == 3 or bool(scene.contact.self or scene.obstacles or leaves)
+
+
+def _is_judged(scene: Scene, static: bool) -> bool:
+    """Whether the stability of an equilibrium is."""
+    turned = any(load.what == "moment" for end in scene.ends.both for load in end.loads)
+    return (static or isinstance(scene.initial, Equilibrium)) and _has_rods(scene) and not turned
 
 
 def _kernels_of_lines(system: System, static: bool) -> list[str]:
     """Of lines with names."""
     found = [*OF_LINES, REST_OF_LINES if static else STEPS_OF_LINES]
+    joined = {name for name, x in system.lines.items() if system.is_joined(x.start) or system.is_joined(x.end)}
+    scenes = [system.scene_of(name) for name in system.lines if name not in joined]
+    planar = [x for x in scenes if not _is_in_space(x, system.dimension)]
+    if planar:
+        found.insert(0, SOLVER[0])
+    if any(_is_judged(x, static) for x in planar):
+        found.append(STABILITY)
     if system.adaptive:
         found.append(CRITERIA if static else ZONES)
     if system.touching_pairs:

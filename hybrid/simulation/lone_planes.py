@@ -146,9 +146,11 @@ class LonePlanes:
             x.attach(solver)
 
     def _leave(self, k: int) -> None:
-        """Line k goes on in space, with its push."""
+        """Line k goes on in space, with its push unless it does so for other lines, as if it had been there always."""
         x = self._lines[k]
-        if x.monitor.speed:
+        if x.monitor.speed and self._run.lines[k].shares and x.plane is not None:
+            x.monitor.leave_as_it_is(x.plane)
+        elif x.monitor.speed:
             x.monitor.leave(self._model(k), x, self._run.state.lines[k])
         x.plane = None
 

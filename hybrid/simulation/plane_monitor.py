@@ -134,8 +134,12 @@ class PlaneMonitor:
         a = state.a1 - np.einsum("ij,ij->i", state.a1, d)[:, None] * d
         size = np.linalg.norm(a, axis=1)[:, None]
         state.a1[:] = np.where(size > 0.0, a / np.where(size > 0.0, size, 1.0), state.a1)
-        self.speed, self._s, self.home, self.real = 0.0, NO_NODES, model.plane, False
+        self.leave_as_it_is(model.plane)
         return replace(model, line=in_space(model.line), plane=None)
+
+    def leave_as_it_is(self, plane: Floats) -> None:
+        """Go on in space without the push: other lines move this one out of its plane, if anything does."""
+        self.speed, self._s, self.home, self.real = 0.0, NO_NODES, plane, False
 
     def come_back(self, model: Model, run: CarriesPush, state: State) -> Model | None:
         """The model in the plane, and the state projected on it; None: its rods are twisted.

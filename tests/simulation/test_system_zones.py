@@ -250,23 +250,12 @@ def test_a_line_breaks_while_zones_move() -> None:
     assert found.status == "complete" and any(e.kind == "end released" for e in found.events)
 
 
-@pytest.mark.parametrize(
-    ("line", "scene", "where"),
-    [
-        ({"connections": {"end": {"tangent": [0, 0, 1]}}}, {}, "connections"),
-        (
-            {"connections": {"start": {"tangent": [0, 0, 1]}}, "model": MODEL | {"force_catenary": [[0, 5]]}},
-            {},
-            "start",
-        ),
-    ],
-)
-def test_what_is_not_computed_is_refused(line: dict[str, Any], scene: dict[str, Any], where: str) -> None:
-    given = mooring(**scene)
-    given["lines"]["east"] = given["lines"]["east"] | line
+def test_what_is_not_computed_is_refused() -> None:
+    given = mooring()
+    given["lines"]["east"] = given["lines"]["east"] | {"connections": {"end": {"tangent": [0, 0, 1]}}}
     with pytest.raises(SceneError) as refused:
         hybrid.run(given)
-    assert where in refused.value.complaints[0].where
+    assert "connections" in refused.value.complaints[0].where
 
 
 def stepped_again(scene: dict[str, Any], times: np.ndarray) -> hybrid.Result:

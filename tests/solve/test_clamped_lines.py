@@ -453,7 +453,6 @@ def test_rods_that_may_all_spin_find_their_equilibrium_at_once() -> None:
     ("where", "change", "expected"),
     [
         ("lines.line0.connections.start.tangent", lambda t: t["lines"]["line0"]["connections"].update(start="clamped"), "direction"),
-        ("lines.line0.connections.start", lambda t: t["lines"]["line0"].update(model="catenary"), "catenary"),
         ("lines.line1.connections.start", lambda t: t["lines"]["line0"]["connections"].update(end="pinned"), "another line"),
         ("lines.line0.connections.end.tangent", lambda t: t["lines"]["line1"]["connections"].update(start={"tangent": [1, 0, 0]}), "axes of point"),
         ("lines.line0.connections.start.swivel", lambda t: t["lines"]["line0"]["connections"].update(

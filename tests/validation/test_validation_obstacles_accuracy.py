@@ -178,7 +178,7 @@ def test_a_line_that_hangs_through_a_pipe_lies_on_it_on_any_mesh(cells: int, x: 
 
 def test_a_line_that_is_found_behind_a_pipe_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no way leads to the other side: stretched round the pipe, here without the ways that do."""
-    monkeypatch.setattr("hybrid.simulation.system_contact_equilibrium.behind_obstacles", lambda *_: iter(()))
+    monkeypatch.setattr("hybrid.simulation.equilibrium.behind_obstacles", lambda *_: iter(()))
     with hybrid.static(as_system(under_pipe(100))) as found:
         one = found.lines["one"]
         (said,) = [x for x in one.events if x.kind == "several equilibria"]

@@ -415,15 +415,18 @@ def accept(steps, system):
 
 
 @inner
-def settle_lone(steps):
-    """After a step that was shortened: accelerations of lines by themselves, as of one line (kernels.step.accept)."""
+def settle_ended(steps):
+    """After a step that was shortened: accelerations of lines that share no end with others, as of one line."""
     clock, counts = steps.clock, steps.counts
-    for j in range(steps.lone.shape[0] if counts.repeats > 0 else 0):
-        job = read(steps.lone[j])
-        state = job.old
-        if counts.parity:
-            state = job.new
-        settle(job.line, state, clock.until - clock.begin)
+    if counts.repeats > 0:
+        system = read_system(steps.even)
+        for l in range(system.tables.shape[0]):
+            if system.joints[l, 0] < 0 and system.joints[l, 1] < 0:
+                job = read(system.tables[l])
+                state = job.old
+                if counts.parity:
+                    state = job.new
+                settle(job.line, state, clock.until - clock.begin)
 
 
 @inner
@@ -448,7 +451,7 @@ def between_steps(steps, table):
             return PAUSED
         counts.phase = TRY
         if counts.controlled or clock.now >= clock.until:
-            settle_lone(steps)
+            settle_ended(steps)
             counts.phase = BEGIN_STEP
     if counts.phase == BEGIN_STEP:
         if not clock.now < clock.stop:
