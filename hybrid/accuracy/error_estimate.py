@@ -169,7 +169,7 @@ class Estimate:
         What they make of a vibration that lasts adds up: it goes by all steps, where there are more of these.
         """
         of_all = fast.steps / max(slow.steps, 1)
-        return of_all if name in self.shares_mixed and of_all > LEAST_RATIO else self._shorter(fast, slow)
+        return of_all if name in self.shares_mixed and of_all > 1.0 else self._shorter(fast, slow)
 
     def show_steps(self, fast: RunSample) -> None:
         """Take a run on the cells of the coarser one in shorter steps, where that in longer steps shows nothing."""

@@ -131,7 +131,7 @@ def fine_rods() -> hybrid.Result:
 @pytest.mark.parametrize(
     ("bends", "asked"),
     [
-        ({"model": "adaptive"}, {"accuracy": {"position": "1%", "tension": "1%"}}),
+        ({"model": {"kind": "adaptive", "tolerance": 1e-3}}, {"accuracy": {"position": "1%", "tension": "1%"}}),
         ({"model": "catenary"}, {"accuracy": {"position": "2%", "tension": "2%"}}),
         ({"model": {"kind": "adaptive", "tolerance": 2e-3}}, {"time": {"duration": 4.0, "step": 0.025}}),
     ],

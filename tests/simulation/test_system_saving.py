@@ -87,7 +87,7 @@ def test_what_is_taken_back_leaves_nothing(breaks: str, tmp_path: Path) -> None:
             if k % 3 == 0:
                 saved = lines.save()
                 before = lines.point("float")
-                for scale in (3.0, -2.0):
+                for scale in (1.2, 0.8):  # a larger jump creates energy, which is an error where outputs are written
                     for _ in range(min(4, 20 - k)):
                         step(lines, scale)
                     lines.restore(saved)
