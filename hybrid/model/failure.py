@@ -49,9 +49,9 @@ def weaknesses(system: System) -> tuple[Weakness, ...]:
 
 
 def after_failure(model: SystemModel, weakness: Weakness, t: float) -> SystemModel:
-    """The system with the ends of a weakness loose from t (s) on, as far as they are at their point; the old one is as
+    """The system with the ends of a weakness loose from t (s) on.
 
-    it was.
+    Those are, as far as they are at their point; the old system is as it was.
     """
     ends = [at for at in weakness.ends if at not in model.loose]
     points, loose = len(model.free), model.loose | (set(ends) if weakness.leaves else set())

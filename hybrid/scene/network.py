@@ -76,9 +76,9 @@ REACHED = 0.95
 
 
 class _JoinedPin(Pinned):
-    """The end of a line at a point that is free, or on a free body, or that it may break from, held where that is
+    """The end of a line at a point that may move or let go, held where that is first.
 
-    first.
+    The point is free, or on a free body, or the line may break from it.
     """
 
     @property
@@ -606,9 +606,9 @@ class Network(Table):
         return of_unnamed_model(asked, any(x.pipe is not None and x.pipe.max_stress for x in line.sections))
 
     def _places(self, line: JoinedLine) -> dict[str, Triple | None]:
-        """Where the points of a line are first [m], a free one no farther from the other than the line is long; None:
+        """Where the points of a line are first [m]; None: where its first shape has them.
 
-        a free end that is where the first shape of the line has it.
+        A free one is no farther from the other than the line is long.
         """
         names = {"start": line.start, "end": line.end}
         places = {key: self._known_place(name) for key, name in names.items()}

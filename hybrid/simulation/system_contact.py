@@ -197,7 +197,7 @@ def renew_solver(run: RunOfLines, after: str) -> None:
     bodies, work = run.solver.bodies.copy(), run.solver.body_work.copy()
     run.make_solver()
     run.solver.bodies[:], run.solver.body_work[:] = bodies, work
-    run.take_other()
+    run.renew_other()
     _evaluate_forces(run, after)
 
 

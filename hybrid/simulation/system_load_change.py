@@ -72,18 +72,18 @@ def change_loads_of_lines(run: RunOfLines, system: System) -> None:
     for line in run.lines:
         line.write_down()
     run.gather_events()  # in the order in which they happen
-    fit = None if run.payout is None else run.payout.take_models
+    fit = None if run.payout is None else run.payout.fit_models
     run.system, run.model = system, loaded_as(run.model, system, run.t, fit)
     run.loaded = run.t  # loads that end now, or would have ended before, act no more
     run.start_from(run.rest)
     for line, model in zip(run.lines, run.model.models, strict=True):
         line.follow(model)
     if run.zones is not None:
-        run.zones.take_loads()
+        run.zones.change_loads()
     done = run.solver.body_work[:, DONE:SPRING].copy()
     run.make_solver()
     run.solver.body_work[:, DONE:SPRING] = done
-    run.take_other()
+    run.renew_other()
     run.restart_steps()
     others = "other loads act, or points and bodies move otherwise"
     text = f"from t = {run.t:.6g} s on {others}, as `hybrid resume` was asked to"

@@ -148,7 +148,7 @@ class SystemPayout:
         for x in self.lines.values():
             x.limit_step()
 
-    def take_models(self, model: SystemModel) -> SystemModel:
+    def fit_models(self, model: SystemModel) -> SystemModel:
         """A model with other loads on the cells of t = 0, with the cells of now."""
         found = [*model.models]
         for k, x in self.lines.items():

@@ -438,7 +438,7 @@ class SystemRun:
             self._look_for_overlaps()
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
                 line.note_equilibrium(x, state, None, self.found, self.turned)
-            self.take_other()
+            self.renew_other()
             self.loop.attach(solver, self.state, self.other)
             self._output()
             text = f"equilibrium: {self.found.summary}; residual force {self.found.residual:.2g} N"
@@ -560,7 +560,7 @@ class SystemRun:
         self.solver.adopt_cells(number, model.line, model.sea.values, work, line.books)
         line.adopt_cells(model)
 
-    def take_other(self) -> None:
+    def renew_other(self) -> None:
         """Room for the state after the next step, of lines as they are now."""
         self.other = self.state.copy()
 
@@ -605,7 +605,7 @@ class SystemRun:
                 line.note_start(x, state, 0.0)
             line.diagnostics.scheme(time.rho_inf)
             line.diagnostics.watch(line.books.clock)
-        self.take_other()
+        self.renew_other()
         self._attach()
         self._output()
         if self._begun is not None:

@@ -104,7 +104,7 @@ def bring_back(run: SystemRun, saved: SavedSystem) -> None:
         if run.payout is not None:
             run.payout.restore(saved.run["payout"])
         if moving:
-            run.take_other()
+            run.renew_other()
         run.make_solver()
     set_state(run, saved.run)
     for line, rows in zip(run.lines, saved.waiting, strict=True):

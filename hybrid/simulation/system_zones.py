@@ -496,7 +496,7 @@ class SystemZones:
                 x.switching.release(k, model)
                 self._take_full(x, model)
 
-    def take_loads(self) -> None:
+    def change_loads(self) -> None:
         """Go on with the models of the run, whose loads and motions are others on the same cells."""
         for x in self.lines:
             model = self._run.model.models[x.number]

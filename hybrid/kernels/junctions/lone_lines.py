@@ -17,8 +17,14 @@ from hybrid.kernels.step.job import read
 # Of the radius of a line: how far from a body or sheave that is free it is near it.  A step goes a fraction of that where
 # a line comes to rest on something; if it touches before it is near, the try of the step is made again.
 NEARBY = 1.0
-# Of `near`: the line always moves with others; nothing is near it; something is; it touches that.
-JOINED, APART, NEAR, TOUCHES = -1, 0, 1, 2
+# Of `near`: the line always moves with others.
+JOINED = -1
+# Nothing that is free is near it.
+APART = 0
+# Something is.
+NEAR = 1
+# It touches that.
+TOUCHES = 2
 
 
 @inner
