@@ -65,7 +65,7 @@ def test_plan_draws_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypatch
 def test_what_is_compiled_is_called_without_numba(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its import takes as long as a short run; so do together rich, tables of several lines, payout, and the special
+    """Its import takes as long as a short run; so do together rich, payout, and the special
 
     functions of a line that snaps alone, with which f2py comes.
     """
@@ -76,7 +76,7 @@ def test_what_is_compiled_is_called_without_numba(
         _, modules = call(command, "hanging.yaml")
     assert "hybrid.kernels.machine.linked_code" in modules
     assert not modules & {"numba", "scipy", "scipy.special", "numpy.f2py", "matplotlib"}
-    assert not modules & {"hybrid.scene.system", "hybrid.simulation.payout", "hybrid.kernels.reel.payout"}
+    assert not modules & {"hybrid.simulation.payout", "hybrid.kernels.reel.payout"}
     assert command == "run" or not any(x.partition(".")[0] == "rich" for x in modules), "a long run shows a line"
 
 
