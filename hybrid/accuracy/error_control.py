@@ -186,12 +186,13 @@ class ErrorController:
         return {x: left for x, left in self.estimate.not_converged.items() if not self._is_round_off(x)}
 
     def _is_round_off(self, name: str) -> bool:
-        """Whether runs differ in a quantity by no more than round-off, or without friction by what nobody asks for."""
+        """Whether runs differ in a quantity by no more than round-off, or without friction by less than is asked."""
         assert self.estimate is not None
         raw, unit = RAW.get(name, name), {"bending_moment": "N m", "curvature": "1/m", "position": "m"}.get(name, "N")
         least = self.asked.round_off(unit) if self.asked is not None else 0.0
         values = self.estimate.run.values[raw]
-        part = ROUND_OFF_OF if self.held else NOTHING
+        asked = self.asked.of_tension if self.asked is not None else None
+        part = ROUND_OFF_OF if self.held else min(NOTHING, asked or NOTHING)
         return self.estimate.changes[raw][0] <= max(least, part * float(np.abs(np.asarray(values)).max()))
 
     def _irregular_note(self) -> list[tuple[str, str]]:

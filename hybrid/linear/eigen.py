@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import eig_banded
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import splu
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
@@ -30,12 +29,12 @@ DENSE = 2
 BLOCK = 3
 BLOCK_LEFT = 1e-13
 SPENT = 1e-12
+# Of a new vector, how much is left of it beside those before, at least.
+OWN = 0.5
 # So many shifts are tried, each by this part farther off; what a mode may leave of its equations, of their
 # terms and of the largest stiffness.
 SHIFTS, ASIDE, LEFT, NO_FORCE = 4, 1.37e-3, 1e-3, 1e-13
 SEED = 1
-# Vectors to a mode beyond which blocks do not converge: round-off of stiff lines.
-MOST_VECTORS = 8
 
 
 @dataclass(frozen=True)
@@ -136,6 +135,9 @@ def _nearest(A: sparse.csc_array, M: sparse.csc_array, shift: float, count: int)
         H[:, known:], H[known:] = C, C.T
         largest = float(np.abs(H.diagonal()).max())
         W, MW, R = _orthonormal(W, M, SPENT * largest)
+        if W.size:  # what is small has round-off of those before, and where these span all it has nothing else
+            W, MW, again = _orthonormal(W - Q @ (MQ.T @ W), M, OWN)
+            R = again @ R
         if size >= check or not W.size:
             inverse, axes = _banded(H)
             order = np.argsort(-np.abs(inverse))[:count]
@@ -143,25 +145,11 @@ def _nearest(A: sparse.csc_array, M: sparse.csc_array, shift: float, count: int)
             if left.max(initial=0.0) <= BLOCK_LEFT * largest:
                 break
             check = size + 4 * BLOCK
-            if size > MOST_VECTORS * count + 60:
-                return _by_arpack(factors, A, M, shift, count)
         Q, MQ = np.hstack([Q, W]), np.hstack([MQ, MW])
     if order.size < count:
         raise np.linalg.LinAlgError("fewer modes than wanted")
     # what has no mass follows what has: one more round takes the rest of the start out of it
     vectors = factors.solve(np.einsum("ij,jk->ik", MQ, axes[:, order]))
-    vectors /= np.sqrt(np.einsum("ij,ij->j", vectors, M @ vectors))
-    return np.einsum("ij,ij->j", vectors, A @ vectors), np.asarray(vectors)
-
-
-def _by_arpack(
-    factors: Any, A: sparse.csc_array, M: sparse.csc_array, shift: float, count: int
-) -> tuple[Floats, Floats]:
-    """As `_nearest`, where blocks take too many vectors."""
-    inverse = LinearOperator(A.shape, matvec=factors.solve, dtype=float)
-    start = factors.solve(M @ np.random.default_rng(SEED).normal(size=A.shape[0]))
-    _, vectors = eigsh(A, count, M=M, sigma=shift, OPinv=inverse, which="LM", v0=start)
-    vectors = np.stack([factors.solve(M @ x) for x in vectors.T], axis=1)
     vectors /= np.sqrt(np.einsum("ij,ij->j", vectors, M @ vectors))
     return np.einsum("ij,ij->j", vectors, A @ vectors), np.asarray(vectors)
 
