@@ -85,7 +85,9 @@ def _layer(view: ObservedStates, rows: Integers, all_nodes: Integers, way: int, 
     part[0] = 1.0
     gone = part <= FADED
     part[np.logical_or.accumulate(gone, axis=0)] = 0.0  # of each output by itself: none depends on those beside it
-    kept = min(1 + int((part > 0.0).any(axis=1).sum()), len(nodes))
+    lasts = (part > 0.0).sum(axis=0)
+    of_cells = np.where(np.arange(len(nodes))[:, None] <= lasts, of_cells, 0.0)
+    kept = min(1 + int(lasts.max()), len(nodes))
     at = np.abs(all_nodes - nodes[0])
     use = at < kept
     return EndLayer(nodes[:kept], way, rows[use], at[use], EI, deep[: kept - 1], part[:kept], of_cells[:kept])

@@ -376,8 +376,8 @@ def bends_by_load(plain: Observation, corrected: Observation) -> Floats:
     for (one, (first, last, row)), (two, (_, _, after)) in pairwise(zip(parts, spans, strict=True)):
         if one.kind == two.kind:
             change[[row + last - first, after]] = 0.0
-    for layer, _ in plain._taken_at_ends:
-        change[layer.rows] = 0.0
+    for layer, _ in plain._taken_at_ends:  # of each output up to where it has faded in that
+        change[layer.rows] = np.where(layer.at[:, None] <= (layer.part > 0.0).sum(axis=0), 0.0, change[layer.rows])
     return np.asarray(plain.grid.sides @ change)
 
 

@@ -36,12 +36,15 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import self_reach, without_contact
+from hybrid.model.system import SystemResolution, build_system
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.obstacles import files_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
+from hybrid.scene.short_form import LINE, network_of, short_form
+from hybrid.scene.system import System
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.equilibrium import equilibrium_of
@@ -70,6 +73,10 @@ from hybrid.simulation.run_sample import (
     split_outputs,
     usual_cells,
 )
+from hybrid.simulation.switch import as_network
+from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation.system_run import Recording, SystemRun, start_of
+from hybrid.simulation.system_zones import Start
 from hybrid.simulation.time_loop import FORCE_COLUMNS, TimeLoop
 from hybrid.simulation.transient import Transient
 from hybrid.simulation.zone_switching import ZoneSwitching
@@ -131,6 +138,8 @@ class Case:
         self._told: tuple[Scene, str] | None = None  # a scene, and what it is as a text
         self._owner = threading.get_ident()  # the thread that puts files in their places
         self._begun: tuple[Resolution, tuple[Model, Equilibrium | None, ZoneSwitching | None]] | None = None
+        self._start_of_lines: tuple[Resolution, Start] | None = None
+        self._networks: dict[int, tuple[Scene, System]] = {}  # of scenes, by their identity
         self.reach: Reach | None = None  # how far the line moves, by a pre-run
         self.came_near_itself = False  # whether the line did in a run to compare with
         # Whether contact with itself is computed in runs to compare with: where it is asked for, or the line has
@@ -388,6 +397,8 @@ class Case:
         """
         begin = clock.thread_time()
         self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)
+        if as_network():
+            return self._sample_of_network(resolution, points, until, begin)
         model, equilibrium, switching = self._start(resolution)
         s = points if points is not None else self.points.s[self.places] if self.places.size else self.points.s
         ranges = points is None and self._judges
@@ -441,10 +452,77 @@ class Case:
         self.reach = survey.reach
         return survey
 
+    # --- as a network of one line -----------------------------------------------------------------
+
+    def network(self, scene: Scene) -> System:
+        """The network of one line that computes what a scene does."""
+        known = self._networks.get(id(scene))
+        if known is None or known[0] is not scene:
+            known = self._networks[id(scene)] = scene, network_of(scene)
+        return known[1]
+
+    def _network_run(self, resolution: Resolution, target: Target | None, recording: Recording) -> SystemRun:
+        """The run of the network, as yet without a first output; recording: beside what the case says."""
+        system, changes = self.network(self.scene), [replace(x, scene=self.network(x.scene)) for x in self.changes]
+        recording = recording._replace(planes=True, error=True)
+        if recording.source is None:
+            recording = recording._replace(start=self._network_start(resolution))
+        finely = SystemResolution({LINE: resolution})
+        return SystemRun(system, target, self._texts["scene"], True, finely, recording, self.criterion, changes)
+
+    def _network_start(self, resolution: Resolution) -> Start:
+        """The first state of the network, which may have been kept for a run of this resolution."""
+        kept, self._start_of_lines = self._start_of_lines, None
+        if kept is not None and kept[0] is resolution:
+            return kept[1]
+        system = self.network(self.scene)
+        with at_once(self.interrupted):
+            model = build_system(system, SystemResolution({LINE: resolution}))
+            return start_of(system, model, True, self.criterion)
+
+    def _sample_of_network(
+        self, resolution: Resolution, points: Floats | None, until: float | None, begin: float
+    ) -> RunSample:
+        """As `sample`; begin: s, of the processor."""
+        s = points if points is not None else self.points.s[self.places] if self.places.size else self.points.s
+        recording = Recording(points=self.points._replace(s=s), until=until, touches=self.touches_itself)
+        with short_form(self.scene).said():
+            run = self._network_run(resolution, None, recording)
+            line = run.lines[0]
+            numbers = (len(run.times) + 1) * sum(math.prod(field.shape) for field in line.observer.fields)
+            if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
+                line.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)), FORCE_COLUMNS)
+            found = line.recorder
+            assert isinstance(found, ComparisonRecorder)
+            run.record_motion(self.progress, self._comparison_interrupted)
+        self.came_near_itself |= run.came_near_itself or line.contact is not None
+        values, errors = split_outputs({name: found[name] for name in found.names})
+        cpu = clock.thread_time() - begin
+        moves, follows = line.manager is not None, follows_curvature(self.scene)
+        unknown = [f"in a run to compare with, {text}" for kind, text in found.events if kind == NOT_ESTIMATED]
+        notes = tuple((NOT_ESTIMATED, text) for text in unknown[:1])
+        rows = found.reference() if isinstance(found, RowsRecorder) else {}
+        held: dict[str, Any] = {}
+        if points is None and self._judges:
+            held = {x.name: y for x, y in line.envelope.fixed()} | run.quantities.ranges_of(LINE)
+            held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t)
+        return RunSample(
+            resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
+            resolution.every, False, errors, resolution.zones * line.model.length if moves else 0.0, notes, rows,
+            found.steps, found.catenary if moves else np.zeros(0), doubt_of_line(line), run.lets_touch, self.places,
+            extremes=extremes_about(held, self.points.s),
+        )  # fmt: skip
+
     # --- parts of a run -------------------------------------------------------------------------
 
     def first_shape(self, resolution: Resolution) -> tuple[Model, State]:
         """Model and state of a run as it begins, which are kept for a run of this resolution that comes next."""
+        if as_network():
+            with short_form(self.scene).said():
+                start = self._network_start(resolution)
+            self._start_of_lines = resolution, start
+            line = start.model.models[0]
+            return line, line.start if start.found is None else start.found.state.lines[0]
         model, found, _ = begun = self._start(resolution)
         self._begun = resolution, begun
         return model, model.start if found is None else found.state
@@ -537,6 +615,11 @@ def _datasets(data: Mapping[str, Any], *groups: str) -> list[str]:
     """Names of what stands in groups of a file, or of a result in memory, itself."""
     names = [f"{x}/{name}" for x in groups for name in data.get(x, ())] or [x for x in data if x.startswith(groups)]
     return [x for x in names if x.count("/") == 1 and hasattr(data[x], "shape")]
+
+
+def doubt_of_line(line: LineResult) -> Floats:
+    """As `doubt_of`, of the line of a network."""
+    return line.correction.doubt if line.correction is not None and line.manager is None else np.array(NO_DOUBT)
 
 
 def doubt_of(run: Transient) -> Floats:

@@ -220,6 +220,7 @@ class LineCells(CellChanges):
         line, model = run.lines[number], run.model.models[number]
         watched = run.watch is not None and run.watch.is_needed
         plain = carries_all(model, switching) and not model.line.bits & REMEMBERS and line.contact is None
+        plain &= line.correction is None
         return plain and not watched and switching.manager.layout.rod.size >= LEAST_CELLS
 
     def fits(self, switching: ZoneSwitching) -> bool:

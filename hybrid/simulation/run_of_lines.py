@@ -71,6 +71,8 @@ class RunOfLines(Protocol):
     passed: set[tuple[int, int]]  # and to pass through each other
     let_pass: set[tuple[int, int]]  # of lines that may meet, those between which contact is not computed
     found: SystemEquilibrium | None
+    lets_touch: bool  # whether contact begins by itself where lines come near themselves
+    came_near_itself: bool  # whether one has
 
     @property
     def zones(self) -> MovingZones | None: ...

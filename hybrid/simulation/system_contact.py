@@ -89,6 +89,11 @@ def begin_contact(run: RunOfLines) -> None:
     Nothing moves; energy that contact has at once is booked as that of a change of zones.
     """
     near = [line for line in run.lines if line.nears_itself]
+    run.came_near_itself |= bool(near)
+    if not run.lets_touch:
+        for line in near:
+            line.watch_itself_no_more(run.solver)
+        return
     begun = []
     for line in near:
         x, line.nears_itself = run.solver.lines[line.number], False

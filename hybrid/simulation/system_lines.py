@@ -27,6 +27,7 @@ from hybrid.kernels.state.books import (
     PARTS_ITSELF,
     STRAINS,
     STRETCHED,
+    UNKNOWN_ERROR,
     Books,
     Clock,
     Counts,
@@ -35,9 +36,10 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.forces import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, sampled_size, slip_size
+from hybrid.kernels.watch.bending_error import sampled_size as error_size
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
-from hybrid.model.output_points import output_points
+from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.resolution import follows_curvature, wants_errors
 from hybrid.model.scales import wave_step
 from hybrid.model.sections import section_changes
@@ -47,6 +49,7 @@ from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
+from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
@@ -54,7 +57,7 @@ from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.kind_changes import Around
 from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
 from hybrid.simulation.result_file import result_recorder
-from hybrid.simulation.run_sample import COMPARED
+from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.time_loop import FORCE_COLUMNS
 from hybrid.solve.joined import JoinedLine
@@ -94,10 +97,24 @@ def twist_at_rest(x: JoinedLine, state: State) -> float:
     return float(twist) / (2.0 * np.pi)
 
 
-def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | None = None) -> Observer:
+class Wanted(NamedTuple):
+    """What is wanted of the outputs of a line beside what its scene says."""
+
+    pending: str = ""  # what is to come when the run is complete (store.records)
+    points: OutputPoints | None = None  # None: those of the scene
+    error: bool = False  # whether that of leaving bending out is followed
+    torque: Callable[[], float] | None = None  # N m, of zones that move; None: it follows from the turn of the ends
+
+
+WANTED = Wanted()
+
+
+def observer_of(
+    scene: Scene, model: Model, moves: bool, only: Sequence[str] | None = None, wanted: Wanted = WANTED
+) -> Observer:
     """What records the outputs of a line; moves: whether it does, or is in equilibrium; only: quantities, None: all."""
-    points = output_points(scene)
-    if moves and model.payout is not None:
+    points = wanted.points or output_points(scene)
+    if wanted.points is None and moves and model.payout is not None:
         points = output_points(scene, model.payout.longest, not model.payout.side)
     zones_move = moves and model.layout is not None
     kinds = {"rod", "catenary"} if zones_move else None
@@ -108,7 +125,7 @@ def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | N
         () if only else model.sea.names,
     )  # fmt: skip
     recorded = Recorded(
-        moves and only is None, only, criteria,
+        moves and only is None, only, criteria, wanted.error,
         edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
         quantities=None if only else quantities_of(scene),
     )  # fmt: skip
@@ -129,6 +146,7 @@ class Waiting(NamedTuple):
     """What waits to be recorded of a line."""
 
     outputs: Sequence[Batch]
+    errors: Sequence[Floats]  # of leaving bending out, of these
     aside: Sequence[tuple[Model, Output]]  # outputs of other cells
     log: Sequence[Floats]  # rows of steps
     first_energy: float | None  # J, that the balance counts from
@@ -142,23 +160,27 @@ class LineResult:
 
     def __init__(
         self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
-        outputs: int, target: Target | None = None, pending: str = "", paying: PayingOut | None = None,
+        outputs: int, target: Target | None = None, wanted: Wanted = WANTED, paying: PayingOut | None = None,
     ) -> None:  # fmt: skip
         """number: of the line in its system; found: the equilibrium that it starts from, None: it has none; state: from
 
         which displacements count; outputs: after the first, 0 of an equilibrium; target: of the system, None: it is
-        only to be compared with; pending: as of the run; paying: the length of a line that is paid out.
+        only to be compared with; paying: the length of a line that is paid out.
         """
         self.number, self.name, self.model, self.scene = number, name, model, scene
         self.events, self.paying = EventLog(), paying
         self.held = np.ones(2, np.int8)  # (2,) ends that count as held in outputs: all but free ones, by their points
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
-        self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None)
+        self.correction: Correction | None = None  # of the error of leaving bending out
+        if wanted.error:
+            self.correction = Correction(model, wanted.torque)
+        self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None, wanted)
         self.envelope = Envelope(scene, model, self._moves, found is not None and found.settled)
         self.marked = marked_places(scene, model)
         self.envelope.itself.on &= target is not None or bool(model.line.bits & MAY_TOUCH)
         self._itself = LineWatch(self.envelope.itself, model)
+        self.lets_touch = True  # whether contact begins by itself where the line comes near itself
         self.nears_itself = self.parts_itself = False  # whether contact with itself has to begin, or to end
         self.target = MemoryTarget() if isinstance(target, MemoryTarget) else None  # else it will be a part of a file
         self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
@@ -166,7 +188,7 @@ class LineResult:
         if target is not None:
             to, texts = self.target or io.BytesIO(), {"scene": partial(scene_text, scene)}
             recorder = result_recorder(
-                scene, model, self.observer, to, texts, found, self.envelope, outputs, notes={PENDING: pending}
+                scene, model, self.observer, to, texts, found, self.envelope, outputs, notes={PENDING: wanted.pending}
             )
             if isinstance(recorder, Recorder):
                 recorder.lay_by()
@@ -177,6 +199,9 @@ class LineResult:
         self.manager: DomainManager | None = None  # of zones that move
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
+        self._errors: list[Floats] = []  # of leaving bending out, as sampled with these
+        self._sampled_errors: Floats = np.zeros((0, 0))
+        self._unknown_until = -np.inf  # s, that nothing is to be said of an unknown error
         self._aside = OutputsAside()  # of other cells
         self.shown: Callable[[Batch], None] | None = None  # what looks at outputs beside the recorder
         self._log: list[Floats] = []
@@ -203,6 +228,7 @@ class LineResult:
             hinges=self.model.hinges, placed=begin[base], borne=1.0 + borne_strain(self.model),
             extremes=no_extremes(nodes + marked.size),
             touch=self._blank_touch(),
+            model_error=self.correction.corrector.sampled if self.correction is not None else np.zeros((2, 0)),
         )  # fmt: skip
 
     @property
@@ -210,7 +236,8 @@ class LineResult:
         """Numbers of an output of the line, of the most cells that it may have."""
         line, layout, touches = self.model.line, self.model.layout, self.books.touch.size > 0
         more = len(line.torsion), touches, line.moved.size, sampled_size(line)
-        return sample_size(line.h.size if layout is None else int(layout.starts[-1]), layout is not None, *more)
+        cells = line.h.size if layout is None else int(layout.starts[-1])
+        return sample_size(cells, layout is not None, *more) + (error_size(cells) if self.correction else 0)
 
     def make_room(self, rows: int) -> None:
         """Room for so many samples of the line as it is; what is there is gone."""
@@ -300,7 +327,7 @@ class LineResult:
     def outputs_join(self) -> bool:
         """Whether outputs wait though the cells that they are of change, because these follow the curvature."""
         follows = self._moves and self.paying is None and not self.touches and follows_curvature(self.scene)
-        follows = follows and self.shown is None
+        follows = follows and self.shown is None and self.correction is None
         return follows and may_be_joined(self.observer, self.model.line)
 
     def follow(self, model: Model, other_cells: bool = False) -> None:
@@ -313,6 +340,8 @@ class LineResult:
         if not (other_cells and self.outputs_join):
             self.write_down()
         self.model, first = model, self.observer.first_energy
+        if self.correction is not None:
+            self.correction.switch(model)
         self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
         self.observer.first_energy = first
         self.books.hinges[:] = model.hinges
@@ -320,6 +349,8 @@ class LineResult:
         self._itself = LineWatch(self.envelope.itself, model)
         if self.touches != bool(self.books.touch.size):
             self.books = self.books._replace(touch=self._blank_touch())
+        if self.correction is not None:
+            self.books = self.books._replace(model_error=self.correction.corrector.sampled)
 
     def take_cells(self, model: Model, extremes: bool = True) -> None:
         """Go on with other cells; extremes: whether those of now count."""
@@ -363,6 +394,11 @@ class LineResult:
     def attach(self, solver: SystemSolver, states: tuple[State, State], clock: Clock, counts: Counts) -> None:
         """Steps of a solver go on with the line, between two states in turn; clock, counts: of the run."""
         solver.bind_line(self.number, **self._itself.attach(states, clock, counts))
+        if self.correction is not None:
+            x, work, own = solver.lines[self.number], solver.work[self.number], self.books
+            corrector = self.correction.corrector
+            job = corrector.bind(x.line, x.sea, x.ends, states, own.clock, own.counts, work)
+            solver.bind_line(self.number, following=job, follower=corrector.address())
 
     def log(self, rows: Floats) -> None:
         """Log steps (n, len(LOG) + 1), the last column the time of the processor, s."""
@@ -375,8 +411,14 @@ class LineResult:
             solver.bind_line(self.number, **bound)
         else:
             found = sum(bit for flag, bit in WATCHED.items() if seen & flag)
-        found = self._itself.tell(found, t, dt, state, self.events.event)
+        hides = bool(found & HIDES) and not self.lets_touch
+        found = self._itself.tell(found, t, dt, state, self.events.event) | (NEARS if hides else 0)
         self.nears_itself, self.parts_itself = bool(found & NEARS), bool(found & PARTS)
+
+    def watch_itself_no_more(self, solver: SystemSolver) -> None:
+        """Do not look any longer how near the line comes to itself."""
+        self.nears_itself = self.envelope.itself.on = False
+        solver.bind_line(self.number, itself=0)
 
     def watch(self, step: LineStep) -> None:
         """Look at what a step has flagged; the stretch of a run to compare with is not its matter.
@@ -386,6 +428,10 @@ class LineResult:
         flags, step.books.counts.notices = int(step.books.counts.notices), 0
         if isinstance(self.recorder, ComparisonRecorder):
             flags &= ~(STRETCHED | JUMPED)
+        if flags & UNKNOWN_ERROR and self.correction is not None and step.t > self._unknown_until:
+            s_a, s_b, text = self.correction.unknown(self.model.zones)
+            self.events.event(step.t, s_a, s_b, NOT_ESTIMATED, text)
+            self._unknown_until = step.t + self.model.time_scale  # that it takes the whole line to move
         self._stop_if(self.diagnostics.look(step, flags), step.t, step.state)
 
     def _stop_if(self, stop: Stop, t: float | None, state: State) -> None:
@@ -408,7 +454,9 @@ class LineResult:
         """Rows (n, size) of samples of the line on so many cells, as views."""
         line, varies = self.model.line, self.model.layout is not None
         sizes = cells, self.held, varies, len(line.torsion), self.books.touch.shape[1], line.moved.size
-        return batch_of_rows(rows, *sizes, slip_size(line), bool(line.bits & REMEMBERS))[0]
+        batch, left = batch_of_rows(rows, *sizes, slip_size(line), bool(line.bits & REMEMBERS))
+        self._sampled_errors = left[:, : self.books.model_error.shape[1]]
+        return batch
 
     def state_now(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
         """The state at t (s), now, as an output that is made of it."""
@@ -427,6 +475,7 @@ class LineResult:
             self._aside.put(self.model, outputs_in(batch, self.model.line, self.model.zones))
         else:
             self._waiting.append(batch)
+            self._errors.append(self._sampled_errors)
         full = sum(len(x.t) for x in self._waiting) >= WAITING or self._aside.full
         if full or not self._moves or self.observer.writes_criteria:
             self.write_down()
@@ -445,16 +494,17 @@ class LineResult:
                 raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]))
         if not self._waiting:
             return
-        waiting, self._waiting = self._waiting, []
+        (waiting, self._waiting), (errors, self._errors) = (self._waiting, []), (self._errors, [])
         batch = waiting[0]
         if len(waiting) > 1:
             batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
+        shift = self.correction.shift(np.concatenate(errors), batch) if self.correction is not None else None
         there, seen, more = self.look(batch)
         ratios = None
         if self.observer.writes_criteria:  # of a line whose outputs do not wait: those of one step
             assert self.manager is not None
             ratios = np.repeat(self.manager.largest_ratios(self.observer.grid.s)[None], len(batch.t), axis=0)
-        values = there.values_of(seen, ratios)
+        values = there.values_of(seen, ratios, shift)
         self.observer.first_energy = there.first_energy
         self.recorder.save_batch(batch.t.copy(), values, there.zone_rows, [there.rows_of(zones) for zones in more])
         if not self._moves:
@@ -484,11 +534,13 @@ class LineResult:
 
     def waiting(self) -> Waiting:
         """Outputs and steps that wait, to come back to."""
-        return Waiting([*self._waiting], [*self._aside.waiting], [*self._log], self.observer.first_energy)
+        aside, log = [*self._aside.waiting], [*self._log]
+        return Waiting([*self._waiting], [*self._errors], aside, log, self.observer.first_energy)
 
     def wait_again(self, kept: Waiting) -> None:
         """Let that wait which `waiting` has returned, and nothing else."""
         self._waiting, self._aside, self._log = [*kept.outputs], OutputsAside(kept.aside), [*kept.log]
+        self._errors = [*kept.errors]
         self.observer.first_energy = kept.first_energy
 
     def impose_now(self) -> None:
@@ -538,6 +590,7 @@ class LineResult:
             "ends": self.model.ends.checkpoint(), "first_energy": self.observer.first_energy or 0.0,
             **({"torsion": {name: x.copy() for name, x in answers.items()}} if answers else {}),
             **({} if self.contact is None else {"self_contact": self.contact.checkpoint(t)}),
+            **({} if self.correction is None else {"correction": self.correction.checkpoint()}),
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any], work: Work, t: float, joints: Sequence[int]) -> None:
@@ -556,6 +609,8 @@ class LineResult:
         self.observer.first_energy = saved["first_energy"]
         if self.contact is not None:
             self.contact.restore(saved["self_contact"], t)
+        if self.correction is not None:
+            self.correction.restore(saved["correction"])
         ends = saved["ends"] | {"released": model.ends.released}  # as what broke says: files of 1.0 have none released
         model.ends.restore(ends, t)
         apart = np.abs(saved["ends"]["position"] - model.ends.values.position).max(axis=1)

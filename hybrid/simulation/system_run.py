@@ -25,12 +25,14 @@ from hybrid.kernels.state.state import Floats, Moves, Work, state_for
 from hybrid.kernels.step.accept import MANY
 from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
+from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import SAME_STOP, equal_steps, output_times
-from hybrid.model.system import SystemResolution, build_system
+from hybrid.model.system import SystemModel, SystemResolution, build_system
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.plane import OUT
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
+from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.body_overlap import note_overlaps
 from hybrid.simulation.collapse import COLLAPSE, GIVE_UP, TOUCH_EACH_OTHER, TOUCHES_ITSELF, collapse_text
@@ -68,12 +70,12 @@ from hybrid.simulation.system_contact import (
     tell_passages,
 )
 from hybrid.simulation.system_failures import Failures
-from hybrid.simulation.system_lines import WAITING, LineResult, LineStep
+from hybrid.simulation.system_lines import WAITING, LineResult, LineStep, Wanted
 from hybrid.simulation.system_load_change import change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, joined_lines, named
-from hybrid.simulation.system_zones import SystemZones, managers_for, start_at_rest, zones_as_placed
+from hybrid.simulation.system_zones import Start, SystemZones, managers_for, start_at_rest, zones_as_placed
 from hybrid.simulation.time_loop import FORCE_COLUMNS, WORK, apart, falls_on
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
 from hybrid.solve.joined import SystemState, SystemTaken
@@ -106,7 +108,10 @@ class Recording(NamedTuple):
     kept: whether a file gets checkpoints; source: the result to go on with, from its checkpoint, in place of a start;
     found: what was found before the run, for whoever goes on with its file; pending: what is to come when it is
     complete (store.records); notes: events (kind, text) of the whole of the run; begun: called behind the first output;
-    planes: whether lines that are joined to nothing are computed in the planes in which they lie.
+    planes: whether lines that are joined to nothing are computed in the planes in which they lie; start: the first
+    state, if it is known; points: of outputs of the only line, None: those of its scene; until: s, its end, if it comes
+    before that of the scene; touches: whether contact begins by itself where lines come near themselves, else that is
+    only noticed; error: whether that of leaving bending out is followed, of lines whose resolution says so.
     """
 
     kept: bool = False
@@ -116,6 +121,11 @@ class Recording(NamedTuple):
     notes: Sequence[tuple[str, str]] = ()
     begun: Callable[[SystemRun], None] | None = None
     planes: bool = False
+    start: Start | None = None
+    points: OutputPoints | None = None
+    until: float | None = None
+    touches: bool = True
+    error: bool = False
 
 
 ALONE = Recording()
@@ -135,47 +145,44 @@ class SystemRun:
         for, or the checkpoint says; criterion: one more for zones that move (adapt.user_criterion); changes: loads and
         motions of these systems hold from some time on.
         """
-        kept, source, found, pending, notes, self._begun, planes = recording
+        kept, source, found, pending, notes, self._begun, planes, *_ = recording
         self._before, self._pending, self._notes = found or {}, pending, notes
-        end = system.require_time().duration if moves else 0.0
-        self.changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < end]
+        self.end = (recording.until or system.require_time().duration) if moves else 0.0
+        self.changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < self.end]
+        self.lets_touch, self.came_near_itself = recording.touches, False
         self.criterion = criterion
         self.system, self.target, self.moves = system, target, moves
         self.kept = kept and isinstance(target, Path)
         self.changed = 0  # how many of the changes have been made
         if source is not None:
             resolution, self.changed = kept_resolution(system, source), kept_changes(source, len(self.changes))
-        self.model = build_system(system, resolution=resolution)
+        self.model = recording.start.model if recording.start else build_system(system, resolution=resolution)
         if self.changed:
             self.system = self.changes[self.changed - 1].scene
             self.model = loaded_as(self.model, self.system, 0.0)
         self.resolution = self.model.resolution
         one = self.resolution.one
         follow = (one.step, one.shortest) if moves and one.local is not None else (0.0, 0.0)
-        names = self.model.names
-        guesses = system.guesses
-        known = self.model.scenes
-        self.scenes = [system.scene_of(name, system.carried(name), guesses, scene=known[name]) for name in names]
+        names, scenes = self.model.names, line_scenes(system, self.model)
+        self.scenes = [scenes[name] for name in names]
         self.times = output_times(self.scenes[0]) if moves else []
         if moves and one.every > 1:  # a run to compare with has as many times fewer
             self.times = [*self.times[one.every - 1 : -1 : one.every], self.times[-1]]
+        if moves and self.end < self.times[-1]:
+            self.times = [*(t for t in self.times if t < self.end), self.end]
         rho = system.require_time().rho_inf if moves else 0.0
         turn = min(x.turn for x in self.resolution.lines.values())
         self.loop = SystemSteps(rho, [0.0, *self.times], *follow, turn)
         self.found: SystemEquilibrium | None = None
         managers, self._begins = _NO_ZONES, source is None  # whether there is a start, and no checkpoint
-        scenes = dict(zip(names, self.scenes, strict=True))
         if source is not None:
             blank = [state_for(x.line) for x in self.model.models]
             self.state = SystemState(blank, np.zeros_like(self.model.body_places))
             managers = managers_for(scenes, self.model, criterion)
-        elif moves and system.starts_as_placed:
-            self.model, managers = zones_as_placed(scenes, self.model, criterion)
-            self.state = SystemState([x.start for x in self.model.models], self.model.body_places).copy()
         else:
-            with at_once():
-                self.model, self.found, managers = start_at_rest(system, scenes, self.model, moves, criterion)
-            self.state = self.found.state.copy()
+            self.model, self.found, managers = recording.start or start_of(system, self.model, moves, criterion)
+            placed = SystemState([x.start for x in self.model.models], self.model.body_places)
+            self.state = (placed if self.found is None else self.found.state).copy()
         self.start_from(self.state.bodies if self._begins else self.model.body_places)
         self.payout: SystemPayout | None = None  # of lines that are paid out
         if moves and any(x.payout is not None for x in self.model.models):
@@ -183,8 +190,12 @@ class SystemRun:
 
             self.payout = SystemPayout(self)
         reels = self.payout.lines if self.payout is not None else {}
+        wanted = [
+            Wanted(pending, recording.points, recording.error and x.follows_error, _torque_of(managers.get(k)))
+            for k, x in enumerate(self.model.models)
+        ]
         self.lines: list[LineResult] = [
-            LineResult(k, name, scene, model, self.found, state, len(self.times), target, pending, reels.get(k))
+            LineResult(k, name, scene, model, self.found, state, len(self.times), target, wanted[k], reels.get(k))
             for k, (name, scene, model, state) in enumerate(
                 zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
             )
@@ -506,6 +517,8 @@ class SystemRun:
         for line, x in zip(self.lines, lines, strict=True):
             line.held = np.minimum(x.ends.held, 1)
         lines = lines if self.planes is None else self.planes.on(lines)
+        follows = [line.correction is not None for line in self.lines]
+        lines = [x._replace(serves=x.serves or y) for x, y in zip(lines, follows, strict=True)]
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
@@ -605,6 +618,9 @@ class SystemRun:
                 line.note_start(x, state, 0.0)
             line.diagnostics.scheme(time.rho_inf)
             line.diagnostics.watch(line.books.clock)
+            if line.correction is not None:
+                rubs = self.found is not None and line.number in self.found.with_friction
+                line.correction.begin(line.model.ends.at(0.0), state, self.found is not None, rubs)
         self.renew_other()
         self._attach()
         self._output()
@@ -621,7 +637,7 @@ class SystemRun:
 
         until: s, the last of them; None: the end of the run.
         """
-        end = self.system.require_time().duration if until is None else until
+        end = self.end if until is None else until
         given = [*(m.ends.breaks for m in self.model.models), self.model.breaks]
         self._jumps = sorted({x for each in given for x in each if x < end})
         self._breaks = sorted({*self._jumps, *(x for x in self.failures.times if x < end)})
@@ -699,6 +715,10 @@ class SystemRun:
             self.zones.attach(loop)
         if self.payout is not None:
             self.payout.attach(loop)
+        for line in self.lines:
+            line.lets_touch = self.lets_touch
+            if line.correction is not None:
+                line.correction.set_torque()
         moves = [model.ends.moves() for model in self.model.models]
         if len(moves) != len(self._moved) or any(x is not y for x, y in zip(moves, self._moved, strict=True)):
             self._moved = moves
@@ -928,6 +948,27 @@ class SystemRun:
             line.events.event(self.t, s, s, COLLAPSE, text, value=self.last_step)
         if self.target is None and tiny >= GIVE_UP:
             raise LineFailed(line.number, Outcome.COLLAPSED, self.t, s, text)
+
+
+def line_scenes(system: System, model: SystemModel) -> dict[str, Scene]:
+    """Scenes of the lines of a system by name, between points as they are first looked for."""
+    guesses, known = system.guesses, model.scenes
+    return {name: system.scene_of(name, system.carried(name), guesses, scene=known[name]) for name in model.names}
+
+
+def start_of(system: System, model: SystemModel, moves: bool, criterion: UserCriterion | None) -> Start:
+    """The first state of a system, with its zones; moves: whether a motion begins there, else it is at rest."""
+    scenes = line_scenes(system, model)
+    if moves and system.starts_as_placed:
+        model, managers = zones_as_placed(scenes, model, criterion)
+        return Start(model, None, managers)
+    with at_once():
+        return start_at_rest(system, scenes, model, moves, criterion)
+
+
+def _torque_of(manager: DomainManager | None) -> Callable[[], float] | None:
+    """What gives the torque of a line as far as its rods do not carry it, N m; None: its zones stay."""
+    return None if manager is None else lambda: float(manager.torque)
 
 
 def run_system(

@@ -66,7 +66,7 @@ class Start(NamedTuple):
     """Zones of a system at rest."""
 
     model: SystemModel
-    found: SystemEquilibrium
+    found: SystemEquilibrium | None  # None: a motion begins as the scene says
     managers: Mapping[int, DomainManager]  # by the number of the line
 
 

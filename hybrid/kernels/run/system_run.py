@@ -395,6 +395,11 @@ def accept(steps, system):
         row[0], row[1], row[2], row[3] = clock.now, dt, counts.tries + counts.wasted, clock.correction
         row[4], row[5], row[6] = residual, counts.repeats, report[LOCAL_ERROR]
         row[7], row[8] = pull(report, 0), pull(report, 1)
+        if job.follower != 0:
+            own = job.books.clock  # by which the error is followed
+            own.last_dt, own.step_before, own.rho_before = dt, system.asked.before, system.asked.rho_of_last
+            job.books.counts.parity = counts.parity
+            job.books.counts.notices |= call_follower(job.follower, job.following)
         steps.seen[l] = watch_itself(job, job.new)
         flags |= job.books.counts.notices | steps.seen[l]
     if steps.watcher != 0:  # the parity is that of the next step

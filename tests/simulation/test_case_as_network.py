@@ -1,0 +1,92 @@
+"""A case computes the same by the network of one line as by the cable: its runs to compare with, its pre-runs.
+
+Goes with the old road (simulation.switch), but for what does not compare the two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.scene.read import as_scene
+from hybrid.simulation import system_lines
+from hybrid.simulation.case import Case
+from hybrid.simulation.run_sample import RunSample
+
+SCENE: dict[str, Any] = {
+    "cable": {"sections": [{"length": 20, "mass": 1.5, "axial_stiffness": 1e6, "bending_stiffness": 50, "diameter": 0.02}]},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
+             "end": {"kind": "pinned", "position": [15, 0, 2],
+                     "motion": {"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0}}},
+    "initial": "equilibrium", "mesh": {"cells": 40}, "time": {"duration": 0.8}, "output": {"every": 0.05},
+    "accuracy": "1%",
+}  # fmt: skip
+SAME = 1e-8  # of the scale of a quantity: errors of forces are differences over 1e-4 of the shift
+
+
+def sample(case: Case, road: str, monkeypatch: pytest.MonkeyPatch, **more: Any) -> RunSample:
+    """The run of a case with the error of leaving bending out, by one of the two roads."""
+    monkeypatch.setenv("HYBRID_CABLES", road)
+    return case.sample(finely(case), **more)
+
+
+def finely(case: Case) -> Resolution:
+    """How finely."""
+    return replace(first_resolution(case.scene), follow=True)
+
+
+def assert_same(a: RunSample, b: RunSample) -> None:
+    """All that is compared of two runs is the same."""
+    assert (a.steps, a.cells, a.every, a.bound, a.touches, a.notes) == (
+        b.steps,
+        b.cells,
+        b.every,
+        b.bound,
+        b.touches,
+        b.notes,
+    )
+    for mine, its in ((a.values, b.values), (a.model_error, b.model_error), (a.extremes, b.extremes)):
+        assert set(mine) == set(its)
+        for name in mine:
+            one, two = np.asarray(mine[name]), np.asarray(its[name])
+            assert one.shape == two.shape, name
+            assert np.abs(one - two).max(initial=0.0) <= SAME * max(float(np.abs(one).max(initial=0.0)), 1e-3), name
+    for one, two in ((a.forces, b.forces), (a.catenary, b.catenary), (a.doubt, b.doubt)):
+        np.testing.assert_allclose(one, two, rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("model", ["rod", "catenary", "adaptive"])
+def test_a_run_to_compare_with(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(as_scene(SCENE | {"model": model}), None)
+    cable, network = (sample(case, road, monkeypatch) for road in ("cable", "network"))
+    assert bool(cable.model_error) == (model != "rod")
+    assert_same(cable, network)
+
+
+def test_a_pre_run_ends_before_the_run_at_places_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(as_scene(SCENE | {"model": "catenary", "dimension": 3}), None)
+    places = np.array([0.0, 3.3, 20.0])
+    cable, network = (sample(case, road, monkeypatch, points=places, until=0.32) for road in ("cable", "network"))
+    assert network.values["tension"].shape == (8, 3)
+    assert_same(cable, network)
+
+
+def test_an_output_does_not_depend_on_those_that_are_looked_at_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(as_scene(SCENE | {"model": "catenary"}), None)
+    together = sample(case, "network", monkeypatch)
+    monkeypatch.setattr(system_lines, "WAITING", 1)
+    assert_same(together, sample(case, "network", monkeypatch))
+
+
+def test_many_outputs_go_into_a_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+    case = Case(as_scene(SCENE | {"model": "catenary"}), None)
+    kept = sample(case, "network", monkeypatch)
+    case.beside_result = tmp_path / "run.h5"
+    monkeypatch.setattr("hybrid.simulation.case.MOST_IN_MEMORY", 10)
+    stored = sample(case, "network", monkeypatch)
+    assert stored.rows and len(list(tmp_path.iterdir())) == 1
+    assert_same(kept, stored)
