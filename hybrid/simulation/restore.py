@@ -34,6 +34,7 @@ from hybrid.model.self_reach import touching
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.initial_zones import manager_for
+from hybrid.simulation.old_checkpoints import is_of_cable
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.store.checkpoint import Checkpoint, read_checkpoint
 from hybrid.store.hdf5_file import opened
@@ -153,6 +154,7 @@ def kept_resolution(system: System, source: Path) -> SystemResolution:
     if not tree:  # of an earlier program
         return first
     with refused(source):
+        tree = {next(iter(system.lines)): tree} if is_of_cable(tree) else tree
         if set(tree) != set(system.lines):
             raise ValueError("resolutions of other lines")
         found = {name: resolution_from(tree[name], system.scene_of(name)) for name in system.lines}
@@ -180,15 +182,6 @@ def restored_points(result: Result, length: float, far: float | None = None) -> 
 
 
 # --- the model ----------------------------------------------------------------------------------
-
-
-def mesh_tree(model: Model) -> Tree:
-    """Where the nodes of a model are, and its zones, for a checkpoint."""
-    if model.layout is not None:
-        return (model.layout if model.payout is None else model.payout.first_layout)._asdict()
-    assert not isinstance(model.mesh, Layout)
-    s, zones = model.mesh
-    return {"s": s, "zones": [[x.kind, x.s_a, x.s_b] for x in zones]}
 
 
 def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any]) -> tuple[Model, Model]:

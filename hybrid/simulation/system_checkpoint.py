@@ -18,6 +18,7 @@ from hybrid.scene.obstacles import files_of as obstacle_files
 from hybrid.scene.system import System
 from hybrid.simulation.lines_contact_start import touch_each_other
 from hybrid.simulation.lone_planes import LonePlanes
+from hybrid.simulation.old_checkpoints import as_of_line, is_of_cable
 from hybrid.simulation.restore import program, refused, resolution_tree
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.system_contact import let_touch
@@ -92,6 +93,8 @@ def checkpoint(run: KeptRun) -> dict[str, Any]:
 
 def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
     """Go on as `checkpoint` has written, with a run that was made for it.  ValueError: that cannot be."""
+    if is_of_cable(saved):
+        saved = as_of_line(saved, run.lines[0].name, run.model.models[0], run.failures.all)
     if "broken" in saved:  # not in files of an earlier program
         if not isinstance(saved["broken"], list):
             raise ValueError("broken: numbers of what has broken were expected")
@@ -100,9 +103,9 @@ def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
     older: dict[str, Any] = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "planes": {}, "changes": 0}
     older |= {"cuts": run.loop.cuts(), "vibrations": {}, "rotations": run.rotations.last}
     older |= {key: [] for key in ("passed", "met", "let_pass", "between")}
-    complete = "interval" in saved  # else steps ended at outputs
     older |= {"rho": run.system.require_time().rho_inf, "interval": 0.0, "worked": run.loop.worked[1, :, :SPRING]}
-    saved = older | dict(saved)
+    older |= {"bodies": run.state.bodies, "body_work": run.solver.body_work[:, :SPRING]}  # nor has a cable
+    given, saved = saved, older | dict(saved)
     saved["zones"] = zones_of_today(saved["zones"])
     near = [x.number for x in run.lines if "self_contact" in _of(saved, x.name) and not x.touches]
     let_touch(run, near)
@@ -143,8 +146,8 @@ def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
         run.planes.restore_planes(found["planes"])
     run.make_solver()
     set_state(run, found)
-    if not complete:
-        for line in run.lines:
+    for line in run.lines:
+        if "imposed" not in _of(given, line.name).get("before", ()):  # not in files of an earlier program
             line.impose_now()
 
 
@@ -189,7 +192,8 @@ def of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:
         if mine is not None and "torsion" in mine:
             line = {"torsion": mine["torsion"]} | line
         if mine is not None:
-            line = {"before": mine["before"], "rho": rho} | line
+            before = line.get("before", {})
+            line = {"rho": rho} | line | {"before": mine["before"] | before if isinstance(before, dict) else before}
         if mine is not None and isinstance(line.get("noted"), dict):
             line = line | {"noted": mine["noted"] | line["noted"]}
         found[name] = line

@@ -14,7 +14,7 @@ from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE, state_for
 from hybrid.kernels.step.sampling import SAME_TIME
 from hybrid.kernels.step.step_law import WARY
-from hybrid.simulation.restore import mesh_tree
+from hybrid.simulation.old_checkpoints import mesh_tree
 from hybrid.simulation.transient import Transient
 from hybrid.solve.run import LENGTHS
 from hybrid.store.named_arrays import matched

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.combinations.networks import both, differences, events_differ
-from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, scene_of
+from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, S, scene_of
 from tests.problems import tables_with
 
 FREE = {"kind": "free", "force": [40, 3, 30]}
@@ -33,6 +33,12 @@ SCENES: dict[str, dict[str, Any]] = {
         START: {"kind": "pinned", "position": [0, 0, 1.0]},
         "time": {"duration": 1.2, "step": 0.04},
         "output": {"every": 0.2, "points": 13},
+    },
+    "torque of tension through catenary zones": FEATURES["zones"][0]
+    | FEATURES["turns"][0]
+    | {
+        S + "tension_torque": 2e-3,
+        END + ".motion": {"heave": {"amplitude": 0.05, "period": 1.0}, "ramp": 0.3},
     },
     "zones that move": {"model": {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[4, 8]]}},
 }

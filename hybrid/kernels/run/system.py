@@ -57,7 +57,7 @@ from hybrid.kernels.state.report import (
     SLACKEST,
     SLACKEST_CELL,
 )
-from hybrid.kernels.step.accept import impose_now, keep_past, watch
+from hybrid.kernels.step.accept import book_torques, impose_now, keep_past, watch
 from hybrid.kernels.step.generalized_alpha import Scheme, scheme
 from hybrid.kernels.step.job import call_quantities, call_reel, read
 from hybrid.kernels.step.newton import (
@@ -363,6 +363,7 @@ def keep_books(tables, joints, dt, t):
             books.power[1, k] = books.power[0, k]
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
         book_work(line, dt, report, books)
+        book_torques(job.old, new, dt, books)
         if books.base.shape[0] > 0:
             books.counts.notices |= watch(line, job.ends, job.old, new, books, report, t, dt)
         keep_past(line, job.ends, job.old, books, report)

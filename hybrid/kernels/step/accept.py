@@ -174,6 +174,13 @@ def keep_past(line, ends, old, books, report):
 
 
 @inner
+def book_torques(old, new, dt, books):
+    """Work in a step of the torques that zones which are bent pass on."""
+    for z in range(new.turn.shape[0]):
+        books.work[0, ZONES] += 0.5 * dt * (old.turn[z, POWER] + new.turn[z, POWER])
+
+
+@inner
 def accept(line, ends, old, new, books, work, end, dt):
     """The step that was tried is taken: clock, books and log."""
     clock, count, report = books.clock, books.counts, work.report
@@ -187,8 +194,7 @@ def accept(line, ends, old, new, books, work, end, dt):
         books.power[1, j] = books.power[0, j]
     find_powers(line, ends, books.velocity, new, report, books.power[0])
     book_work(line, dt, report, books)
-    for z in range(new.turn.shape[0]):
-        books.work[0, ZONES] += 0.5 * dt * (old.turn[z, POWER] + new.turn[z, POWER])
+    book_torques(old, new, dt, books)
     row = books.log[count.rows]
     row[0], row[1], row[2], row[3] = end, dt, count.tries + count.wasted, clock.correction
     row[4], row[5], row[6] = report[RESIDUAL], count.repeats, report[LOCAL_ERROR]

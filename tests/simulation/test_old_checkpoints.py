@@ -1,0 +1,128 @@
+"""What a cable's file of 1.0 holds of a run goes on as a network of one line, and is the run that was not stopped."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from bits import Stopping
+from test_self_contact_default import led_through
+
+import hybrid
+from hybrid.scene.read import as_scene
+from hybrid.scene.short_form import network_of
+from hybrid.simulation.old_checkpoints import as_of_line
+from hybrid.simulation.progress import Progress
+from hybrid.store.checkpoint import SLOTS, Checkpoint, read_checkpoint, write_slot
+from hybrid.store.named_arrays import pack
+from tests.combinations.networks import differences, events_differ
+from tests.combinations.pairs import END, START, S, scene_of
+from tests.problems import tables_with
+
+QUANTITIES = {
+    "slope": {"kind": "declination", "end": "start"},
+    "turn": {"kind": "azimuth", "end": "end"},
+    "way": {"kind": "touchdown_excursion", "end": "start"},
+}
+MOVED = {"heave": {"amplitude": 0.05, "period": 1.0}, "ramp": 0.3}
+FLAT = {
+    START: {"kind": "pinned", "position": [0, 0, 0]},
+    END: {"kind": "pinned", "position": [8, 0, 0], "motion": MOVED},
+}
+PULLED = {"kind": "free", "force": {"value": [60, 3, 30], "until": 0.25}}
+# Names of features of tests/combinations/pairs.py, and what else is other. Cut off at 0.33 s of 0.5 s.
+CASES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
+    "catenary, waves": (("catenary", "waves"), {}),
+    "rods, friction, quantities": (("seabed", "clamp"), {"output.quantities": QUANTITIES}),
+    "zones that are fixed": (("zones", "soil"), {}),
+    "zones that move": (("zones that move", "seabed"), {}),
+    "cells that follow": (("cells that follow", "seabed"), {}),
+    "paid out": (("payout", "seabed"), {}),
+    "paid out, zones that move": (("payout", "zones that move"), {}),
+    "paid out, cells that follow": (("payout", "cells that follow"), {}),
+    "let go": (("release", "zones that move"), {}),
+    "a load that has stopped": ((), {END: PULLED}),
+    "a vehicle": (("body",), {START + ".motion": MOVED}),
+    "self contact": (("contact", "seabed"), {}),
+    "steps that follow": (("chosen steps", "zones that move"), {}),
+    "torque through zones": (("zones", "turns"), {S + "tension_torque": 2e-3, END + ".motion": MOVED}),
+    "a rope that remembers": (("polyester", "vortices"), {}),
+    "a sheave": (("sheave", "slip"), {}),
+    "in a plane": ((), FLAT),
+    "in a plane, steps that follow": (("chosen steps",), FLAT | {"dimension": 2}),
+}
+
+
+class _Cut:
+    """Stops a run after a time (s), from outside."""
+
+    def __init__(self, t: float) -> None:
+        self.t = t
+
+    def __call__(self, now: Progress) -> None:
+        if now.t > self.t:
+            raise KeyboardInterrupt
+
+
+def cut_off(scene: hybrid.Scene | hybrid.System, path: Path, t: float) -> Checkpoint:
+    """The last checkpoint of a run that is stopped from outside after t (s)."""
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, path, progress=_Cut(t))
+    with h5py.File(path) as file:
+        return read_checkpoint(file)
+
+
+def gone_on(tables: Mapping[str, Any], t: float, folder: Path) -> tuple[hybrid.Result, hybrid.Result]:
+    """A run of a cable, and its network that goes on from where the cable was stopped after t (s)."""
+    scene = as_scene(tables_with(tables, {"output.exact": True}))
+    old = cut_off(scene, folder / "cable.h5", t)
+    mine = cut_off(network_of(scene), folder / "network.h5", old.state["t"] - 1e-6)._asdict()
+    assert abs(mine["state"]["t"] - old.state["t"]) < 1e-9 and "lines" not in old.state
+    data = pack(mine | {"state": old.state, "resolution": old.resolution})
+    gc.collect()  # results that were stopped hold their files
+    with h5py.File(folder / "network.h5", "r+", libver=("v110", "v110")) as file:
+        for name in SLOTS:
+            file[name].resize(max(len(data), file[name].shape[0]), axis=0)
+            file[name][:] = 0
+        write_slot([file[name] for name in SLOTS], mine["number"], data)
+    return hybrid.run(scene), hybrid.resume(folder / "network.h5")
+
+
+@pytest.mark.long  # 0.5 s each
+@pytest.mark.parametrize("name", CASES)
+def test_a_network_goes_on_where_a_cable_was_stopped(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    features, more = CASES[name]
+    Stopping(monkeypatch)
+    monkeypatch.setattr("hybrid.simulation.time_loop.WORK", 1)
+    cable, network = gone_on(tables_with(scene_of(*features), more), 0.33, tmp_path)
+    assert [str(x) for x in differences(cable, network)] == []
+    assert events_differ(cable, network) == []
+    assert len(cable.times) > 4 and np.ptp(cable.position[3:, 3:-3], axis=0).max() > 1e-4
+
+
+@pytest.mark.slow
+def test_contact_that_has_begun_by_itself_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Stopping(monkeypatch)
+    cable, network = gone_on(led_through(), 2.4, tmp_path)
+    assert cable["energy/self_contact"].max() > 0.0
+    assert [str(x) for x in differences(cable, network)] == []
+
+
+def test_what_is_of_another_line_or_of_no_cable_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Stopping(monkeypatch)
+    tables = scene_of("catenary")
+    saved = cut_off(as_scene(tables), tmp_path / "cable.h5", 0.1).state
+    model = hybrid.model.build.build(as_scene(tables))
+    assert set(as_of_line(saved, "cable", model, ())["lines"]) == {"cable"}
+    with pytest.raises(ValueError, match="surplus: not in the checkpoint of any cable"):
+        as_of_line(saved | {"surplus": 1.0}, "cable", model, ())
+    longer = hybrid.model.build.build(as_scene(tables_with(tables, {"mesh.cells": 20})))
+    with pytest.raises(ValueError, match="nodes that are not those of the line"):
+        as_of_line(saved, "cable", longer, ())
