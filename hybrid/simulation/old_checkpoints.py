@@ -18,14 +18,12 @@ from hybrid.store.named_arrays import Tree, matched
 
 SAME_NODE = 1e-9  # of the length: round-off of the place of a node
 # What the tree of a line calls names of the old one, and what that of the run does.
-OF_LINE = {name: name for name in "state rho work power envelope ends first_energy torsion".split()}
+OF_LINE = {x: x for x in ("state", "rho", "work", "power", "envelope", "ends", "first_energy", "torsion")}
 OF_LINE |= {"_stored": "stored", "watch": "noted"}
-OF_RUN = {name: name for name in "t steps changes cpu rho leg".split()} | {"dt": "last", "last": "interval"}
+OF_RUN = {x: x for x in ("t", "steps", "changes", "cpu", "rho", "leg")} | {"dt": "last", "last": "interval"}
 # What becomes something else, and what follows from the scene, or is of the last step alone.
-TURNED_INTO_OTHERS = set(
-    "report tension twist control vibration lengths _turned _slackened self_contact zoning payout mesh plane push home "
-    "correction".split()
-)
+TURNED_INTO_OTHERS = {"report", "tension", "twist", "control", "vibration", "lengths", "_turned", "_slackened", "mesh"}
+TURNED_INTO_OTHERS |= {"self_contact", "zoning", "payout", "plane", "push", "home", "correction"}
 # From where excursions and azimuths count, by their names behind that of the line.
 FIRST = {"first_places": "first", "first_turns": "turns"}
 LEFT_OUT = {"iterations", "floor", "_beyond"}
