@@ -70,6 +70,7 @@ from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
 from hybrid.store.records import ERROR_ESTIMATE, not_converged_attribute
+from hybrid.store.writer import WriteMode
 
 if TYPE_CHECKING:
     from hybrid.accuracy.free_vibrations import LostBy
@@ -267,7 +268,7 @@ class SystemPasses:
         if target is None and self.moves and not self._touches:
             asked = system_without_contact(asked)
         if self.moves:
-            recording = Recording(True, source, found, ERROR_ESTIMATE, self._of_results)
+            recording = Recording(WriteMode(found or {}), source, ERROR_ESTIMATE, self._of_results)
             run = run_system(
                 asked, target, scene_text(asked), self.reporter, self.interrupted, name, resolution, recording,
                 self._criterion, self._changes,

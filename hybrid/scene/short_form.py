@@ -46,6 +46,14 @@ POINTS: dict[str, tuple[str, dict[str, str], tuple[str, ...]]] = {
     "body": ("free", {"thrust": "force"}, ()),
 }  # fmt: skip
 
+# What networks say of points, and what is said of ends.
+WORDS = {
+    "gives way": "is let go",
+    "break_at": "release_at",
+    "; what came loose is free": " and is free",
+    "a moment at a point": "an end moment",
+}
+
 
 class NotInNetwork(SceneError):
     """The scene of a cable has what a network of one line cannot have yet."""
@@ -73,6 +81,8 @@ class ShortForm:
         for there, here in sorted(self.pairs, key=lambda x: -len(x[0])):
             message = re.sub(rf"\b{re.escape(dotted(there))}\b", dotted(here), message)
         message = re.sub(rf"\bline {LINE}\b", "the cable", message)
+        for words, instead in WORDS.items():
+            message = message.replace(words, instead)
         return re.sub(r"\bpoint (start|end)\b", r"ends.\1", message)
 
     @contextmanager
@@ -81,8 +91,12 @@ class ShortForm:
         try:
             yield
         except ComputationError as error:
-            detail = self.text(error.detail).removeprefix("the cable; ")
-            raise ComputationError(error.outcome, error.t, error.s, detail, error.snapshot, error.first) from None
+            raise self.error(error) from None
+
+    def error(self, error: ComputationError) -> ComputationError:
+        """What has failed of the network, of the cable."""
+        detail, first = self.text(error.detail).removeprefix("the cable; "), self.text(error.first)
+        return ComputationError(error.outcome, error.t, error.s, detail, error.snapshot, first)
 
     def finding(self, found: Finding) -> Finding:
         """What is wrong with the network, of the scene."""

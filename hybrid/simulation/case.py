@@ -205,7 +205,8 @@ class Case:
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, target)
         assert loop.run.envelope is not None
-        notes = {PENDING: ERROR_ESTIMATE if mode.before else "", RODS_AT_START: reasons_at_start(switching)}
+        manager = switching.manager if switching is not None else None
+        notes = {PENDING: ERROR_ESTIMATE if mode.before else "", RODS_AT_START: reasons_at_start(manager)}
         recorder = result_recorder(
             self.scene, model, loop.observer, target, self._texts, equilibrium, loop.run.envelope,
             len(output_times(self.scene)), mode, notes,

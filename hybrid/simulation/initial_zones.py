@@ -64,14 +64,14 @@ def zones_at_start(
     return model, equilibrium, ZoneSwitching(model, manager)
 
 
-def reasons_at_start(switching: ZoneSwitching | None) -> str:
+def reasons_at_start(manager: DomainManager | None) -> str:
     """Why each first rod is one, as JSON: [from, to (m), {criterion: its ratio, the largest first}]; "": no zones.
 
     Without a criterion: rods that lie between others, or that were no equilibrium's, or that stay (`zones fixed`).
     """
-    if switching is None:
+    if manager is None:
         return ""
-    manager, found = switching.manager, []
+    found = []
     base, rod = manager.layout.base, manager.layout.rod
     for a, b in pairwise(edges(rod.astype(int))):
         if rod[a]:

@@ -17,6 +17,7 @@ from hybrid.model.system import SystemModel, SystemResolution
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.events import Sink
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.system_lines import LineResult
 from hybrid.solve.joined import SystemState
@@ -82,6 +83,11 @@ class RunOfLines(Protocol):
 
     @property
     def recorder(self) -> Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder: ...
+
+    @property
+    def noted(self) -> Sink: ...
+
+    def note(self, kind: str, text: str, **more: float) -> None: ...
 
     @property
     def t(self) -> float: ...

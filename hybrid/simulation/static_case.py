@@ -60,7 +60,8 @@ class StaticCase:
             refuse_contact(model, where)
         envelope = Envelope(self.scene, model, moves=False)
         pending = ERROR_ESTIMATE if wants_errors(self.scene) else ""
-        notes = {PENDING: pending, RODS_AT_START: reasons_at_start(switching)}
+        manager = switching.manager if switching is not None else None
+        notes = {PENDING: pending, RODS_AT_START: reasons_at_start(manager)}
         with result_recorder(self.scene, model, observer, target, texts, found, envelope, notes=notes) as recorder:
             ends, events = model.ends.at(np.inf), EventLog()
             diagnostics = Diagnostics(model, events)
@@ -69,8 +70,7 @@ class StaticCase:
             note_laid(self.scene, model, found.state, events)
             report, work = np.zeros(REPORT_SIZE), np.zeros(len(POWERS))
             diagnostics.mesh(observer.look(batch_of_one(0.0, ends, found.state, report, work, model.sea.values)))
-            if switching is not None and not model.line.torsion.size:
-                manager = switching.manager
+            if manager is not None and not model.line.torsion.size:
                 diagnostics.torque(0.0, manager.torque * manager.compliance, manager.torque)
             stretched = diagnostics.stretch(found.state)
             stop = stretched or diagnostics.left_plane(found.state.r) or diagnostics.still(ends, found.state)

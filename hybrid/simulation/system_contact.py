@@ -174,7 +174,7 @@ def _gives_up_pairs(run: RunOfLines, dt: float) -> bool:
     if not touches:
         return False
     run.gather_events()
-    run.recorder.event(run.t, 0.0, 0.0, GIVEN_UP, given_up_text(run, dt))
+    run.note(GIVEN_UP, given_up_text(run, dt))
     assert run.model.touching is not None
     alone = {a for a, b in touches if a == b}
     pairs = run.model.touching.pairs

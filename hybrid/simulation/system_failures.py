@@ -77,7 +77,7 @@ class Failures:
                 energy += lost
         text = f"{x.name} {why}; what came loose is free from here on"
         s = float(run.model.models[line].line.s[-end])
-        run.recorder.event(run.t, s, s, "end released", text, energy=energy)
+        run.noted.event(run.t, s, s, "end released", text, energy=energy)
 
     def _part(self, k: int) -> None:
         """Take the ends off their point, in a solver of its own."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -47,7 +45,6 @@ from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
-from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.deferred_recorder import DeferredRecorder
@@ -56,7 +53,6 @@ from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.kind_changes import Around
 from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
-from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.time_loop import FORCE_COLUMNS
@@ -66,9 +62,8 @@ from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_flaws import slack_cell
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
+from hybrid.store.array_recorder import ArrayRecorder
 from hybrid.store.comparison_recorder import ComparisonRecorder
-from hybrid.store.records import PENDING
 from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:
@@ -97,10 +92,14 @@ def twist_at_rest(x: JoinedLine, state: State) -> float:
     return float(twist) / (2.0 * np.pi)
 
 
+# What makes the recorder of a line: the equilibrium that it starts from, if it does, and outputs after the first.
+NewRecorder = Callable[["LineResult", "SystemEquilibrium | None", int], "Recorder | ArrayRecorder | ComparisonRecorder"]
+
+
 class Wanted(NamedTuple):
     """What is wanted of the outputs of a line beside what its scene says."""
 
-    pending: str = ""  # what is to come when the run is complete (store.records)
+    record: NewRecorder | None = None  # makes what the line is recorded by; None: it is only to be compared with
     points: OutputPoints | None = None  # None: those of the scene
     error: bool = False  # whether that of leaving bending out is followed
     torque: Callable[[], float] | None = None  # N m, of zones that move; None: it follows from the turn of the ends
@@ -127,7 +126,7 @@ def observer_of(
     recorded = Recorded(
         moves and only is None, only, criteria, wanted.error,
         edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
-        quantities=None if only else quantities_of(scene),
+        gauges=() if only else scene.output.elevation or (), quantities=None if only else quantities_of(scene),
     )  # fmt: skip
     return Observer(model.line, model.sea.values, model.zones, points, features, recorded)
 
@@ -160,12 +159,12 @@ class LineResult:
 
     def __init__(
         self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
-        outputs: int, target: Target | None = None, wanted: Wanted = WANTED, paying: PayingOut | None = None,
+        outputs: int, wanted: Wanted = WANTED, paying: PayingOut | None = None,
     ) -> None:  # fmt: skip
         """number: of the line in its system; found: the equilibrium that it starts from, None: it has none; state: from
 
-        which displacements count; outputs: after the first, 0 of an equilibrium; target: of the system, None: it is
-        only to be compared with; paying: the length of a line that is paid out.
+        which displacements count; outputs: after the first, 0 of an equilibrium; paying: the length of a line that is
+        paid out.
         """
         self.number, self.name, self.model, self.scene = number, name, model, scene
         self.events, self.paying = EventLog(), paying
@@ -175,25 +174,19 @@ class LineResult:
         self.correction: Correction | None = None  # of the error of leaving bending out
         if wanted.error:
             self.correction = Correction(model, wanted.torque)
-        self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None, wanted)
+        self.observer = observer_of(scene, model, self._moves, COMPARED if wanted.record is None else None, wanted)
         self.envelope = Envelope(scene, model, self._moves, found is not None and found.settled)
         self.marked = marked_places(scene, model)
-        self.envelope.itself.on &= target is not None or bool(model.line.bits & MAY_TOUCH)
+        self.envelope.itself.on &= wanted.record is not None or bool(model.line.bits & MAY_TOUCH)
         self._itself = LineWatch(self.envelope.itself, model)
         self.lets_touch = True  # whether contact begins by itself where the line comes near itself
         self.nears_itself = self.parts_itself = False  # whether contact with itself has to begin, or to end
-        self.target = MemoryTarget() if isinstance(target, MemoryTarget) else None  # else it will be a part of a file
         self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
-        self.recorder = ComparisonRecorder(FORCE_COLUMNS)
-        if target is not None:
-            to, texts = self.target or io.BytesIO(), {"scene": partial(scene_text, scene)}
-            recorder = result_recorder(
-                scene, model, self.observer, to, texts, found, self.envelope, outputs, notes={PENDING: wanted.pending}
-            )
-            if isinstance(recorder, Recorder):
-                recorder.lay_by()
-            self.recorder = recorder
+        record = wanted.record
+        self.recorder = ComparisonRecorder(FORCE_COLUMNS) if record is None else record(self, found, outputs)
         self.books = self._own_books(state)
+        if self.envelope.quantities:
+            self.books = self.envelope.quantities.given_to(self.books)
         self.contact: SelfContact | None = None
         self.shares = False  # whether its contact is computed with that of other lines
         self.manager: DomainManager | None = None  # of zones that move
@@ -560,8 +553,8 @@ class LineResult:
         """Extremes up to t (s), for the file."""
         self.recorder.replace(self.envelope.values(self.model.nodes, self.books.extremes, t))
 
-    def close(self, t: float, status: str, message: str) -> list[tuple[float, float, float, str, str]]:
-        """Record the envelope up to t (s) and the status; events as of `take_events`."""
+    def finish(self, t: float, status: str) -> None:
+        """Write the envelope up to t (s), and note what is to be said of all of it; status: of the run."""
         if status == "complete" and self._moves and not isinstance(self.recorder, ComparisonRecorder):
             self.diagnostics.finish(self.books)
         elif status == "failed":
@@ -572,9 +565,6 @@ class LineResult:
         if self.contact is not None and (tries := self.contact.given_up):
             self.events.event(t, 0.0, self.model.length, "steps cut", energy_gains_text(tries), value=float(tries))
         self.envelope.itself.tell_unkept(self.model, self.events.event)
-        noted = self.take_events()
-        self.recorder.close(status, message)
-        return noted
 
     def checkpoint(self, work: Work, t: float) -> dict[str, Any]:
         """What the rest of the run depends on beside the state at t (s), between two steps, with no output waiting."""

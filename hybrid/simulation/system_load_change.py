@@ -87,4 +87,4 @@ def change_loads_of_lines(run: RunOfLines, system: System) -> None:
     run.restart_steps()
     others = "other loads act, or points and bodies move otherwise"
     text = f"from t = {run.t:.6g} s on {others}, as `hybrid resume` was asked to"
-    run.recorder.event(run.t, 0.0, 0.0, "loads change", text)
+    run.note("loads change", text)

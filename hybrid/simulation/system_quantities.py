@@ -35,7 +35,7 @@ class SystemQuantities:
     """The quantities of all lines, each computed from a state of its line."""
 
     def __init__(self, system: System, scenes: Mapping[str, Scene]) -> None:
-        """scenes: of the lines, by name."""
+        """scenes: of the lines whose quantities are kept here, by name; others keep them themselves."""
         self._wanted, self._scenes, self._system = system.output.quantities, scenes, system
         self._idle: frozenset[tuple[str, int]] = frozenset()
         self._of_line: dict[str, tuple[Quantities, dict[str, Probe]]] = {}
@@ -49,7 +49,7 @@ class SystemQuantities:
 
     def keep_ranges(self, lines: Sequence[LineResult]) -> None:
         """From now on the books of the lines keep the ranges of what is asked of them, over all steps."""
-        for line in lines:
+        for line in (x for x in lines if x.name in self._scenes):
             mine = {name: q for name, q in self._wanted.items() if q.line == line.name}
             found = StepQuantities(line.scene, mine, line.envelope.quantities.pipes)
             if found:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
@@ -18,7 +17,6 @@ from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
-from hybrid.kernels.machine.cache import cache_folder
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Moves, Work, state_for
@@ -30,25 +28,21 @@ from hybrid.model.plan import SAME_STOP, equal_steps, output_times
 from hybrid.model.system import SystemModel, SystemResolution, build_system
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.plane import OUT
-from hybrid.scene.points import Fairlead
-from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.body_overlap import note_overlaps
 from hybrid.simulation.collapse import COLLAPSE, GIVE_UP, TOUCH_EACH_OTHER, TOUCHES_ITSELF, collapse_text
-from hybrid.simulation.deferred_recorder import DeferredRecorder
-from hybrid.simulation.events import energy_gains_text
+from hybrid.simulation.events import Sink, energy_gains_text
 from hybrid.simulation.failure import Stopped, explanation, first_remedy, write_snapshot
 from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.lines_contact import LinesWatch, shared_of
 from hybrid.simulation.lines_contact_start import note_crossings
 from hybrid.simulation.lone_planes import LonePlanes
-from hybrid.simulation.pair_forces import fields_of_pairs, values_of_pairs
 from hybrid.simulation.progress import RESULT, ProgressReporter
-from hybrid.simulation.restart import LoadChange, changes_text
+from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import kept_resolution, refused, require_same
-from hybrid.simulation.result_file import places_of_elevation
+from hybrid.simulation.run_file import Cable, CableFile, LinesFile
 from hybrid.simulation.step_events import CUTS, count_iterations, note_cut, note_iterations, note_slack
 from hybrid.simulation.system_checkpoint import (
     content,
@@ -72,7 +66,7 @@ from hybrid.simulation.system_contact import (
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import WAITING, LineResult, LineStep, Wanted
 from hybrid.simulation.system_load_change import change_loads_of_lines, loaded_as, with_loads_of
-from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, values_of
+from hybrid.simulation.system_points import Rotations, Sampled
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, joined_lines, named
 from hybrid.simulation.system_zones import Start, SystemZones, managers_for, start_at_rest, zones_as_placed
@@ -84,15 +78,12 @@ from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.solve.system_steps import SystemSteps
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
+from hybrid.store.array_recorder import Target
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
-from hybrid.store.format import Field
 from hybrid.store.hdf5_file import opened
-from hybrid.store.header import Header, Text
-from hybrid.store.named_arrays import Tree
-from hybrid.store.records import PENDING
-from hybrid.store.writer import Recorder, WriteMode
+from hybrid.store.header import Text
+from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_payout import SystemPayout
@@ -105,18 +96,17 @@ LOOK = 16
 class Recording(NamedTuple):
     """What there is beside a run: around it, before it and after it.
 
-    kept: whether a file gets checkpoints; source: the result to go on with, from its checkpoint, in place of a start;
-    found: what was found before the run, for whoever goes on with its file; pending: what is to come when it is
-    complete (store.records); notes: events (kind, text) of the whole of the run; begun: called behind the first output;
-    planes: whether lines that are joined to nothing are computed in the planes in which they lie; start: the first
-    state, if it is known; points: of outputs of the only line, None: those of its scene; until: s, its end, if it comes
-    before that of the scene; touches: whether contact begins by itself where lines come near themselves, else that is
-    only noticed; error: whether that of leaving bending out is followed, of lines whose resolution says so.
+    mode: how a file is written; source: the result to go on with, from its checkpoint, in place of a start; pending:
+    what is to come when it is complete (store.records); notes: events (kind, text) of the whole of the run; begun:
+    called behind the first output; planes: whether lines that are joined to nothing are computed in the planes in
+    which they lie; start: the first state, if it is known; points: of outputs of the only line, None: those of its
+    scene; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself where
+    lines come near themselves, else that is only noticed; error: whether that of leaving bending out is followed, of
+    lines whose resolution says so; cable: what the network was made of, whose file it gets.
     """
 
-    kept: bool = False
+    mode: WriteMode = AT_ONCE
     source: Path | None = None
-    found: Tree | None = None
     pending: str = ""
     notes: Sequence[tuple[str, str]] = ()
     begun: Callable[[SystemRun], None] | None = None
@@ -126,6 +116,7 @@ class Recording(NamedTuple):
     until: float | None = None
     touches: bool = True
     error: bool = False
+    cable: Cable | None = None
 
 
 ALONE = Recording()
@@ -145,14 +136,16 @@ class SystemRun:
         for, or the checkpoint says; criterion: one more for zones that move (adapt.user_criterion); changes: loads and
         motions of these systems hold from some time on.
         """
-        kept, source, found, pending, notes, self._begun, planes, *_ = recording
-        self._before, self._pending, self._notes = found or {}, pending, notes
+        source, planes = recording.source, recording.planes
+        self._notes, self._begun = recording.notes, recording.begun
         self.end = (recording.until or system.require_time().duration) if moves else 0.0
-        self.changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < self.end]
+        self.changes: Sequence[LoadChange[System]] = [
+            replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < self.end
+        ]
         self.lets_touch, self.came_near_itself = recording.touches, False
         self.criterion = criterion
         self.system, self.target, self.moves = system, target, moves
-        self.kept = kept and isinstance(target, Path)
+        self.kept = recording.mode.before is not None and isinstance(target, Path)
         self.changed = 0  # how many of the changes have been made
         if source is not None:
             resolution, self.changed = kept_resolution(system, source), kept_changes(source, len(self.changes))
@@ -165,7 +158,7 @@ class SystemRun:
         follow = (one.step, one.shortest) if moves and one.local is not None else (0.0, 0.0)
         names, scenes = self.model.names, line_scenes(system, self.model)
         self.scenes = [scenes[name] for name in names]
-        self.times = output_times(self.scenes[0]) if moves else []
+        self.times: Sequence[float] = output_times(self.scenes[0]) if moves else []
         if moves and one.every > 1:  # a run to compare with has as many times fewer
             self.times = [*self.times[one.every - 1 : -1 : one.every], self.times[-1]]
         if moves and self.end < self.times[-1]:
@@ -190,16 +183,18 @@ class SystemRun:
 
             self.payout = SystemPayout(self)
         reels = self.payout.lines if self.payout is not None else {}
-        wanted = [
-            Wanted(pending, recording.points, recording.error and x.follows_error, _torque_of(managers.get(k)))
-            for k, x in enumerate(self.model.models)
-        ]
-        self.lines: list[LineResult] = [
-            LineResult(k, name, scene, model, self.found, state, len(self.times), target, wanted[k], reels.get(k))
-            for k, (name, scene, model, state) in enumerate(
-                zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
-            )
-        ]
+        self.rotations = Rotations(system, self.model)
+        form = LinesFile if recording.cable is None else CableFile
+        self.file: LinesFile | CableFile = form(self, text, recording)
+        self.lines = list[LineResult]()
+        for k, (name, scene, model, state) in enumerate(
+            zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
+        ):
+            manager, error = managers.get(k), recording.error and model.follows_error
+            record = partial(self.file.line_recorder, manager=manager) if target is not None else None
+            wanted = Wanted(record, recording.points, error, _torque_of(manager))
+            shown, outputs = self.file.scene_of(scene), len(self.times)
+            self.lines.append(LineResult(k, name, shown, model, self.found, state, outputs, wanted, reels.get(k)))
         if self._begins:
             for line in self.lines:
                 line.diagnostics.begin()
@@ -209,10 +204,9 @@ class SystemRun:
         self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
         self.passed: set[tuple[int, int]] = set()  # and those that have been said to
         self.let_pass: set[tuple[int, int]] = set()  # of lines that may meet, those between which it is not computed
-        self.rotations = Rotations(system, self.model)
         shaken = zip(scenes.items(), self.resolution.lines.values(), strict=True)
         self.vibrations = VibrationsOfLines({name: VibrationSteps(scene, x) for (name, scene), x in shaken})
-        self.quantities = SystemQuantities(system, scenes)
+        self.quantities = SystemQuantities(system, self.file.of_quantities(scenes))
         if moves:
             self.quantities.keep_ranges(self.lines)
         self.cpu = 0.0  # s, of the processor, in earlier parts of the run
@@ -229,11 +223,7 @@ class SystemRun:
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
         self._begin = clock_now()
-        self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder()
-        if source is not None:
-            self.recorder = self._go_on(source, {"scene": text if isinstance(text, str) else text()} | self._told)
-        elif target is not None:
-            self.recorder = self._new_recorder(text)
+        self.recorder = self._go_on(source) if source is not None else self.file.begin()
 
     # --- where it is --------------------------------------------------------------------------------
 
@@ -277,59 +267,27 @@ class SystemRun:
         return any(getattr(point, "moment", None) is not None for point in self.system.points.values())
 
     @property
-    def _parts(self) -> dict[str, Recorder]:
-        return {line.name: line.recorder for line in self.lines if isinstance(line.recorder, Recorder)}
-
-    def _new_recorder(self, text: Text) -> Recorder | ArrayRecorder:
-        """The result of the points and bodies, with those of the lines in it."""
-        assert self.target is not None
-        attributes: dict[str, str | float | int] = {
-            "title": self.system.title, "cells": self.model.cells, "lines": len(self.model.names),
-            "length": sum(x.length for x in self.model.models),
-        }  # fmt: skip
-        if self.found is not None:
-            attributes |= {"static_path": self.found.summary, "static_residual": self.found.residual}
-        on_bodies = {x: point.body for x, point in self.system.points.items() if isinstance(point, Fairlead)}
-        if self._pending:
-            attributes[PENDING] = self._pending
-        if on_bodies:
-            attributes["fairleads"] = json.dumps(on_bodies)
-        fixed = [*self.quantities.limits, *self.quantities.ranges, *places_of_elevation(gauges_of(self.system))]
-        header = Header(np.zeros(1), self._fields, (), attributes, {"scene": text} | self._told, fixed)
-        if isinstance(self.target, MemoryTarget):
-            targets = {line.name: line.target for line in self.lines if line.target is not None}
-            return ArrayRecorder(self.target, header, targets)
-        recorder = Recorder(
-            self.target, header, outputs=len(self.times) + 1, overwrite=True,
-            mode=WriteMode(self._before if self.kept else None), templates=cache_folder().parent, parts=self._parts,
-        )  # fmt: skip
-        recorder.files = self._files
-        return recorder
-
-    @property
-    def _fields(self) -> list[Field]:
-        """What is recorded at every output, beside the lines."""
-        return [*fields_of(self.system), *fields_of_pairs(self.model), *self.quantities.fields]
-
-    @property
-    def _told(self) -> dict[str, str]:
-        """What the file says of changes, if there are some."""
-        return {"changes": changes_text(self.changes)} if self.changes else {}
-
-    @property
-    def _files(self) -> dict[str, str]:
+    def files(self) -> dict[str, str]:
         """Digests of the files of motions and loads, by path, of all that holds at some time."""
         found = files_of(self.system)
         for x in self.changes:
             found |= files_of(x.scene)
         return found
 
-    def _go_on(self, source: Path, texts: Mapping[str, str]) -> Recorder:
+    @property
+    def noted(self) -> Sink:
+        """What notes events of the whole run."""
+        return self.file.noted
+
+    def note(self, kind: str, text: str, **more: float) -> None:
+        """Note an event of the whole run, now."""
+        self.noted.event(self.t, *self.file.span, kind, text, **more)
+
+    def _go_on(self, source: Path) -> Recorder:
         """Be where the checkpoint of a result is, and write behind its rows; ResultError: that cannot be."""
-        assert isinstance(self.target, Path)
         with opened(source) as file:
             point = read_checkpoint(file)
-            require_same(point, self._files, self.criterion, source)
+            require_same(point, self.files, self.criterion, source)
             self.make_solver()
             with refused(source):
                 restore(self, point.state)
@@ -338,12 +296,10 @@ class SystemRun:
                     raise ValueError(f"t = {self.t:g} s after an output at {point.t:g} s")
             self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
             self.other, self._between = self.state.copy(), True
-            recorder = Recorder.again(
-                file, self.target, self._fields, (), point, texts, self._before, (), self._parts, self._pending
-            )
-        recorder.files = self._files
+            recorder = self.file.again(file, point)
+        recorder.files = self.files
         if why := other_program(point):
-            recorder.event(point.t, 0.0, 0.0, OTHER_PROGRAM, why)
+            recorder.event(point.t, *self.file.span, OTHER_PROGRAM, why)
         self._begin, self._checked = clock_now() - self.cpu, self.steps
         return recorder
 
@@ -366,8 +322,11 @@ class SystemRun:
         self.gather_events()
         made = monotonic() - begin
         if new and isinstance(self.recorder, Recorder):
+            begins_late = self._checked < 0 and self.recorder.is_late
             self.cpu, self._checked = clock_now() - self._begin, self.steps
             self.recorder.checkpoint(lambda: content(self))
+            if begins_late and not self.recorder.due:
+                return
         if not last:
             self.recorder.flush(made)
 
@@ -375,9 +334,7 @@ class SystemRun:
         """Record the events of the lines, in the result of the system with their names, as they happened."""
         tell_meetings(self)
         tell_passages(self)
-        noted = [(x, f"line {line.name}: {x[-1]}") for line in self.lines for x in line.take_events()]
-        for (t, s_a, s_b, kind, _), text in sorted(noted, key=lambda event: event[0][0]):
-            self.recorder.event(t, s_a, s_b, kind, text)
+        self.file.gather()
 
     def _output(self) -> None:
         """Record points, bodies and lines as they are, where an output is due."""
@@ -393,13 +350,7 @@ class SystemRun:
         self.loop.counts.samples = 0
         states = [line.sampled(count) for line in self.lines]
         seen = Sampled(states, self.loop.body_samples[:count])
-        if self.target is not None:
-            values = values_of(self.system, self.model, seen)
-            self.rotations.go_on(values)
-            by_name = {line.name: x for line, x in zip(self.lines, states, strict=True)}
-            values |= values_of_pairs(self.model, self.solver.shared, states)
-            values |= self.quantities.values(by_name, {line.name: line for line in self.lines})
-            self.recorder.save_batch(seen.t, values, [("lines", 0.0, 0.0)])
+        self.file.save(seen)
         note_dry_bodies(self.system, self.model, seen, self.dry, self.recorder.event)
         note_overlaps(self.model, seen, self.overlaps, self.recorder.event)
         note_pulled_under(self.system, self.model, seen, self.under, self.recorder.event, moves=self.moves)
@@ -421,16 +372,14 @@ class SystemRun:
 
     def _close(self, status: str, message: str) -> None:
         """Close all, with the events of the lines in the result of the points too."""
-        self.gather_events()
         for line in self.lines:
-            for t, s_a, s_b, kind, text in line.close(self.t, status, message):
-                self.recorder.event(t, s_a, s_b, kind, f"line {line.name}: {text}")
+            line.finish(self.t, status)
+        self.gather_events()
         if status == "complete":
-            count_iterations(self.loop.clock, self.loop.counts, 0.0, self.recorder)
+            count_iterations(self.loop.clock, self.loop.counts, self.file.span[1], self.noted)
         if self.shared is not None and (tries := self.shared.given_up):
-            self.recorder.event(self.t, 0.0, 0.0, "steps cut", energy_gains_text(tries))
-        self.recorder.replace(self.quantities.range_values())
-        self.recorder.close(status, message)
+            self.note("steps cut", energy_gains_text(tries))
+        self.file.close(status, message)
 
     # --- what is computed ---------------------------------------------------------------------------
 
@@ -583,7 +532,7 @@ class SystemRun:
             if text.startswith(name := f"line {line.name}: "):
                 line.events.event(0.0, 0.0, line.model.length, kind, text.removeprefix(name))
                 return
-        self.recorder.event(0.0, 0.0, 0.0, kind, text)
+        self.note(kind, text)
 
     def begin_motion(self) -> None:
         """Make the start ready for steps, and record it."""
@@ -610,7 +559,7 @@ class SystemRun:
         if self.system.environment.waves is not None:
             text = "waves act on lines and points, not on the body, which has no members"
             for body in (x for x in self.model.bodies if x.members is None):
-                self.recorder.event(0.0, 0.0, 0.0, "waves on body neglected", f"body {body.name}: {text}")
+                self.note("waves on body neglected", f"body {body.name}: {text}")
         for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
             if self.found is not None:
                 line.note_equilibrium(x, state, 0.0, self.found, self.turned)
@@ -838,7 +787,7 @@ class SystemRun:
 
     def failed(self, failed: LineFailed) -> ComputationError:
         """What a failure becomes: a file with all that there is, and an error that names the line."""
-        error = named(failed, self.model, left=self._snapshot(failed.outcome))
+        error = self.file.in_words(named(failed, self.model, left=self._snapshot(failed.outcome)))
         with suppress(LineFailed):
             self._record_last()
         for line in self.lines:
@@ -864,11 +813,7 @@ class SystemRun:
         if self.target is None or not self.moves:
             return None
         content: dict[str, Any] = {"t": self.t, "dt": float(self.loop.clock.tried_dt), "outcome": outcome.name}
-        content |= {"scene": scene_text(self.system), "bodies": self.state.bodies}
-        for line, state in zip(self.lines, self.state.lines, strict=True):
-            values = {"s": line.model.line.s, **state._asdict()}
-            content |= {f"{line.name}/{name}": x for name, x in values.items()}
-        return write_snapshot(self.target, content)
+        return write_snapshot(self.target, content | self.file.snapshot(self.state))
 
     def _settle(self, solver: SystemSolver) -> None:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
@@ -934,7 +879,7 @@ class SystemRun:
             s = float(slack.model.line.s[int(loop.counts.slack_cell)])
             note_slack(clock, float(slack.books.clock.wave_step), s, slack.events)
         if flags & b.ITERATIONS_CUT:
-            note_iterations(clock, loop.counts, 0.0, self.recorder)
+            note_iterations(clock, loop.counts, self.file.span[1], self.noted)
 
     def _tell_collapse(self) -> None:
         """Steps have become so short that the run may not end: an event; one to be compared with stops."""
@@ -981,7 +926,8 @@ def run_system(
 
     name: of the pass; resolution, recording, criterion, changes: as of `SystemRun`.
     """
-    recording = recording._replace(kept=True, planes=recording.begun is None)  # what is followed beside is in space
+    mode = recording.mode._replace(before=recording.mode.before or {})  # it can be resumed
+    recording = recording._replace(mode=mode, planes=recording.begun is None)  # what is followed beside is in space
     run = SystemRun(system, target, text, True, resolution, recording, criterion, changes)
     reporter.begin(name, run.resolution.one)
     run.record_motion(reporter, interrupted)

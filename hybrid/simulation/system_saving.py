@@ -42,15 +42,16 @@ def defer(run: SystemRun) -> None:
     if isinstance(run.recorder, DeferredRecorder):
         return
     assert isinstance(run.recorder, Recorder)
-    run.recorder = DeferredRecorder(run.recorder)
+    whole, run.recorder = run.recorder, DeferredRecorder(run.recorder)
     for line in run.lines:
         assert isinstance(line.recorder, Recorder)
-        line.recorder = DeferredRecorder(line.recorder)
+        line.recorder = run.recorder if line.recorder is whole else DeferredRecorder(line.recorder)
 
 
 def recorders(run: SystemRun) -> list[DeferredRecorder]:
     """Those of the system and of its lines, once they are deferred."""
-    return [x for x in (run.recorder, *(line.recorder for line in run.lines)) if isinstance(x, DeferredRecorder)]
+    found = dict.fromkeys((run.recorder, *(line.recorder for line in run.lines)))  # that of a cable is the only one
+    return [x for x in found if isinstance(x, DeferredRecorder)]
 
 
 def commit(run: SystemRun) -> None:

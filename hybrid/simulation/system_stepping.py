@@ -255,7 +255,7 @@ class SystemSimulation(SettableObstacles):
         except LineFailed as failed:
             raise (self._fail(failed) if before is None else self._undo(failed, before)) from None
         if text := contradictions(self._set_from_outside()):
-            self._run.recorder.event(0.0, 0.0, 0.0, "implausible", text)
+            self._run.noted.event(0.0, *self._run.file.span, "implausible", text)
         return self.t
 
     def _set_from_outside(self) -> dict[str, DrivenEnd]:

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, NamedTuple
 
+import h5py
 import numpy as np
 import yaml
 
 import hybrid
 from hybrid import Result, Scene
-from hybrid.scene.read import as_scene
+from hybrid.model.resolution import first_resolution
+from hybrid.model.system import SystemResolution
+from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.short_form import LINE, network_of
+from hybrid.simulation.case import Case
+from hybrid.simulation.progress import ProgressReporter
+from hybrid.simulation.run_file import Cable
+from hybrid.simulation.system_run import Recording, SystemRun
+from hybrid.store.reader import open_result
+from hybrid.store.writer import WriteMode
 
 SAME = 1e-9  # of the scale of a dataset: round-off that a motion of some hundred steps lets grow
 # What says how Newton's method went, and clocks: no quantity of the line.
@@ -24,6 +35,9 @@ SLOW = 0.05  # m/s or rad/s
 SMALL = 1e-3  # of F, or of FL
 UNITS_OF_WORK = ("J", "W", "N m")
 GRAVITY = 9.81  # m/s2
+# Of a file: when it was made, how a dataset names others, and where a run may go on.
+UNLIKE = ("created", "DIMENSION_LIST", "REFERENCE_LIST")
+CHECKPOINTS = "checkpoint/slot_"
 
 
 class Difference(NamedTuple):
@@ -49,9 +63,54 @@ def both(tables: dict[str, Any], rest: bool = False) -> tuple[Result, Result]:
     return compute(scene), compute(network_of(scene))
 
 
+def both_files(scene: Scene, folder: Path) -> tuple[Path, Path]:
+    """The files of a cable and of its network, which gets that of a cable; each is computed once."""
+    cable, network = folder / "cable.h5", folder / "network.h5"
+    Case(scene, None).record(first_resolution(scene), cable)
+    system, recording = network_of(scene), Recording(WriteMode({}), planes=True, cable=Cable(scene))
+    resolution = SystemResolution({LINE: first_resolution(scene)})
+    run = SystemRun(system, network, scene_text(scene), True, resolution, recording)
+    run.record_motion(ProgressReporter(None, 1.0), lambda: False)
+    return cable, network
+
+
+def files_differ(one: Path, other: Path) -> list[str]:
+    """What two files do not have in common: datasets, their form, attributes, texts, and numbers beyond round-off."""
+    with h5py.File(one) as a, h5py.File(other) as b:
+        found = [*_attributes_differ(a, b, "/"), *_contents_differ(a, b)]
+    with open_result(one) as cable, open_result(other) as network:
+        return found + [str(x) for x in differences(cable, network)]
+
+
+def _contents_differ(a: h5py.File, b: h5py.File) -> Iterator[str]:
+    names = [set[str](), set[str]()]
+    for file, those in zip((a, b), names, strict=True):
+        file.visit(those.add)
+    yield from (f"{x}: in one alone" for x in sorted(names[0] ^ names[1]))
+    for name in sorted(x for x in names[0] & names[1] if not x.startswith(CHECKPOINTS)):
+        x, y = a[name], b[name]
+        yield from _attributes_differ(x, y, name)
+        if not isinstance(x, h5py.Dataset):
+            continue
+        forms = [(each.dtype, each.shape, [(d.label, [*d.keys()]) for d in each.dims]) for each in (x, y)]
+        if forms[0] != forms[1]:
+            yield f"{name}: {forms[0]}, {forms[1]}"
+        elif x.dtype.kind != "f" and name not in NUMERICS and not np.array_equal(x[()], y[()]):
+            k = np.argmax(np.ravel(x[()] != y[()]))
+            yield f"{name}: {np.ravel(x[()])[k]}, {np.ravel(y[()])[k]}"
+
+
+def _attributes_differ(x: Any, y: Any, name: str) -> Iterator[str]:
+    for key in sorted({*x.attrs, *y.attrs} - {*UNLIKE}):
+        a, b = x.attrs.get(key), y.attrs.get(key)
+        same = np.isclose(a, b, rtol=SAME) if isinstance(a, float) and isinstance(b, float) else np.array_equal(a, b)
+        if not same:
+            yield f"{name} has {key}: {a}, {b}"
+
+
 def differences(cable: Result, network: Result, same: float = SAME) -> list[Difference]:
     """Datasets that differ by more than `same` of their scale, the worst first, and events."""
-    line, found = network.lines[LINE], list[Difference]()
+    line, found = dict(network.lines).get(LINE, network), list[Difference]()
     sections = yaml.safe_load(cable.scene_text)["cable"]["sections"]
     weight = GRAVITY * sum(x["mass"] * x["length"] for x in sections)
     force = max(float(np.abs(cable["tension"]).max()), weight)  # a line that falls has hardly any tension

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.combinations.networks import both, differences, events_differ
+from tests.combinations.networks import both, both_files, differences, events_differ, exact_scene, files_differ
 from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, S, scene_of
 from tests.problems import tables_with
 
@@ -50,6 +51,31 @@ def test_a_cable_is_a_network_of_one_line(name: str) -> None:
     cable, network = both(tables)
     assert [str(x) for x in differences(cable, network)] == []
     assert events_differ(cable, network) == []
+
+
+ENDS = {"force": {"kind": "horizontal_force", "end": "start"}, "angle": {"kind": "declination", "end": "end"}}
+GAUGES = [[0.0, 0.0], [5.0, 2.0]]
+# Each of another kind of dataset, attribute or event.
+FILES: dict[str, dict[str, Any]] = {
+    "rod": {"title": "a rod", "output.history": [5.0], START: CLAMP},
+    "catenary": {"model": "catenary"},
+    "zones": SCENES["zones that move"],
+    "seabed": FEATURES["seabed"][0],
+    "payout": FEATURES["payout"][0],
+    "waves": FEATURES["waves"][0] | {"output.elevation": GAUGES},
+    "quantities": FEATURES["seabed"][0]
+    | {"output.quantities": ENDS | {"over": {"kind": "clearance", "point": [5, 0, 0]}}},
+    "let go": FEATURES["release"][0],
+    "pipe": FEATURES["water"][0],
+    "clumps and sections": FEATURES["clump"][0],
+    "obstacle": FEATURES["obstacle"][0],
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_file_is_that_of_a_cable(name: str, tmp_path: Path) -> None:
+    scene = exact_scene(tables_with(scene_of(), FILES[name]))
+    assert files_differ(*both_files(scene, tmp_path)) == []
 
 
 def test_at_rest() -> None:
