@@ -114,7 +114,10 @@ def _interface(scene: Scene | System) -> dict[str, Any]:
 
 def _points(made: Any) -> dict[str, Any]:
     points = {
-        name: {"settable": made.settable(name), "position": np.round(made.point(name).position, 12).tolist()}
+        name: {
+            "settable": "position" in made.settable(name),
+            "position": np.round(made.point(name).position, 12).tolist(),
+        }
         for name in made.scene.points
     }
     return {"points": points, "lines": [*made.scene.lines]}

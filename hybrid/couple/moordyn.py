@@ -24,7 +24,8 @@ from hybrid.kernels.state.state import Floats
 from hybrid.scene.analysis import CatenaryModel
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import parse_either
-from hybrid.simulation.system_stepping import PointState, SystemSimulation
+from hybrid.simulation.stepped_points import PointState
+from hybrid.simulation.system_stepping import SystemSimulation
 
 # s: the longest step, and how long a system may be stepped.
 LONGEST_STEP, DURATION = 0.05, 1e7

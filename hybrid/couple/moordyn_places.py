@@ -8,7 +8,7 @@ from hybrid.interop.moordyn.bodies import rotation_of
 from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import frame_of
 from hybrid.simulation.stepped import CableState
-from hybrid.simulation.system_stepping import PointState
+from hybrid.simulation.stepped_points import PointState
 
 
 def frame_of_angles(angles: Floats) -> Floats:

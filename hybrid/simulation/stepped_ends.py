@@ -15,7 +15,7 @@ from hybrid.model.driven_end import STILL, DrivenEnd, rotation_vector
 from hybrid.model.sea import Surroundings
 from hybrid.scene.schema import Scene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
-from hybrid.simulation.interface_stiffness import interface_stiffness
+from hybrid.simulation.interface_stiffness import interface_stiffness, step_taken
 from hybrid.simulation.payout import length_asked
 from hybrid.simulation.set_obstacles import SettableObstacles
 from hybrid.simulation.stepped import EndForces, Triple, numbers, one_thread, triple, vector
@@ -227,7 +227,8 @@ class SteppedEnds(SettableObstacles):
             raise ValueError("the stiffness of a line over a sheave that turns freely is not worked out")
         if not run.model.ends.values.held[k]:
             raise ValueError(f"ends.{end} is not held: it has no stiffness that is felt from outside")
-        return interface_stiffness(run, k, run.resolution.step)
+        taken = step_taken(run.run.clock, float(run.run.clock.last_dt), run.resolution.step, run.controlled)
+        return interface_stiffness(run.model, k, (run.before, run.state), taken, run.t)
 
     def _turns(self, k: int) -> bool:
         """Whether end k holds the direction of a rod."""

@@ -47,6 +47,7 @@ from hybrid.simulation.stepped import (
     tension_now,
 )
 from hybrid.simulation.stepped_ends import SteppedEnds
+from hybrid.simulation.switch import as_network
 from hybrid.simulation.system_stepping import SystemSimulation
 from hybrid.simulation.transient import StepFailed
 from hybrid.store.hdf5_file import check_target
@@ -79,7 +80,7 @@ class Simulation(SteppedEnds):
 
     def __new__(cls, scene: SceneLike | System, *args: Any, **more: Any) -> Any:
         read = as_scene_or_system(scene)
-        if not isinstance(read, Scene):
+        if not isinstance(read, Scene) or as_network():
             return SystemSimulation(read, *args, **more)
         made = super().__new__(cls)
         made.scene = read

@@ -48,6 +48,11 @@ class Failures:
                 found = True
         return found
 
+    def release(self, weakness: Weakness, why: str) -> None:
+        """Break now what a program outside lets go; why: for the event."""
+        self.all = (*self.all, weakness)
+        self._break(len(self.all) - 1, why)
+
     def _force(self, x: Weakness) -> float:
         """Force of the ends on their point, N."""
         reports = [(self._run.solver.work[line].report, FORCE_A + 3 * k) for line, k in x.ends

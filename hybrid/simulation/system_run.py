@@ -23,6 +23,7 @@ from hybrid.kernels.state.state import Floats, Moves, Work, state_for
 from hybrid.kernels.step.accept import MANY
 from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
+from hybrid.model.failure import Weakness
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import SAME_STOP, equal_steps, output_times
 from hybrid.model.system import SystemModel, SystemResolution, build_system
@@ -746,8 +747,17 @@ class SystemRun:
         if self.payout is not None:
             self.payout.accepted()
         if self.failures.all and self.failures.due(step):
-            self.restart_steps()
-            self.other = self.state.copy()
+            self._restart_loose()
+
+    def release(self, weakness: Weakness, why: str) -> None:
+        """Let ends of lines go now, between two steps; why: for the event.  LineFailed."""
+        self.failures.release(weakness, why)
+        self._restart_loose()
+
+    def _restart_loose(self) -> None:
+        """Go on after something has come loose."""
+        self.restart_steps()
+        self.other = self.state.copy()
 
     def restart_steps(self) -> None:
         """Loads, or what holds the lines, are others now: accelerations jump."""
@@ -787,16 +797,24 @@ class SystemRun:
 
     def failed(self, failed: LineFailed) -> ComputationError:
         """What a failure becomes: a file with all that there is, and an error that names the line."""
-        error = self.file.in_words(named(failed, self.model, left=self._snapshot(failed.outcome)))
+        error = self.error_of(failed)
+        self.finish_failed(failed, str(error))
+        return error
+
+    def error_of(self, failed: LineFailed) -> ComputationError:
+        """An error that names the line, with a snapshot of the last good state."""
+        return self.file.in_words(named(failed, self.model, left=self._snapshot(failed.outcome)))
+
+    def finish_failed(self, failed: LineFailed, text: str) -> None:
+        """Close the file with all that there is; text: of the failure."""
         with suppress(LineFailed):
             self._record_last()
         for line in self.lines:
             if line.number == failed.line or failed.line < 0:
                 s = failed.s or 0.0
-                line.events.event(failed.t or 0.0, s, s, failed.outcome.name.lower(), str(error))
+                line.events.event(failed.t or 0.0, s, s, failed.outcome.name.lower(), text)
         with suppress(ResultError):
-            self.finish("failed", str(error))
-        return error
+            self.finish("failed", text)
 
     def _record_last(self) -> None:
         """Record the last good state, in place of the output that would have come next."""

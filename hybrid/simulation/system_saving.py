@@ -9,16 +9,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.kernels.state.state import Floats
+from hybrid.model.driven_end import DrivenEnd
 from hybrid.model.system import SystemModel
 from hybrid.simulation.deferred_recorder import DeferredRecorder
-from hybrid.simulation.stepped import Triple
+from hybrid.simulation.set_obstacles import Course
 from hybrid.simulation.system_checkpoint import checkpoint, set_state
 from hybrid.simulation.system_run import SystemRun
+from hybrid.solve.joined import SystemState
 from hybrid.store.writer import Recorder
 
 
 class SavedSystem(NamedTuple):
-    """What `SystemSimulation.save` returns."""
+    """What `Simulation.save` returns."""
 
     owner: object  # what tells one simulation from another
     number: int  # of the state that was final then
@@ -27,14 +29,14 @@ class SavedSystem(NamedTuple):
     waiting: tuple[Any, ...]  # rows of each line that are not recorded yet
     marks: tuple[int, ...]  # of the recorders
     stops: tuple[float, ...]  # s, that are still to come
-    paths: Mapping[str, list[Floats]]  # of points that are set from outside, for each end there
-    next: Mapping[str, tuple[Triple, Triple | None]]  # where points are to be at the end of the next step
+    before: SystemState  # the state before the last step
+    stood: tuple[tuple[Floats, Floats], ...]  # positions (2, 3) m and frames (2, 9) of the ends of each line
+    loads: tuple[Any, ...]  # of these ends
+    driven: Mapping[str, list[DrivenEnd]]  # what moves points that are set from outside, for each end there
+    paths: Mapping[str, list[Floats]]  # on which they are
+    next: Mapping[str, Course]  # where points are to be at the end of the next step
     obstacles: Any  # what is set of them
     wound: Mapping[int, tuple[float | None, float]]  # length (m) and rate (m/s) that lines are to have then
-
-    def place(self, line: str, end: str) -> Floats:
-        """Position (3,) m of a held end."""
-        return np.asarray(self.run["lines"][line]["ends"]["position"][int(end == "end")])
 
 
 def defer(run: SystemRun) -> None:
@@ -82,7 +84,9 @@ def kept(run: SystemRun) -> dict[str, Any]:
     run.gather_events()
     return {
         "run": copied(checkpoint(run)), "model": run.model, "waiting": tuple(line.waiting() for line in run.lines),
-        "marks": tuple(recorder.mark() for recorder in recorders(run)),
+        "marks": tuple(recorder.mark() for recorder in recorders(run)), "before": run.other.copy(),
+        "stood": tuple((x.ends.values.position.copy(), x.ends.values.frame.copy()) for x in run.model.models),
+        "loads": tuple(model.ends.keep_loads() for model in run.model.models),
     }  # fmt: skip
 
 
@@ -107,7 +111,12 @@ def bring_back(run: SystemRun, saved: SavedSystem) -> None:
         if moving:
             run.renew_other()
         run.make_solver()
+    for model, loads in zip(run.model.models, saved.loads, strict=True):
+        model.ends.bring_back_loads(loads, saved.run["t"])
     set_state(run, saved.run)
+    for old, then in zip(run.other.lines, saved.before.lines, strict=True):
+        for x, value in zip(old, then, strict=True):
+            x[:] = value
     for line, rows in zip(run.lines, saved.waiting, strict=True):
         line.wait_again(rows)
         line.model.sea.at(run.t)

@@ -183,13 +183,12 @@ class ZoneSwitching:
             saved["h"].min() > 0.0 and saved["kb"].min() >= 0.0 and strain.shape in (NO_STRAIN.shape, line.kb.shape)
         ):
             raise ValueError("lengths, stiffness or strains that no line has")
-        zones = self.zones
-        if relaxing is not None:
-            cells = np.zeros(line.h.size)
-            template = {"lack": cells, "rate": cells, "since": cells - np.inf, "keeps": cells > 0.0}
-            for name, x in matched(relaxing, template, "relaxing").items():
-                getattr(zones, name)[:] = x
-            zones.counts.relaxing = 1
+        zones, cells = self.zones, np.zeros(line.h.size)
+        at_rest = {"lack": cells, "rate": cells, "since": cells - np.inf, "keeps": cells > 0.0}
+        now = at_rest if relaxing is None else matched(relaxing, at_rest, "relaxing")
+        for name, x in now.items():  # of a run that has gone on since, too
+            getattr(zones, name)[:] = x
+        zones.counts.relaxing = relaxing is not None
         if (following := saved["following"]) is not None:
             needs = {"true": zones.true, "calm": zones.calm, "waves": zones.waves}
             found = matched(following, needs, "following")
@@ -199,8 +198,7 @@ class ZoneSwitching:
         self.let_review()  # whether rods may go is another matter now
         line.h[:], line.kb[:], line.force[:] = saved["h"], saved["kb"], saved["force"]
         zones.lengths[:] = line.h
-        if strain.size:
-            zones.strain[1], zones.counts.strained = strain, 1
+        zones.strain[1], zones.counts.strained = strain if strain.size else 0.0, bool(strain.size)
 
     def begin(self, ends: Ends, state: State) -> None:
         """Weigh the criteria of the first state."""

@@ -50,26 +50,67 @@ def system(duration: float = 1.0) -> hybrid.SystemSimulation:
 
 
 def test_several_lines_have_the_verbs_of_one_cable() -> None:
-    """`step` does the same of both, up to the duration; a verb of the other kind of scene says what to use."""
+    """`step` does the same of both, up to the duration; an end is a point; what is of one line asks for its name."""
     with system(0.22) as stepped, system(0.22) as advanced:
         assert [stepped.step() for _ in range(5)] == pytest.approx([0.05, 0.1, 0.15, 0.2, 0.22], abs=1e-12)
         assert [advanced.advance(t) for t in (0.05, 0.1, 0.15, 0.2, 0.22)]
         assert np.array_equal(stepped.line("line1").position, advanced.line("line1").position)
         with pytest.raises(ValueError, match="duration"):
             stepped.step()
-        for verb, instead in {"set_end": "set_point", "state": r"line\(name\)", "release": "break_at"}.items():
-            with pytest.raises(AttributeError, match=f"SystemSimulation has no '{verb}': use {instead}"):
-                getattr(stepped, verb)
-        with pytest.raises(AttributeError, match=r"SystemSimulation has no 'stepp'$"):
-            stepped.stepp()  # type: ignore[attr-defined]
+        for of_one in (lambda: stepped.state, lambda: stepped.length, stepped.frames, stepped.forces):
+            with pytest.raises(ValueError, match=r"several lines: name one, as in line\(name\)"):
+                of_one()
     with pytest.raises(ValueError, match="is over"):
         stepped.step()
-    data = hybrid.parse_scene(SCENE).model_dump(exclude_none=True)
-    with (
-        hybrid.Simulation(data) as cable,
-        pytest.raises(AttributeError, match="Simulation has no 'set_point': use set_end"),
-    ):
-        cable.set_point("end", PLACE)  # type: ignore[attr-defined]
+    places = []
+    with system(0.1) as lines:
+        for verb in (lines.set_point, lines.set_end):
+            saved = lines.save()
+            verb("point4", [PLACE[0], PLACE[1], PLACE[2] + 0.1])
+            lines.step()
+            places.append(lines.line("line1").position)
+            lines.restore(saved)
+    assert np.array_equal(places[0], places[1])
+
+
+def test_a_point_of_several_lines_is_let_go() -> None:
+    """By the program outside as by the scene, at the same time; the free end of one line is then pulled by a force."""
+    found = []
+    for broken in (False, True):
+        with several(broken) as lines:
+            lines.advance(0.2)
+            if not broken:
+                saved = lines.save()
+                lines.release("b")
+                lines.set_force("b", [3.0, 0.0, 0.0])
+                lines.advance(0.3)
+                lines.restore(saved)
+                lines.release("b")
+                with pytest.raises(ValueError, match=r"points\.b is not held: there is nothing to release"):
+                    lines.release("b")
+                with pytest.raises(ValueError, match=r"points\.b is not held: set_force acts on it"):
+                    lines.set_point("b", PLACE)
+            lines.advance(0.5)
+            found.append(lines.line("one").position)
+            assert [x.kind for x in lines.result().events].count("end released") == 1
+    assert found[0] == pytest.approx(found[1], abs=1e-9)
+
+
+def several(broken: bool) -> hybrid.SystemSimulation:
+    """Two ropes of their own, one of which comes off a point at 0.2 s if the scene says so."""
+    rope = {"length": 3.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e4, "damping": {"mass": 0.5}}
+    points = {"a": [0, 0, 0], "b": [2, 0, 0], "c": [0, 1, 0], "d": [2, 1, 0]}
+    tables: dict[str, Any] = {
+        "points": {name: {"position": x} for name, x in points.items()},
+        "lines": {
+            name: {"start": a, "end": b, "sections": [rope], "mesh": {"cells": 12}, "model": {"kind": "catenary", "slack": "warn"}}
+            for name, a, b in (("one", "a", "b"), ("other", "c", "d"))
+        },
+        "time": {"duration": 0.5, "step": 0.02},
+    }  # fmt: skip
+    if broken:
+        tables["points"]["b"]["break_at"] = {"time": 0.2}
+    return hybrid.SystemSimulation(tables)
 
 
 def uses_of_a_system(s: hybrid.SystemSimulation) -> Iterator[Callable[[], Any]]:

@@ -10,6 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.state.report import FORCE_A
+from hybrid.simulation.switch import as_network
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHIFT = 1e-5  # m
@@ -39,6 +40,18 @@ SCENES = {
 }  # fmt: skip
 
 
+def report_now(cable: Any) -> np.ndarray:
+    """Forces of the state of now: the report of a step is of the iterate before the last correction."""
+    if not as_network():
+        run = cable._loop.run
+        run.stepper.evaluate_forces(run.model.sea.at(run.t), run.model.ends.at(run.t), run.state)
+        return run.stepper.work.report
+    run = cable._run
+    run.ends_of_now()
+    run.solver.evaluate_forces(run.state, run.t)
+    return run.solver.work[0].report
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("end", ["start", "end"])
 @pytest.mark.parametrize("name", list(SCENES))
@@ -58,10 +71,7 @@ def test_it_is_what_differences_of_the_step_give(name: str, end: str) -> None:
 
         def force(shift: np.ndarray) -> np.ndarray:
             step(shift)
-            run = cable._loop.run
-            # The report of a step is of the iterate before the last correction.
-            run.stepper.evaluate_forces(run.model.sea.at(run.t), run.model.ends.at(run.t), run.state)
-            return run.stepper.work.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3].copy()
+            return report_now(cable)[FORCE_A + 3 * k : FORCE_A + 3 * k + 3].copy()
 
         step(np.zeros(3))
         found = cable.stiffness(end)

@@ -94,4 +94,4 @@ def test_two_threads_in_one_simulation_are_told_apart() -> None:
         assert any("another thread" in text for text in refused)
     with simulation(400) as alone:
         alone.advance(2.0)
-        assert np.array_equal(alone.state.position, cable._loop.run.state.r)
+        assert np.array_equal(alone.state.position, cable.state.position)

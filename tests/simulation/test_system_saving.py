@@ -163,7 +163,7 @@ def test_what_cannot_be_restored_is_refused() -> None:
         first, foreign = lines.save(), other.save()
         step(lines)
         for wrong in (foreign, None, "x", {}, object()):
-            with pytest.raises(ValueError, match="of this SystemSimulation"):
+            with pytest.raises(ValueError, match="of this Simulation"):
                 lines.restore(wrong)
         lines.save()
         with pytest.raises(ValueError, match="later save"):
