@@ -222,6 +222,16 @@ class Envelope:
         self.begin, self.start[:], self.bounds[:] = found["begin"], found["start"], found["bounds"]
         now[:], self.itself.itself.found[:] = found["now"], found["itself"]
 
+    def begin_at(self, t: float, model: Model, r: Floats, note: Callable[..., None]) -> None:
+        """Extremes begin at t (s), with nodes at r (N+1, 3) m, and an event says so; note: as Recorder.event.
+
+        Files of 0.6 have none.
+        """
+        self.begin = t
+        self.count_from(model, r)
+        text = f"the file has no extremes of the steps before t = {t:.6g} s: the envelope is of those after it"
+        note(t, 0.0, model.length, "envelope incomplete", text)
+
     # --- for the file -------------------------------------------------------------------------------
 
     def fixed(self) -> list[tuple[Field, np.ndarray]]:

@@ -19,13 +19,11 @@ from hybrid.store.named_arrays import Tree, matched
 SAME_NODE = 1e-9  # of the length: round-off of the place of a node
 # What the tree of a line calls names of the old one, and what that of the run does.
 OF_LINE = {x: x for x in ("state", "rho", "work", "power", "envelope", "ends", "first_energy", "torsion")}
-OF_LINE |= {"_stored": "stored", "watch": "noted"}
+OF_LINE |= {"_stored": "stored", "watch": "noted", "first_places": "first_places", "first_turns": "first_turns"}
 OF_RUN = {x: x for x in ("t", "steps", "changes", "cpu", "rho", "leg")} | {"dt": "last", "last": "interval"}
 # What becomes something else, and what follows from the scene, or is of the last step alone.
 TURNED_INTO_OTHERS = {"report", "tension", "twist", "control", "vibration", "lengths", "_turned", "_slackened", "mesh"}
 TURNED_INTO_OTHERS |= {"self_contact", "zoning", "payout", "plane", "push", "home", "correction"}
-# From where excursions and azimuths count, by their names behind that of the line.
-FIRST = {"first_places": "first", "first_turns": "turns"}
 LEFT_OUT = {"iterations", "floor", "_beyond"}
 
 
@@ -39,16 +37,13 @@ def as_of_line(saved: Mapping[str, Any], name: str, model: Model, weaknesses: Se
 
     model: of the line as the run begins; weaknesses: what may break. ValueError: it is of another line.
     """
-    known = {*OF_LINE, *OF_RUN, *TURNED_INTO_OTHERS, *FIRST, *LEFT_OUT}
+    known = {*OF_LINE, *OF_RUN, *TURNED_INTO_OTHERS, *LEFT_OUT}
     if odd := [x for x in saved if x not in known]:
         raise ValueError(f"{', '.join(odd)}: not in the checkpoint of any cable")
     _check_mesh(saved["mesh"], model)
     line = {new: saved[old] for old, new in OF_LINE.items() if old in saved}
-    quantities = {f"{name}/{new}": saved[old] for old, new in FIRST.items() if old in saved}
-    if isinstance(line.get("envelope"), dict):
-        line["envelope"] = dict(line["envelope"])
-        if (ranges := line["envelope"].pop("quantities", None)) is not None:
-            quantities[name] = ranges
+    line.setdefault("envelope", None)  # files of 0.6 have none, and no end had been let go in them
+    line["ends"] = {"released": np.zeros(2, int)} | line["ends"]
     if not line.get("torsion"):
         line.pop("torsion", None)
     contact = saved.get("self_contact")
@@ -60,8 +55,8 @@ def as_of_line(saved: Mapping[str, Any], name: str, model: Model, weaknesses: Se
         line["before"]["touch"] = np.zeros((1, 0)) if contact is None else contact["touch"][None]
     if saved.get("correction") is not None:
         line["correction"] = saved["correction"]
-    found = _of_run(saved) | {"lines": {name: line}, "quantities": quantities, "dry": [], "overlaps": [], "under": {}}
-    found["broken"] = _broken(saved["ends"], weaknesses)
+    found = _of_run(saved) | {"lines": {name: line}, "quantities": {}, "dry": [], "overlaps": [], "under": {}}
+    found["broken"] = _broken(line["ends"]["released"], weaknesses)
     found["vibrations"] = {name: saved["vibration"]} if "vibration" in saved else {}
     found["zones"] = {} if saved["zoning"] is None else {name: _zones(saved)}
     found["planes"] = {name: {"plane": saved["plane"], "home": saved.get("home"), "push": _push(saved["push"])}}
@@ -92,10 +87,9 @@ def _push(saved: Any) -> Any:
     return {"real": False} | saved if isinstance(saved, dict) else saved
 
 
-def _broken(ends: Mapping[str, Any], weaknesses: Sequence[Weakness]) -> list[int]:
-    """Numbers of what may break, of the ends that had been let go; a file of 0.6 does not say, and none had."""
-    none = np.zeros(2, int)
-    released = matched(ends.get("released", none), none, "ends/released")
+def _broken(saved: Any, weaknesses: Sequence[Weakness]) -> list[int]:
+    """Numbers of what may break, of the ends (2,) that had been let go."""
+    released = matched(saved, np.zeros(2, int), "ends/released")
     if not np.isin(released, (0, 1)).all():
         raise ValueError(f"ends that are let go: {released}")
     found = {x.ends[0][1]: k for k, x in enumerate(weaknesses)}

@@ -21,19 +21,23 @@ from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.old_checkpoints import as_of_line, is_of_cable
 from hybrid.simulation.restore import program, refused, resolution_tree
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.system_contact import let_touch
+from hybrid.simulation.system_contact import evaluate_forces, let_touch
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_points import Rotations
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_zones import SystemZones
 from hybrid.simulation.transient_checkpoint import FIRST_REPORT, FIRST_WORKS, zoning_of_today
 from hybrid.simulation.vibration_steps import VibrationsOfLines
+from hybrid.solve.run import no_extremes
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:  # what a run without winches does not load
     from hybrid.simulation.system_payout import SystemPayout
+
+
+REFERENCES = "first_places", "first_turns"  # of outputs of a line
 
 
 class KeptRun(RunOfLines, Protocol):
@@ -125,14 +129,31 @@ def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
     saved = {"quantities": run.quantities.unknown(), "under": {}, "overlaps": [], **saved}  # nor did it keep ranges
     saved["quantities"] = run.quantities.of_today(saved["quantities"])
     saved["lines"] = of_today(saved.get("lines"), template["lines"], saved["rho"])
-    for name, line in template["lines"].items():
-        if name in template["zones"]:
-            line["envelope"] = None  # of other meshes as well
+    for line in template["lines"].values():
+        line["envelope"] = None  # of other meshes as well, and of files of 0.6
+        line |= {x: np.full_like(line[x], np.nan) for x in REFERENCES if x in line}
         line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
         line["before"]["report"] = line["report"]
         if "self_contact" in line:
             line["self_contact"] = None  # as many places of friction as there are
     found = matched(dict(saved), template)
+    _check_told(run, found)
+    run.start_from(found["rest"])
+    if run.planes is not None:
+        run.planes.restore_planes(found["planes"])
+    run.make_solver()
+    set_state(run, found)
+    if any("report" not in _of(given, line.name) for line in run.lines):  # nor in one of 0.6, of a cable
+        evaluate_forces(run, "where the checkpoint is")
+        for line in run.lines:  # whose envelope is of the steps to come
+            line.books.extremes[:] = no_extremes(line.books.extremes.shape[2])
+    for line in run.lines:
+        if "imposed" not in _of(given, line.name).get("before", ()):  # not in files of an earlier program
+            line.impose_now()
+
+
+def _check_told(run: KeptRun, found: Mapping[str, Any]) -> None:
+    """ValueError: what has been told of names that the run does not have, or equal steps that cannot be."""
     if not (isinstance(found["dry"], list) and set(found["dry"]) <= set(run.system.bodies)):
         raise ValueError("dry: names of bodies were expected")
     if not (isinstance(found["overlaps"], list) and all(isinstance(x, str) for x in found["overlaps"])):
@@ -141,14 +162,6 @@ def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
         raise ValueError("under: names of points were expected")
     if not (0.0 <= found["leg"][0] <= found["t"] and found["leg"][1] >= 0 and found["steps"] >= 0):
         raise ValueError(f"leg: a time up to {found['t']:g} s was expected")
-    run.start_from(found["rest"])
-    if run.planes is not None:
-        run.planes.restore_planes(found["planes"])
-    run.make_solver()
-    set_state(run, found)
-    for line in run.lines:
-        if "imposed" not in _of(given, line.name).get("before", ()):  # not in files of an earlier program
-            line.impose_now()
 
 
 def _begun(run: KeptRun) -> list[list[int]]:
@@ -193,7 +206,8 @@ def of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:
             line = {"torsion": mine["torsion"]} | line
         if mine is not None:
             before = line.get("before", {})
-            line = {"rho": rho} | line | {"before": mine["before"] | before if isinstance(before, dict) else before}
+            older = {"rho": rho, "report": mine["report"]} | {x: mine[x] for x in REFERENCES if x in mine}
+            line = older | line | {"before": mine["before"] | before if isinstance(before, dict) else before}
         if mine is not None and isinstance(line.get("noted"), dict):
             line = line | {"noted": mine["noted"] | line["noted"]}
         found[name] = line

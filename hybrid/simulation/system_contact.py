@@ -203,19 +203,20 @@ def renew_solver(run: RunOfLines, after: str) -> None:
     run.make_solver()
     run.solver.bodies[:], run.solver.body_work[:] = bodies, work
     run.renew_other()
-    _evaluate_forces(run, after)
+    evaluate_forces(run, after)
 
 
 def go_on_as_attached(run: RunOfLines, after: str) -> None:
     """Go on with the same solver and states in mid-motion, for lines that have changed; after: as of `renew_solver`."""
     run.gather_events()
     turns = run.loop.turns
-    _evaluate_forces(run, after)
+    evaluate_forces(run, after)
     run.solver.take_turns(turns)
     run.loop.stand_after_change()
 
 
-def _evaluate_forces(run: RunOfLines, after: str) -> None:
+def evaluate_forces(run: RunOfLines, after: str) -> None:
+    """The forces of the state of now; after: as of `renew_solver`.  LineFailed: there are none."""
     for model in run.model.models:
         model.ends.at(run.t)
         model.sea.at(run.t)

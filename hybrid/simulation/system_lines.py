@@ -580,8 +580,14 @@ class LineResult:
             "ends": self.model.ends.checkpoint(), "first_energy": self.observer.first_energy or 0.0,
             **({"torsion": {name: x.copy() for name, x in answers.items()}} if answers else {}),
             **({} if self.contact is None else {"self_contact": self.contact.checkpoint(t)}),
-            **({} if self.correction is None else {"correction": self.correction.checkpoint()}),
+            **({} if self.correction is None else {"correction": self.correction.checkpoint()}), **self.references(),
         }  # fmt: skip
+
+    def references(self) -> dict[str, Floats]:
+        """From where excursions, m, and from which azimuths, deg, count that are recorded with the line."""
+        found = self.observer.quantities
+        places = {} if found is None else {"first_places": found.first, "first_turns": found.turns}
+        return {name: x.copy() for name, x in places.items() if x.size}
 
     def restore(self, saved: Mapping[str, Any], work: Work, t: float, joints: Sequence[int]) -> None:
         """Go on at t (s) as `checkpoint` has written; joints: as of `JoinedLine`.  ValueError: that cannot be."""
@@ -593,10 +599,16 @@ class LineResult:
         books.twist[0], books.touch[:1] = before["twist"], before["touch"]
         for name, x in answers_of(work.torsion).items():
             x[:] = saved["torsion"][name]
-        self.envelope.restore(saved["envelope"], books.extremes)
+        if saved["envelope"] is not None:
+            self.envelope.restore(saved["envelope"], books.extremes)
+        else:
+            self.envelope.begin_at(t, model, saved["state"]["r"], self.events.event)
         books.start[:] = self.envelope.start_of(model.nodes)
         books.placed[:] = self.diagnostics.restore(saved["noted"], books, books.start)
         self.observer.first_energy = saved["first_energy"]
+        if (quantities := self.observer.quantities) is not None and self.references():
+            quantities.first[:] = saved.get("first_places", quantities.first)
+            quantities.turns[:] = saved.get("first_turns", quantities.turns)
         if self.contact is not None:
             self.contact.restore(saved["self_contact"], t)
         if self.correction is not None:

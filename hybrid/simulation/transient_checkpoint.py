@@ -173,10 +173,7 @@ def _restore_envelope(run: Transient, saved: Mapping[str, Any] | None) -> None:
     if envelope is None:
         return
     if saved is None:
-        envelope.begin = run.t
-        envelope.count_from(run.model, run.state.r)
-        text = f"the file has no extremes of the steps before t = {run.t:.6g} s: the envelope is of those after it"
-        run.events.event(run.t, 0.0, run.model.length, "envelope incomplete", text)
+        envelope.begin_at(run.t, run.model, run.state.r, run.events.event)
     else:
         envelope.restore(saved, books.extremes)
     books.start[:] = envelope.start_of(nodes)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,12 +13,14 @@ from bits import Stopping
 from test_self_contact_default import led_through
 
 import hybrid
-from hybrid.scene.read import as_scene
+from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.short_form import network_of
 from hybrid.simulation.old_checkpoints import as_of_line
-from hybrid.simulation.progress import Progress
-from hybrid.store.checkpoint import SLOTS, Checkpoint, read_checkpoint, write_slot
-from hybrid.store.named_arrays import pack
+from hybrid.simulation.progress import Progress, ProgressReporter
+from hybrid.simulation.run_file import Cable
+from hybrid.simulation.system_run import Recording, SystemRun
+from hybrid.store.checkpoint import Checkpoint, read_checkpoint
+from hybrid.store.writer import WriteMode
 from tests.combinations.networks import differences, events_differ
 from tests.combinations.pairs import END, START, S, scene_of
 from tests.problems import tables_with
@@ -54,6 +55,7 @@ CASES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "a rope that remembers": (("polyester", "vortices"), {}),
     "a sheave": (("sheave", "slip"), {}),
     "in a plane": ((), FLAT),
+    "what leaving bending out does": (("zones",), {"output.errors": True}),
     "in a plane, steps that follow": (("chosen steps",), FLAT | {"dimension": 2}),
 }
 
@@ -81,16 +83,11 @@ def gone_on(tables: Mapping[str, Any], t: float, folder: Path) -> tuple[hybrid.R
     """A run of a cable, and its network that goes on from where the cable was stopped after t (s)."""
     scene = as_scene(tables_with(tables, {"output.exact": True}))
     old = cut_off(scene, folder / "cable.h5", t)
-    mine = cut_off(network_of(scene), folder / "network.h5", old.state["t"] - 1e-6)._asdict()
-    assert abs(mine["state"]["t"] - old.state["t"]) < 1e-9 and "lines" not in old.state
-    data = pack(mine | {"state": old.state, "resolution": old.resolution})
-    gc.collect()  # results that were stopped hold their files
-    with h5py.File(folder / "network.h5", "r+", libver=("v110", "v110")) as file:
-        for name in SLOTS:
-            file[name].resize(max(len(data), file[name].shape[0]), axis=0)
-            file[name][:] = 0
-        write_slot([file[name] for name in SLOTS], mine["number"], data)
-    return hybrid.run(scene), hybrid.resume(folder / "network.h5")
+    assert 0.9 * t < old.state["t"] <= t + 0.05 and "lines" not in old.state
+    recording = Recording(WriteMode({}), folder / "cable.h5", planes=True, error=True, cable=Cable(scene))
+    run = SystemRun(network_of(scene), folder / "network.h5", scene_text(scene), True, None, recording)
+    run.record_motion(ProgressReporter(None, 1.0), lambda: False)
+    return hybrid.run(scene), hybrid.open(folder / "network.h5")
 
 
 @pytest.mark.long  # 0.5 s each
@@ -103,7 +100,7 @@ def test_a_network_goes_on_where_a_cable_was_stopped(
     monkeypatch.setattr("hybrid.simulation.time_loop.WORK", 1)
     cable, network = gone_on(tables_with(scene_of(*features), more), 0.33, tmp_path)
     assert [str(x) for x in differences(cable, network)] == []
-    assert events_differ(cable, network) == []
+    assert "output.errors" in more or events_differ(cable, network) == []  # of runs to compare with
     assert len(cable.times) > 4 and np.ptp(cable.position[3:, 3:-3], axis=0).max() > 1e-4
 
 

@@ -1,6 +1,8 @@
 """Result files of releases: what each of them can still be used for.
 
-tests/data holds a file of 0.4.0 and of 0.5.0, and of 0.6.0 one that was stopped after 0.5 s of 1 s by Ctrl-C.  Whoever
+tests/data holds a file of 0.4.0 and of 0.5.0, and of 0.6.0 one that was stopped after 0.5 s of 1 s by Ctrl-C.  Of 1.0.0
+it has two that were stopped, whose older checkpoint is blank: one with zones that move, in steps of 0.02 s, and one in
+a plane, in steps that follow the motion.  Whoever
 changes the format of checkpoints adds one of the release before, and says here what becomes of it.
 """
 
@@ -97,3 +99,24 @@ def test_a_file_of_0_6_is_resumed(other: bool, tmp_path: Path, monkeypatch: pyte
         if other:
             (event,) = (e for e in result.events if e.kind == OTHER_PROGRAM)
             assert "0.6.0" in event.text and "9.9.9" in event.text and event.t == point.t
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "stopped"), [("zones", 1.04), ("plane", 0.7)])
+def test_a_file_of_1_0_is_resumed(name: str, stopped: float, tmp_path: Path) -> None:
+    """Zones that move, friction on a bed, quantities and an end that was let go; a plane and steps that follow."""
+    path = kept(f"result_1.0_{name}.h5.gz", tmp_path)
+    with opened(path) as file:
+        point = read_checkpoint(file)
+    assert point.program.startswith("1.0.0 ") and abs(point.state["t"] - stopped) < 0.05
+    with hybrid.resume(path) as result, hybrid.run(hybrid.parse_scene(result.scene_text)) as fresh:
+        assert result.status == "complete" and set(result.names) == set(fresh.names)
+        assert np.array_equal(result.times, fresh.times) and result.zones[-1] == fresh.zones[-1]
+        assert len(result["steps/t"]) == len(fresh["steps/t"])
+        names = "position velocity tension curvature bending_moment energy/kinetic work/scheme envelope/tension_max"
+        for key in (*names.split(), *(x for x in fresh.names if x.startswith("quantities/"))):
+            scale = np.nanmax(np.abs(fresh[key]))
+            assert np.allclose(result[key], fresh[key], rtol=0, atol=SAME * scale, equal_nan=True), key
+        late = result.times > point.t
+        assert np.ptp(fresh.position[late], axis=0).max() > 0.05, "nothing moves after the checkpoint"
+        assert [e.t for e in result.events if e.kind == OTHER_PROGRAM] == [point.t]
