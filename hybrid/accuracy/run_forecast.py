@@ -31,7 +31,11 @@ from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import kernels_of
+from hybrid.simulation.switch import as_network
+from hybrid.simulation.system_run import Recording, SystemRun
 from hybrid.simulation.time_loop import TimeLoop
+from hybrid.simulation.transient import Transient
+from hybrid.solve.system_statics import LineFailed
 from hybrid.store.comparison_recorder import ComparisonRecorder
 
 if TYPE_CHECKING:  # its tables take long to make
@@ -108,7 +112,7 @@ class _Probe(Case):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene, None)
-        self.loop: TimeLoop | None = None  # the last
+        self.loop: TimeLoop | SystemRun | None = None  # the last
         self.at_rest: tuple[Model, State] | None = None  # where it begins, if that is an equilibrium
         self._end = np.inf
         self._most_steps = np.inf
@@ -118,8 +122,8 @@ class _Probe(Case):
     def _is_used_up(self) -> bool:
         now, steps = clock.process_time(), 0
         if self.loop is not None:
-            steps = self.loop.run.steps
-            self.seen.append(Seen(now, steps, self.loop.run.t))
+            steps = _run_of(self.loop).steps
+            self.seen.append(Seen(now, steps, _run_of(self.loop).t))
         if steps < self._most_steps and self._end + ONCE < now < np.inf and len(self.seen) == 2:
             self._end = now + FIRST_STEPS  # what is done once, as compiling, is no cost of a step
         return steps >= self._most_steps or now > self._end
@@ -133,9 +137,42 @@ class _Probe(Case):
         self.seen = [Seen(clock.process_time(), 0, 0.0)]
         return self.loop
 
-    def first_steps(self, resolution: Resolution) -> tuple[TimeLoop, float, float]:
+    def _network_run(self, *args: Any, **kwargs: Any) -> SystemRun:
+        self.loop = super()._network_run(*args, **kwargs)
+        self.seen = [Seen(clock.process_time(), 0, 0.0)]
+        return self.loop
+
+    def _first_steps_of_network(self, resolution: Resolution) -> tuple[SystemRun, float, float]:
+        """As `first_steps`."""
+        begin = begun = clock.process_time()
+        self.allow(np.inf)
+        run = self._network_run(resolution, None, Recording(touches=self.touches_itself))
+        (line,), (model,) = run.state.lines, run.model.models
+        self.at_rest = None if run.found is None else (model, line.copy())
+        known = resolution.local is None and model.payout is None
+        self.allow(FIRST_STEPS, ENOUGH_STEPS if known else np.inf)
+        try:
+            run.begin_motion()
+            begun = clock.process_time()  # the first state is made once, however many steps there are
+            self.seen = [Seen(begun, run.steps, run.t)]
+            for stop in run.stops():
+                run.go_to(stop, self._look)
+        except KeyboardInterrupt:
+            pass
+        except LineFailed as failed:
+            raise run.failed(failed) from None
+        self.seen.append(Seen(clock.process_time(), run.steps, run.t))
+        return run, begun - begin, run.steps * _cost_of_a_step(self.seen)
+
+    def _look(self) -> None:
+        if self._is_used_up():
+            raise KeyboardInterrupt
+
+    def first_steps(self, resolution: Resolution) -> tuple[TimeLoop | SystemRun, float, float]:
         """The loop of a result after its first steps; s of processor time before them, and of so many without what is
         done once."""
+        if as_network():
+            return self._first_steps_of_network(resolution)
         begin = clock.process_time()
         self.allow(np.inf)  # the budget of the pre-run may be used up, and the equilibrium has none
         model, equilibrium, switching = self._start(resolution)
@@ -178,7 +215,7 @@ def _measured(scene: Scene, found: Plan) -> Plan:
     duration = scene.require_time().duration
     survey += still
     steps = _steps(scene, resolution, loop, coarse, case.seen)
-    motion = steps * _dearer(found) * spent / max(loop.run.steps, 1)
+    motion = steps * _dearer(found) * spent / max(_run_of(loop).steps, 1)
     seconds, most = _of_passes(scene, setup, motion, duration / scene.output_interval, found)
     if scene.contact.self:  # by name: the first steps show nothing of it
         seconds, most = seconds + (TOUCHING - 1.0) * motion, most + (MOST_TOUCHING - 1.0) * motion
@@ -209,31 +246,39 @@ def _dearer(found: Plan) -> float:
     return mean / first
 
 
+def _run_of(loop: TimeLoop | SystemRun) -> Transient | SystemRun:
+    """What counts its steps."""
+    return loop if isinstance(loop, SystemRun) else loop.run
+
+
 def _steps(
-    scene: Scene, resolution: Resolution, loop: TimeLoop, coarse: TimeLoop | None, seen: Sequence[Seen]
+    scene: Scene, resolution: Resolution, loop: TimeLoop | SystemRun, coarse: TimeLoop | SystemRun | None,
+    seen: Sequence[Seen],
 ) -> float:  # fmt: skip
     """Steps of the result, which has come as far as its loop.
 
     coarse: of the mesh pre-run, whose steps, longer by one factor, show how many each part of the motion asks for.
     seen: of its loop.
     """
-    run, duration = loop.run, scene.require_time().duration
+    run, duration = _run_of(loop), scene.require_time().duration
     if run.t >= duration:
         return float(run.steps)
     if resolution.local is None:
         return float(count_steps(scene))
     rate = _steps_a_second(seen)
     if run.steps < SETTLED:  # they still grow: not shorter than the next is to be
-        rate = min(rate, 1.0 / float(run.run.clock.next_dt))
+        steps = run.loop if isinstance(run, SystemRun) else run.run
+        rate = min(rate, 1.0 / float(steps.clock.next_dt))
     linear = run.steps + rate * (duration - run.t)
-    if coarse is None or coarse is loop or not coarse.run.steps:
+    if coarse is None or coarse is loop or not _run_of(coarse).steps:
         return linear
-    assert isinstance(coarse.recorder, ComparisonRecorder)
-    times = coarse.recorder.steps[:, 0]
+    recorder = coarse.lines[0].recorder if isinstance(coarse, SystemRun) else coarse.recorder
+    assert isinstance(recorder, ComparisonRecorder)
+    times = recorder.steps[:, 0]
     passed = int((times <= run.t).sum())
     if not passed:
         return linear
-    return run.steps * times.size / passed * duration / max(coarse.run.t, 1e-9 * duration)
+    return run.steps * times.size / passed * duration / max(_run_of(coarse).t, 1e-9 * duration)
 
 
 def _of_passes(scene: Scene, setup: float, motion: float, outputs: float, found: Plan) -> tuple[float, float]:
@@ -263,9 +308,6 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     """The same of several lines: their first steps, as often as all runs would take them."""
     if found.cells > MOST_CELLS or not is_warm(kernels_of(system)):
         return found
-    from hybrid.simulation.system_run import Recording, SystemRun
-    from hybrid.solve.system_statics import LineFailed
-
     time, begin = system.require_time(), clock.process_time()
     try:
         run = SystemRun(system, None, "", moves=True, recording=Recording(planes=True))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -57,6 +57,7 @@ from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import program, refused, require_same, resolution_from, resolution_tree, restored_parts
 from hybrid.simulation.result_checks import damped_vibrations
 from hybrid.simulation.result_file import STEP_FIELDS, mesh_fields, result_recorder
+from hybrid.simulation.run_file import AnyRecorder, Cable
 from hybrid.simulation.run_sample import (
     ALL,
     COMPARED,
@@ -111,6 +112,16 @@ MOST_IN_MEMORY = 1_000_000
 Begun = Callable[[TimeLoop, Equilibrium | None], None]
 
 
+class Computed(NamedTuple):
+    """What is asked of the run of a complete result."""
+
+    resolution: Resolution
+    model: Model  # at its end
+    steps: int
+    zones_move: bool
+    doubt: Floats  # of `RunSample`
+
+
 class Case:
     """One scene in motion, computed as often and as finely as it takes."""
 
@@ -162,8 +173,11 @@ class Case:
         first = self._takes_its_place(target)
         begin = self._begin_result(resolution, first)
         kept = before or {} if isinstance(target, Path) else None
-        late = not (first and self.progress.heard)
-        loop, recorder, equilibrium = self.prepare(resolution, target, WriteMode(kept, late, unseen=not first))
+        mode = WriteMode(kept, late=not (first and self.progress.heard), unseen=not first)
+        if as_network():
+            recording = Recording(mode, pending=ERROR_ESTIMATE if before else "", notes=self.notes)
+            return self._move(self._network_run(resolution, target, recording), begin, first)
+        loop, recorder, equilibrium = self.prepare(resolution, target, mode)
         loop.recorder = recorder
         if isinstance(recorder, Recorder):
             recorder.amended = self.beside_result is not None
@@ -173,12 +187,17 @@ class Case:
                 begun(loop, equilibrium)
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
+        waits = self._take_late_file(recorder, first)
+        return self._compared(_of_cable(loop.run), target, clock.process_time() - begin, waits)
+
+    def _take_late_file(self, recorder: AnyRecorder, first: bool) -> LateFile | None:
+        """The file of a complete result that has still to be put in its place; first: as of `_begin_result`."""
         waits = recorder.late_file if isinstance(recorder, Recorder) else None
         if first:
             self.late_file = waits
         else:
             self.late_finer = waits
-        return self._compared(loop.run, target, clock.process_time() - begin, waits)
+        return waits
 
     def _takes_its_place(self, target: Target) -> bool:
         """Whether a result is where it belongs, and not beside one that it may replace."""
@@ -229,6 +248,8 @@ class Case:
 
     def resume(self, source: Path, target: Path, before: Tree | None = None) -> RunSample:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
+        if as_network():
+            return self._resume_network(source, target, before)
         with opened(source) as file:
             point = read_checkpoint(file)
             require_same(point, self._files, self.criterion, source)
@@ -264,7 +285,7 @@ class Case:
                 recorder.event(point.t, 0.0, model.length, OTHER_PROGRAM, f"{text}: the last digits may be others")
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
-        return self._compared(loop.run, target, loop.cpu, None)
+        return self._compared(_of_cable(loop.run), target, loop.cpu, None)
 
     def is_unfinished(self, source: Path, resolution: Resolution) -> bool:
         """Whether a file holds a run of this case, with this resolution, that was cut off."""
@@ -280,7 +301,8 @@ class Case:
                 point = read_checkpoint(file)
         except ResultError:
             return False
-        return pack(point.resolution) == pack(resolution_tree(resolution))
+        tree = resolution_tree(resolution)
+        return pack(point.resolution) in (pack(tree), pack({LINE: tree}))
 
     def _begin_result(self, resolution: Resolution, first: bool) -> float:
         """The pass of a result begins; s of processor time.  first: it takes the place of one that may be there."""
@@ -323,7 +345,7 @@ class Case:
         }
         return {path: digest_of(Path(path)) for path in sorted(paths)}
 
-    def _compared(self, run: Transient, target: Target, cpu: float, late: LateFile | None) -> RunSample:
+    def _compared(self, run: Computed, target: Target, cpu: float, late: LateFile | None) -> RunSample:
         """What is to be compared of a complete result; late: it has no file yet."""
         resolution, cells = run.resolution, compared_cells(run.model)
         if not wants_errors(self.scene):
@@ -352,18 +374,18 @@ class Case:
         values, model_error = split_outputs(found)
         notes: Notes = ()
         catenary, bound = np.zeros(0), 0.0
-        if run.switching is not None:
+        if run.zones_move:
             bound = resolution.zones * run.model.length
-        if resolution.local is not None or run.switching is not None:
+        if resolution.local is not None or run.zones_move:
             whole = Result(late.path, contents=late.contents) if late is not None else None
             with written_result(target) if whole is None else nullcontext(whole) as result:
                 if resolution.local is not None:
                     notes = damped_vibrations(result)
-                if run.switching is not None:
+                if run.zones_move:
                     catenary = np.array([catenary_share(x) for x in result.zones])
         return RunSample(
             resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, bound, notes, forces=forces,
-            catenary=catenary, doubt=doubt_of(run), touches=touches, places=self.places, at_edges=missed,
+            catenary=catenary, doubt=run.doubt, touches=touches, places=self.places, at_edges=missed,
             extremes=extremes_about(held, self.points.s),
         )  # fmt: skip
 
@@ -465,11 +487,40 @@ class Case:
     def _network_run(self, resolution: Resolution, target: Target | None, recording: Recording) -> SystemRun:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
         system, changes = self.network(self.scene), [replace(x, scene=self.network(x.scene)) for x in self.changes]
-        recording = recording._replace(planes=True, error=True)
-        if recording.source is None:
-            recording = recording._replace(start=self._network_start(resolution))
-        finely = SystemResolution({LINE: resolution})
-        return SystemRun(system, target, self._texts["scene"], True, finely, recording, self.criterion, changes)
+        recording = recording._replace(planes=True, error=True, cable=Cable(self.scene, self.changes))
+        if recording.points is None:
+            recording = recording._replace(points=self.points)
+        with short_form(self.scene).said():
+            if recording.source is None:
+                recording = recording._replace(start=self._network_start(resolution))
+            finely = SystemResolution({LINE: resolution})
+            return SystemRun(system, target, self._texts["scene"], True, finely, recording, self.criterion, changes)
+
+    def _move(self, run: SystemRun, begin: float, first: bool) -> RunSample:
+        """A result to its end; begin: s of processor time, when it was begun; first: as of `_begin_result`."""
+        recorder, target = run.recorder, run.target
+        assert target is not None and isinstance(recorder, Recorder | ArrayRecorder)
+        if isinstance(recorder, Recorder):
+            recorder.amended = self.beside_result is not None
+        with recorder:
+            run.record_motion(self.progress, self._result_interrupted)
+        (line,) = run.lines
+        done = Computed(run.resolution.one, line.model, run.steps, line.manager is not None, doubt_of_line(line))
+        return self._compared(done, target, clock.process_time() - begin, self._take_late_file(recorder, first))
+
+    def _resume_network(self, source: Path, target: Path, before: Tree | None) -> RunSample:
+        """As `resume`."""
+        with opened(source) as file:
+            if "self_contact" not in file and self_reach(self.scene).may:
+                self.scene = without_contact(self.scene)
+                self.changes = tuple(replace(x, scene=without_contact(x.scene)) for x in self.changes)
+            with refused(source):
+                resolution = resolution_from(read_checkpoint(file).resolution, self.scene)
+        first = self._takes_its_place(target)
+        begin = self._begin_result(resolution, first)
+        recording = Recording(WriteMode(before or {}), source, ERROR_ESTIMATE if before else "")
+        run = self._network_run(resolution, target, recording)
+        return self._move(run, begin - run.cpu, first)
 
     def _network_start(self, resolution: Resolution) -> Start:
         """The first state of the network, which may have been kept for a run of this resolution."""
@@ -487,15 +538,17 @@ class Case:
         """As `sample`; begin: s, of the processor."""
         s = points if points is not None else self.points.s[self.places] if self.places.size else self.points.s
         recording = Recording(points=self.points._replace(s=s), until=until, touches=self.touches_itself)
-        with short_form(self.scene).said():
-            run = self._network_run(resolution, None, recording)
-            line = run.lines[0]
-            numbers = (len(run.times) + 1) * sum(math.prod(field.shape) for field in line.observer.fields)
-            if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
-                line.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)), FORCE_COLUMNS)
-            found = line.recorder
-            assert isinstance(found, ComparisonRecorder)
+        run = self._network_run(resolution, None, recording)
+        line = run.lines[0]
+        numbers = (len(run.times) + 1) * sum(math.prod(field.shape) for field in line.observer.fields)
+        if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
+            line.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)), FORCE_COLUMNS)
+        found = line.recorder
+        assert isinstance(found, ComparisonRecorder)
+        try:
             run.record_motion(self.progress, self._comparison_interrupted)
+        finally:
+            found.close("", "")
         self.came_near_itself |= run.came_near_itself or line.contact is not None
         values, errors = split_outputs({name: found[name] for name in found.names})
         cpu = clock.thread_time() - begin
@@ -505,7 +558,7 @@ class Case:
         rows = found.reference() if isinstance(found, RowsRecorder) else {}
         held: dict[str, Any] = {}
         if points is None and self._judges:
-            held = {x.name: y for x, y in line.envelope.fixed()} | run.quantities.ranges_of(LINE)
+            held = {x.name: y for x, y in line.envelope.fixed()}
             held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t)
         return RunSample(
             resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
@@ -621,6 +674,10 @@ def _datasets(data: Mapping[str, Any], *groups: str) -> list[str]:
 def doubt_of_line(line: LineResult) -> Floats:
     """As `doubt_of`, of the line of a network."""
     return line.correction.doubt if line.correction is not None and line.manager is None else np.array(NO_DOUBT)
+
+
+def _of_cable(run: Transient) -> Computed:
+    return Computed(run.resolution, run.model, run.steps, run.switching is not None, doubt_of(run))
 
 
 def doubt_of(run: Transient) -> Floats:

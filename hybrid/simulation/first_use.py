@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.kernels.machine.compile import is_warm
+from hybrid.kernels.machine.compile import entry, is_warm
 from hybrid.model.build import Model, build
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import first_resolution, wants_errors
@@ -20,6 +20,8 @@ from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Equilibrium, Scene
+from hybrid.scene.short_form import network_of
+from hybrid.simulation.switch import as_network
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.system import System
@@ -52,8 +54,20 @@ def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
 
     static: those of its equilibrium, whose stability is judged where there are rods and no end moments.
     """
+    if not scene.line_names and as_network() and not static:
+        return _kernels_of_network(scene)
     kernels: Any = _kernels_of_lines if scene.line_names else _kernels_of_cable
     return list(kernels(scene, static))
+
+
+def _kernels_of_network(scene: Any) -> list[str]:
+    """Of a cable that is computed as a network of one line."""
+    found = _kernels_of_lines(network_of(scene), False)
+    if scene.contact.self:
+        found += [TOUCHING, TOUCHING_LINES[0]]
+    if wants_errors(scene) and scene.model.kind != "rod":
+        found.append(MODEL_ERROR)
+    return found
 
 
 def _kernels_of_cable(scene: Scene, static: bool) -> list[str]:
@@ -127,8 +141,11 @@ def compile_beside(scene: Scene | System, static: bool = False) -> None:
     """
     if scene.line_names:
         return
-    needed = _beside_solver(scene, static)
-    if MODEL_ERROR in needed:  # a line in a plane needs both solvers
+    if as_network() and not static:
+        needed = [x for x in _kernels_of_network(scene) if x != SOLVER[1]]  # which this process begins with
+    else:
+        needed = _beside_solver(scene, static)
+    if MODEL_ERROR in needed and SOLVER[1] not in needed:  # a line in a plane needs both solvers
         needed.insert(needed.index(OUTPUTS) + 1, SOLVER[1])
     missing = [name for name in needed if not is_warm([name])]
     frozen = getattr(sys, "frozen", False)  # an application made by PyInstaller would start itself again
@@ -155,6 +172,9 @@ def compile_all(names: Sequence[str]) -> None:
     from hybrid.kernels.run.run import in_space, run
 
     table = np.zeros(0, np.int64)  # of which only the type counts
+    for name in (*OF_LINES[:1], STEPS_OF_LINES, SOLVER[0], *PAYOUT_OF_LINES):
+        if name in names:
+            entry(name).compile_unless_busy(table)
     if STEPS in names:
         run.compile_unless_busy(table)
     if PAYOUT in names:

@@ -22,6 +22,7 @@ from hybrid.kernels.step.newton import Limits
 from hybrid.model.build import Model
 from hybrid.model.system import SystemModel
 from hybrid.outputs.joined_lines import Output, outputs_in
+from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.cell_changes import LEAST_CELLS, CellChanges
 from hybrid.simulation.envelope import Envelope
 from hybrid.simulation.kind_changes import carries_all
@@ -43,6 +44,8 @@ class OfLine(Protocol):
     def marked(self) -> Sequence[tuple[float, int]]: ...
     @property
     def contact(self) -> SelfContact | None: ...
+    @property
+    def correction(self) -> Correction | None: ...
     @property
     def outputs_join(self) -> bool: ...
     @property

@@ -49,6 +49,8 @@ def as_of_line(saved: Mapping[str, Any], name: str, model: Model, weaknesses: Se
     contact = saved.get("self_contact")
     if contact is not None:
         line["self_contact"] = contact
+    if saved.get("correction") is not None:
+        line["correction"] = saved["correction"]
     if "report" in saved:  # not in a file of 0.6
         line["report"] = saved["report"][0]
         line["before"] = {"report": saved["report"][1], "tension": saved["tension"], "twist": saved["twist"]}

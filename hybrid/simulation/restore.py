@@ -104,6 +104,8 @@ def resolution_tree(resolution: Resolution) -> Tree:
 def resolution_from(tree: Any, scene: Scene) -> Resolution:
     """The resolution again.  ValueError: it is none for this scene."""
     first = first_resolution(scene)
+    if not is_of_cable(tree) and len(tree) == 1:
+        (tree,) = tree.values()  # by the name of the only line
     if "later" not in tree:  # of a checkpoint of before, whose steps were short from one end to the other
         tree = tree | {"later": first.later * tree["step"] / first.step if first.step else 0.0, "still": first.still}
     later = {

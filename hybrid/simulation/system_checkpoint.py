@@ -204,6 +204,8 @@ def of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:
             line = line | {"report": np.pad(report, (0, REPORT_SIZE - report.size))}
         if mine is not None and "torsion" in mine:
             line = {"torsion": mine["torsion"]} | line
+        if mine is not None and "correction" in mine and isinstance(line.get("correction", {}), dict):
+            line = line | {"correction": mine["correction"] | line.get("correction", {})}
         if mine is not None:
             before = line.get("before", {})
             older = {"rho": rho, "report": mine["report"]} | {x: mine[x] for x in REFERENCES if x in mine}

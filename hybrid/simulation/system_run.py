@@ -578,6 +578,7 @@ class SystemRun:
             self._begun(self)
         self.gather_events()
         self._between = True
+        self.loop.set_quota(LOOK if self.loop.counts.asks else ROWS)
         self.vibrations.begin(self.loop.clock)
         self.keep()
         self._logged = clock_now() - self._begin

@@ -35,7 +35,6 @@ from hybrid.simulation.initial_zones import (
     zones_without_equilibrium,
 )
 from hybrid.simulation.lines_cells import LineCells
-from hybrid.simulation.payout_zones import PaidZones
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.system_cells import equilibrium_on_cells, following
 from hybrid.simulation.system_contact import go_on_as_attached, renew_solver
@@ -50,6 +49,7 @@ from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
+    from hybrid.simulation.payout_zones import PaidZones
     from hybrid.simulation.system_payout import SystemPayout
     from hybrid.solve.system_steps import SystemSteps
 
@@ -253,6 +253,8 @@ class SystemZones:
 
     def _pay(self, payout: SystemPayout) -> None:
         """Zones know of the winches of their lines, and these of them."""
+        from hybrid.simulation.payout_zones import PaidZones
+
         run = self._run
         for x in self.lines:
             paying = payout.lines.get(x.number)

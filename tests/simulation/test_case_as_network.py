@@ -6,16 +6,19 @@ Goes with the old road (simulation.switch), but for what does not compare the tw
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import hybrid
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.scene.read import as_scene
 from hybrid.simulation import system_lines
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample
+from tests.combinations.networks import INSTANTS
 
 SCENE: dict[str, Any] = {
     "cable": {"sections": [{"length": 20, "mass": 1.5, "axial_stiffness": 1e6, "bending_stiffness": 50, "diameter": 0.02}]},
@@ -90,3 +93,43 @@ def test_many_outputs_go_into_a_file(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     stored = sample(case, "network", monkeypatch)
     assert stored.rows and len(list(tmp_path.iterdir())) == 1
     assert_same(kept, stored)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", ["catenary", "adaptive"])
+def test_a_result_and_its_errors(model: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Every dataset of the file, and every event."""
+    found = []
+    for road in ("cable", "network"):
+        monkeypatch.setenv("HYBRID_CABLES", road)
+        found.append(hybrid.run(SCENE | {"model": model}, tmp_path / f"{road}.h5"))
+    cable, network = found
+    assert list(cable.names) == list(network.names)
+    assert [(x.kind, x.text) for x in cable.events] == [(x.kind, x.text) for x in network.events]
+    for name in cable.names:
+        one, two = cable[name], network[name]
+        if one.dtype.kind != "f" or name == "steps/cpu" or name.endswith(INSTANTS):
+            continue
+        most = SAME * max(float(np.abs(one[np.isfinite(one)]).max(initial=0.0)), 1e-3)
+        np.testing.assert_allclose(one, two, rtol=0.0, atol=max(most, 1e-8), err_msg=name)
+
+
+@pytest.mark.long
+def test_what_was_stopped_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A result that the cable's road has begun is completed by the network's, with its errors."""
+    whole = hybrid.run(SCENE | {"model": "catenary"}, tmp_path / "whole.h5")
+
+    def stop(progress: Any) -> None:
+        if progress.name == "result" and progress.t > 0.3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("hybrid.simulation.progress.REPORT_EVERY", 0.0)
+    for road in ("cable", "network"):
+        monkeypatch.setenv("HYBRID_CABLES", road)
+        path = tmp_path / f"{road}.h5"
+        with pytest.raises(KeyboardInterrupt):
+            hybrid.run(SCENE | {"model": "catenary", "output": {"every": 0.05, "exact": True}}, path, progress=stop)
+        monkeypatch.setenv("HYBRID_CABLES", "network")
+        found = hybrid.resume(path)
+        np.testing.assert_allclose(found["tension"], whole["tension"], rtol=2e-2)
+        assert found.attributes["error_total_position"] > 0.0

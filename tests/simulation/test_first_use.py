@@ -16,6 +16,7 @@ from hybrid.kernels.reel import payout, payout_nodes
 from hybrid.kernels.run import payout_run
 from hybrid.scene.read import as_scene_or_system
 from hybrid.simulation import first_use
+from hybrid.simulation.switch import as_network
 
 
 @pytest.mark.parametrize("name", ["hybrid", "numpy", "signal"])
@@ -61,8 +62,9 @@ def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
         "cable": {"sections": [{"length": 40.0, "mass": 2.0}]}, "ends": ends, "initial": "equilibrium",
         "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 10, "step": 0.05},
     })  # fmt: skip
-    assert first_use.PAYOUT in first_use.kernels_of(scene)
-    assert first_use.PAYOUT not in first_use.kernels_of(scene, static=True)
+    paid = first_use.PAYOUT_OF_LINES[0] if as_network() else first_use.PAYOUT
+    assert paid in first_use.kernels_of(scene)
+    assert paid not in first_use.kernels_of(scene, static=True)
 
 
 ROPE = {"length": 12, "mass": 2.0, "diameter": 0.02, "axial_stiffness": 1e5}
