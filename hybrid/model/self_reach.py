@@ -42,7 +42,7 @@ def self_reach(scene: Scene) -> Reach:
     off = {
         "a section has no diameter": any(x.diameter is None for x in sections),
         "catenaries that stay touch each other with contact: {self: true} alone": isinstance(model, CatenaryModel),
-        "dimension: 2, where contact: {self: true} alone computes it": scene.dimension == 2,
+        "dimension: 2, where contact: {self: true} alone computes it": scene.dimension == 2 or scene.contact.in_plane,
     }
     why = next((text for text, holds in off.items() if holds), "")
     if why:

@@ -208,6 +208,7 @@ class Contact(Table):
     )
     _ends_are_set: bool = PrivateAttr(default=False)
     _rubs_on_others: bool = PrivateAttr(default=False)
+    _in_plane: bool = PrivateAttr(default=False)
 
     @property
     def rubs(self) -> bool:
@@ -218,6 +219,17 @@ class Contact(Table):
         """The same of a line that touches others, with this friction."""
         found = self.model_copy()
         found._rubs_on_others = friction > 0.0
+        return found
+
+    @property
+    def in_plane(self) -> bool:
+        """Whether it is of a line of a network of two dimensions, where lines touch themselves if that is asked."""
+        return self._in_plane
+
+    def of_lines_in_plane(self) -> Contact:
+        """The same of such a line."""
+        found = self.model_copy()
+        found._in_plane = True
         return found
 
     @property

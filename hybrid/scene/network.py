@@ -585,6 +585,7 @@ class Network(Table):
     def _contact_of(self, name: str) -> Contact:
         """Contact of a line with itself, which knows whether it rubs on others."""
         own = self.lines[name].contact
+        own = own.of_lines_in_plane() if self.dimension == 2 else own
         touches = self.contact is not None and any(name in pair for pair in self.touching_pairs)
         return own.beside_others(self.contact.friction) if self.contact is not None and touches else own
 

@@ -52,6 +52,7 @@ WORDS = {
     "break_at": "release_at",
     "; what came loose is free": " and is free",
     "a moment at a point": "an end moment",
+    "points and bodies move otherwise": "the ends move otherwise",
 }
 
 
@@ -95,7 +96,7 @@ class ShortForm:
 
     def error(self, error: ComputationError) -> ComputationError:
         """What has failed of the network, of the cable."""
-        detail, first = self.text(error.detail).removeprefix("the cable; "), self.text(error.first)
+        detail, first = re.sub(r"^the cable(; |$)", "", self.text(error.detail)), self.text(error.first)
         return ComputationError(error.outcome, error.t, error.s, detail, error.snapshot, first)
 
     def finding(self, found: Finding) -> Finding:

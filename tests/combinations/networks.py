@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,8 +21,10 @@ from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.short_form import LINE, network_of
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ProgressReporter
+from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_file import Cable
 from hybrid.simulation.system_run import Recording, SystemRun
+from hybrid.store.array_recorder import Target
 from hybrid.store.reader import open_result
 from hybrid.store.writer import WriteMode
 
@@ -50,9 +54,9 @@ class Difference(NamedTuple):
         return f"{self.name} {self.by:.1e}"
 
 
-def exact_scene(tables: dict[str, Any]) -> Scene:
-    """The scene of these tables, in space, with steps that end at outputs."""
-    tables = {key: x for key, x in tables.items() if key != "solver"} | {"dimension": 3}
+def exact_scene(tables: dict[str, Any], dimension: int = 3) -> Scene:
+    """The scene of these tables, in space or in a plane, with steps that end at outputs."""
+    tables = {key: x for key, x in tables.items() if key != "solver"} | {"dimension": dimension}
     return as_scene(tables | {"output": tables.get("output", {}) | {"exact": True}})
 
 
@@ -63,14 +67,27 @@ def both(tables: dict[str, Any], rest: bool = False) -> tuple[Result, Result]:
     return compute(scene), compute(network_of(scene))
 
 
-def both_files(scene: Scene, folder: Path) -> tuple[Path, Path]:
+def network_run(scene: Scene, target: Target, changes: Sequence[LoadChange[Scene]] = (), **recording: Any) -> SystemRun:
+    """The run of the network of a cable, which gets the file of that; recording: fields of `Recording`."""
+    asked = Recording(**{"mode": WriteMode({}), "planes": True, "cable": Cable(scene, changes)} | recording)
+    resolution = None if asked.source is not None else SystemResolution({LINE: first_resolution(scene)})
+    others = [LoadChange(x.t, network_of(x.scene)) for x in changes]
+    return SystemRun(network_of(scene), target, scene_text(scene), True, resolution, asked, None, others)
+
+
+def recorded(run: SystemRun, looks: int | None = None) -> SystemRun:
+    """A run to its end; looks: after as many reports of its progress it is interrupted."""
+    left = itertools.count(0 if looks is None else -looks)
+    with nullcontext() if looks is None else suppress(KeyboardInterrupt):
+        run.record_motion(ProgressReporter(None, 1.0), lambda: looks is not None and next(left) >= 0)
+    return run
+
+
+def both_files(scene: Scene, folder: Path, changes: Sequence[LoadChange[Scene]] = ()) -> tuple[Path, Path]:
     """The files of a cable and of its network, which gets that of a cable; each is computed once."""
     cable, network = folder / "cable.h5", folder / "network.h5"
-    Case(scene, None).record(first_resolution(scene), cable)
-    system, recording = network_of(scene), Recording(WriteMode({}), planes=True, cable=Cable(scene))
-    resolution = SystemResolution({LINE: first_resolution(scene)})
-    run = SystemRun(system, network, scene_text(scene), True, resolution, recording)
-    run.record_motion(ProgressReporter(None, 1.0), lambda: False)
+    Case(scene, None, changes).record(first_resolution(scene), cable)
+    recorded(network_run(scene, network, changes))
     return cable, network
 
 
@@ -87,6 +104,8 @@ def _contents_differ(a: h5py.File, b: h5py.File) -> Iterator[str]:
     for file, those in zip((a, b), names, strict=True):
         file.visit(those.add)
     yield from (f"{x}: in one alone" for x in sorted(names[0] ^ names[1]))
+    events = [Counter(zip(x["events/kind"][()], x["events/text"][()], strict=True)) for x in (a, b)]  # in any order
+    yield from (f"event of one alone: {x}" for x in [*(events[0] - events[1]), *(events[1] - events[0])])
     for name in sorted(x for x in names[0] & names[1] if not x.startswith(CHECKPOINTS)):
         x, y = a[name], b[name]
         yield from _attributes_differ(x, y, name)
@@ -95,7 +114,7 @@ def _contents_differ(a: h5py.File, b: h5py.File) -> Iterator[str]:
         forms = [(each.dtype, each.shape, [(d.label, [*d.keys()]) for d in each.dims]) for each in (x, y)]
         if forms[0] != forms[1]:
             yield f"{name}: {forms[0]}, {forms[1]}"
-        elif x.dtype.kind != "f" and name not in NUMERICS and not np.array_equal(x[()], y[()]):
+        elif x.dtype.kind != "f" and not name.startswith(("events/", *NUMERICS)) and not np.array_equal(x[()], y[()]):
             k = np.argmax(np.ravel(x[()] != y[()]))
             yield f"{name}: {np.ravel(x[()])[k]}, {np.ravel(y[()])[k]}"
 
