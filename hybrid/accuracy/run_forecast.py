@@ -35,7 +35,7 @@ from hybrid.simulation.switch import as_network
 from hybrid.simulation.system_run import Recording, SystemRun
 from hybrid.simulation.time_loop import TimeLoop
 from hybrid.simulation.transient import Transient
-from hybrid.solve.system_statics import LineFailed
+from hybrid.solve.joined import LineFailed
 from hybrid.store.comparison_recorder import ComparisonRecorder
 
 if TYPE_CHECKING:  # its tables take long to make

@@ -48,8 +48,8 @@ from hybrid.simulation.layer_mesh import layered_lines
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import static_system
 from hybrid.solve.joined import SystemState
+from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_statics import SystemEquilibrium
 
 OF_LINE = re.compile(r"^(?:(max|min) )?([^/@]+)/(.+)$")
 # Tables of a scene on which every line hangs; numbers of a free body on which none does.
@@ -152,7 +152,7 @@ class NetworkAtRest(OfScene):
         wanted_of = (l for l, x in enumerate(self.lines) if x.wanted)
         self.gradients = {l: Gradients(self.lines[l], self._bodies.turns(l)) for l in wanted_of}
 
-    def _contact(self, found: SystemEquilibrium, states: SystemState, of: Sequence[Wanted]) -> ContactAtRest | None:
+    def _contact(self, found: LinesAtRest, states: SystemState, of: Sequence[Wanted]) -> ContactAtRest | None:
         """Contact of lines with each other, if they have any, in states at rest.  SceneError: a result is of it."""
         if found.solver.shared is None and not found.settled:
             return None

@@ -25,9 +25,10 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.contact_equilibrium import settled_from, with_contact
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.slack_bends import slack_remedy
-from hybrid.solve.flaws import ON_BED, behind_obstacles, overstretched_cell, passed_obstacles, rubs_on
+from hybrid.solve.flaws import ON_BED, behind_obstacles, passed_obstacles, rubs_on
+from hybrid.solve.search import PUSHED
 from hybrid.solve.stability import is_stable
-from hybrid.solve.statics import PUSHED, Equilibrium, Search, solve_statics
+from hybrid.solve.statics import Equilibrium, Search, solve_statics
 
 # Turns that close the frames of the initial shape, at most, and round-off; the twist of a cell, rad, that is resolved.
 CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
@@ -72,7 +73,7 @@ def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
         first = slack_remedy(model, failed.outcome, failed.s)
         if not reasons and not first:
             raise
-        roads = failed.detail.splitlines()
+        roads = [x for x in failed.detail.splitlines() if x.endswith(" in all)")]
         ways = f"{len(roads)} ways to an equilibrium were" if len(roads) > 1 else "1 way to an equilibrium was"
         tried = f"{ways} tried, the last: {roads[-1].strip()}"
         because = "\n              ".join([*reasons, tried]) if reasons else failed.detail
@@ -192,7 +193,9 @@ def _statics(
     scene: Scene, model: Model, t: float, settle: str = "", quick: bool = False, start: State | None = None
 ) -> Equilibrium:
     """The equilibrium by the ways of `Search`, from the start of the model or another."""
-    search = Search(settle, quick, model.slack == "warn" and not quick, model.other_starts)
+    lies = bool(model.line.bits & OBSTACLES)
+    borne = borne_strain(model) if lies else np.zeros(0)
+    search = Search(settle, quick, model.slack == "warn" and not quick, model.other_starts, borne=borne)
 
     def keeps_turns(state: State) -> bool:
         try:
@@ -202,14 +205,9 @@ def _statics(
         return True
 
     counts = bool(scene.ends.turns) and keeps_turns(model.start)  # else too few cells: no way helps
-    lies = bool(model.line.bits & OBSTACLES)
 
     def refused(state: State) -> tuple[Outcome, int]:
-        if counts and not keeps_turns(state):
-            return Outcome.TURNS_LOST, -1
-        if lies and (cell := overstretched_cell(model.line, state, borne_strain(model))) >= 0:
-            return Outcome.OVERSTRETCHED, cell
-        return Outcome.OK, -1
+        return (Outcome.TURNS_LOST if counts and not keeps_turns(state) else Outcome.OK), -1
 
     def elsewhere(state: State) -> tuple[Outcome, int]:
         outcome, cell = refused(state)
@@ -228,7 +226,7 @@ def _statics(
         except ComputationError:  # where no way leads to the side of the span, or of the shape, the other may be meant
             if quick:
                 raise
-    return solve(search._replace(refused=refused if counts or lies else None))
+    return solve(search._replace(refused=refused if counts else None))
 
 
 def _settles(scene: Scene, model: Model, t: float) -> bool:

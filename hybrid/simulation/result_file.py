@@ -50,7 +50,7 @@ from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 
 if TYPE_CHECKING:
     from hybrid.scene.quantities import Quantity
-    from hybrid.solve.system_statics import SystemEquilibrium
+    from hybrid.solve.lines_at_rest import LinesAtRest
 
 STEP_FIELDS = (
     Field("t", "s", "time at the end of the step"),
@@ -74,7 +74,7 @@ def result_recorder(
     observer: Observer,
     target: Target,
     texts: Mapping[str, Text],
-    found: Equilibrium | SystemEquilibrium | None,
+    found: Equilibrium | LinesAtRest | None,
     envelope: Envelope,
     outputs: int = 0,
     mode: WriteMode = AT_ONCE,

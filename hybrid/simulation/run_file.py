@@ -34,7 +34,7 @@ from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.solve.joined import SystemState
-from hybrid.solve.system_statics import SystemEquilibrium
+from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import Checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -108,7 +108,7 @@ class LinesFile:
         return scenes
 
     def line_recorder(
-        self, line: LineResult, found: SystemEquilibrium | None, outputs: int, manager: DomainManager | None
+        self, line: LineResult, found: LinesAtRest | None, outputs: int, manager: DomainManager | None
     ) -> Recorder | ArrayRecorder | ComparisonRecorder:
         """The result of a line, laid by until there is that of the run; manager: of zones that move."""
         target: Target = io.BytesIO()
@@ -251,7 +251,7 @@ class CableFile(LinesFile):
         return {"scene": self._text, "changes": changes_text(self._cable.changes)}
 
     def line_recorder(
-        self, line: LineResult, found: SystemEquilibrium | None, outputs: int, manager: DomainManager | None
+        self, line: LineResult, found: LinesAtRest | None, outputs: int, manager: DomainManager | None
     ) -> Recorder | ArrayRecorder | ComparisonRecorder:
         """The result, if it is a new one."""
         run, asks = self._run, self._asks

@@ -21,9 +21,9 @@ from hybrid.simulation.events import Sink
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.system_lines import LineResult
 from hybrid.solve.joined import SystemState
+from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_statics import SystemEquilibrium
 from hybrid.solve.system_steps import SystemSteps
 from hybrid.store.array_recorder import ArrayRecorder
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -71,7 +71,7 @@ class RunOfLines(Protocol):
     met: set[tuple[int, int]]  # lines that have been said to touch
     passed: set[tuple[int, int]]  # and to pass through each other
     let_pass: set[tuple[int, int]]  # of lines that may meet, those between which contact is not computed
-    found: SystemEquilibrium | None
+    found: LinesAtRest | None
     lets_touch: bool  # whether contact begins by itself where lines come near themselves
     came_near_itself: bool  # whether one has
 

@@ -28,7 +28,7 @@ from hybrid.simulation.interface_stiffness import interface_stiffness, step_take
 from hybrid.simulation.set_obstacles import Course, SettableObstacles
 from hybrid.simulation.stepped import CableState, EndForces, numbers, one_thread, triple, vector
 from hybrid.simulation.system_run import SystemRun
-from hybrid.solve.system_statics import LineFailed
+from hybrid.solve.joined import LineFailed
 
 # Of the largest component: what is out of a plane by no more is in it.
 IN_PLANE = 1e-9

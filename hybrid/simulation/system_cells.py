@@ -17,9 +17,9 @@ from hybrid.simulation.initial_zones import MOST_ROUNDS, on_fewer, planned_cells
 from hybrid.simulation.system_start import equilibrium_of_system, solve_from
 from hybrid.simulation.zone_switching import on_layout
 from hybrid.solve.joined import SystemState
-from hybrid.solve.system_statics import SystemEquilibrium
+from hybrid.solve.lines_at_rest import LinesAtRest
 
-Rest = tuple[SystemModel, SystemEquilibrium]
+Rest = tuple[SystemModel, LinesAtRest]
 
 
 def following(model: SystemModel, managers: Mapping[int, DomainManager]) -> dict[int, DomainManager]:
@@ -61,9 +61,7 @@ def _with(model: SystemModel, others: Mapping[int, Model]) -> SystemModel:
     return replace(model, models=tuple(others.get(k, x) for k, x in enumerate(model.models)))
 
 
-def _on_planned_cells(
-    model: SystemModel, found: SystemEquilibrium, managers: Mapping[int, DomainManager], t: float
-) -> Rest:
+def _on_planned_cells(model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """The equilibrium with cells as its curvature asks for, from one with others.  ComputationError: there is none."""
     before = {k: planned_cells(model.models[k], x, found.state.lines[k], t) for k, x in managers.items()}
     for _ in range(MOST_ROUNDS):
@@ -82,9 +80,7 @@ def _on_planned_cells(
     raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "cells become shorter and shorter")
 
 
-def _with_catenaries(
-    model: SystemModel, found: SystemEquilibrium, managers: Mapping[int, DomainManager], t: float
-) -> Rest:
+def _with_catenaries(model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """The same where scenes say that lines are catenary, in the equilibrium with that."""
     others, states = dict[int, Model](), [*found.state.lines]
     for k, manager in managers.items():
@@ -102,7 +98,7 @@ def _with_catenaries(
     return model, _solved(model, found, t, states)
 
 
-def _solved(model: SystemModel, found: SystemEquilibrium, t: float, states: list[State]) -> SystemEquilibrium:
+def _solved(model: SystemModel, found: LinesAtRest, t: float, states: list[State]) -> LinesAtRest:
     bodies = found.solver.bodies.copy()
     return solve_from(
         found, model, t, bodies, SystemState(states, found.state.bodies), "the equilibrium of other cells"

@@ -24,9 +24,8 @@ from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.self_watch import deepest_text, diameters
 from hybrid.simulation.system_contact_equilibrium import energy_between, touches_alone
 from hybrid.solve.contact_statics import contact_energy
-from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.joined import JoinedLine, LineFailed, SystemState
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.solve.system_statics import LineFailed
 from hybrid.store.partners import meeting_text
 
 # Diameters by which ways from a joint to where lines that lie along each other meet differ at most.

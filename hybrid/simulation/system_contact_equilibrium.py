@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
-from hybrid.kernels.state.forces import OBSTACLES, SELF_CONTACT
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.first_state import HUNG, first_state
@@ -24,12 +24,14 @@ from hybrid.simulation.contact_equilibrium import KEPT, contact_of, nearness, pa
 from hybrid.simulation.lines_contact import crossed, shared_of, watched_pairs
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.flaws import behind_obstacles, passed_obstacles
-from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.joined import JoinedLine, LineFailed, SystemState
+from hybrid.solve.lines_at_rest import LinesAtRest, lines_at_rest
+from hybrid.solve.search import Start, Tally, in_slower_currents
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.softened import is_in_current
+from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_contact_statics import settled_system, touching_solver
-from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, in_slower_currents, solve_system_statics
 
 # Turns by which an equilibrium without contact may differ from its start, whose shape may have a writhe of its own.
 OF_SHAPE = 0.5
@@ -39,8 +41,8 @@ SLOWER = tuple(np.linspace(0.875, 0.0, 8).tolist())
 
 def solve_with_contact(
     model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Callable[[], Iterator[Start]]
-) -> SystemEquilibrium:
-    """As `solve_system_statics`; of lines that contact is asked for, and that would touch, have lost turns of their
+) -> LinesAtRest:
+    """As `lines_at_rest`; of lines that contact is asked for, and that would touch, have lost turns of their
     ends or have passed through each other on the way from their first shapes, that to which a damped motion with
     contact leads from the first start that is apart; the last start is the equilibrium without contact.
 
@@ -83,7 +85,9 @@ def _passes_another(
         return False
     way = [found]
     if any(is_in_current(lines[k].line, lines[k].sea) for k in model.touching.lines):
-        way += in_slower_currents(lines, len(model.free), bodies, found, SLOWER) or []
+        smooth = [x._replace(line=x.line._replace(bits=x.line.bits & ~FRICTION)) for x in lines]
+        solver = SystemSolver(smooth, len(model.free), bodies.copy())
+        way += in_slower_currents(solver, found, SLOWER, Tally()) or []
     return any(True for a, b in pairwise((first, *way[::-1])) for _ in crossed(model.touching, a, b))
 
 
@@ -122,8 +126,8 @@ def _before_current(model: SystemModel) -> SystemState:
 
 def _on_the_side_of_the_span(
     model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Callable[[], Iterator[Start]]
-) -> SystemEquilibrium:
-    """As `solve_system_statics`, and where a way leads there, with lines that hang on obstacles on the side of their
+) -> LinesAtRest:
+    """As `lines_at_rest`, and where a way leads there, with lines that hang on obstacles on the side of their
 
     straight spans, and others on that of the shapes that the scene gives, as one cable does.
     """
@@ -143,11 +147,11 @@ def _on_the_side_of_the_span(
 
     if there:
         try:
-            every = chain(starts(), _other_starts(model, hung))
-            return solve_system_statics(lines, len(model.free), bodies.copy(), every, behind)
+            others = _other_starts(model, hung)
+            return lines_at_rest(lines, len(model.free), bodies.copy(), starts(), others, behind)
         except LineFailed:  # where no way leads there, the other side may be meant
             pass
-    return solve_system_statics(lines, len(model.free), bodies, starts())
+    return lines_at_rest(lines, len(model.free), bodies, starts())
 
 
 def _other_starts(model: SystemModel, hung: Sequence[int]) -> Iterator[Start]:
@@ -161,7 +165,7 @@ def _other_starts(model: SystemModel, hung: Sequence[int]) -> Iterator[Start]:
 
 def settle(
     model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, start: SystemState, near: bool = False
-) -> SystemEquilibrium:
+) -> LinesAtRest:
     """The equilibrium with contact that a damped motion reaches from a start that is apart; near: as of that."""
     keeps = _keeps_turns(lines, start, KEPT)
     return settled_system(lines, len(model.free), bodies.copy(), start, lambda: contacts_of(model), keeps, near)
@@ -206,9 +210,7 @@ def energy_between(
     return solver.contact_energy(state), solver.shared
 
 
-def nearness_in(
-    model: SystemModel, lines: Sequence[JoinedLine], found: SystemEquilibrium, t: float
-) -> dict[int, Floats]:
+def nearness_in(model: SystemModel, lines: Sequence[JoinedLine], found: LinesAtRest, t: float) -> dict[int, Floats]:
     """How near nodes (N+1,) of lines at rest are to what they may touch, by number: above 1, nearer than two diameters.
 
     Lines that touch neither themselves nor others are not in it.
@@ -231,7 +233,7 @@ def _first_apart(
     return next((state for _, state in starts if math.isfinite(_largest_energy(model, lines, bodies, state))), None)
 
 
-def _has_lost(lines: Sequence[JoinedLine], hung: SystemState, found: SystemEquilibrium) -> bool:
+def _has_lost(lines: Sequence[JoinedLine], hung: SystemState, found: LinesAtRest) -> bool:
     """Whether an equilibrium that knows no contact has lost turns, against its lines hung between first places."""
     return bool(_keeps_turns(lines, hung, OF_SHAPE)(found.state)[1])
 

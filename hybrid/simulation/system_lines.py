@@ -56,12 +56,12 @@ from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
 from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.time_loop import FORCE_COLUMNS
-from hybrid.solve.joined import JoinedLine
+from hybrid.solve.flaws import slack_cell
+from hybrid.solve.joined import JoinedLine, LineFailed
+from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.run import batch_of_rows, no_extremes
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_flaws import slack_cell
-from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.store.array_recorder import ArrayRecorder
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.writer import Recorder
@@ -93,7 +93,7 @@ def twist_at_rest(x: JoinedLine, state: State) -> float:
 
 
 # What makes the recorder of a line: the equilibrium that it starts from, if it does, and outputs after the first.
-NewRecorder = Callable[["LineResult", "SystemEquilibrium | None", int], "Recorder | ArrayRecorder | ComparisonRecorder"]
+NewRecorder = Callable[["LineResult", "LinesAtRest | None", int], "Recorder | ArrayRecorder | ComparisonRecorder"]
 
 
 class Wanted(NamedTuple):
@@ -158,7 +158,7 @@ class LineResult:
     _sampled: Sequence[Output] = ()  # of several meshes, of which `output` is still to be told
 
     def __init__(
-        self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
+        self, number: int, name: str, scene: Scene, model: Model, found: LinesAtRest | None, state: State,
         outputs: int, wanted: Wanted = WANTED, paying: PayingOut | None = None,
     ) -> None:  # fmt: skip
         """number: of the line in its system; found: the equilibrium that it starts from, None: it has none; state: from
@@ -267,7 +267,7 @@ class LineResult:
         return self.contact
 
     def note_equilibrium(
-        self, x: JoinedLine, state: State, t: float | None, found: SystemEquilibrium, turned: bool = False
+        self, x: JoinedLine, state: State, t: float | None, found: LinesAtRest, turned: bool = False
     ) -> None:
         """What an equilibrium leaves open; t: s, where a motion starts from it, None: it is the result.
 

@@ -26,8 +26,7 @@ from hybrid.simulation.payout import Before, PayingOut
 from hybrid.simulation.payout_zones import PaidZones, moving_zones
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.system_contact import renew_solver
-from hybrid.solve.joined import SystemState
-from hybrid.solve.system_statics import LineFailed
+from hybrid.solve.joined import LineFailed, SystemState
 
 if TYPE_CHECKING:
     from hybrid.solve.system import SystemSolver

@@ -73,11 +73,11 @@ from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, jo
 from hybrid.simulation.system_zones import Start, SystemZones, managers_for, start_at_rest, zones_as_placed
 from hybrid.simulation.time_loop import FORCE_COLUMNS, WORK, apart, falls_on
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
-from hybrid.solve.joined import SystemState, SystemTaken
+from hybrid.solve.joined import LineFailed, SystemState, SystemTaken
+from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.run import MOST_SAMPLED, ROWS, Tried
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.solve.system_steps import SystemSteps
 from hybrid.store.array_recorder import Target
 from hybrid.store.checkpoint import read_checkpoint
@@ -167,7 +167,7 @@ class SystemRun:
         rho = system.require_time().rho_inf if moves else 0.0
         turn = min(x.turn for x in self.resolution.lines.values())
         self.loop = SystemSteps(rho, [0.0, *self.times], *follow, turn)
-        self.found: SystemEquilibrium | None = None
+        self.found: LinesAtRest | None = None
         managers, self._begins = _NO_ZONES, source is None  # whether there is a start, and no checkpoint
         if source is not None:
             blank = [state_for(x.line) for x in self.model.models]

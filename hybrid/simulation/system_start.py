@@ -30,17 +30,12 @@ from hybrid.simulation.events import EventLog
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
 from hybrid.solve.flaws import ON_BED, rubs_on
-from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
+from hybrid.solve.joined import JoinedLine, LineFailed, SystemState, joined_ends
+from hybrid.solve.lines_at_rest import LinesAtRest, lines_at_rest, settled_with_friction
+from hybrid.solve.search import Start
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
 from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_statics import (
-    LineFailed,
-    Start,
-    SystemEquilibrium,
-    settled_with_friction,
-    solve_system_statics,
-)
 
 # Equilibria until the water around members is that of the place found, and what of the largest wetted part, velocity
 # and acceleration there counts as the same.
@@ -50,7 +45,7 @@ MOST_ROUNDS, SAME_WATER = 40, 1e-8
 FAR = 3.0
 
 
-def equilibrium_of_system(system: System, model: SystemModel, t: float, friction: bool = True) -> SystemEquilibrium:
+def equilibrium_of_system(system: System, model: SystemModel, t: float, friction: bool = True) -> LinesAtRest:
     """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found.
 
     friction: whether it settles on the bed, of lines that ask for that.
@@ -107,8 +102,8 @@ def _nearer(system: System) -> str:
 
 
 def solve_from(
-    found: SystemEquilibrium, model: SystemModel, t: float, bodies: Floats, start: SystemState, name: str
-) -> SystemEquilibrium:
+    found: LinesAtRest, model: SystemModel, t: float, bodies: Floats, start: SystemState, name: str
+) -> LinesAtRest:
     """The equilibrium with the loads of time t from a start next to another one, with contact if that has it."""
     lines = joined_lines(model, t)
     if found.alone:
@@ -120,7 +115,7 @@ def solve_from(
     if "start" in ways.values():  # where the lines were laid, which nothing else leads to
         ways = dict.fromkeys(ways, "start")
     else:
-        found = solve_system_statics(lines, len(model.free), bodies, iter([(name, start)]))
+        found = lines_at_rest(lines, len(model.free), bodies, [(name, start)])
         found = _keep_turns(model, t, replace(found, not_settled=why))
     return _with_friction(model, t, found, bodies, ways, start)
 
@@ -140,7 +135,7 @@ def _are_alone(model: SystemModel, friction: bool) -> bool:
     return not (joined or touches or (not friction and _ways(model)))
 
 
-def _each_alone(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
+def _each_alone(system: System, model: SystemModel, t: float) -> LinesAtRest:
     """The equilibria of lines that are joined to nothing that moves, found one by one, as of one cable."""
     found = []
     for k, (name, x) in enumerate(zip(model.names, model.models, strict=True)):
@@ -153,7 +148,7 @@ def _each_alone(system: System, model: SystemModel, t: float) -> SystemEquilibri
     return _together(model, t, found)
 
 
-def _together(model: SystemModel, t: float, found: Sequence[Equilibrium]) -> SystemEquilibrium:
+def _together(model: SystemModel, t: float, found: Sequence[Equilibrium]) -> LinesAtRest:
     """Equilibria of all lines as one."""
     rubs = frozenset(k for k, x in enumerate(found) if x.with_friction)
     lines = [
@@ -167,15 +162,15 @@ def _together(model: SystemModel, t: float, found: Sequence[Equilibrium]) -> Sys
     path = max(found, key=lambda x: len(x.path)).path  # of the line that took most ways
     touches = any(x.touch.size for x in found)
     why = "a damped motion with contact, without friction, led there" if touches else ""
-    return SystemEquilibrium(
+    return LinesAtRest(
         states, path, sum(x.iterations for x in found), max(x.residual for x in found), solver, touches, why, rubs,
         tuple(found), {k: x.not_settled for k, x in enumerate(found)},
     )  # fmt: skip
 
 
 def _with_friction(
-    model: SystemModel, t: float, found: SystemEquilibrium, bodies: Floats, ways: Mapping[int, str], first: SystemState
-) -> SystemEquilibrium:
+    model: SystemModel, t: float, found: LinesAtRest, bodies: Floats, ways: Mapping[int, str], first: SystemState
+) -> LinesAtRest:
     """The equilibrium in which friction has settled from one without it, in these ways (`settling`) of lines.
 
     first: from where lines come to rest where a scene asks for that.  LineFailed: none is found where one is asked for.
@@ -197,7 +192,7 @@ def _with_friction(
     return replace(found, not_settled=why)
 
 
-def _keep_turns(model: SystemModel, t: float, found: SystemEquilibrium) -> SystemEquilibrium:
+def _keep_turns(model: SystemModel, t: float, found: LinesAtRest) -> LinesAtRest:
     """The same equilibrium; LineFailed where a line has lost turns by which its ends, which hold it, twist it."""
     for k, (name, x, state) in enumerate(zip(model.names, model.models, found.state.lines, strict=True)):
         try:

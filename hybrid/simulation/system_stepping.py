@@ -34,7 +34,7 @@ from hybrid.simulation.stepped_points import SteppedPoints
 from hybrid.simulation.system_run import ALONE, SystemRun, static_system
 from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.system_start import named
-from hybrid.solve.system_statics import LineFailed
+from hybrid.solve.joined import LineFailed
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked

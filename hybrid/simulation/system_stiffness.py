@@ -33,9 +33,9 @@ from hybrid.simulation.system_contact import refuse_within_itself
 from hybrid.simulation.system_contact_equilibrium import contacts_of
 from hybrid.simulation.system_start import equilibrium_of_system
 from hybrid.solve.joined import SystemState
+from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_contact_statics import touching_solver
-from hybrid.solve.system_statics import SystemEquilibrium
 
 VERTICAL = np.array([0.0, 0.0, 1.0])
 # Where the stiffness is that between equilibria: how far these are apart, of the longest line, and rad; where lines
@@ -118,7 +118,7 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     return Stiffness(at, matrix, np.asarray(matrix - own, float), position, rotation)
 
 
-def _equilibrium(system: System, model: SystemModel) -> SystemEquilibrium:
+def _equilibrium(system: System, model: SystemModel) -> LinesAtRest:
     """Under full loads, without friction.  SceneError: a line that contact is asked for is within itself in it."""
     found = equilibrium_of_system(system, model, np.inf, friction=False)
     if not found.settled:
@@ -297,7 +297,7 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     )  # fmt: skip
 
 
-def _largest_tension(found: SystemEquilibrium, model: SystemModel, system: System, l: int) -> float:
+def _largest_tension(found: LinesAtRest, model: SystemModel, system: System, l: int) -> float:
     """Of the cells of line l, and of its ends, where the force of what holds it is known, N."""
     state, report, line = found.state.lines[l], found.solver.work[l].report, model.models[l]
     marks = marks_of(system.scene_of(model.names[l]), line)
@@ -346,15 +346,13 @@ def _points_of(system: System, kind: str, name: str) -> list[str]:
     return [p for p, point in system.points.items() if isinstance(point, Fairlead) and point.body == name]
 
 
-def _place(system: System, model: SystemModel, found: SystemEquilibrium, point: str) -> Floats:
+def _place(system: System, model: SystemModel, found: LinesAtRest, point: str) -> Floats:
     """Where a point is in an equilibrium."""
     line, end = system.lines_at(point)[0]
     return np.asarray(found.state.lines[model.names.index(line)].r[-(end == "end")]).copy()
 
 
-def _clamped_as_they_lie(
-    system: System, model: SystemModel, found: SystemEquilibrium, point: str
-) -> dict[str, JoinedLine]:
+def _clamped_as_they_lie(system: System, model: SystemModel, found: LinesAtRest, point: str) -> dict[str, JoinedLine]:
     """The lines, with inertial directions of an equilibrium for those that are clamped to a free point."""
     axes = found.state.bodies[len(model.bodies) + model.rigid.index(point), FRAME:V].reshape(3, 3)
     lines = dict(system.lines)
@@ -367,7 +365,7 @@ def _clamped_as_they_lie(
     return lines
 
 
-def _from_where_they_lie(system: System, found: SystemEquilibrium) -> dict[str, JoinedLine]:
+def _from_where_they_lie(system: System, found: LinesAtRest) -> dict[str, JoinedLine]:
     """The lines, whose equilibria are searched for from that."""
     shapes = (tuple(map(tuple, x.r.tolist())) for x in found.state.lines)
     return {
@@ -400,7 +398,7 @@ def _make_as_hard(moved: System, there: SystemModel, system: System, model: Syst
         new.sea.values.obstacles[:, STIFFNESS_OF] = old.sea.values.obstacles[same, STIFFNESS_OF]
 
 
-def _contact_on(found: SystemEquilibrium, system: System, body: str, origin: Floats) -> tuple[Floats, Floats]:
+def _contact_on(found: LinesAtRest, system: System, body: str, origin: Floats) -> tuple[Floats, Floats]:
     """Force (3,) N of lines that touch a body, and moment (3,) N m about its origin."""
     force, moment, surfaces = np.zeros(3), np.zeros(3), list(system.surfaces)
     if body not in surfaces or body in system.obstacles:
@@ -416,7 +414,7 @@ def _contact_on(found: SystemEquilibrium, system: System, body: str, origin: Flo
 
 
 def _let_go(
-    system: System, model: SystemModel, found: SystemEquilibrium, kind: str, name: str
+    system: System, model: SystemModel, found: LinesAtRest, kind: str, name: str
 ) -> tuple[SystemSolver, SystemState]:
     """The lines of an equilibrium as they are, with what is held at a point or body free to move."""
     points, bodies = len(model.free), found.solver.bodies

@@ -43,8 +43,8 @@ from hybrid.simulation.system_kinds import SystemKinds
 from hybrid.simulation.system_start import joined_lines, solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
 from hybrid.solve.joined import SystemState, SystemTaken
+from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.run import Tried
-from hybrid.solve.system_statics import SystemEquilibrium
 from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Start(NamedTuple):
     """Zones of a system at rest."""
 
     model: SystemModel
-    found: SystemEquilibrium | None  # None: a motion begins as the scene says
+    found: LinesAtRest | None  # None: a motion begins as the scene says
     managers: Mapping[int, DomainManager]  # by the number of the line
 
 
@@ -95,8 +95,8 @@ def start_at_rest(
 
 
 def _zones_at_rest(
-    model: SystemModel, found: SystemEquilibrium, managers: Mapping[int, DomainManager], t: float
-) -> tuple[SystemModel, SystemEquilibrium]:
+    model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
+) -> tuple[SystemModel, LinesAtRest]:
     """Zones for the equilibrium of a system whose lines with managers are all rod: rod only where it is needed.
 
     As of one cable (simulation.initial_zones): where the two equilibria are further apart than the tolerance of a line
@@ -145,8 +145,8 @@ def _take_rods(manager: DomainManager, model: Model) -> None:
 
 
 def _within(
-    model: SystemModel, found: SystemEquilibrium, managers: Mapping[int, DomainManager], t: float
-) -> tuple[SystemModel, SystemEquilibrium] | None:
+    model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
+) -> tuple[SystemModel, LinesAtRest] | None:
     """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
     rods = _asked(managers, model, found, t)
     for _ in range(MOST_ROUNDS):
@@ -170,7 +170,7 @@ def _within(
 
 
 def _asked(
-    managers: Mapping[int, DomainManager], system: SystemModel, found: SystemEquilibrium, t: float
+    managers: Mapping[int, DomainManager], system: SystemModel, found: LinesAtRest, t: float
 ) -> dict[int, np.ndarray]:
     """Base cells that the criteria want to be rod in an equilibrium, by number of the line."""
     near, rods = nearness_in(system, joined_lines(system, t), found, t), {}
@@ -182,9 +182,7 @@ def _asked(
     return rods
 
 
-def _apart(
-    k: int, model: SystemModel, found: SystemEquilibrium, other: SystemModel, answer: SystemEquilibrium
-) -> float:
+def _apart(k: int, model: SystemModel, found: LinesAtRest, other: SystemModel, answer: LinesAtRest) -> float:
     """Largest distance (m) of base nodes of a line between two equilibria, the first of them all rod."""
     full, few = model.models[k].layout, other.models[k].layout
     assert full is not None and few is not None

@@ -28,7 +28,7 @@ from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import EQUILIBRIUM, STEP, Task
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.settling import CALM, damped, nudged
+from hybrid.solve.settling import CALM, damped, nudged, stop
 from hybrid.solve.stability import Stability
 from hybrid.solve.statics import BALANCED, BALANCING, MOST_ITERATIONS, REACH, Equilibrium
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
@@ -169,12 +169,6 @@ def left_over(
     left = out_of_balance(line, rows) + force
     left[[-k for k in (0, 1) if ends.held[k]]] = 0.0
     return float(np.abs(left).max()), force[[0, -1]]
-
-
-def stop(state: State) -> None:
-    """Stop all motion of a state."""
-    for still in (state.v, state.a, state.vd, state.w, state.wa, state.wd):
-        still[:] = 0.0
 
 
 def calming(job: Moving, time_scale: float, length: float) -> Iterator[int]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.errors import Outcome
+from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.junctions.bodies import STATE
 from hybrid.kernels.junctions.carried_frames import SEAT
 from hybrid.kernels.march.assembly import JOINED
@@ -65,6 +65,15 @@ class SystemTaken:
     error: float = 0.0
     ratio: float = 0.0
     rho: float = 0.0
+
+
+class LineFailed(ComputationError):
+    """A computation of lines stopped: number of the line where it did, -1 for a point."""
+
+    def __init__(self, line: int, *error: object, first: str = "") -> None:
+        """error: as of `ComputationError`; first: likewise."""
+        super().__init__(*error, first=first)  # type: ignore[arg-type, misc]
+        self.line, self.first = line, first
 
 
 def joined_ends(ends: Ends, joints: tuple[int, int]) -> Ends:

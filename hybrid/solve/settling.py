@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.errors import Outcome
 from hybrid.kernels.state.forces import MASS_DAMPING, PLANAR, ROTARY
-from hybrid.kernels.state.obstacle_rows import FREE, MOVES
-from hybrid.kernels.state.state import NO_SHEAVES, Ends, Floats, Line, Sea, State
-from hybrid.solve.stepper import Stepper
+from hybrid.kernels.state.state import Floats, Line, State
 
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
 GYRATION = 0.02  # of the length: radius of gyration lent to the spin of a line that settles
@@ -42,60 +39,10 @@ def growth_time(square: float, time_scale: float, damping: float = DAMPING) -> f
     return float(1.0 / (np.sqrt(half**2 - square) - half))
 
 
-class Settling:
-    """Damped motions of one line, whose damping of mass makes them creep within its time scale (s)."""
-
-    def __init__(self, line: Line, sea: Sea, length: float, scale: float) -> None:
-        """length: m; scale: the tension scale, N."""
-        self.line, self.sea, self.length, self.scale = line, sea, length, scale
-        self.time_scale = float(np.sqrt(float(line.mass.sum()) * length / scale))
-
-    def rest(self, ends: Ends, state: State, longest: float = 0.0) -> tuple[State, int]:
-        """Pseudo-transient until the line hardly moves: rho = 0, doubling steps, damping by mass; and its iterations.
-
-        longest: s, of the steps; at least the time scale.  Sheaves are held: without friction nothing turns them, and
-        their correction takes factors that are not kept here.
-        """
-        line, length, time_scale = self.line, self.length, self.time_scale
-        longest = max(longest, time_scale)
-        held = np.where(line.moved == FREE, MOVES, line.moved).astype(np.int8)
-        stepper = Stepper(damped(line, length, time_scale)._replace(moved=held), length, self.scale)
-        old = state._replace(sheave=NO_SHEAVES).copy()
-        new = old.copy()
-        dt, calm, iterations = 1e-3 * time_scale, 0, 0
-        for _ in range(RELAXING_STEPS):
-            taken = stepper.step(self.sea, ends, old, new, dt, 0.0, dt)
-            iterations += taken.iterations
-            if taken.outcome != Outcome.OK:
-                dt *= 0.25
-                if dt < 1e-9 * time_scale:
-                    break
-                old.a[:], old.vd[:], old.v[:] = 0.0, 0.0, 0.0
-                old.wa[:], old.wd[:], old.w[:] = 0.0, 0.0, 0.0
-                continue
-            moved = float(np.abs(new.r - old.r).max())
-            old, new = new, old
-            if taken.iterations <= 5:
-                dt = min(2.0 * dt, longest)
-            calm = calm + 1 if moved < CALM * length * dt / longest else 0
-            if calm >= 3:
-                break
-        return old._replace(sheave=state.sheave.copy()), iterations
-
-    def nudged(self, state: State) -> State:
-        """A state given a small push off an unstable equilibrium: `nudged`."""
-        return nudged(self.line, state, self.length, self.time_scale)
-
-    def fallen(self, ends: Ends, state: State, square: float, shape: Floats) -> tuple[State, int]:
-        """Where a line comes to from an unstable equilibrium, pushed along its softest motion; and the iterations.
-
-        square (1/s^2, below 0), shape (N+1, 3): as of `Stability.softest_motion`.  A slack line on a bed falls in
-        hours where its time scale is seconds: steps are a part of the time in which the motion grows e-fold.  With
-        longer ones it would not grow.
-        """
-        pushed = state.copy()
-        pushed.v[:] = along(shape, self.length, self.time_scale)
-        return self.rest(ends, pushed, GROWN * growth_time(square, self.time_scale))
+def stop(state: State) -> None:
+    """Stop all motion of a state."""
+    for still in (state.v, state.a, state.vd, state.w, state.wa, state.wd):
+        still[:] = 0.0
 
 
 def along(shape: Floats, length: float, time_scale: float, damping: float = DAMPING) -> Floats:

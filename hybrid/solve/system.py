@@ -45,7 +45,8 @@ from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, S
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.step.step_law import REFUSED
 from hybrid.kernels.watch.named_quantities import note_quantities
-from hybrid.solve.contact_statics import left_over
+from hybrid.solve.contact_statics import DAMPING, left_over
+from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.joint_jobs import JointJobs, Rooms
 from hybrid.solve.self_contact import SelfContact
@@ -58,7 +59,6 @@ from hybrid.solve.statics import (
 )
 from hybrid.solve.stepper import HEAVY, REACH
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
-from hybrid.solve.system_flaws import buckling_line, flaw_of_lines
 from hybrid.solve.workspaces import workspace_of
 
 # Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.
@@ -95,6 +95,8 @@ class SystemSolver:
 
     It works in space, but for steps of lines that are joined to nothing and are marked as planar.
     """
+
+    settling = DAMPING
 
     def __init__(
         self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES,
@@ -503,7 +505,7 @@ class SystemSolver:
         found = [*self._contacts.values(), *([] if self.shared is None else [self.shared])]
         return min((x.narrowest for x in found if x.touches), default=np.inf)
 
-    def _proof(self, states: SystemState) -> float:
+    def proof(self, states: SystemState) -> float:
         """Largest force (N) that is left over at a node, a point or a body, with that of contact; reports follow."""
         residual = self.evaluate_forces(states, self.anchor).residual
         return self._largest(*self.unbalanced(states, self.anchor)) if self.in_contact() else residual
@@ -794,6 +796,13 @@ class SystemSolver:
             settle_in_soil(x.line, x.sea, state.r, state.soil)
         return taken
 
+    def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> SystemSolver:
+        """As of `solve.statics.Solver`, without contact."""
+        return SystemSolver(lines, len(self.net), self.bodies if bodies is None else bodies)
+
+    def turned(self, start: SystemState) -> None:
+        """As of `solve.statics.Solver`: chords are not turned."""
+
     def newton(self, start: SystemState) -> tuple[SystemTaken, SystemState]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.
 
@@ -819,7 +828,7 @@ class SystemSolver:
             iterations += taken.iterations
             if taken.outcome != Outcome.OK:
                 break
-            proof = self._proof(new)
+            proof = self.proof(new)
             taken = SystemTaken(taken.outcome, iterations, taken.correction, taken.line, taken.where, proof)
             if not self.is_balanced(new, proof):
                 taken = replace(taken, outcome=Outcome.NOT_CONVERGED)
@@ -829,7 +838,7 @@ class SystemSolver:
                 kept = taken, new.copy()
         if kept is not None and taken.outcome != Outcome.OK:
             taken, new = kept
-            self._proof(new)
+            self.proof(new)
         return taken, new
 
     def is_balanced(self, states: SystemState, residual: float) -> bool:

@@ -19,16 +19,15 @@ from hybrid.kernels.state.report import TWIST
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.solve.contact_stability import ContactStability
-from hybrid.solve.contact_statics import DAMPING, MOST_SPIN, ROAD, STALLING, calming, stop
-from hybrid.solve.flaws import slack_text
-from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
+from hybrid.solve.contact_statics import DAMPING, MOST_SPIN, ROAD, STALLING, calming
+from hybrid.solve.flaws import slack_cell, slack_text
+from hybrid.solve.joined import JoinedLine, LineFailed, SystemState, SystemTaken
+from hybrid.solve.lines_at_rest import LinesAtRest
+from hybrid.solve.search import MOST_FALLS, PUSHED, SAME, damped_bodies
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.settling import along, damped, nudged
+from hybrid.solve.settling import along, damped, nudged, stop
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.solve.statics import MOST_FALLS, PUSHED, SAME
 from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_flaws import slack_cell
-from hybrid.solve.system_statics import LineFailed, SystemEquilibrium, damped_bodies
 
 # That of each line with itself (None: it has none), and of lines with each other, where these may touch.
 Contacts = Callable[[], tuple[Sequence[SelfContact | None], SharedContact | None]]
@@ -164,7 +163,7 @@ def _failed(lines: Sequence[JoinedLine], taken: SystemTaken, states: SystemState
 def settled_system(
     lines: Sequence[JoinedLine], points: int, bodies: Floats, start: SystemState, contacts: Contacts,
     keeps_turns: Callable[[SystemState], tuple[int, str]], near: bool = False,
-) -> SystemEquilibrium:  # fmt: skip
+) -> LinesAtRest:  # fmt: skip
     """Equilibrium of a system with contact of lines with themselves, from a start that is at rest and apart.
 
     points: how many free points there are; contacts: makes contact, without friction; keeps_turns: a line that has lost
@@ -197,7 +196,7 @@ def settled_system(
             why = lost or (taken.outcome.cause if taken.outcome != Outcome.OK else "found")
             path.append(f"{falls.name}: {why} ({total + iterations} iterations in all)")
             if taken.outcome == Outcome.OK and not lost:
-                return SystemEquilibrium(
+                return LinesAtRest(
                     states, tuple(path), total + iterations, taken.residual, found, settled=True,
                     unjudged=falls.unjudged,
                 )  # fmt: skip

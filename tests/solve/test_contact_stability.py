@@ -12,8 +12,8 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.model.system import build_system
 from hybrid.simulation.system_start import equilibrium_of_system
 from hybrid.solve.contact_stability import ContactStability, contact_stiffness
-from hybrid.solve.statics import PUSHED
-from hybrid.solve.system_statics import SystemEquilibrium
+from hybrid.solve.lines_at_rest import LinesAtRest
+from hybrid.solve.search import PUSHED
 from tests.validation.test_validation_lines_contact import crossing
 from tests.validation.test_validation_obstacles_of_lines import system_of
 
@@ -48,7 +48,7 @@ def on_top(joined: bool = False, aside: float = 0.0) -> Tables:
     return tables
 
 
-def equilibrium(tables: Tables) -> SystemEquilibrium:
+def equilibrium(tables: Tables) -> LinesAtRest:
     system = system_of(tables)
     return equilibrium_of_system(system, build_system(system), np.inf)
 

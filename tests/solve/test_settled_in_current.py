@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from random_scenes import random_network
 
 import hybrid
 
@@ -67,3 +68,9 @@ def test_still_water_changes_nothing_where_no_current_acts() -> None:
     one = hybrid.static(chain(environment=calm))
     assert "still water" not in one.attributes["static_path"]
     assert np.abs(one.position[0, :, 1]).max() < 1e-9
+
+
+def test_friction_of_a_network_settles_while_its_current_grows() -> None:
+    """A row of knots, buoys and lines that no step of the growing current led through at once."""
+    found = hybrid.static(random_network(60)[1])
+    assert not [event for event in found.events if event.kind == "static friction neglected"]

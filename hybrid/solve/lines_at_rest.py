@@ -1,0 +1,94 @@
+"""The equilibrium of lines that meet at points, without friction and with it (solve.statics)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+
+from hybrid.errors import Outcome
+from hybrid.kernels.state.forces import FRICTION, WAVES
+from hybrid.kernels.state.state import Floats
+from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.search import PUSHED, Attempt, Start, Tally, attempts, first_sound, pulled, stuck, summary_of
+from hybrid.solve.statics import Equilibrium
+from hybrid.solve.system import SystemSolver
+
+
+@dataclass(frozen=True)
+class LinesAtRest:
+    """A static solution: the state, how it was found (`path`), iterations, and its proof, the largest force
+    out of balance at a node or a point (N)."""
+
+    state: SystemState
+    path: tuple[str, ...]
+    iterations: int
+    residual: float
+    solver: SystemSolver  # whose reports are those of the solution
+    settled: bool = False  # True where a damped motion with contact led there
+    unjudged: str = ""  # where settled: why it is not known that it would stay
+    with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction on the bed took part
+    alone: tuple[Equilibrium, ...] = ()  # of each line where all are joined to nothing that moves: found one by one
+    # By number of those that leave friction to the program, why it did not.
+    not_settled: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def pushed(self) -> bool:
+        """Whether it is beside an equilibrium that is not stable."""
+        return PUSHED in self.path[-1]
+
+    @property
+    def summary(self) -> str:
+        """How it was found, in one line."""
+        return summary_of(self.path, self.iterations)
+
+
+def lines_at_rest(
+    lines: Sequence[JoinedLine], points: int, bodies: Floats, starts: Iterable[Start], others: Iterable[Start] = (),
+    refused: Callable[[SystemState], tuple[Outcome, int, int]] | None = None,
+) -> LinesAtRest:  # fmt: skip
+    """Equilibrium of lines without friction; starts, others: as of `attempts`; refused: as of `first_sound`.
+
+    LineFailed: no way leads to lines under tension.
+    """
+    solver, tally = SystemSolver(_with_bits(lines, ()), points, bodies), Tally()
+    return _found(*first_sound(attempts(solver, starts, others, tally), tally, refused), solver, tally)
+
+
+def settled_with_friction(
+    lines: Sequence[JoinedLine], points: int, bodies: Floats, ways: Mapping[int, str], found: LinesAtRest,
+    first: SystemState,
+) -> LinesAtRest:  # fmt: skip
+    """The equilibrium with friction of the lines named in `ways`, by number.
+
+    ways: "pull": laid without tension along the equilibrium without friction (`found`), or where a current acts along
+    that in still water, then pulled tight, all such lines together; "start", and where that fails: at rest after a
+    damped motion from the first shapes; "usual" for all: pulled tight, and nothing else.  LineFailed.
+    """
+    solver, tally, tried = SystemSolver(_with_bits(lines, ways), points, bodies), Tally(), list[Iterable[Attempt]]()
+    tally.total = found.iterations
+    if "start" not in ways.values():
+        smooth = SystemSolver(_with_bits(lines, ()), points, bodies)
+        tried.append(pulled(smooth, solver, [*ways], found.state, tally))
+    if set(ways.values()) != {"usual"}:
+        tried.append(stuck(solver, ways, first, "the first shapes", tally))
+    return _found(*first_sound(chain(*tried), tally, before=found.path), solver, tally, frozenset(ways))
+
+
+def _with_bits(lines: Sequence[JoinedLine], rough: Iterable[int]) -> list[JoinedLine]:
+    """Lines without waves, and all but those of the numbers `rough` without friction.
+
+    With friction a slack solution is not taken.
+    """
+    rough, found = {*rough}, []
+    for k, x in enumerate(lines):
+        bits = x.line.bits & ~(WAVES | (0 if k in rough else FRICTION))
+        found.append(x._replace(line=x.line._replace(bits=bits), slackens=x.slackens and not rough))
+    return found
+
+
+def _found(
+    path: tuple[str, ...], tried: Attempt, solver: SystemSolver, tally: Tally, rough: frozenset[int] = frozenset()
+) -> LinesAtRest:
+    residual = solver.evaluate_forces(tried.states, solver.anchor).residual
+    return LinesAtRest(tried.states, path, tally.total, residual, solver, with_friction=rough)

@@ -1,0 +1,513 @@
+"""Ways to equilibria of lines, of one or of several that meet: Newton from the shapes given, then slow roads.
+
+One search for all; what solves differs: one line that nothing moves (solve.statics), or a network (solve.system).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from hybrid.errors import Outcome
+from hybrid.kernels.junctions.bodies import DAMPING, FRAME, MASS, V
+from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, OBSTACLES, SEABED, TOUCHES
+from hybrid.kernels.state.obstacle_rows import FREE, MOVES
+from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Floats
+from hybrid.solve.flaws import (
+    at_rest,
+    fold_text,
+    lowest_tension,
+    slack_text,
+)
+from hybrid.solve.joined import JoinedLine, LineFailed, SystemState, SystemTaken
+from hybrid.solve.laid import laid_without_tension
+from hybrid.solve.settling import (
+    CALM,
+    GROWN,
+    RELAXING_STEPS,
+    along,
+    damped,
+    growth_time,
+    gyration,
+    nudged,
+    stop,
+)
+from hybrid.solve.softened import is_in_current, softened, softest, with_current
+from hybrid.solve.stability import Stability
+from hybrid.solve.stepper import Stepper, Taken
+
+LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
+NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
+HARDENING = 8  # parts of the way from a soft, short line to the real one; a part that fails is halved
+LEAST_PART = 1e-3  # of a way that is gone in parts: a smaller one is not tried
+# The way to an equilibrium that has a mirror image on the other side, or may have: which it is hangs on round-off.
+PUSHED = "pushed off an unstable equilibrium"
+# Of the length: unstable equilibria that are nearer than this are one; the most of them that a line is pushed off.
+SAME, MOST_PUSHES = 1e-3, 12
+# The most of them that it is let fall from, slowly, to both sides, those that grow least first.
+MOST_FALLS = 16
+# Parts of a current with which equilibria lead to that in still water: at once, else by and by; and with which one with
+# friction follows it up again where it is not found at once.
+STILLED = ((0.0,), (0.8, 0.6, 0.4, 0.2, 0.1, 0.0))
+GROWING = (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
+PULLED = "pulled tight against friction"
+LIMP = 1e-3  # part of the bending stiffness with which a continuation begins
+# What a balanced state may be and yet no equilibrium; the first is what a search that found none tells.
+FLAWS = (Outcome.SLACK, Outcome.UNSTABLE, Outcome.FOLDED, Outcome.BURIED)
+
+Solution = tuple[SystemTaken, SystemState]
+Start = tuple[str, SystemState]
+
+
+def summary_of(path: Sequence[str], iterations: int) -> str:
+    """How an equilibrium was found, in one line."""
+    failed = len(path) - 1
+    others = f" (after {failed} other way{'s' * (failed > 1)})" if failed else ""
+    return f"{path[-1].split(':')[0]}, {iterations} iterations{others}"
+
+
+class Solver(Protocol):
+    """What a search asks of lines that are solved together."""
+
+    lines: tuple[JoinedLine, ...]
+    bodies: Floats  # (B, NUMBERS)
+    scale: float  # N
+    length: float  # m, of the longest line
+    settling: float  # damping of their motion to rest, as of solve.settling.damped
+
+    def newton(self, start: SystemState) -> Solution:
+        """Static Newton from `start`, which stays; not OK too where what was found is no equilibrium."""
+
+    def balance(self, start: SystemState) -> Solution:
+        """As `newton`, whatever the state is in which forces balance."""
+
+    def turned(self, start: SystemState) -> Solution | None:
+        """As `newton`, with chords that are turned; None: it cannot."""
+
+    def step(
+        self, old: SystemState, new: SystemState, dt: float, rho: float, before: float, rho_before: float
+    ) -> SystemTaken | Taken:
+        """A step of dt (s) to `new`, which is overwritten."""
+
+    def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> Solver:
+        """The same of other lines that are joined likewise; bodies: None: of the same ones."""
+
+    def proof(self, states: SystemState) -> float:
+        """Largest force (N) that is left over in states at rest; reports follow."""
+
+    def is_balanced(self, states: SystemState, residual: float) -> bool:
+        """Whether a largest residual force (N) is round-off of the forces in states."""
+
+
+class Tally:
+    """Newton's iterations so far."""
+
+    total = 0
+
+    def counted(self, solution: Solution) -> Solution:
+        """The same solution, counted."""
+        self.total += solution[0].iterations
+        return solution
+
+
+class Attempt(NamedTuple):
+    """What a way led to; real: with the loads, bed and lines of the scene, not with easier ones on the way to them."""
+
+    how: str
+    taken: SystemTaken
+    states: SystemState
+    solver: Solver
+    real: bool = True
+
+
+def first_sound(
+    ways: Iterable[Attempt], tally: Tally, refused: Callable[[SystemState], tuple[Outcome, int, int]] | None = None,
+    before: Sequence[str] = (),
+) -> tuple[tuple[str, ...], Attempt]:  # fmt: skip
+    """The first attempt that leads to an equilibrium, or to a slack one that is taken, and how those before it went.
+
+    refused: why an equilibrium is not the one that is sought (OK: it may be), the line, and its node or cell; before:
+    how it went until then.  LineFailed: none does, with what says most about the lines.
+    """
+    path, failed = [*before], list[Attempt]()
+    for tried in ways:
+        taken = tried.taken
+        if taken.outcome == Outcome.OK and tried.real and refused is not None:
+            outcome, line, where = refused(tried.states)
+            taken = replace(taken, outcome=outcome, line=line, where=where)
+            tried = tried._replace(taken=taken)
+        cause = "stopped on the way" if not tried.real else taken.outcome.cause if taken.outcome else "found"
+        path.append(f"{tried.how}: {cause} ({tally.total} iterations in all)")
+        if taken.outcome == Outcome.OK and tried.real:
+            return tuple(path), tried
+        if tried.real:
+            failed.append(tried)
+    for worst in (*FLAWS, failed[0].taken.outcome):
+        these = [x for x in failed if x.taken.outcome == worst]
+        for x in sorted(these, key=_compression) if worst == Outcome.SLACK else ():
+            slackens = x.solver.lines[x.taken.line].slackens
+            if slackens and x.solver.is_balanced(x.states, x.solver.proof(x.states)):
+                return tuple(path), x
+        if these:
+            raise _failed(these[0], path)
+    raise AssertionError("one of the ways has failed with the first way's outcome")
+
+
+def _compression(found: Attempt) -> float:
+    """The largest compression (N) of a catenary: a slack shape with more is a strut rather, which no cable is."""
+    each = zip(found.solver.lines, found.states.lines, strict=True)
+    return max(-float(lowest_tension(x.line, x.sea, state)[0]) for x, state in each)
+
+
+def _failed(worst: Attempt, path: Sequence[str]) -> LineFailed:
+    """The error of a search of which nothing came, with the place where the worst result has its flaw."""
+    taken = worst.taken
+    if taken.line < 0:
+        return LineFailed(-1, taken.outcome, None, 0.0, "\n              ".join(path))
+    x, state = worst.solver.lines[taken.line], worst.states.lines[taken.line]
+    node = min(max(taken.where, 0), x.line.s.size - 1)
+    if taken.outcome == Outcome.FOLDED:
+        path = [fold_text(x.line, state, node), *path]
+    if taken.outcome == Outcome.SLACK:
+        path = [slack_text(x.line, state, x.scale), *path]
+    return LineFailed(taken.line, taken.outcome, None, float(x.line.s[node]), "\n              ".join(path))
+
+
+# --- with friction --------------------------------------------------------------------------------------
+
+
+def stuck(rough: Solver, lines: Iterable[int], first: SystemState, shape: str, tally: Tally) -> Iterator[Attempt]:
+    """Where friction alone keeps these lines: they settle from their start, with friction, then Newton from there."""
+    out = first.copy()
+    for k in lines:
+        x = rough.lines[k]
+        Stepper(x.line, x.length, x.scale).static_friction(x.sea, x.ends, out.lines[k])
+    rest, _ = relaxed(rough, out, tally)
+    yield Attempt(f"settled with friction from {shape}", *tally.counted(rough.newton(rest)), rough)
+
+
+def pulled(smooth: Solver, rough: Solver, lines: Sequence[int], states: SystemState, tally: Tally) -> Iterator[Attempt]:
+    """These lines laid where they touch, without tension, along an equilibrium without friction, then pulled tight.
+
+    Lines that a current acts on are laid in still water: what lies is held by friction before the current comes, and
+    the shape in the current without friction would be that of lines that have been swept along the bed.
+    """
+    calm = _in_still_water(smooth, states, tally)
+    how = f"{PULLED} from where it lay without tension{' in still water' if calm is not None else ''}"
+    rest = (states if calm is None else calm).copy()
+    for k in lines:
+        x = rough.lines[k]
+        rest.lines[k] = laid_without_tension(x.line, x.sea, x.ends, rest.lines[k])  # type: ignore[index]
+    yield Attempt(how, *tally.counted(rough.newton(rest)), rough)
+    if calm is not None:
+        for part in GROWING:
+            slower = _in_current(rough, part)
+            taken, found = _taut(slower, *tally.counted(slower.balance(rest)))
+            if taken.outcome != Outcome.OK:
+                break
+            rest = found
+        yield Attempt(f"{how}, while the current grows", *tally.counted(rough.newton(rest)), rough)
+
+
+def _in_still_water(smooth: Solver, states: SystemState, tally: Tally) -> SystemState | None:
+    """The equilibrium beside one in a current that there is without it.
+
+    None: no current acts on lines, or there is none, as of one that floats.
+    """
+    if any(is_in_current(x.line, x.sea) for x in smooth.lines):
+        for ladder in STILLED:
+            if (found := in_slower_currents(smooth, states, ladder, tally)) is not None:
+                return found[-1]
+    return None
+
+
+def in_slower_currents(
+    smooth: Solver, states: SystemState, parts: Sequence[float], tally: Tally
+) -> list[SystemState] | None:
+    """Equilibria that lead from one in a current to those in these parts of it, one from the other.
+
+    None: a line has none, as one that floats.
+    """
+    found = [states]
+    for part in parts:
+        slower = _in_current(smooth, part)
+        taken, state = tally.counted(slower.newton(found[-1]))
+        if taken.outcome != Outcome.OK:
+            return None
+        found.append(state)
+    return found[1:]
+
+
+def _in_current(solver: Solver, part: float) -> Solver:
+    """The same with this part of the current."""
+    return solver.others([x._replace(sea=with_current(x.sea, part)) for x in solver.lines], solver.bodies.copy())
+
+
+# --- without friction -----------------------------------------------------------------------------------
+
+
+def attempts(solver: Solver, starts: Iterable[Start], others: Iterable[Start], tally: Tally) -> Iterator[Attempt]:
+    """Ways to an equilibrium, the quickest first; each is tried only when those before it failed.
+
+    starts: shapes to begin with, with their names; others: those that come into question where these lead nowhere.
+    """
+    ways = _Ways(solver, tally)
+    given, further = list[Start](), list[Start]()
+    for name, start in starts:
+        given.append((name, start))
+        yield ways.newton(f"Newton from {name}", start)
+    several = len(given) > 1
+    if any(x.line.bits & (TOUCHES | FLOW) or x.line.element[[0, -1]].any() for x in solver.lines):
+        for name, start in given:
+            yield ways.eased(start, f", from {name}" if several else "")
+    for name, start in others:
+        further.append((name, start))
+        yield ways.newton(f"Newton from {name}", start)
+    for k, (name, start) in enumerate(given):
+        lost = further and ways.first in (Outcome.NOT_FINITE, Outcome.SINGULAR)
+        yield ways.hardened(further[0][1] if lost and k == 0 else start, f", from {name}" if several else "")
+    for name, start in further:
+        yield ways.hardened(start, f", from {name}")
+    for _, start in given:
+        yield from ways.loaded(start)
+    for name, start in [*given, *further]:
+        yield ways.settled(start, name)
+        yield from ways.pushes()
+    yield from ways.falls()
+
+
+class _Fall(NamedTuple):
+    """A line that buckles, and its softest motion there, as of `Stability.softest_motion`."""
+
+    square: float
+    shape: Floats
+    line: int
+    states: SystemState
+
+
+class _Ways:
+    """Ways to an equilibrium of one search, which knows the unstable and folded ones that it has met."""
+
+    def __init__(self, solver: Solver, tally: Tally) -> None:
+        self.solver, self.tally = solver, tally
+        self.first: Outcome | None = None  # of the first attempt
+        self._flawed: list[tuple[int, SystemState]] = []  # the line that is, -1: a point, and the states
+        self._pushed = self._seen = 0
+
+    def _noted(self, how: str, solution: Solution, real: bool = True) -> Attempt:
+        taken, states = solution
+        self.first = taken.outcome if self.first is None else self.first
+        flaw = taken.outcome in (Outcome.UNSTABLE, Outcome.FOLDED)
+        if flaw and not any(self._are_same(states, x) for _, x in self._flawed):
+            self._flawed.append((taken.line, states))
+        return Attempt(how, taken, states, self.solver, real)
+
+    def _are_same(self, one: SystemState, other: SystemState) -> bool:
+        apart = max(float(np.abs(a.r - b.r).max()) for a, b in zip(one.lines, other.lines, strict=True))
+        return apart <= SAME * self.solver.length
+
+    def newton(self, how: str, start: SystemState) -> Attempt:
+        """Newton's method from a start."""
+        return self._noted(how, self.tally.counted(self.solver.newton(start)))
+
+    def eased(self, states: SystemState, place: str) -> Attempt:
+        """Continuation from an easy sea to the real one: soft bed and obstacles, little current, little bending.
+
+        A part of the way that fails is halved.
+        """
+        solver, done, part, steps, bits = self.solver, -1.0, 1.0, 0, 0
+        while True:
+            goal = min(1.0, done + part)
+            last, here = goal >= 1.0, solver
+            if not last:
+                here = solver.others([_easier(x, max(goal, 0.0)) for x in solver.lines])
+            taken, found = self.tally.counted(here.newton(states) if last else here.balance(states))
+            steps += 1
+            if taken.outcome == Outcome.OK:
+                states, part = found, min(1.5 * part, 0.25) if done < 0.0 else 1.5 * part
+                done = goal
+            else:
+                part *= 0.5
+            if done >= 1.0 or part <= LEAST_PART or (done < 0.0 and part <= 0.5):
+                break
+        for x in solver.lines:
+            bits |= x.line.bits
+        kinds = ((SEABED, "a soft seabed"), (OBSTACLES, "soft obstacles"), (FLOW, "no current"))
+        easy = [name for bit, name in kinds if bits & bit]
+        easy += ["little bending"] if any(x.line.element.any() for x in solver.lines) else []
+        return self._noted(f"from {', '.join(easy)} in {steps} steps{place}", (taken, found), last)
+
+    def hardened(self, start: SystemState, place: str) -> Attempt:
+        """From soft and short lines, stretched by their start, to the real ones: they sag from any start.
+
+        The starting shapes are under the tension scale at a strain of 1.  First cells get their real length, so that
+        soft lines sag and stay taut; then their compliance falls to the real one.  A part that fails is halved.
+        """
+        solver, states = self.solver, start.copy()
+        short = [0.5 * np.linalg.norm(state.e, axis=1) for state in start.lines]
+        for x, state in zip(solver.lines, states.lines, strict=True):
+            state.T[:] = x.scale
+        done, part, steps = 0.0, 1.0 / HARDENING, 0
+        while True:
+            goal = min(1.0, done + part)
+            if goal == 1.0:
+                taken, found = self.tally.counted(solver.newton(states))
+            else:
+                here = solver.others([_harder(x, goal, h) for x, h in zip(solver.lines, short, strict=True)])
+                taken, found = _taut(here, *self.tally.counted(here.balance(states)))
+            steps += 1
+            if taken.outcome == Outcome.OK:
+                states, done, part = found, goal, 1.5 * part
+            else:
+                part *= 0.5
+            if done >= 1.0 or part <= LEAST_PART:
+                break
+        what = "soft lines" if len(solver.lines) > 1 else "a soft line"
+        return self._noted(f"{what} hardened in {steps} steps{place}", (taken, found), goal == 1.0)
+
+    def loaded(self, start: SystemState) -> Iterator[Attempt]:
+        """End loads and moments applied in steps, each solved with turning chords, where the solver has these."""
+        for steps in LOAD_STEPS:
+            states = start
+            for k in range(1, steps + 1):
+                lines = [
+                    x._replace(ends=x.ends._replace(force=k / steps * x.ends.force, moment=k / steps * x.ends.moment))
+                    for x in self.solver.lines
+                ]
+                found = self.solver.others(lines).turned(states)
+                if found is None:
+                    return
+                taken, states = self.tally.counted(found)
+                if taken.outcome not in (Outcome.OK, Outcome.SLACK, Outcome.FOLDED):
+                    break
+            how = f"turning chords, end loads in {steps} step{'s' * (steps > 1)}"
+            yield self._noted(how, (taken, states), k == steps)
+
+    def settled(self, start: SystemState, name: str) -> Attempt:
+        """A damped motion to rest, then Newton's method."""
+        rest, calm = relaxed(self.solver, start, self.tally)
+        taken, states = self.tally.counted(self.solver.newton(rest))
+        if calm and taken.outcome not in (Outcome.OK, *FLAWS):
+            slack, _ = _taut(self.solver, replace(taken, outcome=Outcome.OK), rest)
+            if slack.outcome == Outcome.SLACK:  # what has no tension has no one place that Newton could find
+                taken, states = slack, rest
+        return self._noted(f"damped motion to rest from {name}, then Newton", (taken, states))
+
+    def pushes(self) -> Iterator[Attempt]:
+        """Small pushes off what was met that is not stable; ends stay with what they are joined to."""
+        while self._pushed < min(len(self._flawed), MOST_PUSHES):
+            _, states = self._flawed[self._pushed]
+            self._pushed, out = self._pushed + 1, states.copy()
+            for k, x in enumerate(self.solver.lines):
+                own = float(np.sqrt(float(x.line.mass.sum()) * x.length / x.scale))
+                out.lines[k] = nudged(x.line, states.lines[k], x.length, own)  # type: ignore[index]
+                out.lines[k].v[[-j for j in (0, 1) if x.joints[j] >= 0]] = 0.0
+            rest, _ = relaxed(self.solver, out, self.tally)
+            yield self.newton(PUSHED, rest)
+
+    def falls(self) -> Iterator[Attempt]:
+        """Slow falls from states in which a line buckles, to both sides, from that which grows least first."""
+        solver, slow = self.solver, list[_Fall]()
+        time_scale = _time_scale(solver)
+        for _ in range(MOST_FALLS):
+            slow += [self._fall(*x) for x in self._flawed[self._seen :] if x[0] >= 0]
+            self._seen, slow = len(self._flawed), sorted((x for x in slow if x.square < 0.0), key=lambda x: x.square)
+            if not slow:
+                return
+            fall = slow.pop()
+            longest = GROWN * growth_time(fall.square, time_scale, solver.settling)
+            for way in (1.0, -1.0):
+                if len(self._flawed) == self._seen:  # else it has led to one that is not known, from which it goes on
+                    out, x = fall.states.copy(), solver.lines[fall.line]
+                    out.lines[fall.line].v[:] = along(way * fall.shape, x.length, time_scale, solver.settling)
+                    rest, _ = relaxed(solver, out, self.tally, longest)
+                    yield self.newton(f"{PUSHED}, along its softest motion", rest)
+
+    def _fall(self, line: int, states: SystemState) -> _Fall:
+        """The softest motion of a line between its ends."""
+        x = self.solver.lines[line]
+        ends = x.ends._replace(held=np.minimum(x.ends.held, 1))
+        stability = Stability(x.line, x.sea, x.length, x.scale)
+        return _Fall(*stability.softest_motion(ends, states.lines[line], gyration(x.line, x.length)), line, states)
+
+
+def _easier(x: JoinedLine, part: float) -> JoinedLine:
+    """A line over a softer bed and softer obstacles, in less current, with less bending; part: 0 the easiest to 1."""
+    sea = with_current(softened(x.line, x.sea, softest(x.line, x.sea, x.length) ** (1.0 - part)), part)
+    if x.rides.size:  # a body would sink through lines that are soft
+        sea = sea._replace(obstacles=x.sea.obstacles)
+    return x._replace(sea=sea, line=x.line._replace(kb=x.line.kb * LIMP ** (1.0 - part)))
+
+
+def _harder(x: JoinedLine, goal: float, short: Floats) -> JoinedLine:
+    """A line between soft and short, and real; goal: 0 to 1, of the way; short: (N,) m, its first cells."""
+    line, longer, harder = x.line, min(1.0, 2.0 * goal), max(0.0, 2.0 * goal - 1.0)
+    soft, hard = np.maximum(line.ck, 1.0 / x.scale), np.maximum(line.ck, NEARLY_STIFF / x.scale)
+    h, ck = short ** (1 - longer) * line.h**longer, soft ** (1 - harder) * hard**harder
+    return x._replace(line=line._replace(h=h, ck=ck, bits=line.bits & ~AXIAL_LAW, law_at=NO_ADDRESS))
+
+
+def _taut(solver: Solver, taken: SystemTaken, states: SystemState) -> Solution:
+    """What balances, with the outcome SLACK where a catenary is not under tension."""
+    for k, (x, state) in enumerate(zip(solver.lines, states.lines, strict=True)):
+        tension, cell = lowest_tension(x.line, x.sea, state)
+        if taken.outcome == Outcome.OK and not tension > max(at_rest(x), 0.0):
+            return replace(taken, outcome=Outcome.SLACK, line=k, where=int(cell)), states
+    return taken, states
+
+
+def _time_scale(solver: Solver) -> float:
+    """s, in which the lines and bodies settle."""
+    mass = sum(float(x.line.mass.sum()) for x in solver.lines) + float(solver.bodies[:, MASS].sum())
+    return float(np.sqrt(mass * solver.length / solver.scale))
+
+
+def relaxed(solver: Solver, start: SystemState, tally: Tally, longest: float = 0.0) -> tuple[SystemState, bool]:
+    """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until lines hardly move; whether they did.
+
+    longest: s, of the steps; at least the time scale.  Sheaves are held: without friction nothing turns them.
+    """
+    time_scale = _time_scale(solver)
+    longest = max(longest, time_scale)
+    lines, old = [], start.copy()
+    for k, x in enumerate(solver.lines):
+        held = np.where(x.line.moved == FREE, MOVES, x.line.moved).astype(np.int8)
+        slow = damped(x.line, x.length, time_scale, solver.settling)._replace(moved=held)
+        lines.append(x._replace(line=slow, slackens=True))
+        old.lines[k] = old.lines[k]._replace(sheave=NO_SHEAVES)  # type: ignore[index]
+    here, new = solver.others(lines, damped_bodies(solver.bodies, time_scale)), old.copy()
+    meets = any(x.rides.size for x in solver.lines)
+    dt, calm = 1e-3 * time_scale, 0
+    for _ in range(RELAXING_STEPS):
+        taken = here.step(old, new, dt, 0.0, dt, 0.0)
+        tally.total += taken.iterations
+        if taken.outcome != Outcome.OK:
+            dt *= 0.25
+            if dt < 1e-9 * time_scale:
+                break
+            old.bodies[:, V:] = 0.0
+            for state in old.lines:
+                stop(state)
+            continue
+        moved = max(float(np.abs(a.r - b.r).max()) for a, b in zip(new.lines, old.lines, strict=True))
+        if meets:  # what nothing but contact holds may still fall where lines are at rest
+            moved = max(moved, float(np.abs(new.bodies[:, :FRAME] - old.bodies[:, :FRAME]).max()))
+        old, new = new, old
+        if taken.iterations <= 5:
+            dt = min(2.0 * dt, longest)
+        calm = calm + 1 if moved < CALM * solver.length * dt / longest else 0
+        if calm >= 3:
+            break
+    for k, state in enumerate(start.lines):
+        old.lines[k] = old.lines[k]._replace(sheave=state.sheave.copy())  # type: ignore[index]
+    return old, calm >= 3
+
+
+def damped_bodies(bodies: Floats, time_scale: float) -> Floats:
+    """Bodies with damping by mass that lets them settle in a time scale, s."""
+    slow = bodies.copy()
+    slow[:, DAMPING : DAMPING + 36] += 2.0 / time_scale * bodies[:, MASS : MASS + 36]
+    return slow
