@@ -46,7 +46,7 @@ from hybrid.simulation.progress import (
     listener_of,
     tell_of_compiling,
 )
-from hybrid.simulation.restart import RemainingLines, remaining
+from hybrid.simulation.restart import Remaining, remaining
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
@@ -171,7 +171,7 @@ def resume(
         if left.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
-        if isinstance(left, RemainingLines):
+        if not left.flat:
             _move_lines(left.scene, target, progress, path, criterion, left)
             return open_result(target)
         case = Case(left.scene, criterion, left.changes, left.points)
@@ -209,7 +209,7 @@ def _several_lines(
 
 def _move_lines(
     system: System, target: Target, progress: bool | Listener, source: Path | None = None,
-    criterion: UserCriterion | None = None, left: RemainingLines | None = None,
+    criterion: UserCriterion | None = None, left: Remaining[System] | None = None,
 ) -> None:  # fmt: skip
     """Compute the motion of several lines; source: the result to go on with; left: what is to be done with it."""
     changes = left.changes if left is not None else ()

@@ -42,7 +42,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import survey_resolution
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT
-from hybrid.simulation.restart import RemainingRun
+from hybrid.simulation.restart import Remaining
 from hybrid.simulation.restore import refused
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.amend import may_be_amended
@@ -56,7 +56,7 @@ class Passes:
     """Computes a result and, where they are wanted, its errors."""
 
     def __init__(
-        self, case: Case, target: Target, source: Path | None = None, remaining: RemainingRun | None = None
+        self, case: Case, target: Target, source: Path | None = None, remaining: Remaining[Scene] | None = None
     ) -> None:
         """source, remaining: what to continue."""
         self.case, self.target, self.source, self.remaining = case, target, source, remaining
@@ -67,7 +67,7 @@ class Passes:
     def compute(self) -> None:
         """All passes."""
         case, remaining = self.case, self.remaining
-        resolution = first_resolution(case.scene) if remaining is None else remaining.resolution
+        resolution = first_resolution(case.scene) if remaining is None else remaining.resolution.one
         if not wants_errors(case.scene):
             self._first(self._surveyed(resolution)[1] if remaining is None else resolution, self.target)
             return

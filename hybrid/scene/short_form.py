@@ -125,6 +125,11 @@ def network_of(scene: Scene) -> System:
         raise NotInNetwork(list(_complaints(scene, error))) from None
 
 
+def as_network(scene: Scene | System) -> tuple[System, ShortForm]:
+    """The network that computes what a scene asks for, and where the keys of that are in the scene."""
+    return (network_of(scene), short_form(scene)) if isinstance(scene, Scene) else (scene, ShortForm(()))
+
+
 def short_form(scene: Scene) -> ShortForm:
     """Where the keys of the network of a scene are in that."""
     pairs: list[tuple[Place, Place]] = [(("lines", LINE), ("cable",))]

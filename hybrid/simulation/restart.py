@@ -6,26 +6,24 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
 from hybrid.errors import Complaint, ResultError, SceneError
-from hybrid.model.build import Model, build
+from hybrid.model.build import Model
 from hybrid.model.ends import EndConditions
 from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.output_points import OutputPoints
-from hybrid.model.payout import longest_out, winch_at, winch_side
-from hybrid.model.resolution import Resolution
+from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.self_reach import self_reach
-from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import as_scene_or_system, parse_either, parse_scene, scene_text
-from hybrid.scene.schema import Scene
-from hybrid.simulation.restore import kept_resolution, refused, resolution_from, restored_points
-from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
+from hybrid.scene.base import dotted
+from hybrid.scene.read import as_scene_or_system, parse_either, scene_text
+from hybrid.scene.short_form import as_network
+from hybrid.simulation.restore import kept_resolution, refused, restored_points
+from hybrid.store.checkpoint import read_before, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
@@ -38,11 +36,7 @@ if TYPE_CHECKING:  # its tables take long to make
 MAY_CHANGE = (
     "environment.fluid.current", "environment.fluid.waves", "time.duration",
     *(f"ends.{end}.{key}" for end in ("start", "end") for key in ("motion", "force", "thrust", "moment")),
-)  # fmt: skip
-MAY_CHANGE_OF_LINES = (
-    "environment.fluid.current", "environment.fluid.waves", "time.duration",
-    *(f"points.NAME.{key}" for key in ("motion", "force", "moment")),
-    *(f"bodies.NAME.{key}" for key in ("motion", "force", "moment")),
+    *(f"{what}.NAME.{key}" for what in ("points", "bodies") for key in ("motion", "force", "moment")),
 )  # fmt: skip
 # Of the length, and of the length in the time of a transverse wave: what an end may jump by, and its velocity.
 SAME_PLACE, SAME_SPEED = 1e-6, 1e-3
@@ -61,165 +55,132 @@ class LoadChange(Generic[S]):
 
 
 @dataclass(frozen=True)
-class RemainingRun:
-    """What is to be done: a scene, what changes later, and where to begin.
+class Remaining(Generic[S]):
+    """What is to be done with a result: a scene, what changes later, and where to begin.
 
-    before: what was found before the run, of what it is part of; {}: nothing, it begins with `resolution`.  anew: from
-    t = 0, not from the checkpoint; reached: s, where it begins; points: of the result, None if it is computed anew.
+    flat: whether it is of a cable, whose file has no groups of lines.  before: what was found before the run, of what
+    it is part of; {}: nothing, it begins with `resolution`.  anew: from t = 0, not from the checkpoint; reached: s,
+    where it begins; points: of a flat result, None if it is computed anew.
     """
 
-    scene: Scene
-    changes: tuple[LoadChange[Scene], ...]
-    resolution: Resolution
+    scene: S
+    changes: tuple[LoadChange[S], ...]
+    flat: bool
+    resolution: SystemResolution
     before: Tree
     anew: bool
     reached: float
     points: OutputPoints | None
 
 
-def remaining_run(
+def remaining(
     path: Path, until: float | None = None, settings: Sequence[str] = (), start: float | None = None
-) -> RemainingRun:
+) -> Remaining[Any]:
     """What a result leaves to be done, if it is to go on until then, with these settings from `start` (s) on.
 
     ResultError: nothing, or it cannot be told; SceneError: what is asked cannot be.
     """
-    scene, changes, status, before, point, points = _found(path)
-    with refused(path):
-        resolution = resolution_from(point.resolution, scene)
-    if start is not None and not settings:
-        raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
-    if until is None and not settings:
-        if status == "complete" and not before:
-            fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
-            raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
-        return RemainingRun(scene, changes, resolution, before, False, point.t, points)
-    if until is not None:
-        scene, changes = _longer(scene, changes, until, point.t)
-    anew = False
-    if settings:
-        begin = point.t if start is None else start
-        last = changes[-1] if changes else LoadChange(0.0, scene)
-        changed = parse_scene(scene_text(last.scene), overrides=settings)
-        end = changed.require_time().duration
-        if until is not None and end != until:
-            raise _refused("time.duration", f"{end:g} s", f"{until:g} s, as until says, or nothing", "say it once")
-        _check(last, changed, resolution, begin, end)
-        if end != scene.require_time().duration:
-            scene, changes = _longer(scene, changes, end, point.t)
-        changes, anew = (*changes, LoadChange(begin, changed)), begin < point.t
-    reached, kept = (0.0, None) if anew else (point.t, points)
-    return RemainingRun(scene, changes, resolution, {}, anew, reached, kept)
-
-
-class RemainingLines(NamedTuple):
-    """What is to be done with several lines; anew, reached: as of `RemainingRun`."""
-
-    scene: System
-    changes: tuple[LoadChange[System], ...]
-    anew: bool
-    reached: float
-
-
-def remaining(
-    path: Path, until: float | None = None, settings: Sequence[str] = (), start: float | None = None
-) -> RemainingRun | RemainingLines:
-    """What a result leaves to be done, as of `remaining_run`, of one line or of several."""
-    lines = remaining_system(path, until, settings, start)
-    return remaining_run(path, until, settings, start) if lines is None else lines
-
-
-def remaining_system(
-    path: Path, until: float | None = None, settings: Sequence[str] = (), start: float | None = None
-) -> RemainingLines | None:
-    """What a result of several lines leaves to be done, as of `remaining_run`; None: it is of one cable.
-
-    ResultError: nothing is left to do; SceneError: what is asked cannot be.
-    """
-    with open_result(path) as result:
-        if not result.lines:
-            return None
-        found, _ = parse_either(result.scene_text)
-        if isinstance(found, Scene):
-            return None
-        meets = _knows_lines_that_meet(path)
-        found = _as_often(as_begun(found, result, meets), result)
-        done, reached = result.done, float(result.times[-1]) if len(result.times) else 0.0
-        changes = tuple(LoadChange(t, as_begun(_several(text), result, meets)) for t, text in _told(path, result))
+    left, done = _found(path)
     if start is not None and not settings:
         raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
     if until is None and not settings:
         if done:
             fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
-        return RemainingLines(found, changes, False, reached)
+        return left
+    left = replace(left, before={})
     if until is not None:
-        found, changes = _longer_lines(found, changes, until, reached)
+        left = _longer(left, until)
     if not settings:
-        return RemainingLines(found, changes, False, reached)
-    begin = reached if start is None else start
-    last = changes[-1] if changes else LoadChange(0.0, found)
-    changed = _several(scene_text(last.scene), settings)
+        return left
+    begin = left.reached if start is None else start
+    last = left.changes[-1] if left.changes else LoadChange(0.0, left.scene)
+    changed, _ = parse_either(scene_text(last.scene), overrides=settings)
     end = changed.require_time().duration
     if until is not None and end != until:
         raise _refused("time.duration", f"{end:g} s", f"{until:g} s, as until says, or nothing", "say it once")
-    _check_lines(last, changed, kept_resolution(found, path), begin, end)
-    if end != found.require_time().duration:
-        found, changes = _longer_lines(found, changes, end, reached)
-    anew = begin < reached
-    return RemainingLines(found, (*changes, LoadChange(begin, changed)), anew, 0.0 if anew else reached)
+    _check(last, changed, left.resolution, begin, end)
+    if end != left.scene.require_time().duration:
+        left = _longer(left, end)
+    left = replace(left, changes=(*left.changes, LoadChange(begin, changed)))
+    return replace(left, anew=True, reached=0.0, points=None) if begin < left.reached else left
 
 
-def _several(text: str, settings: Sequence[str] = ()) -> System:
-    """Several lines, which a text is known to be of."""
-    found, _ = parse_either(text, overrides=settings)
-    assert not isinstance(found, Scene)
-    return found
+def _found(path: Path) -> tuple[Remaining[Any], bool]:
+    """What is left of a result as it is, and whether that is nothing."""
+    with opened(path) as file:
+        before, point = read_before(file), read_checkpoint(file)
+        with refused(path):
+            state = point.state
+            meets, reached = "let_pass" in state, max(point.t, float(state["t"]))
+        with open_result(path) as result:
+            flat, points = not result.lines, None
+
+            def read(text: str) -> Any:
+                scene: Any = parse_either(text)[0]
+                return scene if flat else as_begun(scene, result, meets)
+
+            scene = _as_often(read(result.scene_text), result)
+            changes = tuple(LoadChange(t, read(text)) for t, text in _told(path, result))
+            if flat:
+                with refused(path):
+                    longest = longest_out(scene)
+                    points = restored_points(result, longest, None if winch_side(scene) else scene.length)
+            done = result.done and not (flat and before)
+    resolution = kept_resolution(as_network(scene)[0], path)
+    return Remaining(scene, changes, flat, resolution, before, False, reached, points), done
 
 
-def _longer_lines(
-    system: System, changes: Sequence[LoadChange[System]], until: float, reached: float
-) -> tuple[System, tuple[LoadChange[System], ...]]:
-    """As `_longer`, of several lines."""
-    _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).lines[name].at(t=...)")
-    _refuse_before_changes(changes, until)
-    every = system.output_interval
-    other = tuple(LoadChange(x.t, _several(_text_until(x.scene, until, every))) for x in changes)
-    return _several(_text_until(system, until, every)), other
+def _longer(left: Remaining[Any], until: float) -> Remaining[Any]:
+    """The same until another time (s), with outputs as often as before."""
+    reading = "hybrid.open(path).at(t=...)" if left.flat else "hybrid.open(path).lines[name].at(t=...)"
+    _refuse_what_is_no_later_time(until, left.reached, reading)
+    _refuse_before_changes(left.changes, until)
+    every = left.scene.output_interval
+    scene = _scene_until(left.scene, until, every)
+    _refuse_more_out(left.scene, scene, until)
+    changes = tuple(LoadChange(x.t, _scene_until(x.scene, until, every)) for x in left.changes)
+    return replace(left, scene=scene, changes=changes)
 
 
-def _text_until(scene: Scene | System, until: float, every: float) -> str:
-    """The text of a scene that ends at another time (s), with outputs every so many seconds."""
+def _scene_until(scene: Any, until: float, every: float) -> Any:
+    """A scene that ends at another time (s), with outputs every so many seconds."""
     data = scene.model_dump(mode="json", exclude_none=True)
     data["time"]["duration"] = until
     data.setdefault("output", {})["every"] = every
-    return scene_text(as_scene_or_system(data))
+    return parse_either(scene_text(as_scene_or_system(data)))[0]
 
 
-def _check_lines(
-    last: LoadChange[System], changed: System, resolution: SystemResolution, begin: float, end: float
-) -> None:
-    """As `_check`, of several lines: motions of held points and of bodies."""
+def _refuse_more_out(before: Any, after: Any, until: float) -> None:
+    """SceneError: by `until` (s) more of a line is out than its result has points for."""
+    (one, form), (other, _) = as_network(before), as_network(after)
+    for name in one.lines:
+        scene, longer = one.scene_of(name), other.scene_of(name)
+        out = longest_out(longer)
+        if out > longest_out(scene) * (1.0 + SAME_PLACE):
+            end = ("start", "end")[winch_side(scene)]
+            where = dotted(form.place(("lines", name, "connections", end, "payout", "longest")))
+            expected = f"a time up to which at most {longest_out(scene):.6g} m are out, for which the result has points"
+            fix = f"run the scene again with {where}"
+            raise _refused("until", f"{until:g} s, when {out:.6g} m are out", expected, fix)
+
+
+def _check(last: LoadChange[Any], changed: Any, resolution: SystemResolution, begin: float, end: float) -> None:
+    """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
     from hybrid.model.system import build_system
 
-    _check_what_changes(last.t, begin, end, _differences(_plain(last.scene), _plain(changed)), MAY_CHANGE_OF_LINES)
-    before = build_system(last.scene, resolution)
-    after = build_system(changed, resolution, before)
-    for name, one, other, joints in zip(before.names, before.models, after.models, before.joints, strict=True):
+    _check_what_changes(last, changed, begin, end)
+    (before, form), (system, _) = as_network(last.scene), as_network(changed)
+    old = build_system(before, resolution)
+    new = build_system(system, resolution, old)
+    for name, one, other, joints in zip(old.names, old.models, new.models, old.joints, strict=True):
         other.ends.take_frames(one.ends)
         for k, end_name in enumerate(("start", "end")):
             if joints[k] < 0:
-                point = getattr(changed.lines[name], end_name)
-                body = changed.body_of(point)
-                where = f"bodies.{changed.points[point].body}" if body is not None else f"points.{point}"  # type: ignore[union-attr]
-                _refuse_jump(one, other, k, begin, f"{where}.motion")
-
-
-def _knows_lines_that_meet(path: Path) -> bool:
-    """Whether the version that wrote a result computed contact between lines without being asked."""
-    with opened(path) as file, suppress(ResultError):  # without a checkpoint nothing goes on
-        return "let_pass" in read_checkpoint(file).state
-    return True
+                point = getattr(system.lines[name], end_name)
+                body = system.body_of(point)
+                place = ("points", point) if body is None else ("bodies", getattr(system.points[point], "body", ""))
+                _refuse_jump(one, other, k, begin, dotted(form.place((*place, "motion"))))
 
 
 def as_begun(system: System, result: Result, meets: bool) -> System:
@@ -237,18 +198,6 @@ def as_begun(system: System, result: Result, meets: bool) -> System:
 def changes_text(changes: Sequence[LoadChange[Any]]) -> str:
     """Phases as JSON, for the file; empty if there are none."""
     return json.dumps([{"t": x.t, "scene": scene_text(x.scene)} for x in changes]) if changes else ""
-
-
-def _found(path: Path) -> tuple[Scene, tuple[LoadChange[Scene], ...], str, Tree, Checkpoint, OutputPoints]:
-    with opened(path) as file:
-        before, point = read_before(file), read_checkpoint(file)
-        with open_result(path) as result:
-            scene = _as_often(parse_scene(result.scene_text), result)
-            status = result.status
-            with refused(path):
-                points = restored_points(result, longest_out(scene), scene.length if not winch_side(scene) else None)
-            changes = tuple(LoadChange(t, parse_scene(text)) for t, text in _told(path, result))
-    return scene, changes, status, before, point, points
 
 
 def _as_often(scene: Any, result: Result) -> Any:
@@ -287,39 +236,14 @@ def _refuse_before_changes(changes: Sequence[LoadChange[Any]], until: float) -> 
         raise _refused("until", f"{until:g} s", f"a time after the change at {later[0]:g} s", fix)
 
 
-def _longer(
-    scene: Scene, changes: Sequence[LoadChange[Scene]], until: float, reached: float
-) -> tuple[Scene, tuple[LoadChange[Scene], ...]]:
-    """The same until another time, with outputs as often as before."""
-    _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).at(t=...)")
-    _refuse_before_changes(changes, until)
-    every = scene.output_interval
-    out, longest = parse_scene(_text_until(scene, until, every)), longest_out(scene)
-    if longest_out(out) > longest * (1.0 + SAME_PLACE):
-        expected = f"a time up to which at most {longest:.6g} m are out, for which the result has points"
-        fix = f"run the scene again with {winch_at(scene)}.longest"
-        raise _refused("until", f"{until:g} s, when {longest_out(out):.6g} m are out", expected, fix)
-    return out, tuple(LoadChange(x.t, parse_scene(_text_until(x.scene, until, every))) for x in changes)
-
-
-def _check(last: LoadChange[Scene], changed: Scene, resolution: Resolution, begin: float, end: float) -> None:
-    """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
-    _check_what_changes(last.t, begin, end, _differences(_plain(last.scene), _plain(changed)), MAY_CHANGE)
-    check_motions(changed)
-    before, after = build(last.scene, resolution), build(changed, resolution)
-    after.ends.take_frames(before.ends)
-    for k, name in enumerate(("start", "end")):
-        _refuse_jump(before, after, k, begin, f"ends.{name}.motion")
-
-
-def _check_what_changes(
-    since: float, begin: float, end: float, changed: Sequence[tuple[str, str]], allowed: Sequence[str]
-) -> None:
-    """SceneError: a change at `begin` is before the last one, `since`, or not before the end (s), or of what stays."""
-    if not since <= begin < end:
+def _check_what_changes(last: LoadChange[Any], changed: Any, begin: float, end: float) -> None:
+    """SceneError: a change at `begin` (s) is before the last one, or not before the end (s), or of what stays."""
+    if not last.t <= begin < end:
         fix = "a later end as well, --until T" if begin == end else ""
-        raise _refused("from", f"{begin:g} s", f"a time from {since:g} s on and before the end, {end:g} s", fix)
-    for where, value in changed:
+        raise _refused("from", f"{begin:g} s", f"a time from {last.t:g} s on and before the end, {end:g} s", fix)
+    before, after = _plain(last.scene), _plain(changed)
+    allowed = [x for x in MAY_CHANGE if x.split(".")[0] in before]
+    for where, value in _differences(before, after):
         key = re.sub(r"^(points|bodies)\.[^.\[]+", r"\1.NAME", where)
         if not any(key == x or key.startswith((f"{x}.", f"{x}[")) for x in allowed):
             fix = "run the changed scene from its start"
@@ -346,7 +270,7 @@ def _place(ends: EndConditions, k: int, t: float) -> tuple[np.ndarray, ...]:
     return now.position[k].copy(), ends.velocity[k].copy(), now.frame[k].copy(), now.spin[k].copy()
 
 
-def _plain(scene: Scene | System) -> dict[str, Any]:
+def _plain(scene: Any) -> dict[str, Any]:
     return dict(scene.model_dump(mode="json", exclude_none=True))
 
 

@@ -15,6 +15,7 @@ import hybrid
 import hybrid.simulation.time_loop
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
+from hybrid.scene.short_form import network_of
 from hybrid.simulation import case, initial_zones, restore
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, lock
@@ -141,6 +142,26 @@ def test_an_end_that_is_moved_from_a_time_on(tmp_path, whole):
     travel = "ends.start.motion={travel: {by: [0.5, 0, 0], over: 1.0, begin: 2.5}}"
     with hybrid.resume(whole, until=4.0, settings=[travel]) as result:
         assert np.allclose(result.position[-1, 0], [0.5, 0, 0]) and np.allclose(result.position[25, 0], 0.0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("form", [lambda x: x, network_of], ids=["cable", "network"])
+def test_a_change_is_made_where_the_run_stands_and_not_at_its_last_output(form, tmp_path, monkeypatch):
+    """Outputs every second, stopped half-way between two: the file has the time at which the change was made."""
+    scene = form(swinging(output={"every": 1.0, "points": 11}))
+    path = stopped(tmp_path / "run.h5", monkeypatch, scene, 160)
+    with opened(path) as file:
+        point = checkpoint.read_checkpoint(file)
+    t, more = point.state["t"], {"settings": ["environment.fluid.current=[0.9, 0, 0]"]}
+    assert point.t == 1.0 and 1.2 < t < 1.7
+    with pytest.raises(hybrid.ResultError, match="computes the run anew"):
+        hybrid.resume(path, start=t - 0.1, **more)
+    hybrid.run(scene, tmp_path / "long.h5").close()
+    hybrid.resume(tmp_path / "long.h5", tmp_path / "anew.h5", start=t, **more).close()
+    with hybrid.resume(path, **more) as result, hybrid.open(tmp_path / "anew.h5") as anew:
+        assert json.loads(result.changes_text)[0]["t"] == t
+        one, other = (dict(x.lines).get("cable", x).position for x in (result, anew))
+        assert np.allclose(one, other, rtol=0, atol=1e-9)
 
 
 # ---- refusals --------------------------------------------------------------------------------------
