@@ -117,6 +117,8 @@ class SystemModel:
     @property
     def unheld(self) -> tuple[int, ...]:
         """Numbers in `rigid` of points to which no line is clamped any longer: nothing asks how they are turned."""
+        if not self.rigid:
+            return ()
         first = len(self.free) + len(self.bodies)
         held = {self.joints[line][k] for line, k in np.argwhere(self.seats[:, :, TURNS] != 0.0)}
         return tuple(k for k in range(len(self.rigid)) if first + k not in held)

@@ -486,7 +486,7 @@ class Network(Table):
         ValidationError of pydantic.  directions: as of `direction` by end, in place of those.  scene: of the line with
         its points where the scene has them, if it is known.
         """
-        if places is not None or directions is not None:
+        if places or directions is not None:  # without places all points are where the scene has them
             return self._scene_of(name, carrying, places, directions, scene)
         known, key = self._known_scenes, (name, tuple(carrying))
         if key not in known:

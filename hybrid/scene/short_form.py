@@ -18,6 +18,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from pydantic import ValidationError
@@ -33,6 +34,7 @@ from hybrid.scene.system import System
 
 LINE = "cable"
 ENDS = ("start", "end")
+MOST_KEPT = 8  # networks, of the scenes asked for last: to validate one takes 1 ms, and it keeps the scene of its line
 # Tables of a scene that a line has.
 OF_LINE = ("mesh", "resolution", "contact", "initial")
 # Of an end by its kind: the kind of its point, what keys of the point are called there, which keys the connection has.
@@ -105,8 +107,28 @@ class ShortForm:
         return Finding(self.place(found.at), self.text(found.expected), self.text(found.fix), given)
 
 
+class _This:
+    """A scene as a key: itself, and none that is equal."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+
+    def __hash__(self) -> int:
+        return id(self.scene)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _This) and other.scene is self.scene
+
+
 def network_of(scene: Scene) -> System:
     """The network of one line that computes what a scene of a cable does.  NotInNetwork: there is none yet."""
+    return _made_of(_This(scene))
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _made_of(key: _This) -> System:
+    """The network of a scene, kept for whoever asks for it next."""
+    scene = key.scene
     made = {name: _end(getattr(scene.ends, name)) for name in ENDS}
     line: dict[str, Any] = {name: getattr(scene, name) for name in OF_LINE if getattr(scene, name) is not None}
     line |= {"start": "start", "end": "end", "connections": {name: held for name, (_, held) in made.items()}}

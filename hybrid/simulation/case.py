@@ -44,7 +44,6 @@ from hybrid.scene.obstacles import files_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.short_form import LINE, network_of, short_form
-from hybrid.scene.system import System
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.equilibrium import equilibrium_of
@@ -150,7 +149,6 @@ class Case:
         self._owner = threading.get_ident()  # the thread that puts files in their places
         self._begun: tuple[Resolution, tuple[Model, Equilibrium | None, ZoneSwitching | None]] | None = None
         self._start_of_lines: tuple[Resolution, Start] | None = None
-        self._networks: dict[int, tuple[Scene, System]] = {}  # of scenes, by their identity
         self.reach: Reach | None = None  # how far the line moves, by a pre-run
         self.came_near_itself = False  # whether the line did in a run to compare with
         # Whether contact with itself is computed in runs to compare with: where it is asked for, or the line has
@@ -477,16 +475,9 @@ class Case:
 
     # --- as a network of one line -----------------------------------------------------------------
 
-    def network(self, scene: Scene) -> System:
-        """The network of one line that computes what a scene does."""
-        known = self._networks.get(id(scene))
-        if known is None or known[0] is not scene:
-            known = self._networks[id(scene)] = scene, network_of(scene)
-        return known[1]
-
     def _network_run(self, resolution: Resolution, target: Target | None, recording: Recording) -> SystemRun:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
-        system, changes = self.network(self.scene), [replace(x, scene=self.network(x.scene)) for x in self.changes]
+        system, changes = network_of(self.scene), [replace(x, scene=network_of(x.scene)) for x in self.changes]
         recording = recording._replace(planes=True, error=True, cable=Cable(self.scene, self.changes))
         if recording.points is None:
             recording = recording._replace(points=self.points)
@@ -527,7 +518,7 @@ class Case:
         kept, self._start_of_lines = self._start_of_lines, None
         if kept is not None and kept[0] is resolution:
             return kept[1]
-        system = self.network(self.scene)
+        system = network_of(self.scene)
         with at_once(self.interrupted):
             model = build_system(system, SystemResolution({LINE: resolution}))
             return start_of(system, model, True, self.criterion)
