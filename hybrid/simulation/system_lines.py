@@ -470,6 +470,7 @@ class LineResult:
             self._waiting.append(batch)
             self._errors.append(self._sampled_errors)
         full = sum(len(x.t) for x in self._waiting) >= WAITING or self._aside.full
+        full |= self.cells is not None and bool(self._waiting)  # which change, and these with them
         if full or not self._moves or self.observer.writes_criteria:
             self.write_down()
 

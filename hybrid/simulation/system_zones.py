@@ -103,6 +103,7 @@ def _zones_at_rest(
     criteria become stricter, and where that does not help zones stay rod.
     """
     allowed = {k: manager.tolerance for k, manager in managers.items()}
+    most, rest = _most_rod(model, found, managers, t)
     try:
         for part in STRICTER:
             for k, manager in managers.items():
@@ -110,15 +111,41 @@ def _zones_at_rest(
                 manager.tolerance = part * allowed[k]
             answer = _within(model, found, managers, t)
             if answer is None:
-                return model, found
-            if all(_apart(k, model, found, *answer) <= allowed[k] for k in managers):
+                break
+            if all(_apart(k, most, rest, *answer) <= allowed[k] for k in managers):
                 return answer
+        held = answer is not None
     except ComputationError:
-        pass
+        held = True
     for k, manager in managers.items():
-        manager.held, manager.tolerance = True, allowed[k]
-        _take_rods(manager, model.models[k])
-    return model, found
+        manager.held |= held
+        manager.tolerance = allowed[k] if held else manager.tolerance
+        _take_rods(manager, most.models[k])
+    return most, rest
+
+
+def _most_rod(
+    model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
+) -> tuple[SystemModel, LinesAtRest]:
+    """The most rod that scenes let lines have, and its equilibrium, from that of lines that are all rod."""
+    free = {k: manager.given >= 0 for k, manager in managers.items()}
+    if all(x.all() for x in free.values()):
+        return model, found
+    return _with_rods(model, found, free, t)
+
+
+def _with_rods(
+    model: SystemModel, found: LinesAtRest, rods: Mapping[int, np.ndarray], t: float
+) -> tuple[SystemModel, LinesAtRest]:
+    """Lines of which these base cells are rod, by their numbers, at rest, from lines that are all rod."""
+    models, states = [*model.models], [*found.state.lines]
+    for k, rod in rods.items():
+        full = model.models[k]
+        assert full.layout is not None
+        models[k] = on_layout(full, full.layout._replace(rod=rod))
+        states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at(t))
+    other, start = replace(model, models=tuple(models)), SystemState(states, found.state.bodies)
+    return other, solve_from(found, other, t, found.solver.bodies.copy(), start, "the equilibrium of rods")
 
 
 def zones_as_placed(
@@ -150,18 +177,11 @@ def _within(
     """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
     rods = _asked(managers, model, found, t)
     for _ in range(MOST_ROUNDS):
-        if all(rod.all() for rod in rods.values()):
+        if all(rod[managers[k].given >= 0].all() for k, rod in rods.items()):
             return None
-        models, states = [*model.models], [*found.state.lines]
+        other, answer = _with_rods(model, found, rods, t)
         for k, manager in managers.items():
-            full = model.models[k]
-            assert full.layout is not None
-            models[k] = on_layout(full, full.layout._replace(rod=rods[k]))
-            states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at(t))
-            manager.set_layout(full.layout._replace(rod=rods[k]))
-        other = replace(model, models=tuple(models))
-        start = SystemState(states, found.state.bodies)
-        answer = solve_from(found, other, t, found.solver.bodies.copy(), start, "the equilibrium of rods")
+            _take_rods(manager, other.models[k])
         more = {k: rods[k] | asked for k, asked in _asked(managers, other, answer, t).items()}
         if all((more[k] == rods[k]).all() for k in managers):
             return other, answer

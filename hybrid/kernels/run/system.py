@@ -145,8 +145,11 @@ def march_lines(system, given, steps):
         if steps and job.iterated != 0:
             call_reel(job.iterated, job.reel_table)
         outcome, _, _, where = call_solver(system.solver, tables[l])
-        # the last block is not solved yet
-        if outcome != OK and not (outcome == SINGULAR and joints[l, END] >= 0 and where == n):
+        # the last block is not solved yet; forces of a line alone are known whatever its equations are
+        known = joints[l, END] >= 0 and where == n
+        if system.asked.what == ASSEMBLY and joints[l, START] < 0 and joints[l, END] < 0:
+            known = job.work.report[RESIDUAL] < math.inf
+        if outcome != OK and not (outcome == SINGULAR and known):
             return l, where
         if steps and job.iterated != 0:
             call_reel(job.iterated, job.reel_table)
