@@ -53,7 +53,14 @@ from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
-from hybrid.simulation.restore import program, refused, require_same, resolution_from, resolution_tree, restored_parts
+from hybrid.simulation.restore import (
+    other_program,
+    refused,
+    require_same,
+    resolution_from,
+    resolution_tree,
+    restored_parts,
+)
 from hybrid.simulation.result_checks import damped_vibrations
 from hybrid.simulation.result_file import STEP_FIELDS, mesh_fields, result_recorder
 from hybrid.simulation.run_file import AnyRecorder, Cable
@@ -277,10 +284,8 @@ class Case:
             )  # fmt: skip
         recorder.files = self._files
         with recorder:
-            if point.program != program():
-                wrote, this = (x.split()[0] for x in (point.program, program()))
-                text = f"begun by hybrid-cable {wrote}, from here on by {this}" + " in another state" * (wrote == this)
-                recorder.event(point.t, 0.0, model.length, OTHER_PROGRAM, f"{text}: the last digits may be others")
+            if why := other_program(point):
+                recorder.event(point.t, 0.0, model.length, OTHER_PROGRAM, why)
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
         return self._compared(_of_cable(loop.run), target, loop.cpu, None)

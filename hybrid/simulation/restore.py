@@ -63,6 +63,15 @@ def program() -> str:
     return f"{version('hybrid-cable')} {digest.hexdigest()[:16]}"
 
 
+def other_program(point: Checkpoint) -> str:
+    """Text of the event of a run that another program has begun; empty if this one has."""
+    if point.program == program():
+        return ""
+    wrote, this = (x.split()[0] for x in (point.program, program()))
+    text = f"begun by hybrid-cable {wrote}, from here on by {this}" + " in another state" * (wrote == this)
+    return f"{text}: the last digits may be others"
+
+
 def require_same(point: Checkpoint, files: Mapping[str, str], criterion: UserCriterion | None, source: Path) -> None:
     """ResultError: the criterion of a run is missing, or the files that it reads have changed.
 

@@ -29,7 +29,7 @@ from hybrid.simulation.system_zones import SystemZones
 from hybrid.simulation.transient_checkpoint import FIRST_REPORT, FIRST_WORKS, zoning_of_today
 from hybrid.simulation.vibration_steps import VibrationsOfLines
 from hybrid.solve.run import no_extremes
-from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
+from hybrid.store.checkpoint import digest_of, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import matched
 
@@ -293,12 +293,3 @@ def files_of(system: System) -> dict[str, str]:
     for name in system.rigid:
         found |= {given.load.file for given in system.moments_on(name) if given.load.file is not None}
     return {path: digest_of(Path(path)) for path in sorted(found)}
-
-
-def other_program(point: Checkpoint) -> str:
-    """Text of the event of a run that another program has begun; empty if this one has."""
-    if point.program == program():
-        return ""
-    wrote, this = (x.split()[0] for x in (point.program, program()))
-    text = f"begun by hybrid-cable {wrote}, from here on by {this}" + " in another state" * (wrote == this)
-    return f"{text}: the last digits may be others"

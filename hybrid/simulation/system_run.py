@@ -42,14 +42,13 @@ from hybrid.simulation.lines_contact_start import note_crossings
 from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange
-from hybrid.simulation.restore import kept_resolution, refused, require_same
+from hybrid.simulation.restore import kept_resolution, other_program, refused, require_same
 from hybrid.simulation.run_file import Cable, CableFile, LinesFile
 from hybrid.simulation.step_events import CUTS, count_iterations, note_cut, note_iterations, note_slack
 from hybrid.simulation.system_checkpoint import (
     content,
     files_of,
     kept_changes,
-    other_program,
     restore,
 )
 from hybrid.simulation.system_contact import (
@@ -150,14 +149,14 @@ class SystemRun:
         self.changed = 0  # how many of the changes have been made
         if source is not None:
             resolution, self.changed = kept_resolution(system, source), kept_changes(source, len(self.changes))
-        self.model = recording.start.model if recording.start else build_system(system, resolution=resolution)
+        first = self.model = recording.start.model if recording.start else build_system(system, resolution=resolution)
         if self.changed:
             self.system = self.changes[self.changed - 1].scene
-            self.model = loaded_as(self.model, self.system, 0.0)
+            self.model = loaded_as(first, self.system, 0.0)
         self.resolution = self.model.resolution
         one = self.resolution.one
         follow = (one.step, one.shortest) if moves and one.local is not None else (0.0, 0.0)
-        names, scenes = self.model.names, line_scenes(system, self.model)
+        names, scenes = first.names, line_scenes(system, first)
         self.scenes = [scenes[name] for name in names]
         self.times: Sequence[float] = output_times(self.scenes[0]) if moves else []
         if moves and one.every > 1:  # a run to compare with has as many times fewer
@@ -172,7 +171,9 @@ class SystemRun:
         if source is not None:
             blank = [state_for(x.line) for x in self.model.models]
             self.state = SystemState(blank, np.zeros_like(self.model.body_places))
-            managers = managers_for(scenes, self.model, criterion)
+            managers = managers_for(scenes, first, criterion)  # as at the start, whatever loads came later
+            for k, manager in managers.items():
+                manager.load(self.model.models[k].ends.moments)
         else:
             self.model, self.found, managers = recording.start or start_of(system, self.model, moves, criterion)
             placed = SystemState([x.start for x in self.model.models], self.model.body_places)

@@ -12,11 +12,12 @@ import pytest
 from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
+import hybrid.simulation.system_run
 import hybrid.simulation.time_loop
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.short_form import network_of
-from hybrid.simulation import case, initial_zones, restore
+from hybrid.simulation import case, initial_zones, restore, system_zones
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, lock
 from hybrid.store import writer as record
@@ -114,26 +115,34 @@ def test_a_load_that_ends_is_a_load_that_is_changed(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["slack_on_seabed", "touchdown", "laying"])
-def test_changes_are_made_at_their_time_however_often_it_is_stopped(name, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [("slack_on_seabed", None), ("touchdown", None), ("laying", None), ("laying", network_of)],
+    ids=["slack_on_seabed", "touchdown", "laying", "laying, a network"],
+)
+def test_changes_are_made_at_their_time_however_often_it_is_stopped(name, form, tmp_path, monkeypatch):
     """A current from 3 s on: computed anew, from a checkpoint at 3 s, and stopped on the way; one motion."""
-    short = ["time.duration=6", "dimension=null"]
+
+    def lasting(duration):
+        scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", [f"time.duration={duration}", "dimension=null"])
+        return scene if form is None else form(scene)
+
     more = {"settings": ["environment.fluid.current=[0.4, 0.2, 0]"], "start": 3.0}
     monkeypatch.setattr(hybrid.simulation.time_loop, "WORK", FEW_STEPS)
-    hybrid.run(hybrid.load_scene(EXAMPLES / f"{name}.yaml", short), tmp_path / "long.h5").close()
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    hybrid.run(lasting(6), tmp_path / "long.h5").close()
     hybrid.resume(tmp_path / "long.h5", tmp_path / "anew.h5", **more).close()
-    hybrid.run(
-        hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["time.duration=2", short[1]]), tmp_path / "begun.h5"
-    ).close()
+    hybrid.run(lasting(2), tmp_path / "begun.h5").close()
     stopping = Stopping(monkeypatch)
     stopping.left = 30
     with pytest.raises(KeyboardInterrupt):
         hybrid.resume(tmp_path / "begun.h5", until=6.0, progress=stopping, **more)
     hybrid.resume(tmp_path / "begun.h5").close()
     with hybrid.open(tmp_path / "anew.h5") as one, hybrid.open(tmp_path / "begun.h5") as other:
-        assert (one.times == other.times).all() and (one.position == other.position).all()
+        at, there = (dict(x.lines).get("cable", x).position for x in (one, other))
+        assert (one.times == other.times).all() and (at == there).all()
         with hybrid.open(tmp_path / "long.h5") as without:
-            moved = np.abs(one.position - without.position).max(axis=(1, 2))
+            moved = np.abs(at - dict(without.lines).get("cable", without).position).max(axis=(1, 2))
         before = one.times <= 3.0
         assert moved[before].max() == 0.0 and moved[-1] > 1e-4
 
@@ -203,7 +212,7 @@ def test_another_program_goes_on_and_says_so(tmp_path, monkeypatch, whole):
     path = stopped(tmp_path / "run.h5", monkeypatch)
     with h5py.File(path) as file:
         t = checkpoint.read_checkpoint(file).t
-    monkeypatch.setattr(case, "program", lambda: "9.9.9 0123456789abcdef")
+    monkeypatch.setattr(restore, "program", lambda: "9.9.9 0123456789abcdef")
     with hybrid.resume(path) as result, hybrid.open(whole) as same:
         (event,) = (e for e in result.events if e.kind == OTHER_PROGRAM)
         assert event.t == t and hybrid.__version__ in event.text and "9.9.9" in event.text
@@ -468,14 +477,21 @@ def test_a_checkpoint_of_odd_things_is_refused_in_words(tmp_path, monkeypatch):
     path = stopped(tmp_path / "run.h5", monkeypatch)
     with h5py.File(path) as file:
         point = checkpoint.read_checkpoint(file)._asdict()
+    lines = "lines" in point["state"]  # else a file by the road of cables
+    finely, of_line = point["resolution"], point["state"]["lines"]["cable"] if lines else point["state"]
+
+    def fine(**more):
+        return {"resolution": {"cable": finely["cable"] | more} if lines else finely | more}
+
+    def state(**more):
+        return {"state": point["state"] | ({"lines": {"cable": of_line | more}} if lines else more)}
+
     odd = [
         {"resolution": [1.0]}, {"state": point["rows"]}, {"rows": {"nowhere": 3}}, {"rows": {}}, {"rows": {"t": -1}},
         {"happened": {"merge": "often"}}, {"number": 0.0}, {"t": "now"}, {"t": 0.5}, {"zones": [["rod", 0.0]]},
-        {"resolution": point["resolution"] | {"step": 1e-9}}, {"resolution": point["resolution"] | {"parts": 0}},
-        {"resolution": point["resolution"] | {"places": np.array([0.0, 2.0, 1.0])}},
-        {"state": point["state"] | {"t": float("nan")}},
-        {"state": point["state"] | {"work": np.zeros(3)}}, {"state": point["state"] | {"plane": np.zeros((2, 3))}},
-        {"state": {k: v for k, v in point["state"].items() if k != "dt"}},
+        fine(step=1e-9), fine(parts=0), fine(places=np.array([0.0, 2.0, 1.0])),
+        {"state": point["state"] | {"t": float("nan")}}, state(work=np.zeros(3)), state(plane=np.zeros((2, 3))),
+        {"state": {k: v for k, v in point["state"].items() if k != "steps"}},
     ]  # fmt: skip
     for wrong in odd:
         with h5py.File(path, "r+") as file:
@@ -500,6 +516,7 @@ def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
 
 def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeypatch):
     """By the work done: a run whose file is flushed at every pause has the same ones as one that never is."""
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 20 * 40)
     monkeypatch.setattr(hybrid.simulation.time_loop, "WORK", 20 * 40)  # 40 steps of 20 cells
     monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 20 * 7)  # a pause every 7 steps
     places, kept, keep = [], [], record.Recorder.checkpoint
@@ -539,7 +556,8 @@ def test_zones_that_are_fixed_stay_so(tmp_path, monkeypatch):
             manager.held = True
             return manager
 
-        patch.setattr(initial_zones, "manager_for", held)
+        for module in (initial_zones, system_zones):
+            patch.setattr(module, "manager_for", held)
         whole = hybrid.run(lasting(30.0))
         hybrid.run(lasting(15.0), tmp_path / "short.h5").close()
     with hybrid.resume(tmp_path / "short.h5", until=30.0) as more:

@@ -16,7 +16,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import OTHER_PROGRAM
-from hybrid.simulation import case
+from hybrid.simulation import restore
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
 
@@ -79,7 +79,7 @@ def test_a_file_of_0_6_is_resumed(other: bool, tmp_path: Path, monkeypatch: pyte
     """
     path = kept("result_0.6.h5.gz", tmp_path)
     if other:  # as a release will that is not the one that wrote it
-        monkeypatch.setattr(case, "program", lambda: "9.9.9 0123456789abcdef")
+        monkeypatch.setattr(restore, "program", lambda: "9.9.9 0123456789abcdef")
     with opened(path) as file:
         point = read_checkpoint(file)
     assert point.t == pytest.approx(0.5) and point.program.startswith("0.6.0 ")
