@@ -172,8 +172,8 @@ class SystemRun:
             blank = [state_for(x.line) for x in self.model.models]
             self.state = SystemState(blank, np.zeros_like(self.model.body_places))
             managers = managers_for(scenes, first, criterion)  # as at the start, whatever loads came later
-            for k, manager in managers.items():
-                manager.load(self.model.models[k].ends.moments)
+            for k, x in managers.items():
+                x.load(self.model.models[k].ends.moments)
         else:
             self.model, self.found, managers = recording.start or start_of(system, self.model, moves, criterion)
             placed = SystemState([x.start for x in self.model.models], self.model.body_places)
