@@ -62,9 +62,11 @@ def assert_same(a: RunSample, b: RunSample) -> None:
         np.testing.assert_allclose(one, two, rtol=1e-7, atol=1e-7)
 
 
+@pytest.mark.parametrize("step", [None, 0.02], ids=["follow", "fixed"])
 @pytest.mark.parametrize("model", ["rod", "catenary", "adaptive"])
-def test_a_run_to_compare_with(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    case = Case(as_scene(SCENE | {"model": model}), None)
+def test_a_run_to_compare_with(model: str, step: float | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    time = {"duration": 0.8} if step is None else {"duration": 0.8, "step": step}
+    case = Case(as_scene(SCENE | {"model": model, "time": time}), None)
     cable, network = (sample(case, road, monkeypatch) for road in ("cable", "network"))
     assert bool(cable.model_error) == (model != "rod")
     assert_same(cable, network)
