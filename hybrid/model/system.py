@@ -241,8 +241,6 @@ def _in_space(system: System, name: str, model: Model, joints: tuple[int, int]) 
         why = "it is joined to what moves with it"
     elif any(x.motion != x.shift for x in carriers):
         why = "a body that turns moves its end"
-    elif model.layout is not None or model.payout is not None:
-        why = "its zones or its length change, beside other lines"
     elif system.dimension == 3:
         why = "dimension: 3"
     else:
@@ -260,8 +258,7 @@ def _kept_in_plane(system: System, models: Sequence[Model], joints: Sequence[tup
     flat = Entry(WHAT, True, f"dimension: 2; {plane.text()}")
     found = []
     for x, scene, held in zip(models, scenes, joints, strict=True):
-        moves = max(held) >= 0 or x.layout is not None or x.payout is not None
-        if moves or scene.obstacles or scene.contact.self:
+        if max(held) >= 0 or scene.obstacles or scene.contact.self:
             found.append(replace(x, kept_in=axes[2]))
         else:
             contents = tuple(flat if e.what == WHAT else e for e in x.contents)

@@ -53,6 +53,18 @@ class OfLine(Protocol):
     def batch_of(self, rows: Floats, cells: int) -> Batch: ...
 
 
+class HasPlane(Protocol):
+    """The plane of a line, and the push out of it."""
+
+    pushes: tuple[Floats, Floats]
+
+
+class HasPlanes(Protocol):
+    """Those of all lines."""
+
+    def of(self, k: int) -> HasPlane | None: ...
+
+
 class OfRun(Protocol):
     """And of the run of all lines (simulation.system_run)."""
 
@@ -67,6 +79,8 @@ class OfRun(Protocol):
     def lines(self) -> Sequence[OfLine]: ...
     @property
     def payout(self) -> object: ...
+    @property
+    def planes(self) -> HasPlanes | None: ...
     @property
     def asks_quantities(self) -> bool: ...
     def adopt_cells(self, number: int, model: Model, work: Work) -> None: ...
@@ -135,17 +149,31 @@ class OneOfMany:
     """A line of several, as changes of its cells see it: what `Transient` and its compiled run are to a cable."""
 
     of_many = True
-    push = NO_PUSH
-    pushes = NO_PUSH, NO_PUSH
 
     def __init__(self, run: OfRun, number: int, switching: ZoneSwitching) -> None:
         self._system, self._number, self.switching = run, number, switching
         line = run.lines[number]
         self.run, self.envelope, self.marked = self, line.envelope, line.marked
+        self._plane = None if run.planes is None else run.planes.of(number)
         self.table = LineTables(*run.solver.tables_by_itself(number))
         table = line.watch_table
         self.itself = WatchedLine(line, table) if table is not None else None
         self.stepper = Marching(run.solver.work[number], run.solver.limits_by_itself(number))
+
+    @property
+    def push(self) -> Floats:
+        """Out of its plane, now; empty: none."""
+        return self.pushes[self.count.parity]
+
+    @property
+    def pushes(self) -> tuple[Floats, Floats]:
+        """Of states of even and of odd parity."""
+        return (NO_PUSH, NO_PUSH) if self._plane is None else self._plane.pushes
+
+    @pushes.setter
+    def pushes(self, pushes: tuple[Floats, Floats]) -> None:
+        if self._plane is not None:
+            self._plane.pushes = pushes
 
     @property
     def model(self) -> Model:

@@ -1,59 +1,39 @@
 """Lines of several that are joined to nothing and lie in a plane: each is computed in it, as one cable is.
 
 What a line does there, leaves and comes back to is watched by the object that watches one cable
-(simulation.plane_monitor); all else of the run has these lines in space, with the bit of a plane where one is.
+(simulation.plane_monitor).  The model that a run has of a line is one in the plane for as long as it is computed there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from hybrid.errors import IN_SPACE
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.forces import OBSTACLES, SELF_CONTACT
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SELF_CONTACT
+from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.build import Model
-from hybrid.model.plane import planar
-from hybrid.model.system import SystemModel
-from hybrid.simulation.events import EventLog
+from hybrid.model.plane import in_space, planar
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
-from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.simulation.run_of_lines import RunOfLines, change_lines
+from hybrid.simulation.system_contact import renew_solver
+from hybrid.simulation.system_lines import LineResult
 from hybrid.solve.system import SystemSolver
 from hybrid.store.named_arrays import matched
 
 TOUCHES = "where it may touch"
 
 
-class _Line(Protocol):
-    """What is asked of a line of the run."""
-
-    books: b.Books
-    events: EventLog
-    shares: bool
-
-
-class _Run(Protocol):
-    """What is asked of the run."""
-
-    model: SystemModel
-    state: SystemState
-
-    @property
-    def t(self) -> float: ...
-    @property
-    def lines(self) -> Sequence[_Line]: ...
-
-
 class LonePlane:
     """The plane of one line, and the push out of it that is carried along with its steps."""
 
-    def __init__(self, number: int, line: _Line, counts: b.Counts, insists: bool) -> None:
+    def __init__(self, number: int, line: LineResult, counts: b.Counts, insists: bool) -> None:
         """counts: of the run, whose parity says which of two pushes is that of now; insists: as of the monitor."""
         self.monitor = PlaneMonitor(insists)
         self.plane: Floats | None = None  # (3, 3) in which its steps are computed; None: in space
@@ -70,6 +50,15 @@ class LonePlane:
     def push(self) -> Floats:
         """(N+1, 4) out of the plane now, empty where none is carried."""
         return self._pushes[int(self._counts.parity)]
+
+    @property
+    def pushes(self) -> tuple[Floats, Floats]:
+        """Of states of even parity, and of odd."""
+        return self._pushes[0], self._pushes[1]
+
+    @pushes.setter
+    def pushes(self, pushes: tuple[Floats, Floats]) -> None:
+        self._pushes[:] = pushes
 
     def carry(self, pushes: tuple[Floats, Floats]) -> None:
         """Carry a push along, now, and room for the next; empty: none."""
@@ -88,7 +77,7 @@ class LonePlane:
 class LonePlanes:
     """Which lines of a run are computed in a plane."""
 
-    def __init__(self, run: _Run, counts: b.Counts, insists: bool) -> None:
+    def __init__(self, run: RunOfLines, counts: b.Counts, insists: bool) -> None:
         """counts: of its steps; insists: whether the scene asks for two dimensions."""
         self._run = run
         self._lines = {
@@ -96,6 +85,11 @@ class LonePlanes:
             for k, x in enumerate(run.model.models)
             if x.plane is not None
         }
+        self._leaving = self._nearing = frozenset[int]()  # after the last step
+
+    def of(self, k: int) -> LonePlane | None:
+        """What is known of the plane of line k; None: it has none."""
+        return self._lines.get(k)
 
     def _may(self, k: int) -> bool:
         """Whether nothing of line k has to be computed in space."""
@@ -108,9 +102,7 @@ class LonePlanes:
     def _model(self, k: int) -> Model:
         """The model of line k, in its plane where it is in it."""
         model, plane = self._run.model.models[k], self._lines[k].plane
-        return (
-            replace(model, plane=None) if plane is None else replace(model, line=planar(model.line, plane), plane=plane)
-        )
+        return replace(model, plane=None) if plane is None else _in(model, plane)
 
     def begin(self) -> None:
         """Lines that begin in their planes are computed there, from states that lie in them exactly."""
@@ -120,28 +112,26 @@ class LonePlanes:
                     self._run.model.models[k], self._run.state.lines[k], partial(self._note, k)
                 ).plane
 
-    def on(self, lines: Sequence[JoinedLine]) -> list[JoinedLine]:
-        """The lines as another solver gets them: in planes, but for those that touch, or lie in no plane, now."""
-        found = [*lines]
+    def put_lines(self) -> None:
+        """Before another solver: lines in planes, but for those that touch, or lie in no plane, now."""
+        changes = {}
         for k, x in self._lines.items():
-            may, now = self._may(k), self._run.model.models[k].plane
-            x.monitor.comes_back = may
-            if not same_plane(x.monitor.home, now):  # loads are others
-                x.monitor.home = None
+            model, may = self._run.model.models[k], self._may(k)
+            x.monitor.comes_back = may and model.layout is None and model.payout is None
             if x.plane is not None and not may:
                 self._note(k, 0, "out of plane", f"the line comes near itself or another one: {IN_SPACE}, {TOUCHES}")
-            if x.plane is not None and not (may and same_plane(x.plane, now)):
+            if x.plane is not None and not (may and same_plane(x.plane, model.plane)):
                 self._leave(k)
-            plane = x.plane if x.plane is not None else x.monitor.home
-            if plane is not None:
-                line = found[k].line
-                found[k] = found[k]._replace(
-                    line=line._replace(plane=plane) if x.plane is None else planar(line, plane)
-                )
-        return found
+            if not same_plane(x.monitor.home, model.plane):  # loads are others
+                x.monitor.home = None
+            known, line = (x.plane, x.monitor.home, model.line.plane), model.line
+            plane = next(each for each in known if each is not None)
+            if line.plane is not plane or bool(line.bits & PLANAR) != (x.plane is not None):
+                changes[k] = partial(_as_computed, plane=plane, flat=x.plane is not None)
+        change_lines(self._run, changes)
 
     def attach(self, solver: SystemSolver) -> None:
-        """Steps are made by another solver, with lines as of `on`."""
+        """Steps are made by another solver, with lines as of `put_lines`."""
         for x in self._lines.values():
             x.attach(solver)
 
@@ -154,22 +144,35 @@ class LonePlanes:
             x.monitor.leave(self._model(k), x, self._run.state.lines[k])
         x.plane = None
 
-    def after_step(self, renew: Callable[[str], None]) -> None:
-        """Lines leave their planes and come back after a step that has flagged it; renew: gives the run a solver."""
-        left, back = False, dict[int, Model]()
+    def take_cells(self, k: int, line: Line) -> None:
+        """Line k goes on with other cells, to which steps have carried the push."""
+        if k in self._lines:
+            self._lines[k].monitor.take(line)
+
+    def note_step(self) -> None:
+        """Hear of what a step has flagged: pushes that are given anew, and lines that are to leave or to come back."""
+        leaving, nearing = set(), set()
         for k, x in self._lines.items():
             flags = int(self._run.lines[k].books.counts.notices)
             if flags & b.PUSH_DIED:
                 x.monitor.renew(x)
             if flags & b.LEAVES_PLANE and x.monitor.must_leave(x, partial(self._note, k)):
-                self._leave(k)
-                left = True
-            if flags & b.NEARS_PLANE and x.plane is None:
-                model = x.monitor.come_back(self._model(k), x, self._run.state.lines[k])
-                if model is not None:
-                    x.plane, back[k] = model.plane, model
+                leaving.add(k)
+            if flags & b.NEARS_PLANE:
+                nearing.add(k)
+        self._leaving, self._nearing = frozenset(leaving), frozenset(nearing)
+
+    def after_step(self) -> None:
+        """Lines leave their planes, and come back, as the last step asks for."""
+        left, back = [k for k in self._leaving if self._lines[k].plane is not None], dict[int, Model]()
+        for k in left:
+            self._leave(k)
+        for k in self._nearing:
+            x = self._lines[k]
+            if x.plane is None and (model := x.monitor.come_back(self._model(k), x, self._run.state.lines[k])):
+                x.plane, back[k] = model.plane, model
         if left or back:
-            renew("where a line leaves its plane, or comes back to it")
+            renew_solver(self._run, "where a line leaves its plane, or comes back to it")
         for k, model in back.items():
             self._lines[k].monitor.push_on(self._lines[k], model)
 
@@ -208,3 +211,13 @@ class LonePlanes:
                 pair = np.zeros((2, *x.push.shape))
                 push = {"pair": pair, "unit": 0.0, "energy": 0.0, "led": True, "real": False}
                 x.monitor.restore(matched(mine["push"], push, "push"), x)
+
+
+def _as_computed(line: Line, plane: Floats, flat: bool) -> Line:
+    """The line as it is computed: in its plane, or in space beside it."""
+    return planar(line, plane) if flat else in_space(line._replace(plane=plane))
+
+
+def _in(model: Model, plane: Floats) -> Model:
+    """A model in a plane."""
+    return replace(model, line=planar(model.line, plane), plane=plane)

@@ -5,7 +5,8 @@ A part names this and no run, so that the run stands above all of its parts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -121,3 +122,14 @@ class RunOfLines(Protocol):
     def gather_events(self) -> None: ...
 
     def output_due(self) -> None: ...
+
+
+def change_lines(run: RunOfLines, changes: Mapping[int, Callable[[Line], Line]]) -> None:
+    """Give a run models with these lines changed, by number; its solver has still to follow."""
+    models = [*run.model.models]
+    for k, change in changes.items():
+        models[k] = replace(models[k], line=change(models[k].line))
+        run.lines[k].follow(models[k])
+        if run.zones is not None:
+            run.zones.change_line(k, change)
+    run.model = replace(run.model, models=tuple(models))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -20,7 +19,7 @@ from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.contact_start import GIVEN_UP, given_up
 from hybrid.simulation.lines_contact import PASSED, pair_text
 from hybrid.simulation.lines_contact_start import given_up_text, lines_near, touch_each_other, touching_now
-from hybrid.simulation.run_of_lines import RunOfLines
+from hybrid.simulation.run_of_lines import RunOfLines, change_lines
 from hybrid.simulation.self_watch import deepest_text, diameters
 from hybrid.simulation.system_contact_equilibrium import energy_between, touches_alone
 from hybrid.solve.contact_statics import contact_energy
@@ -185,14 +184,8 @@ def _gives_up_pairs(run: RunOfLines, dt: float) -> bool:
 
 def let_touch(run: RunOfLines, numbers: Iterable[int], touch: bool = True) -> None:
     """Give a run models of lines that touch themselves, or no longer; its solver has still to follow."""
-    models = [*run.model.models]
-    for k in numbers:
-        change = partial(touching, friction=run.lines[k].scene.contact.friction) if touch else touching_no_more
-        models[k] = replace(models[k], line=change(models[k].line))
-        run.lines[k].follow(models[k])
-        if run.zones is not None:
-            run.zones.change_line(k, change)
-    run.model = replace(run.model, models=tuple(models))
+    frictions = {k: run.lines[k].scene.contact.friction for k in numbers}
+    change_lines(run, {k: partial(touching, friction=x) if touch else touching_no_more for k, x in frictions.items()})
 
 
 def renew_solver(run: RunOfLines, after: str) -> None:
@@ -216,9 +209,10 @@ def go_on_as_attached(run: RunOfLines, after: str) -> None:
 
 def evaluate_forces(run: RunOfLines, after: str) -> None:
     """The forces of the state of now; after: as of `renew_solver`.  LineFailed: there are none."""
-    for model in run.model.models:
+    for line, model in zip(run.lines, run.model.models, strict=True):
         model.ends.at(run.t)
         model.sea.at(run.t)
+        line.books.velocity[:] = model.ends.velocity  # a try has moved them on
     run.model.load_bodies(run.t, run.solver.bodies, run.loaded)
     taken = run.solver.forces_in_motion(run.state, run.t)
     if taken.outcome != Outcome.OK:

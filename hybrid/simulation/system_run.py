@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from time import monotonic
 from time import process_time as clock_now
@@ -59,7 +58,6 @@ from hybrid.simulation.system_contact import (
     end_contact,
     gives_up_contact,
     refuse_within_itself,
-    renew_solver,
     tell_meetings,
     tell_passages,
 )
@@ -454,8 +452,10 @@ class SystemRun:
 
     def make_solver(self) -> None:
         """A solver for the model as it is."""
-        self.quantities.follow(self.model)
         self._note_partners()
+        if self.planes is not None:
+            self.planes.put_lines()
+        self.quantities.follow(self.model)
         own = {line.number: line.contact for line in self.lines if line.shares and line.contact is not None}
         contacts, shared = [line.touch_itself(self.t) for line in self.lines], shared_of(self.model, rubs=True)
         if shared is not None and self.shared is not None and shared.lines == self.shared.lines:
@@ -467,7 +467,6 @@ class SystemRun:
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         for line, x in zip(self.lines, lines, strict=True):
             line.held = np.minimum(x.ends.held, 1)
-        lines = lines if self.planes is None else self.planes.on(lines)
         follows = [line.correction is not None for line in self.lines]
         lines = [x._replace(serves=x.serves or y) for x, y in zip(lines, follows, strict=True)]
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
@@ -523,6 +522,8 @@ class SystemRun:
         self.model = replace(self.model, models=tuple(models))
         self.solver.adopt_cells(number, model.line, model.sea.values, work, line.books)
         line.adopt_cells(model)
+        if self.planes is not None:
+            self.planes.take_cells(number, model.line)
 
     def renew_other(self) -> None:
         """Room for the state after the next step, of lines as they are now."""
@@ -727,9 +728,9 @@ class SystemRun:
     def _after_step(self, step: float) -> None:
         """What a step has flagged, zones, contact that begins or ends, and what breaks; step: s, the usual one."""
         loop, t = self.loop, self.t
-        if self.planes is not None:
-            self.planes.after_step(partial(renew_solver, self))
         solver = self.solver
+        if self.planes is not None:
+            self.planes.note_step()
         for line, new, old, work in zip(self.lines, self.state.lines, self.other.lines, solver.work, strict=True):
             if seen := int(loop.seen[line.number]):
                 line.look_at_itself(solver, seen, t, self.last_step, new)
@@ -737,6 +738,8 @@ class SystemRun:
                 line.watch(LineStep(t, new, old, work.report, line.books))
         if self.zones is not None:
             self.zones.accepted(self.last_step)
+        if self.planes is not None:
+            self.planes.after_step()
         if any(line.nears_itself for line in self.lines):
             begin_contact(self)
         if loop.counts.notices & b.LINES_NEAR:

@@ -108,6 +108,8 @@ def bring_back(run: SystemRun, saved: SavedSystem) -> None:
             run.zones.take_rods(saved.run["zones"])
         if run.payout is not None:
             run.payout.restore(saved.run["payout"])
+        if run.planes is not None:
+            run.planes.restore_planes(saved.run["planes"])
         if moving:
             run.renew_other()
         run.make_solver()

@@ -289,8 +289,9 @@ class SystemSolver:
         return Limits(REACH * self.lines[number].length, self.lines[number].scale, MOST_OF_STEP)
 
     def marcher_of(self, number: int) -> int:
-        """Address of the kernel that solves a step of a line."""
-        return self._solver
+        """Address of the kernel that solves steps of a line that is solved by itself."""
+        flat = self.lines[number].line.bits & PLANAR
+        return in_plane.address(self._numbers[0, number]) if flat else self._solver
 
     def adopt_cells(self, number: int, line: Line, sea: Sea, work: Work, books: Books) -> None:
         """A line is in other arrays from now on, of which its jobs know."""
@@ -409,10 +410,7 @@ class SystemSolver:
 
     def _marchers(self) -> list[int]:
         """Addresses of the kernels that solve steps of the lines that are solved by themselves."""
-        return [
-            in_plane.address(table.numbers) if self.lines[k].line.bits & PLANAR else self._solver
-            for k, table in self._lone_tables.items()
-        ]
+        return [self.marcher_of(k) for k in self.lone]
 
     def carry(self, number: int, pushes: list[Floats]) -> None:
         """Carry a push out of its plane along with a line: (N+1, 4) of states of even parity, and of odd."""
@@ -634,6 +632,8 @@ class SystemSolver:
                 row[WD : WD + 3] = row[WA : WA + 3] = HEAVY * solved[3:] @ row[FRAME:V].reshape(3, 3)
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             state.vd[:] = HEAVY * work.x[:, 1:4]
+            if x.line.bits & PLANAR:  # round-off of equations in space, which steps in the plane would add up
+                state.vd[:] -= np.outer(state.vd @ x.line.plane[2], x.line.plane[2])
             state.a[:] = state.vd
             state.T[:] += work.x[1:, 0]
             # a spin without inertia has no acceleration, and none is in a plane

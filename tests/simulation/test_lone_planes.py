@@ -16,6 +16,7 @@ import hybrid
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.scene.short_form import network_of
 from hybrid.solve.system import SystemSolver
+from tests.combinations.networks import differences, events_differ
 
 Tables = dict[str, Any]
 
@@ -55,6 +56,33 @@ def test_a_line_in_a_plane_is_the_cable(dimension: int | None, flat: list[list[i
     same(network, cable)
     (line,) = network.lines.values()
     np.testing.assert_array_equal(line["steps/iterations"], cable["steps/iterations"])
+
+
+# What changes cells or lengths of a line in motion: a third of them change within these scenes.
+CHANGES: dict[str, Tables] = {
+    "zones that move": {"model": {"kind": "adaptive", "always_move": True, "hold_time": 0.1}},
+    "cells that follow": {"model": {"kind": "adaptive", "curvature_error": 0.02}, "mesh": {}},
+    "payout": {"payout": {"rate": 1.5, "ramp": 0.5, "longest": 40}},
+}  # fmt: skip
+
+
+def changing(kind: str) -> Tables:
+    """A swinging line whose cells, zones or length change; it lies in a plane, of which nothing is said."""
+    tables = swinging(0.8, 0.0) | {"time": {"duration": 3.0, "step": 0.05}} | CHANGES[kind]
+    if payout := tables.pop("payout", None):
+        tables["ends"]["end"] |= {"payout": payout}
+        tables["ends"]["end"].pop("motion")
+    return tables
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_a_line_that_changes_in_a_plane_is_the_cable(kind: str, flat: list[list[int]]) -> None:
+    """Zones, cells and nodes come and go in the plane; so they do on the way out of it."""
+    tables = changing(kind)
+    network, cable = hybrid.run(as_network(tables)), hybrid.run(tables)
+    assert flat and all(x == [0] for x in flat)
+    assert [str(x) for x in differences(cable, network)] == []
+    assert events_differ(cable, network) == []
 
 
 def test_only_what_is_joined_to_nothing_is_computed_in_a_plane(flat: list[list[int]]) -> None:
@@ -146,3 +174,27 @@ def test_it_is_resumed_bit_for_bit(tmp_path: Path) -> None:
         found = hybrid.resume(tmp_path / "part.h5", until=until)
     for key in ("position", "tension", "envelope/tension_max", "work/end"):
         np.testing.assert_array_equal(found.lines["cable"][key], whole.lines["cable"][key], err_msg=key)
+
+
+def test_stepped_from_outside_it_is_computed_in_the_plane_that_a_scene_asks_for(flat: list[list[int]]) -> None:
+    """As a cable: nothing is set out of the plane, and what is restored goes on there; else it moves in space."""
+    for dimension in (2, None):
+        tables = swinging(0.0, 0.0, dimension)
+        del tables["ends"]["end"]["motion"]
+        cable, network = hybrid.Simulation(tables), hybrid.SystemSimulation(as_network(tables))
+        saved = network.save()
+        for again in (True, False):
+            for k in range(1, 9):
+                place = 15 + 0.03 * k, 20 + 0.04 * k, 0.02 * k * k
+                network.set_point("end", place)
+                network.step()
+                if not again:
+                    cable.set_end("end", place)
+                    cable.step()
+            if again:
+                network.restore(saved)
+        assert flat[-1] == ([0] if dimension == 2 else [])
+        if dimension == 2:
+            with pytest.raises(ValueError, match="out of the plane"):
+                network.set_point("end", (15, 21, 0))
+        assert [str(x) for x in differences(cable.result(), network.result())] == []
