@@ -117,7 +117,8 @@ class LonePlanes:
         changes = {}
         for k, x in self._lines.items():
             model, may = self._run.model.models[k], self._may(k)
-            x.monitor.comes_back = may and model.layout is None and model.payout is None
+            stays = model.layout is None and model.payout is None and self._run.lines[k].correction is None
+            x.monitor.comes_back = may and stays
             if x.plane is not None and not may:
                 self._note(k, 0, "out of plane", f"the line comes near itself or another one: {IN_SPACE}, {TOUCHES}")
             if x.plane is not None and not (may and same_plane(x.plane, model.plane)):

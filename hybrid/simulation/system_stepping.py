@@ -31,7 +31,7 @@ from hybrid.simulation.run_file import Cable
 from hybrid.simulation.set_obstacles import ONE_STEP
 from hybrid.simulation.stepped import SLIVER, end_of_step, in_space, iterations_allowed, one_thread
 from hybrid.simulation.stepped_points import SteppedPoints
-from hybrid.simulation.system_run import ALONE, SystemRun, static_system
+from hybrid.simulation.system_run import Recording, SystemRun, static_system
 from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.system_start import named
 from hybrid.solve.joined import LineFailed
@@ -124,7 +124,9 @@ class SystemSimulation(SteppedPoints):
     def _begun(self, most: int, criterion: UserCriterion | None) -> SystemRun:
         """The run at its start; most: iterations that a step may take.  ComputationError."""
         compile_beside(self.scene)
-        recording = ALONE if self._form is None else ALONE._replace(cable=Cable(self.scene))
+        recording = Recording(planes=self._system.dimension == 2)  # else points may be set anywhere
+        if self._form is not None:
+            recording = recording._replace(cable=Cable(self.scene))
         with nullcontext() if self._form is None else self._form.said():
             cells, text = layers_at_rest(self._system), scene_text(self.scene)
             run = SystemRun(self._system, self._target, text, True, cells, recording, criterion)
