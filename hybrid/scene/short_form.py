@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -95,6 +95,10 @@ class ShortForm:
             yield
         except ComputationError as error:
             raise self.error(error) from None
+        except SceneError as error:
+            texts = ("where", "value", "expected", "fix")
+            said = [replace(x, **{key: self.text(getattr(x, key)) for key in texts}) for x in error.complaints]
+            raise SceneError(said, error.file) from None
 
     def error(self, error: ComputationError) -> ComputationError:
         """What has failed of the network, of the cable."""

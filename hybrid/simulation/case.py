@@ -498,7 +498,7 @@ class Case:
         assert target is not None and isinstance(recorder, Recorder | ArrayRecorder)
         if isinstance(recorder, Recorder):
             recorder.amended = self.beside_result is not None
-        with recorder:
+        with recorder, short_form(self.scene).said():
             run.record_motion(self.progress, self._result_interrupted)
         (line,) = run.lines
         done = Computed(run.resolution.one, line.model, run.steps, line.manager is not None, doubt_of_line(line))
@@ -542,7 +542,8 @@ class Case:
         found = line.recorder
         assert isinstance(found, ComparisonRecorder)
         try:
-            run.record_motion(self.progress, self._comparison_interrupted)
+            with short_form(self.scene).said():
+                run.record_motion(self.progress, self._comparison_interrupted)
         finally:
             found.close("", "")
         self.came_near_itself |= run.came_near_itself or line.contact is not None

@@ -38,6 +38,7 @@ from hybrid.kernels.watch.bending_error import sampled_size as error_size
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import OutputPoints, output_points
+from hybrid.model.plane import as_begun, planar
 from hybrid.model.resolution import follows_curvature, wants_errors
 from hybrid.model.scales import wave_step
 from hybrid.model.sections import section_changes
@@ -128,7 +129,11 @@ def observer_of(
         edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
         gauges=() if only else scene.output.elevation or (), quantities=None if only else quantities_of(scene),
     )  # fmt: skip
-    return Observer(model.line, model.sea.values, model.zones, points, features, recorded)
+    line = model.line if model.plane is None else planar(model.line, model.plane)
+    line = as_begun(line, model.held, scene.dimension)
+    observer = Observer(line, model.sea.values, model.zones, points, features, recorded)
+    observer.line = model.line
+    return observer
 
 
 class LineStep(NamedTuple):
@@ -461,6 +466,9 @@ class LineResult:
         """Record states."""
         if self.shown is not None:
             self.shown(batch)
+        if self.manager is not None and not self.model.line.torsion.size:
+            manager, t = self.manager, float(batch.t[-1])
+            self.diagnostics.torque(t, manager.torque * manager.compliance, manager.torque)
         if self._sampled:
             self._aside.put(self.model, self._sampled)
             self._sampled = ()

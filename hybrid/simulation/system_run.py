@@ -424,6 +424,7 @@ class SystemRun:
                 if interrupted():
                     raise KeyboardInterrupt
 
+            reporter(self.t, self.steps, 0, self.model.models[0].zones, touches=self.touches)
             for change in self.changes[self.changed :]:
                 for stop in self.stops(change.t):
                     self.go_to(stop, look)
