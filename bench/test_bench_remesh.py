@@ -21,6 +21,7 @@ from hybrid.adapt.state_transfer import transfer_to
 from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.simulation import zone_switching
 from hybrid.simulation.cell_changes import CellChanges
+from tests.inside import OnlyLine
 
 pytestmark = pytest.mark.bench
 SEEDS, LEVELS = (1, 2, 3), ((40, 0.05), (80, 0.025), (160, 0.0125))  # base cells and steps, s
@@ -61,22 +62,22 @@ def forced(scene: dict[str, Any], seed: int | None) -> tuple[hybrid.Result, list
     """A run whose cells change at random after every second step, and what momentum changes by; None: they stay."""
     rng, left, fast, steps = None if seed is None else np.random.default_rng(seed), [], 0.0, 0
     with hybrid.Simulation(scene) as simulation:
-        run = simulation._loop.run
-        assert run.switching is not None
+        inside = OnlyLine(simulation)
         while simulation.t < scene["time"]["duration"] - 1e-9:
-            zones = run.switching.zones
+            zones = inside.zones.switching.zones
             zones.calm[:] = -1000  # no cells join by themselves
             zones.clock.share = 1e9  # nor are any halved, for the layers of the pinned ends, which are 2 cm long
             simulation.step()
             steps += 1
             if steps == 1 or (rng is not None and steps % 2 == 0):
-                changes, line, state = run._changes_of_cells(), run.model.line, run.state
+                inside.run._attach()
+                changes, line, state = inside.zones.cells, inside.model.line, inside.state
                 assert changes is not None
                 fast, before = max(fast, np.linalg.norm(state.v, axis=1).max()), line.mass @ state.v
-                plan_at_random(run.switching.zones, rng)
+                plan_at_random(inside.zones.switching.zones, rng)
                 changes.change()
                 changes.sync()
-                change = run.model.line.mass @ run.state.v - before
+                change = inside.model.line.mass @ inside.state.v - before
                 left.append(float(np.linalg.norm(change) / line.mass.sum()))
         result = simulation.result()
     return result, [x / fast for x in left[1:]]

@@ -17,7 +17,7 @@ import hybrid
 from hybrid.kernels.contact.self_contact import contact_task
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.step.newton import ASKED, FINISH, GAIN, LIMIT, PREPARE, TOUCH
-from hybrid.simulation.transient import Transient
+from tests.inside import OnlyLine
 
 pytestmark = pytest.mark.bench
 STIFF = 0.1  # N m2
@@ -56,12 +56,12 @@ def flying(r: np.ndarray, width: float, step: float, duration: float, friction: 
     }))  # fmt: skip
 
 
-def energy(run: Transient) -> float:
+def energy(line: OnlyLine) -> float:
     """Kinetic, elastic and contact energy, with that of travels, J."""
-    x, parts = run.state, np.zeros(5)
+    x, model, parts = line.state, line.model, np.zeros(5)
     room = np.zeros((x.T.size + 1, 3))
-    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
-    numbers = run.run.contact.contact.numbers
+    observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
+    numbers = line.contact.contact.numbers
     return float(parts.sum() + numbers.energy + numbers.tried)
 
 
@@ -94,22 +94,22 @@ def throw(seed: int) -> dict[str, float]:
         v[:, 2] = -0.5 - 0.5 * np.tanh(np.linspace(-1.0, 1.0, len(r)) / 0.15)
     step, duration = steps * width / speed, 60.0 * width / speed * max(1.0, 0.5 * steps)
     simulation = flying(r, width, step, duration, friction, 0.9 if seed % 2 else 0.5)
-    run = simulation._loop.run
-    run.state.v[:] = v * speed
-    run.state.v[:] += 0.05 * speed * random.normal(size=3) * [1.0, seed % 2, 1.0]
-    run._find_accelerations()
-    mass = run.model.line.mass[:, None]
-    momentum, first, most, touched = (mass * run.state.v).sum(axis=0), energy(run), 0.0, False
-    contact = run.run.contact
+    line = OnlyLine(simulation)
+    line.state.v[:] = v * speed
+    line.state.v[:] += 0.05 * speed * random.normal(size=3) * [1.0, seed % 2, 1.0]
+    line.begin_again()
+    mass = line.model.line.mass[:, None]
+    momentum, first, most, touched = (mass * line.state.v).sum(axis=0), energy(line), 0.0, False
+    contact = line.contact
     while simulation.t < duration * (1.0 - 1e-9):
         simulation.advance(min(simulation.t + step, duration))
-        most = max(most, energy(run))
+        most = max(most, energy(line))
         touched |= contact.contact.counts.points > 0
-    touched |= float(run.envelope.itself.itself.found.least_distance) < 1.03 * width
-    moved = np.abs((mass * run.state.v).sum(axis=0) - momentum).max() / (mass.sum() * speed)
+    touched |= float(line.line.envelope.itself.itself.found.least_distance) < 1.03 * width
+    moved = np.abs((mass * line.state.v).sum(axis=0) - momentum).max() / (mass.sum() * speed)
     return {
-        "touched": float(touched), "energy": most / first, "momentum": float(moved), "steps": run.steps / (duration / step),
-        "space": float(seed % 2), "distance": float(run.envelope.itself.itself.found.least_distance) / width,
+        "touched": float(touched), "energy": most / first, "momentum": float(moved), "steps": line.steps / (duration / step),
+        "space": float(seed % 2), "distance": float(line.line.envelope.itself.itself.found.least_distance) / width,
     }  # fmt: skip
 
 
@@ -186,17 +186,17 @@ def test_search_for_contact_that_is_not_there(shape: str) -> None:
         simulation = coil(cells) if shape == "coil" else hanging(cells, 0.8 if shape == "hanging" else 0.2)
         step = simulation.scene.time.step
         simulation.advance(3.0 * step)
-        run = simulation._loop.run
-        contact, count = run.run.contact, max(5, 20_000 // cells)
+        line = OnlyLine(simulation)
+        contact, count = line.contact, max(5, 20_000 // cells)
         spent, solves = [], 0
         for _ in range(10):
             simulation.advance(simulation.t + step)
-            solves += run.iterations
+            solves += line.iterations
         each = solves / 10.0
         for _ in range(3):
-            before, begin = run.steps, time.process_time()
+            before, begin = line.steps, time.process_time()
             simulation.advance(simulation.t + count * step)
-            whole = (time.process_time() - begin) / (run.steps - before)
+            whole = (time.process_time() - begin) / (line.steps - before)
             assert contact.contact.counts.points == 0
             found, balance = 0.0, 0.0
             for what, times in ((PREPARE, 1.0), (TOUCH, each), (LIMIT, each), (FINISH, 1.0), (GAIN, 0.0)):
@@ -234,17 +234,17 @@ def test_cost_of_contact() -> None:
     found = []
     for cells in (200, 400, 800):
         simulation = approaching(cells)
-        run, step = simulation._loop.run, simulation.scene.time.step
-        counts = run.run.contact.contact.counts
+        line, step = OnlyLine(simulation), simulation.scene.time.step
+        counts = line.contact.contact.counts
         while counts.nodes < 48:
             simulation.advance(simulation.t + step)
         spent = []
         for _ in range(5):
-            solves, steps, begin = 0, run.steps, time.process_time()
+            solves, steps, begin = 0, line.steps, time.process_time()
             for _ in range(6):
                 simulation.advance(simulation.t + step)
-                solves += run.iterations
-            spent.append((time.process_time() - begin) / solves * 6.0 / (run.steps - steps))
+                solves += line.iterations
+            spent.append((time.process_time() - begin) / solves * 6.0 / (line.steps - steps))
         each = 1e3 * float(np.median(spent))
         found.append(each)
         print(f"{cells:6} {counts.nodes:4} {counts.points:5} {solves / 6.0:6.2f} {each:8.3f}")

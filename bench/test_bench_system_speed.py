@@ -320,7 +320,7 @@ def stepped_from_outside(one_by_one: bool, joined: bool, steps: int = 1000) -> f
         lines["tow"] = leg | {"start": "ship", "end": "buoy", "sections": [leg["sections"][0] | {"length": 20}]}
     scene = {"environment": {"fluid": {"density": 1025}}, "points": points, "lines": lines,
              "time": {"duration": 60.0, "step": 0.05}, "output": {"every": 60.0}}  # fmt: skip
-    with hybrid.SystemSimulation(scene) as simulation:
+    with hybrid.Simulation(scene) as simulation:
         now = simulation.advance(1.0)
         begin = clock.process_time()
         if not one_by_one:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from hybrid.scene.system import System
     from hybrid.simulation.listed_outputs import kinds_of_quantities, listed_outputs
     from hybrid.simulation.stepping import Simulation
-    from hybrid.simulation.system_stepping import SystemSimulation
+    from hybrid.simulation.stepping import Simulation as SystemSimulation  # noqa: F401  # deprecated
     from hybrid.simulation.system_stiffness import offsets, stiffness
     from hybrid.store.reader import Result
     from hybrid.store.reader import open_result as open
@@ -61,7 +61,7 @@ _HOME = {
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
     "Simulation": ("hybrid.simulation.stepping", "Simulation"),
-    "SystemSimulation": ("hybrid.simulation.system_stepping", "SystemSimulation"),
+    "SystemSimulation": ("hybrid.simulation.stepping", "Simulation"),  # deprecated
     "System": ("hybrid.scene.system", "System"),
     "compare": ("hybrid.view.comparison", "write_comparison"),
     "design": ("hybrid.designs.design", "design"),
@@ -115,7 +115,6 @@ __all__ = [
     "SceneError",
     "Simulation",
     "System",
-    "SystemSimulation",
     "compare",
     "design",
     "export",

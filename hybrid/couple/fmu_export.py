@@ -18,8 +18,8 @@ import numpy as np
 from hybrid.errors import ResultError, optional_package
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import Scene
+from hybrid.scene.short_form import ENDS
 from hybrid.scene.system import System
-from hybrid.simulation.stepped_ends import ENDS
 from hybrid.simulation.stepping import Simulation
 from hybrid.store.selection import check_target, write_atomically
 
@@ -57,8 +57,7 @@ def export_fmu(scene: SceneLike | System, path: str | Path, *, name: str | None 
         # a module of its own for each unit: several may run in one interpreter
         token = hashlib.sha256((text + (folder / SCENE).read_text(encoding="utf-8")).encode()).hexdigest()[:16]
         script = folder / f"hybrid_{model}_{token}.py"
-        unit = "LinesUnit" if found.points else "CableUnit"
-        script.write_text(_SCRIPT.format(model=model, unit=unit), encoding="utf-8")
+        script.write_text(_SCRIPT.format(model=model), encoding="utf-8")
         made = builder.build_FMU(
             script, folder / "made", [folder / SCENE, folder / INTERFACE, *files], **ABILITIES
         )  # fmt: skip
@@ -70,10 +69,10 @@ _SCRIPT = '''"""A scene of hybrid as a co-simulation unit; made by `hybrid expor
 
 from pythonfmu3 import Fmi3Slave
 
-from hybrid.couple.fmu_unit import {unit}
+from hybrid.couple.fmu_unit import SceneUnit
 
 
-class {model}({unit}, Fmi3Slave):
+class {model}(SceneUnit, Fmi3Slave):
     pass
 '''
 
@@ -106,28 +105,20 @@ def _yaml(data: Any) -> str:
 
 def _interface(scene: Scene | System) -> dict[str, Any]:
     """What may be set of the ends or points, and where they begin."""
-    made: Any = Simulation(scene)
-    with made:
-        time = scene.require_time()
-        return {"step": time.step, "duration": time.duration} | (_points if scene.points else _ends)(made)
-
-
-def _points(made: Any) -> dict[str, Any]:
-    points = {
-        name: {
-            "settable": "position" in made.settable(name),
-            "position": np.round(made.point(name).position, 12).tolist(),
+    with Simulation(scene) as made:
+        time, several = scene.require_time(), bool(scene.points)
+        points = {
+            name: {
+                "settable": sorted(made.settable(name)),
+                "position": np.round(made.point(name).position, 12).tolist(),
+            }
+            for name in (scene.points or ENDS)
         }
-        for name in made.scene.points
-    }
-    return {"points": points, "lines": [*made.scene.lines]}
-
-
-def _ends(made: Any) -> dict[str, Any]:
-    positions = made.state.position[[0, -1]]
-    payout = next(filter(None, (getattr(end, "payout", None) for end in made.scene.ends.both)), None)
-    ends = {
-        end: {"settable": sorted(made.settable(end)), "position": np.round(positions[k], 12).tolist()}
-        for k, end in enumerate(ENDS)
-    }
-    return {"ends": ends, "payout": payout is not None, "winch": payout is not None and payout.from_outside}
+        found: dict[str, Any] = {"step": time.step, "duration": time.duration}
+        if several:
+            for of in points.values():  # a frame is of one line, and turns with no point
+                of["settable"] = [x for x in of["settable"] if x != "frame"]
+            return found | {"points": points, "lines": [*made.scene.lines]}
+        payout = next(filter(None, (getattr(end, "payout", None) for end in made.scene.ends.both)), None)
+        winch = payout is not None and payout.from_outside
+        return found | {"ends": points, "payout": payout is not None, "winch": winch}

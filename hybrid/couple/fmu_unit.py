@@ -3,8 +3,9 @@
 Inputs are what the ends reach at the end of a communication step: place (m), velocity (m/s) and rotation vector (rad,
 from the start's frame) of held ends, force (N) and moment (N m) of free ones; all inertial.  Outputs are forces and
 moments of the cable on what holds its ends, places and velocities of the ends, the largest and the lowest tension.
-Of several lines points stand in place of ends: places and velocities of fixed ones that the scene does not move are
-inputs, the force of its lines on each, its place and velocity, and tensions of each line are outputs.
+Of several lines points stand in place of ends: places and velocities of fixed ones that the scene does not move, and
+forces on free ends of one line, are inputs, the force of its lines on each, its place and velocity, and tensions of
+each line are outputs.
 """
 
 from __future__ import annotations
@@ -31,10 +32,7 @@ from hybrid.couple.fmu_export import INTERFACE, SCENE
 from hybrid.errors import ComputationError, HybridError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.driven_end import rotation
-from hybrid.scene.read import load_scene, load_system
-from hybrid.simulation.stepped_ends import ENDS
 from hybrid.simulation.stepping import Simulation
-from hybrid.simulation.system_stepping import SystemSimulation
 
 UNITS = (
     Unit("m", m=1), Unit("s", s=1), Unit("m/s", m=1, s=-1), Unit("rad", rad=1), Unit("N", kg=1, m=1, s=-2),
@@ -49,6 +47,11 @@ INPUTS = {
     "applied_force": ("N", "force on the free end from the next step on"),
     "applied_moment": ("N.m", "moment on the free end from the next step on"),
 }
+# What `Simulation.settable` says where these may be set.
+SET_BY = {
+    "position": "position", "velocity": "position", "rotation": "frame", "applied_force": "force",
+    "applied_moment": "moment",
+}  # fmt: skip
 OUTPUTS = {
     "force": ("N", "force of the cable on what holds the end"),
     "moment": ("N.m", "moment of the cable on what holds the end"),
@@ -56,20 +59,20 @@ OUTPUTS = {
     "node_velocity": ("m/s", "velocity of the end"),
 }
 OF_POINTS = {
-    "force": "force of the lines on the point",
-    "node_position": "where the point is",
-    "node_velocity": "velocity of the point",
+    "force": ("N", "force of the lines on the point"),
+    "node_position": ("m", "where the point is"),
+    "node_velocity": ("m/s", "velocity of the point"),
 }
 
 
 class SceneUnit:
-    """What the units of any scene have in common."""
+    """The variables and steps of an FMU of a scene; a subclass names the model and inherits Fmi3Slave as well."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self._folder = Path(self.resources)  # type: ignore[attr-defined]
         known = json.loads((self._folder / INTERFACE).read_text(encoding="utf-8"))
-        self._simulation: Any = None
+        self._simulation: Simulation | None = None
         self._values: dict[str, Floats] = {}
         self._recovered: dict[str, Floats] = {}  # tension along each line now
         self._refused = ""  # why a state could not be set
@@ -78,34 +81,74 @@ class SceneUnit:
         self.default_experiment = DefaultExperiment(0.0, known["duration"], known["step"])
         self.register_units(UNITS)  # type: ignore[attr-defined]
         self._register_common()
-        self.register_parts(known)
+        self._register_parts(known)
 
-    def begun(self) -> Any:
-        """The simulation of the scene, begun."""
-        raise NotImplementedError
+    def _register_parts(self, known: dict[str, Any]) -> None:
+        """Of every end or point what may be set and read; the length that is out, the tension."""
+        self._is_cable = "ends" in known
+        self.payout_rate, self._winch = 0.0, bool(known.get("winch"))
+        self._points: dict[str, dict[str, Any]] = known["ends"] if self._is_cable else known["points"]
+        for name, of in self._points.items():
+            self._register_point(name, of["settable"], np.array(of["position"]))
+        if self._winch:
+            text = "rate at which line is paid out at the end of a step; negative: taken in"
+            what = {"causality": Fmi3Causality.input, "variability": Fmi3Variability.continuous, "unit": "m/s"}
+            self.register_variable(Float64("payout_rate", description=text, **what))  # type: ignore[attr-defined]
+        if known.get("payout"):
+            self.output("length", "m", "unstretched length that is out", lambda: self.simulation.length)
+        if self._is_cable:
+            self.tensions("", "", "along the cable")
+        for line in known.get("lines", ()):
+            self.tensions(line, f"{line}.", f"along line {line}")
 
-    def register_parts(self, known: dict[str, Any]) -> None:
-        """Register the variables of the scene; known: its interface."""
-        raise NotImplementedError
-
-    def apply(self, step: float) -> None:
-        """Hand the inputs of a step (s) to the simulation."""
-        raise NotImplementedError
-
-    def value_of(self, part: str, name: str) -> Floats:
-        """An output (3,) of an end or a point."""
-        raise NotImplementedError
-
-    def tension_of(self, line: str) -> Floats:
-        """Tension along a line now, at the points of the result.  ValueError: there is none."""
-        raise NotImplementedError
+    def _register_point(self, point: str, settable: Any, position: Floats) -> None:
+        """The variables of an end or a point.  settable: of several lines exported by 1.0.0 whether it is."""
+        names = {True: ("position",), False: ()}[settable] if isinstance(settable, bool) else settable
+        called = "end" if self._is_cable else "point"
+        for name, (unit, text) in INPUTS.items():
+            if SET_BY[name] in names:
+                begin = position if name == "position" else np.zeros(3)
+                self.vector(point, name, unit, text.replace("end at", f"{called} at"), begin)
+        for name, (unit, text) in (OUTPUTS if self._is_cable else OF_POINTS).items():
+            self.vector(point, name, unit, text, None)
 
     @property
-    def simulation(self) -> Any:
+    def simulation(self) -> Simulation:
         """The simulation, begun when it is first needed: parameters are set before."""
         if self._simulation is None:
-            self._simulation = self.begun()
+            self._simulation = Simulation(self._folder / SCENE, self.output_file or None)
+            if self._is_cable:
+                self._frames = dict(zip(self._points, self._simulation.frames(), strict=True))
         return self._simulation
+
+    def _value_of(self, part: str, name: str) -> Floats:
+        """An output (3,) of an end or a point; NaN: of a step that has failed."""
+        simulation = self.simulation
+        try:
+            if name in ("moment", "force") and self._is_cable:
+                return simulation.forces()[list(self._points).index(part) + 2 * (name == "moment")]
+            if simulation.closed:
+                return np.full(3, np.nan)
+        except ValueError as error:  # an exception here would end the master
+            self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
+            return np.full(3, np.nan)
+        point = simulation.point(part)
+        return {"force": point.force, "node_position": point.position, "node_velocity": point.velocity}[name]
+
+    def _apply(self, step: float) -> None:
+        """Hand the inputs of a step (s) to the simulation."""
+        values = self._values
+        if self._winch:
+            self.simulation.set_payout(self.payout_rate)
+        for name in self._points:
+            placed, turn = self.placed(name, step), values.get(f"{name}.rotation")
+            frame = None if turn is None else rotation(turn) @ self._frames[name]
+            if placed is not None or frame is not None:
+                place, speed = placed or (None, None)
+                self.simulation.set_point(name, place, speed, frame)
+            force, moment = values.get(f"{name}.applied_force"), values.get(f"{name}.applied_moment")
+            if force is not None:
+                self.simulation.set_force(name, force, moment)
 
     def _register_common(self) -> None:
         fixed = {"causality": Fmi3Causality.parameter, "variability": Fmi3Variability.fixed}
@@ -138,7 +181,7 @@ class SceneUnit:
         for axis, letter in enumerate("xyz"):
 
             def get(axis: int = axis) -> float:
-                return float((self._values[f"{end}.{name}"] if begin is not None else self.value_of(end, name))[axis])
+                return float((self._values[f"{end}.{name}"] if begin is not None else self._value_of(end, name))[axis])
 
             def put(value: float, axis: int = axis) -> None:
                 self._values[f"{end}.{name}"][axis] = value
@@ -162,7 +205,8 @@ class SceneUnit:
         """Tension along a line, as recovered once for a state."""
         if line not in self._recovered:
             try:
-                self._recovered[line] = self.tension_of(line)
+                simulation = self.simulation
+                self._recovered[line] = simulation.tension(line) if line else simulation.tension()
             except ValueError as error:  # an exception here would end the master
                 self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
                 return np.full(1, np.nan)
@@ -182,7 +226,7 @@ class SceneUnit:
             now = self.simulation.t
             if abs(current_time - now) > CLOCK * max(step_size, 0.0):
                 raise ValueError(f"a step from {current_time:.9g} s, but the cable is at {now:.9g} s")
-            self.apply(step_size)
+            self._apply(step_size)
             self.simulation.advance(current_time + step_size)
         except ComputationError as error:
             return self._failed(error, Fmi3Status.discard)
@@ -223,119 +267,5 @@ class SceneUnit:
             self._values[name][:] = value
 
 
-class CableUnit(SceneUnit):
-    """The variables and steps of an FMU of one cable; a subclass names the model and inherits Fmi3Slave as well."""
-
-    def register_parts(self, known: dict[str, Any]) -> None:
-        """Of both ends what may be set and read, the length that is out, the tension."""
-        self.payout_rate, self._winch = 0.0, bool(known["winch"])
-        for end in ENDS:
-            settable = known["ends"][end]["settable"]
-            wanted = {"position": settable.count("position"), "velocity": settable.count("position")}
-            wanted |= {"rotation": settable.count("frame"), "applied_force": settable.count("force")}
-            wanted["applied_moment"] = settable.count("moment")
-            for name, (unit, text) in INPUTS.items():
-                if wanted[name]:
-                    begin = known["ends"][end]["position"] if name == "position" else np.zeros(3)
-                    self.vector(end, name, unit, text, np.array(begin))
-            for name, (unit, text) in OUTPUTS.items():
-                self.vector(end, name, unit, text, None)
-        if self._winch:
-            text = "rate at which line is paid out at the end of a step; negative: taken in"
-            what = {"causality": Fmi3Causality.input, "variability": Fmi3Variability.continuous, "unit": "m/s"}
-            self.register_variable(Float64("payout_rate", description=text, **what))  # type: ignore[attr-defined]
-        if known["payout"]:
-            self.output("length", "m", "unstretched length that is out", lambda: self.cable.length)
-        self.tensions("", "", "along the cable")
-
-    @property
-    def cable(self) -> Simulation:
-        """The simulation."""
-        found: Simulation = self.simulation
-        return found
-
-    def begun(self) -> Simulation:
-        """The cable at its start."""
-        found = Simulation(load_scene(self._folder / SCENE), self.output_file or None)
-        self._frames = found.frames()
-        return found
-
-    def value_of(self, part: str, name: str) -> Floats:
-        """An output (3,) of an end; NaN: of a step that has failed."""
-        k, cable = ENDS.index(part), self.cable
-        if name == "node_position":
-            return cable.state.position[-k]
-        if name == "node_velocity":
-            return cable.state.velocity[-k]
-        try:
-            forces = cable.forces()
-        except ValueError as error:  # an exception here would end the master
-            self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
-            return np.full(3, np.nan)
-        return forces[k] if name == "force" else forces[2 + k]
-
-    def tension_of(self, line: str) -> Floats:
-        """Tension along the cable."""
-        return self.cable.tension()
-
-    def apply(self, step: float) -> None:
-        """Hand the inputs to the cable."""
-        values = self._values
-        if self._winch:
-            self.cable.set_payout(self.payout_rate)
-        for k, end in enumerate(ENDS):
-            placed, turn = self.placed(end, step), values.get(f"{end}.rotation")
-            frame = None if turn is None else rotation(turn) @ self._frames[k]
-            if placed is not None or frame is not None:
-                place, speed = placed or (None, None)
-                self.cable.set_end(end, place, speed, frame)
-            force, moment = values.get(f"{end}.applied_force"), values.get(f"{end}.applied_moment")
-            if force is not None:
-                self.cable.set_force(end, force, moment)
-
-
-class LinesUnit(SceneUnit):
-    """The same of several lines, whose fixed points are set."""
-
-    def register_parts(self, known: dict[str, Any]) -> None:
-        """Of every point its place, velocity and force, with inputs of those that may be set; tensions of lines."""
-        self._points = [name for name, point in known["points"].items() if point["settable"]]
-        for point, of in known["points"].items():
-            for name in ("position", "velocity") if of["settable"] else ():
-                unit, text = INPUTS[name]
-                begin = np.array(of["position"] if name == "position" else np.zeros(3))
-                self.vector(point, name, unit, text.replace("the end at", "the point at"), begin)
-            for name, text in OF_POINTS.items():
-                self.vector(point, name, OUTPUTS[name][0], text, None)
-        for line in known["lines"]:
-            self.tensions(line, f"{line}.", f"along line {line}")
-
-    @property
-    def lines(self) -> SystemSimulation:
-        """The simulation."""
-        found: SystemSimulation = self.simulation
-        return found
-
-    def begun(self) -> SystemSimulation:
-        """The lines at their start."""
-        return SystemSimulation(load_system(self._folder / SCENE), self.output_file or None)
-
-    def value_of(self, part: str, name: str) -> Floats:
-        """An output (3,) of a point; NaN: a step has failed, and nothing was saved before it."""
-        if self.lines.closed:
-            return np.full(3, np.nan)
-        point = self.lines.point(part)
-        return {"force": point.force, "node_position": point.position, "node_velocity": point.velocity}[name]
-
-    def tension_of(self, line: str) -> Floats:
-        """Tension along a line.  ValueError: the simulation is over."""
-        if self.lines.closed:
-            raise ValueError("the simulation is over: there are no tensions")
-        return self.lines.tension(line)
-
-    def apply(self, step: float) -> None:
-        """Hand the inputs to the points."""
-        for name in self._points:
-            placed = self.placed(name, step)
-            assert placed is not None
-            self.lines.set_point(name, *placed)
+# Of units that were exported by 1.0.0.
+CableUnit = LinesUnit = SceneUnit

@@ -25,7 +25,7 @@ from hybrid.scene.analysis import CatenaryModel
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import parse_either
 from hybrid.simulation.stepped_points import PointState
-from hybrid.simulation.system_stepping import SystemSimulation
+from hybrid.simulation.stepping import Simulation
 
 # s: the longest step, and how long a system may be stepped.
 LONGEST_STEP, DURATION = 0.05, 1e7
@@ -77,7 +77,7 @@ class MoorDyn:
 
     def __init__(self, path: str) -> None:
         self.deck: Deck = read_deck(read_source(path), needs_lines=False)
-        self.simulation: SystemSimulation | PlacesAlone | None = None
+        self.simulation: Simulation | PlacesAlone | None = None
         self.dt, self.origin, self.closed = LONGEST_STEP, inf, False
         self._refuse_loads()
         if not self.deck.lines:
@@ -160,7 +160,7 @@ class MoorDyn:
         return 6 * len(self.bodies) + 3 * len(self.coupled)
 
     @property
-    def running(self) -> SystemSimulation | PlacesAlone:
+    def running(self) -> Simulation | PlacesAlone:
         """The simulation; ValueError before `Init` and after `Close`."""
         if self.simulation is None:
             raise ValueError("the system is not running: call Init first, and nothing after Close")
@@ -253,7 +253,7 @@ def Init(instance: MoorDyn, x: Sequence[float] = (), v: Sequence[float] = ()) ->
             data["lines"][name]["model"] = {"kind": "catenary", "slack": "warn"}
     data["time"] = {"duration": DURATION, "step": instance.dt}
     data["output"] = data.get("output", {}) | {"every": DURATION}
-    instance.simulation = SystemSimulation(data)
+    instance.simulation = Simulation(data)
     return 0
 
 

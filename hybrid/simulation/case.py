@@ -242,15 +242,6 @@ class Case:
             recorder.event(0.0, 0.0, model.length, "zones fixed", ZONES_FIXED)
         return loop, recorder, equilibrium
 
-    def again(self, saved: Tree, loop: TimeLoop, target: Target, drive: Callable[[Model], None]) -> TimeLoop:
-        """The loop of a run as it was at a checkpoint of its own; drive: sets the ends of its model."""
-        resolution = loop.run.resolution
-        model, switching, correction = restored_parts([self.scene], resolution, saved, self.criterion)
-        drive(model)
-        other = self._loop(self.scene, model, resolution, switching, target, correction)
-        other.restore(saved)
-        return other
-
     def resume(self, source: Path, target: Path, before: Tree | None = None) -> RunSample:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
         if as_network():

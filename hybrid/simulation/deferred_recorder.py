@@ -21,11 +21,9 @@ class DeferredRecorder:
         self._recorder = recorder
         self._waiting: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = []
         self._handed_on = 0  # of all that came
-        self._marked = False
-        self._unseen = False  # whether readers have not yet seen what was handed on last
         self.last = recorder.last  # time of the last output, s
 
-    # --- what a TimeLoop gives it ---------------------------------------------------------------
+    # --- what a run gives it ---------------------------------------------------------------
 
     def save_batch(
         self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]],
@@ -75,7 +73,6 @@ class DeferredRecorder:
 
     def mark(self) -> int:
         """A place to come back to."""
-        self._marked = True
         return self._handed_on + len(self._waiting)
 
     def back_to(self, mark: int) -> None:
@@ -88,20 +85,10 @@ class DeferredRecorder:
 
     def commit(self) -> None:
         """Hand on all that waits."""
-        self._unseen |= bool(self._waiting)
         for name, given, more in self._waiting:
             getattr(self._recorder, name)(*given, **more)
         self._handed_on += len(self._waiting)
         self._waiting.clear()
-
-    def commit_old(self) -> None:
-        """Hand on what waits where nothing was marked, or too much waits."""
-        if not self._marked or self.full:
-            if self._waiting:
-                self.commit()
-            if self._unseen and self._recorder.due:
-                self._recorder.flush()
-                self._unseen = False
 
     def close(self, status: str, message: str) -> None:
         """Hand on all that waits, and close the file."""

@@ -1,19 +1,17 @@
-"""What `hybrid.Simulation` gives out and takes in: states, forces, what `save` keeps, vectors that are checked."""
+"""What `hybrid.Simulation` gives out and takes in: states, forces, vectors that are checked."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import wraps
 from math import isfinite
 from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 
-from hybrid.kernels.state.state import Floats, batch_of_one
-from hybrid.model.build import Model
+from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Zone
 from hybrid.scene.schema import Scene
-from hybrid.simulation.time_loop import TimeLoop
 
 
 class CableState(NamedTuple):
@@ -63,23 +61,6 @@ def one_thread(method: Callable[Concatenate[L, P], R]) -> Callable[Concatenate[L
     return alone
 
 
-class Saved(NamedTuple):
-    """What `save` keeps."""
-
-    mark: int
-    t: float  # s
-    state: Any  # arrays of the compiled run, or a packed checkpoint where zones move
-    watch: Mapping[str, Any]
-    paths: Mapping[int, Floats]
-    places: tuple[Floats, Floats]  # positions (2, 3) m and frames (2, 9) of the ends
-    loads: Any
-    model: Model
-    owner: object  # what tells one Simulation from another
-    number: int  # of the save, from 1
-    cut_short: int  # steps so far
-    obstacles: Any  # what is set of them
-
-
 # Of a step: a step so short is round-off of the times of others.
 SLIVER = 1e-6
 
@@ -92,14 +73,6 @@ def end_of_step(now: float, step: float | None, duration: float) -> float:
     if abs(taken * step - now) < SLIVER * step:
         until = (taken + 1) * step  # a multiple of the step, without round-off that adds up
     return until if duration - until > SLIVER * step else duration
-
-
-def no_such_method(self: object, name: str, instead: Mapping[str, str]) -> AttributeError:
-    """What to say of a name that only the simulation of the other kind of scene has."""
-    kind = type(self).__name__
-    return AttributeError(
-        f"{kind} has no {name!r}" + (f": use {instead[name]}" if name in instead else ""), name=name, obj=self
-    )
 
 
 def vector(x: Sequence[float] | Floats, name: str) -> Floats:
@@ -137,15 +110,3 @@ def iterations_allowed(most: Any) -> int:
     if isinstance(most, bool) or not isinstance(most, int | np.integer) or most < 1:
         raise ValueError(f"most_iterations: expected a whole number of at least 1, found {most!r:.60}")
     return int(most)
-
-
-def tension_now(loop: TimeLoop) -> Floats:
-    """Tension (ns,) N at the points of the result, as it would be written now."""
-    run, model = loop.run, loop.run.model
-    books, observer = run.run.books, loop.observer.on(model.line, model.sea.values, model.zones, model.hinges)
-    batch = batch_of_one(run.t, model.ends.at(run.t), run.state, books.report[0], books.work[0], model.sea.at(run.t))
-    if run.payout is not None:
-        _, seen, _ = run.payout.look(observer, model, batch)
-    else:
-        seen = observer.look(batch)
-    return np.array(seen.tension[:, 0])

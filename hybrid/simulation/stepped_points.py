@@ -69,6 +69,8 @@ class SteppedPoints(SettableObstacles):
     _places: dict[str, list[tuple[int, int]]]  # of points: number of each line there, 0 or 1 for its start or end
     _driven_of: SystemModel | None = None  # whose points those that are set were last looked for among
     _signed: SystemModel | None = None  # of which the next are
+    _report: Floats | None = None  # of the last step, of which the next are
+    _reported: Floats  # (4, 3) forces and moments at both ends in it
     _signs: Floats  # (4, 3) what of the report of a step is a force or a moment on what holds an end, with its sign
 
     @property
@@ -385,7 +387,10 @@ class SteppedPoints(SettableObstacles):
             held, turns = model.ends.values.held, [bool(model.line.element[-k]) for k in (0, 1)]
             parts = held[0], held[1], turns[0], -1.0 * turns[1]
             self._signed, self._signs = run.model, np.repeat(np.array(parts, float), 3).reshape(OF_ENDS, 3)
-        return EndForces(*(run.solver.work[0].report[: 3 * OF_ENDS].reshape(OF_ENDS, 3) * self._signs))
+        report = run.solver.work[0].report
+        if report is not self._report:
+            self._report, self._reported = report, report[: 3 * OF_ENDS].reshape(OF_ENDS, 3)
+        return EndForces(*(self._reported * self._signs))
 
     @one_thread
     def stiffness(self, name: str) -> Floats:

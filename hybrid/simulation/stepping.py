@@ -1,227 +1,241 @@
-"""A cable that is stepped from outside: by a controller, a vessel, another program.
-
-`Simulation` is the time loop of `hybrid.run`, advanced by the caller: the same steps, the same outputs, the same file.
-"""
+"""Lines that are stepped from outside, by a controller, a vessel, another program: points are set, forces read."""
 
 from __future__ import annotations
 
 import io
 import threading
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, nullcontext
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from time import monotonic
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
-from hybrid.errors import ComputationError, SceneError
+from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
-from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd, contradictions
-from hybrid.model.resolution import first_resolution
+from hybrid.model.system import SystemResolution
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import SceneLike, as_scene_or_system
-from hybrid.scene.schema import Scene, missing_time
+from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
+from hybrid.scene.schema import missing_time
+from hybrid.scene.short_form import network_of, short_form
 from hybrid.scene.system import System
-from hybrid.simulation.case import Case
-from hybrid.simulation.deferred_recorder import DeferredRecorder
-from hybrid.simulation.direct_steps import DirectSteps
-from hybrid.simulation.failure import driven_of
 from hybrid.simulation.first_use import compile_beside
-from hybrid.simulation.layer_mesh import layered, survey_of
-from hybrid.simulation.mesh_survey import with_survey
+from hybrid.simulation.layer_mesh import layered_lines
+from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution, with_survey
+from hybrid.simulation.run_file import Cable
+from hybrid.simulation.saving import Saved, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.set_obstacles import ONE_STEP
-from hybrid.simulation.static_case import StaticCase
-from hybrid.simulation.stepped import (
-    SLIVER,
-    CableState,
-    Saved,
-    Triple,
-    end_of_step,
-    in_space,
-    iterations_allowed,
-    no_such_method,
-    one_thread,
-    tension_now,
-)
-from hybrid.simulation.stepped_ends import SteppedEnds
-from hybrid.simulation.switch import as_network
-from hybrid.simulation.system_stepping import SystemSimulation
-from hybrid.simulation.transient import StepFailed
+from hybrid.simulation.stepped import SLIVER, end_of_step, in_space, iterations_allowed, one_thread
+from hybrid.simulation.stepped_points import SteppedPoints
+from hybrid.simulation.system_run import Recording, SystemRun, static_system
+from hybrid.simulation.system_start import named
+from hybrid.solve.joined import LineFailed
+from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
-from hybrid.store.named_arrays import pack, unpack
-from hybrid.store.reader import Result, open_result
-from hybrid.store.writer import Recorder
+from hybrid.store.reader import Result, open_result, written_result
 
-# s, of the wall: what waits is written down after so long, though there is room for more.
-WRITE_EVERY = 60.0
 NUMBER = (int, float, np.integer, np.floating)
-# What only SystemSimulation has, and what does it here.
-OF_SEVERAL = {"set_point": "set_end", "point": "state and forces", "line": "state"}
 
 
-class Simulation(SteppedEnds):
-    """A cable in motion that is stepped from outside; a context manager.
+def layers_at_rest(system: System) -> SystemResolution:
+    """Cells by the equilibrium of the start; where a line says how many cells a layer has, by that of full loads."""
+    asked = [name for name, line in system.lines.items() if line.resolution is not None]
+    first = layered_lines(system, SystemResolution.first(system), True)
+    if not asked:
+        return first
+    memory = MemoryTarget()
+    coarse = SystemResolution({name: replace(survey_resolution(x), every=1) for name, x in first.lines.items()})
+    output = system.output.model_copy(update={"points": POINTS, "quantities": {}})
+    shown = system.model_copy(update={"output": output})
+    run = static_system(shown, memory, partial(scene_text, shown), coarse)
+    found, lines = written_result(memory), dict(first.lines)
+    for name in asked:
+        line, scene, model = found.lines[name], system.scene_of(name), run.model.models[run.model.names.index(name)]
+        outputs = {key: line[key] for key in ("position", "curvature", "tension")}
+        lines[name] = with_survey(lines[name], scene, Survey.of(scene, lines[name], model, line.s, outputs))
+    return SystemResolution(lines)
 
-    Of several lines it is a `hybrid.SystemSimulation`, whose points are set in place of ends.
-    scene: as of `hybrid.run`; its time table gives the step (without one, steps follow the motion) and the duration,
-    beyond which nothing is computed.  output: the HDF5 file to write; None keeps the result in memory.  criterion: as
-    of `hybrid.run`.  Constructing it finds the start that the scene asks for, a static equilibrium perhaps, and nothing
-    else: no run to estimate an error is made.  A scene that says no `dimension` is computed in space, since an end may
-    be set anywhere.  most_iterations: Newton iterations that a step may take, for real time: one that has not converged
-    by then is taken as it is, with an event `iterations cut` and counted in `cut_short`; None: until it has.  One
-    thread at a time: a method called while another thread is in one raises ValueError.
 
-    Raises SceneError, ResultError and ComputationError as `hybrid.run` does.
+def _that_are_set(line: Any) -> Any:
+    """A line, or a cable, whose ends may be set anywhere."""
+    return line.model_copy(update={"contact": line.contact.of_ends_that_are_set()})
+
+
+class Simulation(SteppedPoints):
+    """A scene in motion that is stepped from outside; a context manager.
+
+    scene: as of `hybrid.run`; its time table gives the longest step and the duration, beyond which nothing is computed.
+    output: the HDF5 file to write; None keeps the result in memory.  criterion: as of `hybrid.run`.  Constructing it
+    finds the start that the scene asks for, an equilibrium perhaps, and nothing else: no run to estimate an error is
+    made.  A cable that says no `dimension` is computed in space, since an end may be set anywhere.  most_iterations:
+    Newton iterations that a step may take, for real time: one that has not converged by then is taken as it is, with an
+    event `iterations cut` and counted in `cut_short`; None: until it has.  One thread at a time: a method called while
+    another thread is in one raises ValueError.  Raises SceneError, ResultError and ComputationError as `hybrid.run`
+    does.
     """
-
-    def __new__(cls, scene: SceneLike | System, *args: Any, **more: Any) -> Any:
-        read = as_scene_or_system(scene)
-        if not isinstance(read, Scene) or as_network():
-            return SystemSimulation(read, *args, **more)
-        made = super().__new__(cls)
-        made.scene = read
-        return made
 
     def __init__(
         self, scene: SceneLike | System, output: str | Path | None = None, *, overwrite: bool = True,
         criterion: UserCriterion | None = None, most_iterations: int | None = None,
     ) -> None:  # fmt: skip
-        self._most = iterations_allowed(most_iterations)
-        found = in_space(self.scene)  # which was read to tell what is to be stepped
-        self.scene = found.model_copy(update={"contact": found.contact.of_ends_that_are_set()})
-        if self.scene.time is None:
-            raise SceneError([missing_time(self.scene)])
-        check_motions(self.scene)
+        most = iterations_allowed(most_iterations)
+        self._read_scene(as_scene_or_system(scene))
+        self.lock, self._stack, self._owner = threading.RLock(), ExitStack(), object()
         self._target: Path | io.BytesIO = io.BytesIO()
         if output is not None:
             self._target = Path(output).expanduser().resolve()
             check_target(self._target, overwrite)
-        self.lock = threading.RLock()
-        self._closed, self._failed, self._stack, self._owner = False, "", ExitStack(), object()
-        self._saves = 0  # how often `save` was called
-        if isinstance(self._target, Path):
             self._stack.enter_context(locked(self._target))
-        compile_beside(self.scene)
-        self._case = Case(self.scene, criterion)
+        self._closed = False
+        self._failed: tuple[LineFailed, ComputationError] | None = None  # of the last step, until `restore`
         try:
-            first = first_resolution(self.scene)
-            if self.scene.resolution is None:
-                resolution = layered(self._case, first)
-            else:  # nobody knows the motion: layers are those of the equilibrium under full loads
-                resolution = with_survey(first, self.scene, survey_of(StaticCase(self.scene), first)[0])
-            self._loop, recorder, equilibrium = self._case.prepare(resolution, self._target)
+            self._run = self._begun(most, criterion)
         except BaseException:
             self._stack.close()
             raise
-        assert isinstance(recorder, Recorder)
-        time = self.scene.time
-        self._fixed_step = None if time.controlled else time.step
-        self._duration, self._sliver = time.duration, SLIVER * self._loop.run.resolution.step
-        self._direct: DirectSteps | None = None
-        self._loop.recorder = self._recorder = DeferredRecorder(recorder)
-        self._driven: dict[int, DrivenEnd] = {}
-        self._wound: tuple[float | None, float] | None = None  # length and rate that are set for the next step
-        self._next: dict[int, tuple[Triple, Triple | None, Triple]] = {}  # what ends are set to, for the next step
+        names = self._run.model.names
+        self._places = {
+            point: [(names.index(line), int(end == "end")) for line, end in self._system.lines_at(point)]
+            for point in self._system.points
+        }
+        time, self._stops = self._system.require_time(), self._run.stops()
+        self._fixed_step, self._duration = None if time.controlled else time.step, time.duration
+        self._sliver = SLIVER * self._run.resolution.one.step
+        self._driven, self._next, self._wound = {}, {}, {}
         self._courses, self._moved = {}, {}
-        self._loop.patient = self._plain
-        self._loop.run.run.count.most_iterations = self._most
-        self._loop.run.run.wait_longer()
-        self._written = monotonic()
+        self._final = 0  # how often what had been recorded was made final
+        self._here: Saved | None = None  # what was saved of the state as it is now
+
+    def _read_scene(self, scene: Any) -> None:
+        """The network to compute, whose ends are set, of a scene in either form."""
+        if scene.time is None:
+            raise SceneError([missing_time(scene)])
+        if scene.points:
+            lines = {name: _that_are_set(line) for name, line in scene.lines.items()}
+            self.scene = self._system = scene.model_copy(update={"lines": lines})
+            self._form = None
+        else:
+            self.scene = _that_are_set(in_space(scene))
+            check_motions(self.scene)
+            self._system, self._form = network_of(self.scene), short_form(self.scene)
+
+    def _begun(self, most: int, criterion: UserCriterion | None) -> SystemRun:
+        """The run at its start; most: iterations that a step may take.  ComputationError."""
+        compile_beside(self.scene)
+        recording = Recording(planes=self._system.dimension == 2)  # else points may be set anywhere
+        if self._form is not None:
+            recording = recording._replace(cable=Cable(self.scene))
+        with nullcontext() if self._form is None else self._form.said():
+            cells, text = layers_at_rest(self._system), scene_text(self.scene)
+            run = SystemRun(self._system, self._target, text, True, cells, recording, criterion)
+        run.loop.counts.most_iterations = most
         try:
-            self._loop.begin(equilibrium)
-        except BaseException as error:
-            self.__exit__(type(error), error, None)
-            raise
-
-    if not TYPE_CHECKING:  # mypy would take any name as known
-
-        def __getattr__(self, name: str) -> Any:
-            raise no_such_method(self, name, OF_SEVERAL)
-
-    # --- stepping -------------------------------------------------------------------------------
+            run.begin_motion()
+        except LineFailed as failed:
+            raise run.failed(failed) from None
+        return run
 
     @property
     def cut_short(self) -> int:
         """Steps so far that were taken after `most_iterations` though these had not converged."""
-        return int(self._loop.run.run.count.cut_short)
+        return int(self._run.loop.counts.cut_short)
+
+    # --- stepping -----------------------------------------------------------------------------------
 
     def step(self) -> float:
         """One step of the scene's length, and the time after it (s).
 
         ValueError: steps follow the motion (`advance` says where to), or the duration is over.
         """
-        return self.advance(end_of_step(self._loop.run.t, self._fixed_step, self._duration))
+        self._check_open()
+        return self.advance(end_of_step(self.t, self._fixed_step, self._duration))
 
     @one_thread
     def advance(self, until: float) -> float:
-        """Steps to a time `until` (s), where one ends; returns it.  Ends that are set reach their place there.
+        """Steps to a time `until` (s), where one ends; returns it.  Points that are set reach their place there.
 
-        ValueError: a time that has passed, or beyond the scene's duration; a step has failed and nothing was restored.
+        ValueError: a time that has passed, or beyond the duration; a step has failed and nothing was restored.
+        ComputationError: a step failed.  A cable goes on after `restore`.  Several lines are then, once `save` has been
+        called, back at the time from which they were to advance, with all points at rest that are not set again, and
+        can go on in a shorter step; else the simulation is over, and its result is written.
         """
         self._check_open()
         self._check_sound()
+        until = self._checked_time(until)
+        if self._final and any(recorder.full for recorder in recorders(self._run)):
+            self._commit()
+        before = self._before() if self._final and self._form is None else None
+        self._start_courses(self.t, until)
+        try:
+            self._go_to(until)
+            if not self._final:  # after a `save` nothing is final
+                self._run.keep()
+        except LineFailed as failed:
+            raise (self._fail(failed) if before is None else self._undo(failed, before)) from None
+        if any(not x.is_reported and x.contradiction() for x in self._ends_set()):
+            text = contradictions(self._set_from_outside())
+            self._run.noted.event(0.0, *self._run.file.span, "implausible", text)
+        self._forget_released()
+        return self.t
+
+    def _checked_time(self, until: Any) -> float:
+        """Where to advance to (s); ValueError: that cannot be."""
         if isinstance(until, bool) or not isinstance(until, NUMBER):
             raise ValueError(f"until: expected a number, in s, found {until!r:.60}")
-        moving, duration, sliver = self._loop.run, self._duration, self._sliver
-        now = moving.t
+        now, duration, sliver = self.t, self._duration, self._sliver
         if not now + sliver < until <= duration + sliver:
             raise ValueError(
                 f"until = {until:.9g} s, expected a time after {now:.9g} s, up to time.duration, {duration:g} s"
             )
-        if moving.payout is not None:
-            moving.payout.go_on(now, until, self._wound)
-            self._wound = None
-        one_step = until - now <= ONE_STEP * (self._fixed_step or float(moving.run.clock.last_dt))
-        for k, end in self._driven.items():
-            if (course := self._next.pop(k, None)) is None:
-                end.stay(now, until, one_step)
-            else:
-                end.set(now, until, *course, one_step)
+        return min(float(until), duration)
+
+    def _start_courses(self, now: float, until: float) -> None:
+        """What has been set is on its way from `now` to `until` (s)."""
+        for k, paying in self._run.payout.lines.items() if self._run.payout is not None else ():
+            paying.go_on(now, until, self._wound.pop(k, None))
+        one_step = until - now <= ONE_STEP * (self._fixed_step or self._run.last_step)
+        for name, ends in self._driven.items():
+            course = self._next.pop(name, None)
+            for end in ends:
+                if course is None:
+                    end.stay(now, until, one_step)
+                else:
+                    end.set(now, until, *course, one_step)
         if self._moved:
             self._move_obstacles(now, until, one_step)
-        self._recorder.commit_old()
-        try:
-            self._step_to(min(until, duration))
-        except ComputationError as error:
-            self._failed = str(error)
-            raise
-        if text := contradictions(driven_of(moving.model)):
-            self._recorder.event(0.0, 0.0, float(moving.model.line.s[-1]), "implausible", text)
-        self._forget_released()
-        if monotonic() - self._written > WRITE_EVERY:
-            self._loop.write_down(everything=True)
-            self._written = monotonic()
-        return moving.t
 
-    def _step_to(self, until: float) -> None:
-        try:
-            if self._direct is None or not self._direct.still_of(self._loop):
-                self._direct = DirectSteps(self._loop)
-            self._direct.take(until)
-        except StepFailed as failed:
-            self._loop.fail(failed.tried, failed.dt)
+    def _go_to(self, until: float) -> None:
+        stops, sliver = self._stops, self._sliver
+        while stops and stops[0] < until - sliver:
+            self._run.go_to(stops.pop(0))
+        if stops and stops[0] <= until + sliver:
+            stops.pop(0)
+            self._run.go_to(until)
+        else:
+            self._run.step_to(until)
 
-    @property
-    @one_thread
-    def state(self) -> CableState:
-        """Where the cable is now."""
-        run = self._loop.run
-        x = run.state
-        return CableState(run.t, run.model.line.s.copy(), x.r.copy(), x.v.copy(), x.T.copy(), run.model.zones)
+    def _check_sound(self) -> None:
+        """Of what belongs to the last step: after one that failed there is none until `restore`."""
+        if self._failed is not None:
+            reason = str(self._failed[1]).splitlines()[0]
+            raise ValueError(f"a step has failed ({reason}): restore() what save() returned, or close()")
 
-    @one_thread
-    def tension(self) -> Floats:
-        """Tension (ns,) N now at the points of the result, recovered between cells and at the ends as written there.
+    def _ends_set(self) -> Iterator[DrivenEnd]:
+        """What is set from outside."""
+        for ends in self._driven.values():
+            yield from ends[:1]
+        for name in self._moved:
+            yield self._obstacle_paths(name)[0]
 
-        `state.tension` is that of the cells, and costs less.  ValueError: a step has failed.
-        """
-        self._check_open()
-        self._check_sound()
-        return tension_now(self._loop)
+    def _set_from_outside(self) -> dict[str, DrivenEnd]:
+        names = [self._key_of(name) for name, ends in self._driven.items() if ends]
+        return dict(zip([*names, *(f"obstacles.{name}" for name in self._moved)], self._ends_set(), strict=True))
 
     # --- back and forth ---------------------------------------------------------------------------
 
@@ -229,76 +243,120 @@ class Simulation(SteppedEnds):
     def save(self) -> Any:
         """The state as it is, in memory, to come back to: for the iterations of an implicit coupling.
 
-        What has been computed until now is final; what follows is recorded when the next `save` is made.
-        ValueError: a step has failed; what was saved before it stays good.
+        What has been computed until now is final; what follows is when the next `save` is made.  ValueError: a step has
+        failed; what was saved before it stays good.  ComputationError: what has been computed until now is not sound.
         """
         self._check_open()
         self._check_sound()
-        if not self._plain or self._loop.run.run.waits_much:
-            self._loop.write_down(everything=True)
-        self._recorder.commit()
-        run, watch = self._loop.run, self._loop.remembered()
-        state = run.run.keep() if self._plain else pack(self._loop.checkpoint())
-        paths = {k: end.keep() for k, end in self._driven.items()}
-        loads, ends = run.model.ends.keep_loads(), run.model.ends.values
-        self._saves += 1
-        return Saved(
-            self._recorder.mark(), self.t, state, watch, paths, (ends.position.copy(), ends.frame.copy()), loads,
-            run.model, self._owner, self._saves, self.cut_short, self._kept_courses(),
-        )  # fmt: skip
+        defer(self._run)
+        self._commit()
+        self._here = self._kept()
+        return self._here
 
     @one_thread
     def restore(self, saved: Any) -> None:
-        """Back to what `save` returned.
+        """Back to what `save` returned, as often as wanted; what was computed since leaves no output and no event.
 
-        ValueError: a later `save` has made final what came after it, or another Simulation has returned it.
+        ValueError: another Simulation has returned it, or what came after it is final: a later `save` was made,
+        or more than 1000 outputs or events came since.
         """
         self._check_open()
         if not isinstance(saved, Saved) or saved.owner is not self._owner:
             raise ValueError("restore: expected what save() of this Simulation has returned")
-        if saved.number < self._saves:
-            raise ValueError("a later save() has made final what came after this one")
-        self._recorder.back_to(saved.mark)
-        if isinstance(saved.state, bytes):
-            self._loop = self._case.again(
-                unpack(saved.state), self._loop, self._target, lambda model: self._drive_again(model, saved)
-            )
-            self._loop.recorder = self._recorder
-            self._loop.run.run.count.most_iterations = self._most
-        else:
-            run = self._loop.run
-            if run.model is not saved.model:  # an end has been released since
-                run.set_model(saved.model, run.state.copy())
-            run.run.bring_back(saved.state)
-            ends = saved.model.ends.motions
-            self._driven = {k: end for k, end in ends.items() if isinstance(end, DrivenEnd)}
-            for k, end in self._driven.items():
-                if k in saved.paths:
-                    end.bring_back(saved.paths[k])
-                else:  # it has been set since, for the first time
-                    end.stand(saved.places[0][k], saved.places[1][k])
-            run.model.ends.bring_back_loads(saved.loads, saved.t)
-            run.run.move(run.model.ends.moves())
+        if saved.number < self._final:
+            raise ValueError("a later save() has made final what came after this one, or too much came after it")
+        self._bring_back(saved)
+
+    def _commit(self) -> None:
+        try:
+            commit(self._run)
+        except LineFailed as failed:
+            raise self._fail(failed) from None
+        self._final, self._here = self._final + 1, None
+
+    def _kept(self) -> Saved:
+        paths = {name: [end.keep() for end in ends] for name, ends in self._driven.items()}
+        return Saved(
+            self._owner,
+            self._final,
+            stops=tuple(self._stops),
+            driven=dict(self._driven),
+            paths=paths,
+            next=dict(self._next),
+            wound=dict(self._wound),
+            obstacles=self._kept_courses(),
+            **kept(self._run),
+        )
+
+    def _before(self) -> Saved:
+        """What a step that fails goes back to."""
+        before, self._here = self._here or self._kept(), None
+        return before
+
+    def _bring_back(self, saved: Saved) -> None:
+        for name in self._places.keys() - saved.paths.keys():  # what has been set since, for the first time
+            for line, k in self._places[name]:
+                end = saved.model.models[line].ends.motions.get(k)
+                if isinstance(end, DrivenEnd):
+                    position, frame = saved.stood[line]
+                    end.stand(position[k], frame[k])
+        self._driven, self._driven_of = dict(saved.driven), None
+        self._follow(saved.paths)
         self._bring_back_courses(saved.obstacles)
-        self._loop.remember(saved.watch)
-        self._loop.run.run.count.cut_short = saved.cut_short
+        bring_back(self._run, saved)
+        self._bring_back_courses(saved.obstacles)  # of the model of then
+        self._follow(saved.paths)  # with the frames of then
+        for model in self._run.model.models:
+            model.ends.at(self.t)
+        self._stops, self._next, self._here = [*saved.stops], dict(saved.next), saved
+        self._wound, self._failed = dict(saved.wound), None
+
+    def _follow(self, paths: Mapping[str, list[Floats]]) -> None:
+        """Let points that are set from outside be on these paths."""
+        for name, rows in paths.items():
+            for end, path in zip(self._driven[name], rows, strict=True):
+                end.bring_back(path)
+
+    def _undo(self, failed: LineFailed, before: Saved) -> ComputationError:
+        """Be back where the step began that has failed."""
+        error = named(failed, self._run.model)
+        self._bring_back(before)
         self._next.clear()
-        self._wound = None
-        self._failed = ""
-
-    def _drive_again(self, model: Model, saved: Saved) -> None:
-        self._driven = {k: model.ends.drive(k) for k in saved.paths}
-        for k, path in saved.paths.items():
-            self._driven[k].bring_back(path)
-        model.ends.bring_back_loads(saved.loads, saved.t)
-
-    @property
-    def _plain(self) -> bool:
-        """Whether nothing but the compiled run changes in a step."""
-        run = self._loop.run
-        return run.switching is None and run.correction is None and run.payout is None
+        self._wound.clear()
+        self._courses.clear()
+        return ComputationError(
+            error.outcome, error.t, error.s, f"{error.detail}; the simulation is back at t = {self.t:.6g} s",
+            first="set the points again and advance in a shorter step",
+        )  # fmt: skip
 
     # --- the end ----------------------------------------------------------------------------------
+
+    def _fail(self, failed: LineFailed) -> ComputationError:
+        """What the failure of a step becomes: of several lines the simulation is over."""
+        if self._form is None:
+            self._closed = True
+            with self._stack:
+                return self._end_with(failed)
+        error = self._error_of(failed)
+        self._failed = failed, error
+        return error
+
+    def _error_of(self, failed: LineFailed) -> ComputationError:
+        """An error in the words of the scene, with a snapshot; velocities that contradict their places are told."""
+        if failed.outcome == Outcome.GAINS_ENERGY and (text := contradictions(self._set_from_outside(), soon=True)):
+            failed = LineFailed(failed.line, failed.outcome, failed.t, failed.s, failed.detail, first=text)
+        return self._run.error_of(failed)
+
+    def _end_with(self, failed: LineFailed) -> ComputationError:
+        """Close the file of what has failed."""
+        error = self._error_of(failed)
+        self._run.finish_failed(failed, str(error))
+        return error
+
+    @property
+    def closed(self) -> bool:
+        """Whether the simulation is over, and its result written."""
+        return self._closed
 
     def result(self) -> Result:
         """What has been recorded until now; the simulation is over."""
@@ -308,15 +366,25 @@ class Simulation(SteppedEnds):
     @one_thread
     def close(self) -> None:
         """Write what is left and close the file; a second call does nothing."""
+        self._close("complete", f"{self._run.steps} steps, stepped from outside to t = {self.t:.6g} s")
+
+    def _close(self, status: str, message: str) -> None:
         if self._closed:
             return
         self._closed = True
         with self._stack:
-            self._loop.write_down(everything=True)
-            self._loop.finish()
-            self._recorder.commit()
-            until = f"{self._loop.run.steps} steps, stepped from outside to t = {self.t:.6g} s"
-            self._recorder.close("failed" if self._failed else "complete", self._failed or until)
+            if self._failed is not None:
+                failed, error = self._failed
+                self._run.finish_failed(failed, str(error))
+                return
+            try:
+                self._run.finish(status, message)
+            except LineFailed as late:  # an output says that going on makes no sense
+                raise self._end_with(late) from None
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ValueError("the simulation is over: its result has been written")
 
     def __enter__(self) -> Simulation:
         return self
@@ -324,10 +392,5 @@ class Simulation(SteppedEnds):
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
         if kind is None:
             self.close()
-        elif not self._closed:
-            self._closed = True
-            with self._stack:
-                self._loop.write_down(everything=True)
-                self._recorder.commit()
-                self._loop.write_envelope()
-                self._recorder.close("failed" if issubclass(kind, Exception) else "interrupted", str(error))
+        else:
+            self._close("failed" if issubclass(kind, Exception) else "interrupted", str(error))

@@ -239,7 +239,8 @@ def set_state(run: KeptRun, found: Mapping[str, Any]) -> None:
     run.vibrations.restore(found["vibrations"], run.loop.clock)
     run.loop.restore_cuts(found["cuts"])
     run.passed, run.met, run.let_pass = (_pairs(found[name]) for name in ("passed", "met", "let_pass"))
-    run.watch_lines()  # what has met since has not
+    if len(run.lines) > 1:
+        run.watch_lines()  # what has met since has not
     if run.shared is not None:
         run.shared.restore(found["contact"], run.t)
     run.state.bodies[:], run.solver.body_work[:, :SPRING] = found["bodies"], found["body_work"]

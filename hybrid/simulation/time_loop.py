@@ -21,7 +21,7 @@ from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.read import scene_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
-from hybrid.simulation.diagnostics import REMEMBERED, UNWATCHED, Diagnostics, Stop
+from hybrid.simulation.diagnostics import UNWATCHED, Diagnostics, Stop
 from hybrid.simulation.failure import Stopped, explanation, first_remedy, touch_text, winch_text, write_snapshot
 from hybrid.simulation.load_change import change_loads
 from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
@@ -454,20 +454,6 @@ class TimeLoop:
             "resolution": resolution_tree(self.run.resolution),
             "state": self.checkpoint(),
         }
-
-    def remembered(self) -> dict[str, Any]:
-        """What has been noted so far, to be given to `remember`."""
-        noted = {name: getattr(self.diagnostics, name) for name in REMEMBERED}
-        return {
-            "diagnostics": noted,
-            "run": {name: getattr(self.run, name) for name in ("turned", "slackened", "beyond")},
-        }
-
-    def remember(self, noted: Mapping[str, Any]) -> None:
-        """Forget what has been noted since `remembered`."""
-        vars(self.diagnostics).update(noted["diagnostics"])
-        vars(self.run).update(noted["run"])
-        self.diagnostics.watch(self.run.run.clock)
 
     def checkpoint(self) -> dict[str, Any]:
         """What the rest of the run depends on, between two steps."""

@@ -6,7 +6,7 @@ The loop over time is compiled (kernels.run.run).  Here are its arrays, and what
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -229,39 +229,6 @@ class CompiledRun:
         """From now on steps keep the ranges of the quantities that are asked for in these books, of the same arrays."""
         self.books = books
         self.table.bind(books=books, quantities=note_quantities.address(self.table.numbers))
-
-    def wait_longer(self) -> None:
-        """Before a line is attached for a run that is stepped from outside: more steps and samples may wait."""
-        self._rows, self._room = ROWS_OUTSIDE, np.zeros(0)
-        self.books = self.books._replace(log=np.zeros((ROWS_OUTSIDE, len(b.LOG))))
-
-    @property
-    def waits_much(self) -> bool:
-        """Whether so much waits to be written down that copies of it would cost more than a step."""
-        return bool(self.count.rows > ROWS_KEPT or self.count.samples * self.books.samples.shape[1] > MOST_KEPT)
-
-    def keep(self) -> tuple[Floats, ...]:
-        """Copies of all that steps change, for `bring_back`."""
-        rows = self.books.log[: self.count.rows], self.books.samples[: self.count.samples]
-        return tuple(x.copy() for x in (*rows, *self._changing()))
-
-    def bring_back(self, kept: tuple[Floats, ...]) -> None:
-        """Be as it was when `keep` was called, on the same line."""
-        log, samples, *others = kept
-        self.books.log[: len(log)], self.books.samples[: len(samples)] = log, samples
-        for mine, its in zip(self._changing(), others, strict=True):
-            mine[:] = its
-
-    def _changing(self) -> Iterator[Floats]:
-        skipped = {"outputs", "log", "samples", "borne", "base", "placed", "loaded", "start", "marks", "right"}
-        skipped |= {"hinges", "asked", "path", "radii", "walls"}
-        skipped.add("model_error")  # where it is followed, simulation.stepping packs a checkpoint instead
-        yield from (x for state in self.states for x in state)
-        yield from self.pushes
-        yield from self.answers.values()
-        if self.contact is not None:
-            yield from self.contact.changing()
-        yield from (x for name, x in self.books._asdict().items() if name not in skipped)
 
     # --- what it knows ------------------------------------------------------------------------------
 

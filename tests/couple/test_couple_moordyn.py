@@ -171,7 +171,7 @@ def test_a_deck_that_is_no_scene_is_refused_with_its_line() -> None:
 def test_points_of_a_system_are_set_by_name() -> None:
     data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene.model_dump(exclude_none=True)
     data |= {"time": {"duration": 1.0, "step": 0.05}}
-    with hybrid.SystemSimulation(data) as system:
+    with hybrid.Simulation(data) as system:
         before = system.point("point4").force
         system.set_point("point4", [40.02, 0, -14])
         for until in (0.3, 0.37, 1.0):

@@ -108,7 +108,7 @@ def test_several_lines_are_a_unit_whose_points_are_set(tmp_path: Path) -> None:
     (tmp_path / "lines.yaml").write_text(LINES)
     unit = hybrid.export_fmu(tmp_path / "lines.yaml", tmp_path / "lines.fmu")
     same = hybrid.Simulation(tmp_path / "lines.yaml")
-    assert isinstance(same, hybrid.SystemSimulation)
+    assert isinstance(same, hybrid.Simulation)
     with running(unit, tmp_path / "open") as (lines, number):
         inputs = {x.rsplit(".", 1)[0] for x in number if x.endswith(".position.x") and ".node_" not in x}
         assert inputs == {"foot.position", "ship.position"}

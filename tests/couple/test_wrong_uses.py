@@ -44,9 +44,9 @@ def refused(uses: list[Callable[[], Any]]) -> int:
 # --- several lines -------------------------------------------------------------------------------
 
 
-def system(duration: float = 1.0) -> hybrid.SystemSimulation:
+def system(duration: float = 1.0) -> hybrid.Simulation:
     data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene.model_dump(exclude_none=True)
-    return hybrid.SystemSimulation(data | {"time": {"duration": duration, "step": 0.05}})
+    return hybrid.Simulation(data | {"time": {"duration": duration, "step": 0.05}})
 
 
 def test_several_lines_have_the_verbs_of_one_cable() -> None:
@@ -96,7 +96,7 @@ def test_a_point_of_several_lines_is_let_go() -> None:
     assert found[0] == pytest.approx(found[1], abs=1e-9)
 
 
-def several(broken: bool) -> hybrid.SystemSimulation:
+def several(broken: bool) -> hybrid.Simulation:
     """Two ropes of their own, one of which comes off a point at 0.2 s if the scene says so."""
     rope = {"length": 3.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e4, "damping": {"mass": 0.5}}
     points = {"a": [0, 0, 0], "b": [2, 0, 0], "c": [0, 1, 0], "d": [2, 1, 0]}
@@ -110,10 +110,10 @@ def several(broken: bool) -> hybrid.SystemSimulation:
     }  # fmt: skip
     if broken:
         tables["points"]["b"]["break_at"] = {"time": 0.2}
-    return hybrid.SystemSimulation(tables)
+    return hybrid.Simulation(tables)
 
 
-def uses_of_a_system(s: hybrid.SystemSimulation) -> Iterator[Callable[[], Any]]:
+def uses_of_a_system(s: hybrid.Simulation) -> Iterator[Callable[[], Any]]:
     for x in NO_TIMES:
         yield lambda x=x: s.advance(x)
         yield lambda x=x: s.restore(x)
@@ -137,7 +137,7 @@ def test_wrong_uses_of_several_lines() -> None:
         assert asked.t == 0.1
         asked.advance(0.2)
         assert np.array_equal(asked.line("line1").position, expected)
-    print(f"{count} wrong uses of SystemSimulation")
+    print(f"{count} wrong uses of Simulation")
     assert count > 100
     assert refused([lambda: asked.advance(0.5), lambda: asked.set_point("point4", PLACE)]) == 2
     asked.close()

@@ -21,6 +21,7 @@ from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.plane import in_space, planar
 from hybrid.model.release import without_hold
+from tests.inside import OnlyLine
 
 ROUND = 1e-12
 # Fields in which the time counts: lengths on their way to their true ones, and what balances a node that has entered.
@@ -123,7 +124,7 @@ def test_lines_of_zones_have_every_field() -> None:
 
 def lines_of_a_run(scene: hybrid.Scene) -> Iterator[tuple[Model, Line]]:
     with hybrid.Simulation(scene) as simulation:
-        run = simulation._loop.run
+        run = OnlyLine(simulation)
         for t in (1.0, 2.0, 3.0):
             simulation.advance(t)
             yield run.model, run.model.line

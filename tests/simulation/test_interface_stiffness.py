@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.state.report import FORCE_A
-from hybrid.simulation.switch import as_network
+from tests.inside import OnlyLine
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHIFT = 1e-5  # m
@@ -42,14 +42,10 @@ SCENES = {
 
 def report_now(cable: Any) -> np.ndarray:
     """Forces of the state of now: the report of a step is of the iterate before the last correction."""
-    if not as_network():
-        run = cable._loop.run
-        run.stepper.evaluate_forces(run.model.sea.at(run.t), run.model.ends.at(run.t), run.state)
-        return run.stepper.work.report
-    run = cable._run
-    run.ends_of_now()
-    run.solver.evaluate_forces(run.state, run.t)
-    return run.solver.work[0].report
+    line = OnlyLine(cable)
+    line.run.ends_of_now()
+    line.run.solver.evaluate_forces(line.run.state, line.run.t)
+    return line.work.report
 
 
 @pytest.mark.long

@@ -119,7 +119,7 @@ def test_a_network_that_moves_is_resumed_or_stepped_has_such_cells(tmp_path: Pat
     whole = hybrid.run(as_lines(asked), tmp_path / "whole.h5").lines["one"]
     hybrid.run(as_lines(asked | {"time": {"duration": 0.2, "step": 0.1}}), tmp_path / "half.h5").close()
     longer = hybrid.resume(tmp_path / "half.h5", until=0.4).lines["one"]
-    with hybrid.SystemSimulation(as_lines(asked), tmp_path / "stepped.h5") as stepped:
+    with hybrid.Simulation(as_lines(asked), tmp_path / "stepped.h5") as stepped:
         while stepped.t < 0.4 - 1e-9:
             stepped.step()
     outside = hybrid.open(tmp_path / "stepped.h5").lines["one"]

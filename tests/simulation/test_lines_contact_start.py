@@ -84,7 +84,7 @@ def test_a_run_goes_on_to_the_bit_from_before_and_after_contact_began(begun: Any
 
 
 def test_stepped_back_to_before_contact_began_it_begins_again(begun: Any) -> None:
-    with hybrid.SystemSimulation(unasked()) as run:
+    with hybrid.Simulation(unasked()) as run:
         run.advance(0.2)
         saved = run.save()
         run.advance(0.5)
@@ -244,7 +244,7 @@ def test_a_third_line_joins_two_that_touch_already() -> None:
 def test_contact_that_lets_no_step_lead_on_is_given_up_and_lines_pass(begun: Any, tmp_path: Path) -> None:
     """By hand, because no scene is known in which it happens: the run goes on, says so, and is resumed so."""
     tables = unasked()
-    with hybrid.SystemSimulation(tables, tmp_path / "whole.h5") as run:
+    with hybrid.Simulation(tables, tmp_path / "whole.h5") as run:
         run.advance(0.5)
         assert gives_up_contact(run._run, 1e-6)
         assert run._run.model.touching is None
@@ -257,7 +257,7 @@ def test_contact_that_lets_no_step_lead_on_is_given_up_and_lines_pass(begun: Any
 
 
 def test_a_line_that_parts_from_itself_as_it_comes_near_another_one_stays_in_contact(begun: Any) -> None:
-    with hybrid.SystemSimulation(unasked()) as run:
+    with hybrid.Simulation(unasked()) as run:
         run.advance(0.5)
         run._run.lines[0].parts_itself = True  # as if it had been seen in the step in which contact of two lines began
         run._run._after_step(0.01)

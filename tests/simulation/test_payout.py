@@ -18,6 +18,7 @@ from hybrid.model.payout_law import law_of, length_at
 from hybrid.scene.payout import Payout
 from hybrid.simulation.time_loop import TimeLoop
 from hybrid.simulation.transient import Transient
+from tests.inside import OnlyLine
 
 G = 9.81
 
@@ -224,8 +225,7 @@ def forces(
     """
     found, changes = [], []
     with hybrid.Simulation(scene) as sim:
-        paying = sim._loop.run.payout
-        assert paying is not None
+        paying = OnlyLine(sim).paying
         steps = round(scene["time"]["duration"] / scene["time"]["step"]) - 1
         for _ in range(min(steps, last or steps)):
             if skip is not None and len(changes) == skip:
@@ -399,12 +399,10 @@ def test_a_checkpoint_without_the_side_of_the_winch_is_that_of_one_at_the_end() 
     """Files of before winches at the start have ten numbers of a reel."""
     with hybrid.Simulation(hanging({"rate": 0.5, "ramp": 2.0, "longest": 50.0}, 5.0)) as sim:
         sim.advance(2.0)
-        run = sim._loop.run
-        assert run.payout is not None
-        before = run.payout.reel.numbers.copy()
-        kept = run.payout.checkpoint()
-        run.payout.restore({**kept, "numbers": kept["numbers"][:10]}, run.model)
-        assert np.array_equal(run.payout.reel.numbers, before)
+        line = OnlyLine(sim)
+        before, kept = line.paying.reel.numbers.copy(), line.paying.checkpoint()
+        line.paying.restore({**kept, "numbers": kept["numbers"][:10]}, line.model)
+        assert np.array_equal(line.paying.reel.numbers, before)
 
 
 def test_a_resume_does_not_pay_out_more_than_the_result_has_points_for(tmp_path: Path) -> None:

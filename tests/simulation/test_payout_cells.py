@@ -11,7 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.cli.tables import zones_over_time
-from hybrid.simulation.transient import Transient
+from tests.inside import OnlyLine
 from tests.simulation.test_payout import G, assert_no_kicks, clamped, hanging, sagging
 from tests.simulation.test_payout_zones import touching
 
@@ -33,10 +33,10 @@ def followed(rate: float) -> hybrid.Result:
     return hybrid.run(pinned(rate))
 
 
-def change_cells(run: Transient, random: np.random.Generator, part: float) -> None:
+def change_cells(line: OnlyLine, random: np.random.Generator, part: float) -> None:
     """Other cells far from the winch: a part of the nodes that there might be."""
-    layout = run.model.layout
-    assert layout is not None and run.switching is not None
+    layout, zones = line.model.layout, line.run.zones
+    assert layout is not None and zones is not None
     here = np.zeros(layout.starts[-1] + 1, bool)
     for begin, size in zip(layout.starts, layout.parts, strict=False):
         cells = [(begin, begin + size)]
@@ -45,7 +45,8 @@ def change_cells(run: Transient, random: np.random.Generator, part: float) -> No
             here[[a, b]] = True
             if b - a > 1 and random.random() < part:
                 cells += [(a, (a + b) // 2), ((a + b) // 2, b)]
-    run._switch(run.switching.manager.same_zones(), here)
+    zones.switch(0, line.zones.switching.manager.same_zones(), here)
+    zones.go_on()
 
 
 @pytest.mark.long
@@ -60,12 +61,12 @@ def test_a_hanging_line_weighs_what_is_out_while_its_cells_change(sign: float, s
         scene["ends"] = {"start": scene["ends"]["end"], "end": "free"}
     random, cells, off = np.random.default_rng(1), set(), []
     with hybrid.Simulation(scene) as sim:
-        run = sim._loop.run
+        line = OnlyLine(sim)
         for k in range(350):
             sim.step()
             if k % 10 == 0:
-                change_cells(run, random, 0.5)
-            cells.add(run.model.cells)
+                change_cells(line, random, 0.5)
+            cells.add(line.model.cells)
             force = getattr(sim.forces(), side)[2]
             off.append(force / (-2.0 * sim.length * (G - sign * 0.05)) - 1.0)
         assert abs(sim.length - 40.0) > 7.0

@@ -16,6 +16,7 @@ from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B, PHASE
 from hybrid.model.build import build
 from hybrid.scene.read import as_scene
 from hybrid.simulation.payout import PayingOut
+from tests.inside import OnlyLine
 
 TORQUE = {"tension_torque": 2e-3, "torsional_stiffness": 2e4}
 CURVE = [[0, 0], [0.01, 1500], [0.02, 4000], [0.06, 20000]]
@@ -182,7 +183,7 @@ def test_lift_grows_with_the_length_that_is_out() -> None:
         before = []
         while sim.t < 6.0:
             sim.step()
-            wake = sim._loop.run.state.wake
+            wake = OnlyLine(sim).state.wake
             if before and len(wake) > len(before[-1]):
                 grown = len(wake) - len(before[-1])
                 assert grown == 1

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 
 from hybrid.errors import ComputationError
 from hybrid.model.resolution import first_resolution
@@ -18,7 +19,6 @@ from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_file import Cable
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import Recording, SystemRun
-from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.reader import open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE

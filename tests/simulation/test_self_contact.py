@@ -14,9 +14,8 @@ import hybrid
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.books import FRICTION
 from hybrid.kernels.step.newton import NEAR
-from hybrid.simulation.step_events import count_energy_gains
-from hybrid.simulation.transient import Transient
 from hybrid.view.summary import facts_of
+from tests.inside import OnlyLine
 
 WIDTH, STIFF = 0.02, 0.1
 
@@ -52,13 +51,12 @@ def flying(r: np.ndarray, step: float, duration: float, width: float = WIDTH, **
     }))  # fmt: skip
 
 
-def energy(run: Transient) -> float:
+def energy(line: OnlyLine) -> float:
     """Kinetic, elastic and contact energy, J."""
-    x, parts = run.state, np.zeros(4)
+    x, model, parts = line.state, line.model, np.zeros(4)
     room = np.zeros((x.T.size + 1, 3))
-    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
-    contact = run.run.contact
-    return float(parts.sum()) + (float(contact.contact.numbers.energy) if contact else 0.0)
+    observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
+    return float(parts.sum()) + float(line.contact.contact.numbers.energy)
 
 
 @pytest.mark.long
@@ -75,21 +73,21 @@ def test_a_throw(seed: int, steps: float) -> None:
     step, r = steps * WIDTH / speed, hairpin(random.uniform(20.0, 90.0), gap)
     duration = 60.0 * WIDTH / speed * max(1.0, 0.5 * steps)
     simulation = flying(r, step, duration)
-    run = simulation._loop.run
+    line = OnlyLine(simulation)
     s = np.linspace(-1.0, 1.0, len(r))
-    run.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(s / 0.15))
-    run.state.v[:] += 0.05 * speed * random.normal(size=3)
-    run._find_accelerations()
-    mass = run.model.line.mass[:, None]
-    momentum, first, most, touched = (mass * run.state.v).sum(axis=0), energy(run), 0.0, False
+    line.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(s / 0.15))
+    line.state.v[:] += 0.05 * speed * random.normal(size=3)
+    line.begin_again()
+    mass = line.model.line.mass[:, None]
+    momentum, first, most, touched = (mass * line.state.v).sum(axis=0), energy(line), 0.0, False
     while simulation.t < duration * (1.0 - 1e-9):
         simulation.advance(min(simulation.t + step, duration))
-        most = max(most, energy(run))
-        touched |= run.run.contact.contact.counts[0] > 0
+        most = max(most, energy(line))
+        touched |= line.contact.contact.counts[0] > 0
     assert touched
     assert most < 1.001 * first
-    assert run.envelope.itself.itself.found.least_distance > 0.5 * WIDTH
-    moved = (mass * run.state.v).sum(axis=0) - momentum
+    assert line.line.envelope.itself.itself.found.least_distance > 0.5 * WIDTH
+    moved = (mass * line.state.v).sum(axis=0) - momentum
     assert np.abs(moved).max() < 1e-13 * mass.sum() * speed
 
 
@@ -102,14 +100,14 @@ def test_free_flight_after_contact_gains_no_energy(seed: int) -> None:
     r = hairpin(random.uniform(15.0, 90.0), 3.0 * width)
     step, duration = steps * width / speed, 30.0 * width / speed * steps
     simulation = flying(r, step, duration, width, friction=friction)
-    run = simulation._loop.run
-    run.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(np.linspace(-1.0, 1.0, len(r)) / 0.15))
-    run.state.v[:] += 0.05 * speed * random.normal(size=3)
-    run._find_accelerations()
-    first, most, near = energy(run), 0.0, 0
+    line = OnlyLine(simulation)
+    line.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(np.linspace(-1.0, 1.0, len(r)) / 0.15))
+    line.state.v[:] += 0.05 * speed * random.normal(size=3)
+    line.begin_again()
+    first, most, near = energy(line), 0.0, 0
     while simulation.t < duration * (1.0 - 1e-9):
         simulation.advance(min(simulation.t + step, duration))
-        most, near = max(most, energy(run)), near + int(run.run.contact.call[NEAR])
+        most, near = max(most, energy(line)), near + int(line.contact.call[NEAR])
     assert 0 < near < 20  # of 30
     assert most < 1.001 * first
 
@@ -137,26 +135,23 @@ def test_steps_that_would_create_energy_are_repeated() -> None:
     r = hairpin(random.uniform(15.0, 90.0), 3.0 * width)
     step, duration = steps * width / speed, 30.0 * width / speed * steps
     simulation = flying(r, step, duration, width, friction=friction)
-    run = simulation._loop.run
-    run.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(np.linspace(-1.0, 1.0, len(r)) / 0.15))
-    run.state.v[:] += 0.05 * speed * random.normal(size=3)
-    run._find_accelerations()
-    first, most = energy(run), 0.0
+    line = OnlyLine(simulation)
+    line.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(np.linspace(-1.0, 1.0, len(r)) / 0.15))
+    line.state.v[:] += 0.05 * speed * random.normal(size=3)
+    line.begin_again()
+    first, most = energy(line), 0.0
     while simulation.t < duration * (1.0 - 1e-9):
         simulation.advance(min(simulation.t + step, duration))
-        most = max(most, energy(run))
-    assert run.run.contact is not None and run.run.contact.given_up > 0
+        most = max(most, energy(line))
+    assert line.contact.given_up > 0
     assert most < 1.001 * first
-    told: list[tuple[str, str]] = []
-    run.events.event = lambda t, a, b, kind, text, **_: told.append((kind, text))  # type: ignore[method-assign]
-    count_energy_gains(run)
-    ((kind, text),) = told
-    assert kind == "steps cut" and f"{run.run.contact.given_up} tries" in text and "energy" in text
+    (text,) = (x.text for x in simulation.result().events if x.kind == "steps cut")
+    assert f"{line.contact.given_up} tries" in text and "energy" in text
 
 
-def angular_momentum(run: Transient) -> np.ndarray:
+def angular_momentum(inside: OnlyLine) -> np.ndarray:
     """About the origin, with that of the sections (3,) kg m2/s."""
-    line, x = run.model.line, run.state
+    line, x = inside.model.line, inside.state
     length = np.linalg.norm(x.e, axis=1)[:, None]
     d, turning = x.e / length, np.diff(x.v, axis=0) / length
     sections = line.polar[:, None] * x.w[:, None] * d + line.rotary[:, None] * np.cross(d, turning)
@@ -169,20 +164,20 @@ def test_friction_keeps_momentum_and_angular_momentum(friction: float) -> None:
     speed = 6.0
     step, duration, random = 0.01 * WIDTH / speed, 8.0 * WIDTH / speed, np.random.default_rng(1)
     simulation = flying(hairpin(56.0, 3.0 * WIDTH), step, duration, friction=friction)
-    run = simulation._loop.run
-    s = np.linspace(-1.0, 1.0, run.model.line.s.size)
-    run.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(s / 0.15))
-    run.state.v[:] += 0.05 * speed * random.normal(size=3)
-    run._find_accelerations()
-    mass = run.model.line.mass[:, None]
-    size = (np.linalg.norm(run.state.r, axis=1)[:, None] * mass * np.abs(run.state.v)).sum()
-    momentum, turning, first = (mass * run.state.v).sum(axis=0), angular_momentum(run), energy(run)
+    line = OnlyLine(simulation)
+    s = np.linspace(-1.0, 1.0, line.model.line.s.size)
+    line.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(s / 0.15))
+    line.state.v[:] += 0.05 * speed * random.normal(size=3)
+    line.begin_again()
+    mass = line.model.line.mass[:, None]
+    size = (np.linalg.norm(line.state.r, axis=1)[:, None] * mass * np.abs(line.state.v)).sum()
+    momentum, turning, first = (mass * line.state.v).sum(axis=0), angular_momentum(line), energy(line)
     simulation.advance(duration)
-    assert np.abs((mass * run.state.v).sum(axis=0) - momentum).max() < 1e-13 * mass.sum() * speed
-    assert np.abs(angular_momentum(run) - turning).max() < 1e-6 * size
-    lost = -float(run.run.books.work[0, FRICTION]) / first
+    assert np.abs((mass * line.state.v).sum(axis=0) - momentum).max() < 1e-13 * mass.sum() * speed
+    assert np.abs(angular_momentum(line) - turning).max() < 1e-6 * size
+    lost = -float(line.books.work[0, FRICTION]) / first
     assert 3e-4 < lost < 0.1 if friction else lost == 0.0
-    assert energy(run) < first * (1.0001 - lost)
+    assert energy(line) < first * (1.0001 - lost)
 
 
 def looped(**more: Any) -> dict[str, Any]:
@@ -235,12 +230,12 @@ def test_what_is_at_rest_does_not_depend_on_the_speed_of_the_collision() -> None
     for speed in (0.0, 30.0):
         simulation = hybrid.Simulation(hybrid.validate_scene(looped()))
         simulation.advance(8.2)
-        run = simulation._loop.run
-        contact = run.run.contact.contact
+        line = OnlyLine(simulation)
+        contact = line.contact.contact
         assert contact.counts.points > 0
         contact.numbers.speed = max(speed, contact.numbers.speed)
         simulation.advance(9.0)
-        found.append((float(run.state.T[-1]), run.run.contact.least_distance))
+        found.append((float(line.state.T[-1]), line.contact.least_distance))
         assert contact.numbers.speed < 1.0
     (tension, distance), (other, apart) = found
     assert other == pytest.approx(tension, rel=2e-3)

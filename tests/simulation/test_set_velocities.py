@@ -61,7 +61,7 @@ def test_points_of_several_lines(again: bool) -> None:
     work, data = {}, scene()
     data["output"]["every"] = 0.9  # nothing is judged by its energy before it is told
     for name, said in {"right": 1.0, "left out": None, "half": 0.5}.items():
-        with hybrid.SystemSimulation(data) as lines:
+        with hybrid.Simulation(data) as lines:
             for k in range(18):
                 place = VESSEL + np.array([0, 0, 0.2 * (1.0 - np.cos(2.0 * STEP * (k + 1)))])
                 velocity = np.array([0, 0, 0.4 * np.sin(2.0 * STEP * (k + 1))])

@@ -25,10 +25,10 @@ def cable() -> tuple[hybrid.Simulation, Any]:
     return lines, lambda x: lines.set_end("end", x)
 
 
-def system() -> tuple[hybrid.SystemSimulation, Any]:
+def system() -> tuple[hybrid.Simulation, Any]:
     line = {"start": "a", "end": "b", "model": "rod", "mesh": {"cells": 80}, "sections": [HOSE]}
     points = {"a": {"position": [0, 0, 0]}, "b": {"position": FAR}}
-    lines = hybrid.SystemSimulation(COMMON | {"points": points, "lines": {"hose": line}})
+    lines = hybrid.Simulation(COMMON | {"points": points, "lines": {"hose": line}})
     return lines, lambda x: lines.set_point("b", x)
 
 

@@ -17,6 +17,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import hybrid
+from tests.inside import OnlyLine
 
 OWC = [[0, 0], [0.01, 1000], [0.02, 1900], [0.03, 3000], [0.05, 5000]]
 TAU, A, B = 3.0, 4e5, 20.0
@@ -217,7 +218,7 @@ def test_highest_tensions_go_along_where_zones_move(model: Any) -> None:
     }  # fmt: skip
 
     def peaks(simulation: hybrid.Simulation) -> tuple[Any, Any]:
-        run = simulation._loop.run
+        run = OnlyLine(simulation)
         s = run.model.line.s
         return 0.5 * (s[1:] + s[:-1]), run.state.peak.copy()
 

@@ -14,8 +14,8 @@ from test_system_contact_zones import system as adaptive
 
 import hybrid
 import hybrid.model.build
+from hybrid.simulation.stepping import Simulation
 from hybrid.simulation.system_run import SystemRun
-from hybrid.simulation.system_stepping import SystemSimulation
 
 RUNS_ON = {"friction": RUBS["friction"]}
 NAMES = ("position", "tension", "self_contact", "energy/self_contact", "work/friction")
@@ -77,7 +77,7 @@ def test_what_is_taken_back_takes_its_contact_with_it() -> None:
     times = np.arange(1, 18) * 0.1
     found = []
     for back in (False, True):
-        with SystemSimulation(system(contact=RUNS_ON)) as lines:
+        with Simulation(system(contact=RUNS_ON)) as lines:
             for t in times:
                 if back and t > 1.0:
                     before = lines.save()

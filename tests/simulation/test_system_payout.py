@@ -227,7 +227,7 @@ def test_from_outside_it_is_the_same_and_goes_back() -> None:
     rates = np.interp(np.arange(0.0, 6.3, 0.25), [0, 2, 4, 6], [0, 0.8, 0.8, 0])
     del law["lines"]["wire"]["connections"]["end"]["payout"]["rates"]
     with hybrid.Simulation(scene) as sim:
-        assert isinstance(sim, hybrid.SystemSimulation)
+        assert isinstance(sim, hybrid.Simulation)
         with pytest.raises(ValueError, match=r"lines\.tug\.connections\.start\.payout gives the length"):
             sim.set_payout("tug", 1.0)
         with pytest.raises(ValueError, match=r"lines\.a\.connections has no payout"):

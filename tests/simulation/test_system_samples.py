@@ -146,7 +146,7 @@ def test_a_run_that_stops_between_outputs_goes_on_bit_for_bit(
 def test_what_is_stepped_from_outside_and_taken_back_has_the_same_outputs() -> None:
     """Steps end between outputs; each is computed twice."""
     scene, times = moored(0.03, 0.08, 0.9), [*(0.03 * np.arange(1, 30)), 0.9]  # to the bit the ends of its steps
-    with hybrid.SystemSimulation(scene) as simulation:
+    with hybrid.Simulation(scene) as simulation:
         for t in times:
             saved = simulation.save()
             simulation.advance(t)

@@ -1,4 +1,4 @@
-"""SystemSimulation goes back: what is taken back leaves nothing, a failed step is undone, a strong coupling converges."""
+"""Simulation goes back: what is taken back leaves nothing, a failed step is undone, a strong coupling converges."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def heave(t: float, scale: float = 1.0) -> tuple[Any, Any]:
     )
 
 
-def step(lines: hybrid.SystemSimulation, scale: float = 1.0) -> None:
+def step(lines: hybrid.Simulation, scale: float = 1.0) -> None:
     until = STEP * (round(lines.t / STEP) + 1)
     lines.set_point("vessel", *heave(until, scale))
     lines.advance(until)
@@ -52,7 +52,7 @@ def assert_same(a: hybrid.Result, b: hybrid.Result) -> None:
 
 
 def plain(data: dict[str, Any], steps: int = 20) -> hybrid.Result:
-    with hybrid.SystemSimulation(data) as lines:
+    with hybrid.Simulation(data) as lines:
         for _ in range(steps):
             step(lines)
         return lines.result()
@@ -61,7 +61,7 @@ def plain(data: dict[str, Any], steps: int = 20) -> hybrid.Result:
 def test_a_file_grows_while_it_is_stepped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hybrid.store.writer, "pause", lambda _: 0.0)
     monkeypatch.setattr(hybrid.store.writer, "_PART", 0.0)
-    with hybrid.SystemSimulation(scene(), tmp_path / "run.h5") as lines:
+    with hybrid.Simulation(scene(), tmp_path / "run.h5") as lines:
         for _ in range(6):
             step(lines)
         with hybrid.open(tmp_path / "run.h5") as part:
@@ -82,7 +82,7 @@ def test_what_is_taken_back_leaves_nothing(breaks: str, tmp_path: Path) -> None:
     if breaks == "clamped":
         data["lines"]["hose"]["connections"] = {"end": {"tangent": [0.5, 0, 1]}}
     expected = plain(data)
-    with hybrid.SystemSimulation(data, tmp_path / "back.h5") as lines:
+    with hybrid.Simulation(data, tmp_path / "back.h5") as lines:
         for k in range(20):
             if k % 3 == 0:
                 saved = lines.save()
@@ -107,7 +107,7 @@ def test_bodies_are_taken_back_too() -> None:
     data["bodies"]["spar"]["force"] = {"value": [3e6, 0, 0], "until": 0.45}
     results = []
     for tries in (1, 3):
-        with hybrid.SystemSimulation(data) as lines:
+        with hybrid.Simulation(data) as lines:
             lines.advance(0.3)
             saved = lines.save()
             for k in range(tries):
@@ -122,7 +122,7 @@ def test_bodies_are_taken_back_too() -> None:
 @pytest.mark.long
 def test_too_much_after_a_save_makes_it_final(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hybrid.simulation.deferred_recorder, "MOST_WAITING", 3)
-    with hybrid.SystemSimulation(scene()) as lines:
+    with hybrid.Simulation(scene()) as lines:
         saved = lines.save()
         for _ in range(12):
             step(lines)
@@ -135,7 +135,7 @@ def test_too_much_after_a_save_makes_it_final(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_what_was_set_before_a_save_is_set_after_restore() -> None:
-    with hybrid.SystemSimulation(scene()) as lines:
+    with hybrid.Simulation(scene()) as lines:
         lines.set_point("vessel", *heave(STEP))
         saved, places = lines.save(), []
         for _ in range(2):
@@ -147,7 +147,7 @@ def test_what_was_set_before_a_save_is_set_after_restore() -> None:
 
 
 def test_a_point_that_is_set_first_after_a_save_stands_again_after_restore() -> None:
-    with hybrid.SystemSimulation(scene()) as lines:
+    with hybrid.Simulation(scene()) as lines:
         saved = lines.save()
         for _ in range(3):
             step(lines, 5.0)
@@ -159,7 +159,7 @@ def test_a_point_that_is_set_first_after_a_save_stands_again_after_restore() -> 
 
 
 def test_what_cannot_be_restored_is_refused() -> None:
-    with hybrid.SystemSimulation(scene()) as lines, hybrid.SystemSimulation(scene()) as other:
+    with hybrid.Simulation(scene()) as lines, hybrid.Simulation(scene()) as other:
         first, foreign = lines.save(), other.save()
         step(lines)
         for wrong in (foreign, None, "x", {}, object()):
@@ -190,7 +190,7 @@ def test_a_failed_step_is_undone_and_a_smaller_one_goes_on(hose: str) -> None:
     data["lines"]["hose"]["sections"] = FAILING[hose]
     far = VESSEL + np.array([300.0 if hose == "strain" else -80.0, 0, 0])
     expected = plain(data, 10)
-    with hybrid.SystemSimulation(data) as lines:
+    with hybrid.Simulation(data) as lines:
         lines.save()
         for k in range(10):
             if k in (0, 5):
@@ -212,7 +212,7 @@ def test_a_failed_step_is_undone_and_a_smaller_one_goes_on(hose: str) -> None:
 def test_without_a_save_a_failed_step_ends_the_simulation() -> None:
     data = scene()
     data["lines"]["hose"]["sections"] = [HOSE | {"max_strain": 0.05}]
-    with hybrid.SystemSimulation(data) as lines:
+    with hybrid.Simulation(data) as lines:
         lines.set_point("vessel", VESSEL + np.array([300.0, 0, 0]))
         with pytest.raises(hybrid.ComputationError):
             lines.advance(2 * STEP)
@@ -228,7 +228,7 @@ def test_a_body_that_is_coupled_strongly_converges() -> None:
     """
     m, stiffness = 2.0e4, 2.0e4  # kg, N/m
     tries = []
-    with hybrid.SystemSimulation(scene()) as lines:
+    with hybrid.Simulation(scene()) as lines:
         rest = lines.point("vessel").force
         x, v, a = np.zeros(3), np.array([0.0, 0.0, 0.2]), np.zeros(3)
         for _ in range(10):

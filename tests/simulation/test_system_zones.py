@@ -260,7 +260,7 @@ def test_what_is_not_computed_is_refused() -> None:
 
 def stepped_again(scene: dict[str, Any], times: np.ndarray) -> hybrid.Result:
     """A scene stepped from outside to these times (s), six of which are gone back over and computed twice each time."""
-    with hybrid.SystemSimulation(scene) as simulation:
+    with hybrid.Simulation(scene) as simulation:
         saved = simulation.save()
         for k, t in enumerate(times):
             simulation.advance(float(t))

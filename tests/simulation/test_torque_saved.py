@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.inside import OnlyLine
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def simulation():
 
 
 def answers(simulation):
-    return simulation._loop.run.stepper.work.torsion
+    return OnlyLine(simulation).work.torsion
 
 
 def test_answers_serve_for_steps_of_the_same_length(simulation):

@@ -344,7 +344,7 @@ def test_a_passage_that_is_taken_back_is_not_said() -> None:
     places = {name: tables["points"][name]["position"] for name in ("a", "b")}
     for name in places:
         tables["points"][name].pop("motion")
-    with hybrid.SystemSimulation(tables) as run:
+    with hybrid.Simulation(tables) as run:
 
         def advance(by: float, until: float) -> None:
             for name, (x, y, z) in places.items():

@@ -19,7 +19,7 @@ from hybrid.solve.joined import SystemState
 from hybrid.store.writer import Recorder
 
 
-class SavedSystem(NamedTuple):
+class Saved(NamedTuple):
     """What `Simulation.save` returns."""
 
     owner: object  # what tells one simulation from another
@@ -63,6 +63,7 @@ def commit(run: SystemRun) -> None:
     """
     assert isinstance(run.recorder, DeferredRecorder)
     due, begin = run.recorder.due, monotonic()
+    run.record_samples()
     run.write_log()
     if due:
         for line in run.lines:
@@ -78,7 +79,8 @@ def commit(run: SystemRun) -> None:
 
 
 def kept(run: SystemRun) -> dict[str, Any]:
-    """What a run depends on, in copies: fields of `SavedSystem`."""
+    """What a run depends on, in copies: fields of `Saved`."""
+    run.record_samples()
     run.write_log()
     run.ends_of_now()
     run.gather_events()
@@ -90,7 +92,7 @@ def kept(run: SystemRun) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def bring_back(run: SystemRun, saved: SavedSystem) -> None:
+def bring_back(run: SystemRun, saved: Saved) -> None:
     """Be as when `kept` was called; ends that are set from outside must be on their paths of then."""
     run.gather_events()
     for recorder, mark in zip(recorders(run), saved.marks, strict=True):
@@ -127,10 +129,10 @@ def bring_back(run: SystemRun, saved: SavedSystem) -> None:
 
 def copied(x: Any) -> Any:
     """Named arrays and plain values, as they are once they have been in a file."""
-    if isinstance(x, Mapping):
+    if isinstance(x, np.ndarray):
+        return x.copy()
+    if isinstance(x, dict):
         return {name: copied(value) for name, value in x.items()}
     if isinstance(x, list | tuple):
         return [copied(value) for value in x]
-    if isinstance(x, np.generic):
-        return x.item()
-    return x.copy() if isinstance(x, np.ndarray) else x
+    return x.item() if isinstance(x, np.generic) else x

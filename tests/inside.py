@@ -1,0 +1,80 @@
+"""The only line of what is stepped from outside, from within: for tests that look where no public name leads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import hybrid
+from hybrid.kernels.state.books import Books
+from hybrid.kernels.state.state import State, Work
+from hybrid.model.build import Model
+from hybrid.simulation.payout import PayingOut
+from hybrid.simulation.system_lines import LineResult
+from hybrid.solve.self_contact import SelfContact
+
+
+class OnlyLine:
+    """Model, state, books and parts of the line as they are now."""
+
+    def __init__(self, simulation: hybrid.Simulation) -> None:
+        self.run = simulation._run
+
+    @property
+    def line(self) -> LineResult:
+        """What is recorded of it."""
+        (line,) = self.run.lines
+        return line
+
+    @property
+    def model(self) -> Model:
+        """Its model."""
+        return self.run.model.models[0]
+
+    @property
+    def state(self) -> State:
+        """Its state."""
+        return self.run.state.lines[0]
+
+    @property
+    def work(self) -> Work:
+        """What steps leave."""
+        return self.run.solver.work[0]
+
+    @property
+    def books(self) -> Books:
+        """What steps book."""
+        return self.line.books
+
+    @property
+    def paying(self) -> PayingOut:
+        """How long it is."""
+        assert self.run.payout is not None
+        return self.run.payout.lines[0]
+
+    @property
+    def contact(self) -> SelfContact:
+        """Contact with itself."""
+        assert self.line.contact is not None
+        return self.line.contact
+
+    @property
+    def zones(self) -> Any:
+        """Its zones, if they move."""
+        assert self.run.zones is not None
+        return self.run.zones.lines[0]
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations of the last step."""
+        return int(self.run.loop.counts.iterations)
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+        return self.run.steps
+
+    def begin_again(self) -> None:
+        """Go on with positions and velocities that were written into the state, whose energy nothing has worked for."""
+        self.line.write_down()
+        self.line.observer.first_energy = None  # as of the next output
+        self.run.restart_steps()
