@@ -82,7 +82,7 @@ def run(
     """
     scene = as_scene_or_system(scene)
     if scene.time is None:
-        raise SceneError([missing_time(scene)])
+        raise SceneError([missing_time()])
     if not isinstance(scene, Scene):
         return _several_lines(scene, output, overwrite, progress, criterion)
     check_motions(scene)

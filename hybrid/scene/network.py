@@ -14,7 +14,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from hybrid.errors import SceneError
 from hybrid.scene.accuracy import USUAL, Accuracy, AskedAccuracy, of_unnamed_model
 from hybrid.scene.analysis import (
     EVERY,
@@ -30,8 +29,7 @@ from hybrid.scene.analysis import (
     RodModel,
     Straight,
     Time,
-    interval_of_outputs,
-    size_of_output,
+    Timed,
     without_friction,
 )
 from hybrid.scene.attachments import Attachment
@@ -69,7 +67,7 @@ from hybrid.scene.points import (
     Point,
 )
 from hybrid.scene.quantities import Quantities
-from hybrid.scene.schema import Scene, missing_time
+from hybrid.scene.schema import Scene
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
@@ -245,7 +243,7 @@ class SystemOutput(Table):
         return self.points.get(line, DEFAULT_POINTS) if isinstance(self.points, dict) else self.points
 
 
-class Network(Table):
+class Network(Table, Timed):
     """Several lines, the points where they meet, what acts on them, and what is asked; not checked."""
 
     instead: ClassVar[Mapping[str, str]] = {
@@ -637,21 +635,3 @@ class Network(Table):
         motions = [(getattr(x, "motion", None), getattr(x, "position", None)) for x in given]
         moved = [Held(motion, place, (1.0, 0.0, 0.0)) for motion, place in motions if motion is not None]
         return lasting_period([*moved_in(None, self.obstacles), *((x, x.motion) for x in moved)], self.environment)
-
-    @property
-    def output_interval(self) -> float:
-        """Time between two outputs [s]."""
-        return interval_of_outputs(self.output.every, self.require_time(), self.lasting_period, self.size_of_output)
-
-    @property
-    def size_of_output(self) -> int:
-        """Bytes of an output in the file, roughly."""
-        time, asked = self.time, self.output.errors
-        wanted = self.accuracy is not None or (time is not None and time.controlled)
-        return size_of_output(self.points_kept, wanted if asked is None else asked)
-
-    def require_time(self) -> Time:
-        """The `time` table; SceneError if there is none."""
-        if self.time is None:
-            raise SceneError([missing_time(self)])
-        return self.time

@@ -13,7 +13,6 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from hybrid.errors import Complaint, SceneError
 from hybrid.scene.accuracy import Accuracy, AskedAccuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -30,9 +29,9 @@ from hybrid.scene.analysis import (
     RodZone,
     Straight,
     Time,
+    Timed,
     ZonesModel,
-    interval_of_outputs,
-    size_of_output,
+    missing_time,
     usual_model,
     without_friction,
 )
@@ -151,7 +150,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-class Scene(Table):
+class Scene(Table, Timed):
     """A cable, what holds it, what acts on it, and what is asked."""
 
     instead: ClassVar[Mapping[str, str]] = {"solver": "leave it out: every scene is solved by elimination"}
@@ -245,27 +244,9 @@ class Scene(Table):
         """The shortest period of waves and motions [s]; infinity: there is none."""
         return lasting_period(moved_in(self.ends, self.obstacles), self.environment)
 
-    @property
-    def output_interval(self) -> float:
-        """Time between two outputs [s]."""
-        return interval_of_outputs(self.output.every, self.require_time(), self.lasting_period, self.size_of_output)
-
-    @property
-    def size_of_output(self) -> int:
-        """Bytes of an output in the file, roughly."""
-        time, asked = self.time, self.output.errors
-        wanted = self.accuracy is not None or (time is not None and time.controlled)
-        return size_of_output(self.points_kept, wanted if asked is None else asked)
-
     def without_friction(self) -> Scene:
         """The same whose equilibrium neglects friction, unless the scene says how it settles."""
         return self.model_copy(update={"initial": without_friction(self.initial)})
-
-    def require_time(self) -> Time:
-        """The `time` table; SceneError if the scene has none."""
-        if self.time is None:
-            raise SceneError([missing_time(self)])
-        return self.time
 
     @model_validator(mode="before")
     @classmethod
@@ -286,14 +267,3 @@ def _standard(schema: Any) -> Any:
     if isinstance(schema, dict):
         return {_STANDARD.get(k, k) if not isinstance(v, dict) else k: _standard(v) for k, v in schema.items()}
     return [_standard(x) for x in schema] if isinstance(schema, list) else schema
-
-
-def missing_time(scene: object) -> Complaint:
-    """The complaint of a consumer that computes motion and finds no `time` in the scene."""
-    return Complaint(
-        where="time",
-        value="nothing",
-        expected="a table with duration and step, in s, to compute motion",
-        fix="add `time: {duration: ..., step: ...}`; for the equilibrium alone: hybrid static FILE, or "
-        "hybrid.static(scene) in Python",
-    )

@@ -115,7 +115,7 @@ class Simulation(SteppedPoints):
     def _read_scene(self, scene: Any) -> None:
         """The network to compute, whose ends are set, of a scene in either form."""
         if scene.time is None:
-            raise SceneError([missing_time(scene)])
+            raise SceneError([missing_time()])
         if scene.points:
             lines = {name: _that_are_set(line) for name, line in scene.lines.items()}
             self.scene = self._system = scene.model_copy(update={"lines": lines})

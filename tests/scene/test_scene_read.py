@@ -262,7 +262,7 @@ def test_python_nonsense(data: object) -> None:
 
 def test_time_is_asked_for_only_where_needed() -> None:
     scene = parse_scene(AT_REST)
-    assert "duration" in missing_time(scene).fix
+    assert "duration" in missing_time().fix
     with pytest.raises(SceneError, match="duration"):
         scene.require_time()
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 
 from hybrid.errors import ComputationError
 from hybrid.model.resolution import first_resolution
@@ -110,24 +109,3 @@ def test_a_file_at_rest_is_that_of_a_cable(tmp_path: Path) -> None:
     run = SystemRun(network_of(scene), network, scene_text(scene), False, resolution, Recording(cable=Cable(scene)))
     run.record_equilibrium()
     assert files_differ(cable, network) == []
-
-
-def test_outputs_can_be_taken_back(tmp_path: Path) -> None:
-    scene, whole, target = exact_scene(scene_of()), tmp_path / "whole.h5", tmp_path / "run.h5"
-    recorded(network_run(scene, whole))
-    run = network_run(scene, target)
-    run.begin_motion()
-    first, *stops = run.stops()
-    run.go_to(first)
-    defer(run)
-    assert recorders(run) == [run.recorder]
-    commit(run)
-    nothing = {"stops": (), "paths": {}, "next": {}, "obstacles": None, "wound": {}, "driven": {}}
-    saved = SavedSystem(run, 0, **kept(run), **nothing)
-    for again in (False, True):
-        for stop in stops[: None if again else 2]:
-            run.go_to(stop)
-        if not again:
-            bring_back(run, saved)
-    run.finish()
-    assert files_differ(whole, target) == []
