@@ -90,6 +90,7 @@ if TYPE_CHECKING:
 _NO_ZONES: Mapping[int, DomainManager] = {}
 # Steps that Python has a part in, between two reports of the progress.
 LOOK = 16
+READ_EVERY = 0.01  # s of the wall, after which the time of the processor is read again
 
 
 class Recording(NamedTuple):
@@ -213,6 +214,7 @@ class SystemRun:
         self.cpu = 0.0  # s, of the processor, in earlier parts of the run
         self._logged = 0.0  # s, likewise, when steps were logged last
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
+        self._fitted: tuple[object, ...] | None = None  # what steps are attached to that have come to a stop
         self._moved: list[Moves] = []  # by which ends move in compiled steps
         self._loaded = np.nan  # and `loaded`, of the loads that act there on bodies
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
@@ -224,6 +226,7 @@ class SystemRun:
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
         self._begin = clock_now()
+        self._read = -np.inf, 0.0  # s of the wall, when the time of the processor was read last, and that
         self.recorder = self._go_on(source) if source is not None else self.file.begin()
 
     # --- where it is --------------------------------------------------------------------------------
@@ -258,7 +261,7 @@ class SystemRun:
         clock = self.loop.clock
         clock.now, clock.last_dt, clock.last_rho, self.loop.counts.steps = t, last_step, last_rho, steps
         self.loop.stand_between(interval, self.resolution.one.step)
-        self._logged = clock_now() - self._begin
+        self._logged = self._spent()
 
     # --- the file -----------------------------------------------------------------------------------
 
@@ -585,7 +588,7 @@ class SystemRun:
         self.loop.set_quota(LOOK if self.loop.counts.asks else ROWS)
         self.vibrations.begin(self.loop.clock)
         self.keep()
-        self._logged = clock_now() - self._begin
+        self._logged = self._spent()
 
     def stops(self, until: float | None = None) -> list[float]:
         """Times (s) at which a step ends: where loads jump, the end, and outputs if that is asked.
@@ -631,24 +634,43 @@ class SystemRun:
 
         What is asked around a step takes as long as a step of a hundred cells, and nearly always finds nothing.
         """
-        loop, parts = self.loop, (self.zones, self.payout, self.planes)
-        asked = loop.controlled or self.failures.all or self.system.output.exact or self.resolution.one.ends
-        if asked or self.vibrations.begins or any(x is not None for x in parts):
+        loop = self.loop
+        if self._steps_differ:
             self.go_to(stop)
             return
         steps = equal_steps(self.leg, self.t, stop, self.resolution.one.step, False)
         self.leg = steps[:2]
         loop.begin_leg(stop, *steps)
-        self._between = False
-        code = self._go()
+        self._between, fitted = False, self._fitting()
+        if self._fitted is None or any(x is not y for x, y in zip(fitted, self._fitted, strict=True)):
+            self.record_samples()
+            self._attach()
+        code = self._run_attached()
         if code == b.AT_STOP and not loop.due and not loop.is_half_full:
-            self.leg, self._between = (self.leg[0], int(loop.counts.leg_part)), True
+            self.leg, self._between, self._fitted = (self.leg[0], int(loop.counts.leg_part)), True, fitted
         else:
+            self._fitted = None
             self._step_on(stop, lambda: None, code)
+
+    @property
+    def _steps_differ(self) -> bool:
+        """Whether steps are not all the same, so that each stop has a say in their lengths."""
+        one = self.resolution.one
+        return bool(self.loop.controlled or self.vibrations.begins or self.system.output.exact or one.ends)
+
+    def _fitting(self) -> tuple[object, ...]:
+        """What compiled steps are attached to: where it is the same, and they have come to a stop, they go on."""
+        models, reels = self.model.models, self.payout.lines.values() if self.payout is not None else ()
+        return self.solver, self.model, *(x.ends.moves() for x in models), *(x.reel for x in reels)
 
     def _go(self) -> int:
         """Compiled steps, until a code of kernels.state.books."""
+        self._fitted = None
         self._attach()
+        return self._run_attached()
+
+    def _run_attached(self) -> int:
+        """The same of steps that are attached to what there is."""
         code = self.loop.go()
         if self.zones is not None:
             self.zones.sync()
@@ -746,12 +768,19 @@ class SystemRun:
                 model.ends.at(self.t)
                 model.sea.at(self.t)
 
+    def _spent(self) -> float:
+        """Processor time of the run, s, to within READ_EVERY: to read it may take as long as ten steps."""
+        wall = monotonic()
+        if wall - self._read[0] > READ_EVERY:
+            self._read = wall, clock_now() - self._begin
+        return max(self._read[1], self._logged)
+
     def write_log(self) -> None:
         """Log the steps that have been made since this was called last."""
         rows = self.loop.rows()
         if not len(rows):
             return
-        now = clock_now() - self._begin
+        now = self._spent()
         cpu = np.linspace(self._logged, now, len(rows) + 1)[1:]
         self._logged = now
         self.vibrations.log(rows[:, :, FORCE_COLUMNS])
