@@ -426,6 +426,8 @@ class LineResult:
         flags, step.books.counts.notices = int(step.books.counts.notices), 0
         if isinstance(self.recorder, ComparisonRecorder):
             flags &= ~(STRETCHED | JUMPED)
+        if flags & (STRETCHED | JUMPED):
+            self.write_down()  # what stopped the run before comes first
         if flags & UNKNOWN_ERROR and self.correction is not None and step.t > self._unknown_until:
             s_a, s_b, text = self.correction.unknown(self.model.zones)
             self.events.event(step.t, s_a, s_b, NOT_ESTIMATED, text)

@@ -34,7 +34,7 @@ from hybrid.scene.system import System
 from hybrid.simulation.body_overlap import note_overlaps
 from hybrid.simulation.collapse import COLLAPSE, GIVE_UP, TOUCH_EACH_OTHER, TOUCHES_ITSELF, collapse_text
 from hybrid.simulation.events import Sink, energy_gains_text
-from hybrid.simulation.failure import Stopped, explanation, first_remedy, write_snapshot
+from hybrid.simulation.failure import Stopped, explanation, first_remedy, touch_text, write_snapshot
 from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.lines_contact import LinesWatch, shared_of
@@ -705,6 +705,8 @@ class SystemRun:
                     self._arrive(stop, step)
                 self._between = arrived or loop.counts.phase == b.BEGIN_STEP
                 if code == b.PAUSED:
+                    for line in self.lines:
+                        line.write_down()  # and look at it, as often whatever the outputs
                     loop.set_quota(LOOK if loop.counts.asks else ROWS)
                 if code == b.PAUSED or arrived:
                     look()
@@ -937,7 +939,7 @@ class SystemRun:
             float(line.books.clock.wave_step),
             line.manager is not None,
             max(solver.joints[k]) < 0,
-            self._touching,
+            touch_text(line.contact, model) or self._touching,
         )
         s = float(model.line.s[x.node])
         return LineFailed(k, taken.outcome, self.t, s, explanation(x), first=first_remedy(x))

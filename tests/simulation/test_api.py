@@ -167,7 +167,8 @@ def test_a_second_signal_ends_a_run_at_once(tmp_path: Path, monkeypatch: pytest.
             reached.append(name)
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("hybrid.simulation.case.Case._start", search)
+    for start in ("_start", "_network_start"):
+        monkeypatch.setattr(f"hybrid.simulation.case.Case.{start}", search)
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(WIRE, tmp_path / "run.h5")
     assert reached == ["first", "second"]

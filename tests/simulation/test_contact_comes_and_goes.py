@@ -10,12 +10,10 @@ from test_self_contact_default import WIDTH, led_through
 from test_system_contact import RUBS, system
 
 import hybrid
-import hybrid.simulation.transient
 import hybrid.solve.self_contact
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.step.accept import MANY, collapses
-from hybrid.simulation import contact_start
-from hybrid.simulation.transient import Transient
+from hybrid.simulation import contact_start, system_contact, system_run, transient
 
 GIVEN_UP, COLLAPSE = "contact given up", "steps collapse"
 
@@ -28,12 +26,13 @@ def test_it_comes_and_goes_with_the_legs(monkeypatch: pytest.MonkeyPatch) -> Non
     """An end that swings beside the other: the legs touch twice."""
     happened: list[tuple[str, float]] = []
     for name in ("begin_contact", "end_contact"):
+        for run, of_run in ((transient, contact_start), (system_run, system_contact)):
 
-        def noted(moving: Transient, name: str = name) -> None:
-            happened.append((name, moving.t))
-            getattr(contact_start, name)(moving)
+            def noted(moving: Any, *more: Any, name: str = name, of_run: Any = of_run) -> None:
+                happened.append((name, moving.t))
+                getattr(of_run, name)(moving, *more)
 
-        monkeypatch.setattr(hybrid.simulation.transient, name, noted)
+            monkeypatch.setattr(run, name, noted)
     sway = {"surge": {"amplitude": 0.26, "period": 2.0}, "ramp": 4.0}
     ends = {
         "start": {"kind": "pinned", "position": [0, 0, 0]},
@@ -114,13 +113,14 @@ def hanging(**output: Any) -> dict[str, Any]:
 @pytest.fixture
 def longest(monkeypatch: pytest.MonkeyPatch) -> None:
     """All runs have made a very long step."""
-    begin = Transient.begin
+    for of, name, steps in ((transient.Transient, "begin", "run"), (system_run.SystemRun, "begin_motion", "loop")):
+        first = getattr(of, name)
 
-    def after_a_long_step(self: Transient, *args: Any) -> None:
-        begin(self, *args)
-        self.run.clock.longest = 1e3
+        def after_a_long_step(self: Any, *args: Any, begin: Any = first, steps: str = steps) -> None:
+            begin(self, *args)
+            getattr(self, steps).clock.longest = 1e3
 
-    monkeypatch.setattr(Transient, "begin", after_a_long_step)
+        monkeypatch.setattr(of, name, after_a_long_step)
 
 
 @pytest.mark.usefixtures("longest")

@@ -18,6 +18,8 @@ from hybrid.scene.short_form import network_of
 from hybrid.solve.system import SystemSolver
 from tests.combinations.networks import differences, events_differ
 
+pytestmark = pytest.mark.usefixtures("old_road")
+
 Tables = dict[str, Any]
 
 

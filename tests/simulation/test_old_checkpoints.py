@@ -59,6 +59,8 @@ CASES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "in a plane, steps that follow": (("chosen steps",), FLAT | {"dimension": 2}),
 }
 
+pytestmark = pytest.mark.usefixtures("old_road")
+
 
 class _Cut:
     """Stops a run after a time (s), from outside."""
