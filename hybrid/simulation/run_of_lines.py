@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -81,6 +81,9 @@ class RunOfLines(Protocol):
 
     @property
     def payout(self) -> PaidLines | None: ...
+
+    @property
+    def planes(self) -> Any: ...
 
     @property
     def recorder(self) -> Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder: ...
