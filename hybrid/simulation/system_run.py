@@ -888,7 +888,11 @@ class SystemRun:
     def _record_last(self) -> None:
         """Record the last good state, in place of the output that would have come next."""
         outputs, at, phase = self.loop.outputs, int(self.loop.counts.output), int(self.loop.counts.phase)
-        if self.moves and 0 < at < outputs.size and outputs[at - 1] < self.t and phase != b.SAMPLE:
+        if self._begins and at == 0 and hasattr(self, "solver"):  # the first state, from which no step leads on
+            self.renew_other()
+            self._attach()
+            self._output()
+        elif self.moves and 0 < at < outputs.size and outputs[at - 1] < self.t and phase != b.SAMPLE:
             for model in self.model.models:
                 model.ends.at(self.t)
                 model.sea.at(self.t)

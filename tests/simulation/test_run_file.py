@@ -11,7 +11,7 @@ import pytest
 from hybrid.errors import ComputationError
 from hybrid.model.resolution import first_resolution
 from hybrid.model.system import SystemResolution
-from hybrid.scene.read import scene_text
+from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.short_form import LINE, network_of
 from hybrid.simulation.case import Case
 from hybrid.simulation.restart import LoadChange
@@ -109,3 +109,16 @@ def test_a_file_at_rest_is_that_of_a_cable(tmp_path: Path) -> None:
     run = SystemRun(network_of(scene), network, scene_text(scene), False, resolution, Recording(cable=Cable(scene)))
     run.record_equilibrium()
     assert files_differ(cable, network) == []
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_a_start_from_which_no_step_leads_on_is_in_the_file(flat: bool, tmp_path: Path) -> None:
+    scene = as_scene(scene_of("obstacle") | {"dimension": 2})
+    recording = {} if flat else {"cable": None}
+    with pytest.raises(ComputationError, match="leaves the plane"):
+        recorded(network_run(scene, tmp_path / "run.h5", **recording))
+    with open_result(tmp_path / "run.h5") as result:
+        assert result.status == "failed"
+        assert result.times.tolist() == [0.0]
+        (name,) = result.lines or ("",)
+        assert np.isfinite((result.lines[name] if name else result)["tension"]).all()
