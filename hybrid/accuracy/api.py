@@ -196,6 +196,8 @@ def _several_lines(
     refined = is_refined(system, moves=moves)
     target = _target(output, overwrite, refined or (moves and bool(system.output.errors)))
     with locked(_path(output)):
+        if isinstance(target, Path):
+            beside(target).unlink(missing_ok=True)  # of a run that was cut off
         if not moves and refined:
             assert not isinstance(target, MemoryTarget)
             SystemPasses(system, target, False, ProgressReporter(None, 1.0), lambda: False).compute()

@@ -141,11 +141,14 @@ def _holds(asked: RequestedAccuracy, estimate: Estimate, other: RunSample, skip:
 class Replacement:
     """Records finer results beside a complete one; `settle` lets such a one take its place, or drops it."""
 
-    goes_on = False  # whether one that was stopped stays beside, for whoever goes on with it
+    def __init__(
+        self, target: Target, waits: Callable[[bool], bool] = lambda kept: False, goes_on: bool = False
+    ) -> None:
+        """waits: settles one that waits in memory, so that it needs no file; False: none does.
 
-    def __init__(self, target: Target, waits: Callable[[bool], bool] = lambda kept: False) -> None:
-        """waits: settles one that waits in memory, so that it needs no file; False: none does."""
-        self.target, self._waits = target, waits
+        goes_on: whether one that was stopped stays beside, for whoever goes on with it.
+        """
+        self.target, self._waits, self.goes_on = target, waits, goes_on
         self._new: Target | None = None  # complete, and not settled
 
     def finer(self, record: Callable[[Target], T]) -> T:
@@ -185,12 +188,10 @@ class Replacement:
 class FinerResult(Replacement):
     """Records results one after the other, those after the first beside it."""
 
-    goes_on = True
-
     def __init__(
         self, target: Target, first: Record, refinement: Record, waits: Callable[[bool], bool] = lambda kept: False
     ) -> None:
-        super().__init__(target, waits)
+        super().__init__(target, waits, goes_on=True)
         self._first, self._refinement = first, refinement
         self._done = False
 

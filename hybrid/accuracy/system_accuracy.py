@@ -58,9 +58,10 @@ from hybrid.scene.system import System
 from hybrid.simulation.layer_mesh import layered_lines, shown_lines
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points, survey_resolution, with_survey
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
-from hybrid.simulation.restart import LoadChange
-from hybrid.simulation.restore import kept_resolution, refused, resolution_from, resolution_tree
+from hybrid.simulation.restart import LoadChange, changes_text
+from hybrid.simulation.restore import is_cut_off, kept_resolution, refused, resolution_from, resolution_tree
 from hybrid.simulation.run_sample import RunSample
+from hybrid.simulation.system_load_change import with_loads_of
 from hybrid.simulation.system_run import Recording, run_system, static_system
 from hybrid.store.amend import amend_lines
 from hybrid.store.checkpoint import read_before
@@ -128,9 +129,10 @@ class SystemPasses:
         criterion: UserCriterion | None = None, changes: Sequence[LoadChange[System]] = (),
     ) -> None:  # fmt: skip
         """moves: whether its motion is computed, else its equilibrium; others as of `run_system`."""
-        self._of_results, self._criterion, self._changes = notes, criterion, changes
+        self._of_results, self._criterion = notes, criterion
+        self._changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes]
         self.system, self.target, self.moves = system, target, moves
-        self._replacement = Replacement(target)
+        self._replacement = Replacement(target, goes_on=moves)
         self.reporter, self.interrupted = reporter, interrupted
         time = system.time
         self._steps_free = moves and time is not None and time.controlled and time.tolerance is None
@@ -189,7 +191,7 @@ class SystemPasses:
         self._refine(resolution, result)
         if self._rods_instead({name: x.model_misses for name, x in self.controls.items() if x.model_misses}):
             emptied(self.target)
-            self._replacement = Replacement(self.target)
+            self._replacement = Replacement(self.target, goes_on=self.moves)
             self._refine(*self._first_result(self.surveyed(SystemResolution.first(self.system))))
 
     def _rods_instead(self, failed: Mapping[str, str]) -> bool:
@@ -218,7 +220,7 @@ class SystemPasses:
                 control.halve()
             finer = self._halved(first)
             try:
-                result = self._replacement.finer(partial(self._record, finer, name=REFINEMENT, found=_tree(finer)))
+                result = self._replacement.finer(partial(self._record_finer, finer))
             except ComputationError as error:
                 for control in self.controls.values():
                     control.lacks_errors(error, "finer run")
@@ -282,6 +284,13 @@ class SystemPasses:
         recorders = {x.name: x.recorder for x in run.lines}
         self._compared_rods = {n: x.rods for n, x in recorders.items() if isinstance(x, ComparisonRecorder)}
         return {x.name: compared(x, run, self._costs[-1]) for x in run.lines}
+
+    def _record_finer(self, resolution: SystemResolution, to: Path | io.BytesIO) -> Samples:
+        """A finer result beside the one that is there, or the rest of it."""
+        texts, source = (scene_text(self.system), changes_text(self._changes)), None
+        if isinstance(to, Path) and is_cut_off(to, texts, resolution):
+            source = to
+        return self._record(resolution, to, REFINEMENT, source, _tree(resolution))
 
     def _samples(self, target: Path | io.BytesIO, resolution: SystemResolution, cpu: float) -> Samples:
         """What is compared of a complete result."""
@@ -419,7 +428,7 @@ class SystemPasses:
             if runs[0].cpu * times_the_cost(runs[0].resolution, asks[0]) > WORTH_WRITING:
                 self._write(resolution, result, done=False)  # what follows takes long
             try:
-                found = self._replacement.finer(partial(self._record, finer, name=REFINEMENT, found=_tree(finer)))
+                found = self._replacement.finer(partial(self._record_finer, finer))
             except ComputationError as error:
                 why = f"a finer run failed: {str(error).splitlines()[0]}"
                 self._notes.append((NOT_KEPT, f"{why}; the result is the one before"))
@@ -442,7 +451,7 @@ class SystemPasses:
         The last stays beside where the lines together are no better: they are one result.
         """
         before = {n: x.judged(True).copied() for n, x in self.controls.items() if x.estimate is not None}
-        kept = True
+        kept, stays = True, False
         try:
             wanted = self._judged(resolution, result)
             if wanted:
@@ -457,11 +466,12 @@ class SystemPasses:
                         control.keep(before[name], finer[name])
                 self._notes.append((NOT_KEPT, not_kept_text(next(iter(result.values())), found)))
             return {}, kept
-        except KeyboardInterrupt:  # in a run to compare with: the result before it stays, and is gone on with
-            kept = False
+        except KeyboardInterrupt:  # in a run to compare with: the finer result stays beside, until it is resumed
+            kept, stays = False, self._replacement.goes_on
             raise
         finally:
-            self._replacement.settle(kept)
+            if not stays:
+                self._replacement.settle(kept)
 
     def _judged(self, resolution: SystemResolution, result: Samples) -> dict[str, Resolution]:
         """Take over a result; how finely lines that miss what is asked of them want the next one."""

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
-from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
+from hybrid.errors import OTHER_PROGRAM, ComputationError
 from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.state.forces import SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
@@ -54,11 +54,11 @@ from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import (
+    is_cut_off,
     other_program,
     refused,
     require_same,
     resolution_from,
-    resolution_tree,
     restored_parts,
 )
 from hybrid.simulation.result_checks import damped_vibrations
@@ -92,9 +92,9 @@ from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import digest_of, read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.envelope import GROUP as ENVELOPE
-from hybrid.store.hdf5_file import is_result, open_file, opened
+from hybrid.store.hdf5_file import open_file, opened
 from hybrid.store.limits import EXTREMES, extremes_about
-from hybrid.store.named_arrays import Tree, pack
+from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE, PENDING, RODS_AT_START, THERE
 from hybrid.store.stored_array import StoredArray
@@ -283,20 +283,11 @@ class Case:
 
     def is_unfinished(self, source: Path, resolution: Resolution) -> bool:
         """Whether a file holds a run of this case, with this resolution, that was cut off."""
-        if not is_result(source):
+        texts = self._texts["scene"], self._texts["changes"]
+        if not is_cut_off(source, texts, SystemResolution({LINE: resolution})):
             return False
-        try:
-            with open_result(source) as result:
-                if {"scene": result.scene_text, "changes": result.changes_text} != self._texts:
-                    return False
-                if not np.array_equal(result["s"], self.points.s):
-                    return False
-            with opened(source) as file:
-                point = read_checkpoint(file)
-        except ResultError:
-            return False
-        tree = resolution_tree(resolution)
-        return pack(point.resolution) in (pack(tree), pack({LINE: tree}))
+        with open_result(source) as result:
+            return np.array_equal(result["s"], self.points.s)
 
     def _begin_result(self, resolution: Resolution, first: bool) -> float:
         """The pass of a result begins; s of processor time.  first: it takes the place of one that may be there."""

@@ -37,9 +37,9 @@ from hybrid.simulation.initial_zones import manager_for
 from hybrid.simulation.old_checkpoints import is_of_cable
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.store.checkpoint import Checkpoint, read_checkpoint
-from hybrid.store.hdf5_file import opened
-from hybrid.store.named_arrays import Tree, matched
-from hybrid.store.reader import Result
+from hybrid.store.hdf5_file import is_result, opened
+from hybrid.store.named_arrays import Tree, matched, pack
+from hybrid.store.reader import Result, open_result
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.model.system import SystemResolution
@@ -172,6 +172,22 @@ def kept_resolution(system: System, source: Path) -> SystemResolution:
         if len({(x.step, x.every, x.local is None) for x in found.values()}) > 1:
             raise ValueError("lines with other steps")
         return SystemResolution(found)
+
+
+def is_cut_off(source: Path, texts: tuple[str, str], resolution: SystemResolution) -> bool:
+    """Whether a file holds a run of a scene and its changes (texts), with this resolution, that goes on."""
+    if not is_result(source):
+        return False
+    try:
+        with open_result(source) as result:
+            if (result.scene_text, result.changes_text) != texts:
+                return False
+        with opened(source) as file:
+            tree = read_checkpoint(file).resolution
+    except ResultError:
+        return False
+    asked = {name: resolution_tree(x) for name, x in resolution.lines.items()}
+    return pack(dict.fromkeys(asked, tree) if is_of_cable(tree) else tree) == pack(asked)
 
 
 def restored_points(result: Result, length: float, far: float | None = None) -> OutputPoints:

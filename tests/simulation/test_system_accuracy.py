@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import differences
+from bits import Stopping, differences
 
 import hybrid
 import hybrid.simulation.system_run
 from hybrid.accuracy import system_accuracy, system_errors
 from hybrid.accuracy.finer_result import NOT_KEPT, Replacement
 from hybrid.accuracy.refinement import Verdict
+from hybrid.accuracy.system_accuracy import SystemPasses
 from hybrid.errors import ComputationError
+from hybrid.model.system import SystemResolution
 from hybrid.scene.analysis import RodModel
 from hybrid.scene.system import System
 from hybrid.simulation import progress as reports
@@ -263,3 +266,47 @@ def test_what_a_line_does_not_have_is_refused_with_its_name() -> None:
     scene["lines"]["west"]["accuracy"] = {"bending_moment": "5%"}
     with pytest.raises(hybrid.SceneError, match=r"lines\.west\.accuracy"):
         hybrid.run(scene)
+
+
+@pytest.mark.long
+def test_a_finer_result_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It stays beside the result, and is resumed from where it was; another run does not take it."""
+    section = {"length": 20, "mass": 1.5, "axial_stiffness": 1e6, "diameter": 0.02}
+    heave = {"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0}
+    scene: dict[str, Any] = {
+        "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [15, 0, 2], "motion": heave}},
+        "lines": {"rope": {"start": "a", "end": "b", "model": "catenary", "sections": [section]}},
+        "time": {"duration": 0.8},
+        "output": {"every": 0.1},
+        "accuracy": "0.05%",
+    }
+    surveyed = SystemPasses.surveyed
+
+    def rougher(self: SystemPasses, first: SystemResolution) -> SystemResolution:
+        found = surveyed(self, first).lines
+        return SystemResolution({n: replace(x.coarser(8.0), local=10 * (x.local or 0.0)) for n, x in found.items()})
+
+    monkeypatch.setattr(SystemPasses, "surveyed", rougher)
+    Stopping(monkeypatch)
+    seen: list[float] = []
+
+    def note(now: reports.Progress) -> None:
+        if now.name == reports.REFINEMENT:
+            seen.append(now.t)
+
+    def stop(now: reports.Progress) -> None:
+        if now.name == reports.REFINEMENT and now.t > 0.4:
+            raise KeyboardInterrupt
+
+    hybrid.run(scene, tmp_path / "whole.h5").close()
+    path, left = tmp_path / "run.h5", tmp_path / ".run.h5.finer"
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, path, progress=stop)
+    assert left.exists()
+    finer = left.read_bytes()
+    hybrid.resume(path, progress=note).close()
+    assert seen[0] > 0.3 and not left.exists()
+    assert differences(path, tmp_path / "whole.h5") == []
+    left.write_bytes(finer)
+    hybrid.run(scene | {"title": "another"}, path).close()
+    assert not left.exists()
