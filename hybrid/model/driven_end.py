@@ -145,8 +145,10 @@ class DrivenEnd:
         dt = max(p[TO] - p[FROM], 0.0)
         x = 1.0 if not t < p[TO] else max((t - p[FROM]) / dt, 0.0)
         frame, turn = p[FRAME:TURN].reshape(3, 3), p[TURN:PATH]
-        spin = frame @ turn / dt if dt > 0.0 else np.zeros(3)
-        turned = frame @ rotation(x * turn)
+        if turn.any():
+            turned, spin = frame @ rotation(x * turn), frame @ turn / dt if dt > 0.0 else np.zeros(3)
+        else:
+            turned, spin = frame.copy(), np.zeros(3)
         if x == 1.0:
             return p[THERE:SPEED_THERE].copy(), p[SPEED_THERE:FRAME].copy(), turned, spin
         change = p[THERE:SPEED_THERE] - p[AT:SPEED]

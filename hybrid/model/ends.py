@@ -258,12 +258,17 @@ class EndConditions:
             raise ValueError("a time that is not positive")
         if not np.array_equal(saved["released"], self.released):
             raise ValueError("other ends are let go than were")
+        same = not (self._loads or self._turns or saved["turns"].any()) and np.array_equal(
+            saved["frame"], self._given[0]
+        )
+        moves = self._moves if same else None  # of a run that has gone on since, and comes back
         self._stand_at(saved["frame"])
         self._turns = {k: (x[:3], float(x[3])) for k, x in enumerate(saved["turns"]) if x[3]}
         self._bring_in = saved["bring_in"]
         ramps = saved["ramps"].tolist()
         self._loads = tuple(x._replace(ramp=ramp or None) for x, ramp in zip(self._loads, ramps, strict=True))
         self.set_loads(t)
+        self._moves = moves
         self.at(t)
         return float(np.abs(saved["position"] - self.values.position).max())
 
@@ -329,6 +334,8 @@ class EndConditions:
     def bring_back_loads(self, kept: Any, t: float) -> None:
         """Be loaded again as when `keep_loads` was called, at t (s)."""
         loads, was_set = kept
+        if not (loads or self._loads):
+            return
         self._loads, self._set = tuple(x._replace(value=x.value.copy()) for x in loads), set(was_set)
         self.set_loads(t)
 

@@ -57,6 +57,8 @@ _S_TEXT = (
     "arc lengths of nodes; point loads, changes of section and ends of modules come twice, with the value before and "
     "after them"
 )
+# What is known of a line that was never near itself: infinite distances.
+NEVER_NEAR = blank_itself(np.ones(1)).found
 
 
 def marked_places(scene: Scene, model: Model) -> tuple[tuple[float, int], ...]:
@@ -208,7 +210,7 @@ class Envelope:
     def restore(self, saved: Mapping[str, Any], now: Floats) -> None:
         """Go on as `checkpoint` has written, into `now`.  ValueError: it is that of another line."""
         mine = self.checkpoint(now)
-        mine["itself"] = blank_itself(np.ones(1)).found  # infinite as long as the line was never near itself
+        mine["itself"] = NEVER_NEAR
         older: dict[str, Any] = {"itself": self.itself.itself.found}  # files of before have none
         saved = dict(saved)
         known = saved.get("itself")

@@ -144,9 +144,9 @@ def matched(saved: Any, template: Any, where: str = "") -> Any:
 
 
 def _finite(x: Any, template: Any) -> bool:
-    if np.isnan(x).any() and not np.isnan(template).any():
-        return False
-    return bool(np.isfinite(x).all() or not np.isfinite(template).all())
+    if np.isfinite(x).all():
+        return True
+    return bool((np.isnan(template).any() or not np.isnan(x).any()) and not np.isfinite(template).all())
 
 
 def _odd(where: str, expected: str, given: Any) -> ValueError:
