@@ -103,7 +103,7 @@ def bring_back(run: SystemRun, saved: Saved) -> None:
         moving = run.zones.numbers if run.zones is not None else []
         moving += [*run.payout.lines] if run.payout is not None else []
         for k, (line, model, rows) in enumerate(zip(run.lines, saved.model.models, saved.waiting, strict=True)):
-            line.wait_again(rows._replace(outputs=(), errors=(), aside=(), log=()))
+            line.wait_again(rows._replace(outputs=(), errors=(), ratios=(), aside=(), log=()))
             if k not in moving:
                 line.follow(model)
         if run.zones is not None:

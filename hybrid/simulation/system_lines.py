@@ -151,6 +151,7 @@ class Waiting(NamedTuple):
 
     outputs: Sequence[Batch]
     errors: Sequence[Floats]  # of leaving bending out, of these
+    ratios: Sequence[Floats]  # of criteria, of these
     aside: Sequence[tuple[Model, Output]]  # outputs of other cells
     log: Sequence[Floats]  # rows of steps
     first_energy: float | None  # J, that the balance counts from
@@ -198,6 +199,7 @@ class LineResult:
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
         self._errors: list[Floats] = []  # of leaving bending out, as sampled with these
+        self._ratios: list[Floats] = []  # of criteria, where they are written
         self._sampled_errors: Floats = np.zeros((0, 0))
         self._unknown_until = -np.inf  # s, that nothing is to be said of an unknown error
         self._aside = OutputsAside()  # of other cells
@@ -479,9 +481,12 @@ class LineResult:
         else:
             self._waiting.append(batch)
             self._errors.append(self._sampled_errors)
+            if self.observer.writes_criteria and self.manager is not None:
+                now = self.manager.largest_ratios(self.observer.grid.s)
+                self._ratios.append(np.repeat(now[None], len(batch.t), axis=0))
         full = sum(len(x.t) for x in self._waiting) >= WAITING or self._aside.full
         full |= self.cells is not None and bool(self._waiting)  # which change, and these with them
-        if full or not self._moves or self.observer.writes_criteria:
+        if full or not self._moves:
             self.write_down()
 
     def write_down(self) -> None:
@@ -499,15 +504,13 @@ class LineResult:
         if not self._waiting:
             return
         (waiting, self._waiting), (errors, self._errors) = (self._waiting, []), (self._errors, [])
+        known, self._ratios = self._ratios, []
         batch = waiting[0]
         if len(waiting) > 1:
             batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
         shift = self.correction.shift(np.concatenate(errors), batch) if self.correction is not None else None
         there, seen, more = self.look(batch)
-        ratios = None
-        if self.observer.writes_criteria:  # of a line whose outputs do not wait: those of one step
-            assert self.manager is not None
-            ratios = np.repeat(self.manager.largest_ratios(self.observer.grid.s)[None], len(batch.t), axis=0)
+        ratios = np.concatenate(known) if known else None
         values = there.values_of(seen, ratios, shift)
         self.observer.first_energy = there.first_energy
         self.recorder.save_batch(batch.t.copy(), values, there.zone_rows, [there.rows_of(zones) for zones in more])
@@ -539,12 +542,12 @@ class LineResult:
     def waiting(self) -> Waiting:
         """Outputs and steps that wait, to come back to."""
         aside, log = [*self._aside.waiting], [*self._log]
-        return Waiting([*self._waiting], [*self._errors], aside, log, self.observer.first_energy)
+        return Waiting([*self._waiting], [*self._errors], [*self._ratios], aside, log, self.observer.first_energy)
 
     def wait_again(self, kept: Waiting) -> None:
         """Let that wait which `waiting` has returned, and nothing else."""
         self._waiting, self._aside, self._log = [*kept.outputs], OutputsAside(kept.aside), [*kept.log]
-        self._errors = [*kept.errors]
+        self._errors, self._ratios = [*kept.errors], [*kept.ratios]
         self.observer.first_energy = kept.first_energy
 
     def impose_now(self) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from time import monotonic
 from time import process_time as clock_now
 from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import proxy
 
 import numpy as np
 
@@ -143,7 +144,10 @@ class SystemRun:
             replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < self.end
         ]
         self.lets_touch, self.came_near_itself = recording.touches, False
-        self.criterion = criterion
+        self.criterion, me = (
+            criterion,
+            proxy(self),
+        )  # for parts: in a circle a run would wait for the search for garbage
         self.system, self.target, self.moves = system, target, moves
         self.kept = recording.mode.before is not None and isinstance(target, Path)
         self.changed = 0  # how many of the changes have been made
@@ -183,11 +187,11 @@ class SystemRun:
         if moves and any(x.payout is not None for x in self.model.models):
             from hybrid.simulation.system_payout import SystemPayout
 
-            self.payout = SystemPayout(self)
+            self.payout = SystemPayout(me)
         reels = self.payout.lines if self.payout is not None else {}
         self.rotations = Rotations(system, self.model)
         form = LinesFile if recording.cable is None else CableFile
-        self.file: LinesFile | CableFile = form(self, text, recording)
+        self.file: LinesFile | CableFile = form(me, text, recording)
         self.lines = list[LineResult]()
         for k, (name, scene, model, state) in enumerate(
             zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
@@ -201,7 +205,7 @@ class SystemRun:
             for line in self.lines:
                 line.diagnostics.begin()
         self.shared: SharedContact | None = None  # contact of lines with each other
-        self.planes = LonePlanes(self, self.loop.counts, system.dimension == 2) if planes and moves else None
+        self.planes = LonePlanes(me, self.loop.counts, system.dimension == 2) if planes and moves else None
         self.met: set[tuple[int, int]] = set()  # lines that have been said to touch
         self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
         self.passed: set[tuple[int, int]] = set()  # and those that have been said to
@@ -220,8 +224,8 @@ class SystemRun:
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
         self.overlaps: set[str] = set()  # and what has been said to be in each other
         self.under: dict[str, float] = {}  # depth (m) of points that have been said to be pulled under it
-        self.failures = Failures(self)
-        self.zones = SystemZones(self, managers, self.payout) if managers and moves else None
+        self.failures = Failures(me)
+        self.zones = SystemZones(me, managers, self.payout) if managers and moves else None
         self.loaded = 0.0  # s, loads that have stopped by then act no more
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
@@ -705,8 +709,6 @@ class SystemRun:
                     self._arrive(stop, step)
                 self._between = arrived or loop.counts.phase == b.BEGIN_STEP
                 if code == b.PAUSED:
-                    for line in self.lines:
-                        line.write_down()  # and look at it, as often whatever the outputs
                     loop.set_quota(LOOK if loop.counts.asks else ROWS)
                 if code == b.PAUSED or arrived:
                     look()

@@ -11,6 +11,7 @@ import pytest
 
 import hybrid
 import hybrid.solve.run
+from hybrid.simulation import system_lines
 from hybrid.simulation.time_loop import TimeLoop
 from hybrid.store.recorder import BaseRecorder
 
@@ -139,6 +140,7 @@ def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatc
     many = hybrid.run(scene)
     assert max(batches) > 20  # while lengths or bending are on their way, outputs do not wait
     monkeypatch.setattr(TimeLoop, "_may_wait", False)
+    monkeypatch.setattr(system_lines, "WAITING", 1)
     batches.clear()
     one = hybrid.run(scene)
     assert set(batches) == {1}
