@@ -13,14 +13,10 @@ from bits import Stopping
 from test_self_contact_default import led_through
 
 import hybrid
-from hybrid.scene.read import as_scene, scene_text
-from hybrid.scene.short_form import network_of
+from hybrid.scene.read import as_scene
 from hybrid.simulation.old_checkpoints import as_of_line
-from hybrid.simulation.progress import Progress, ProgressReporter
-from hybrid.simulation.run_file import Cable
-from hybrid.simulation.system_run import Recording, SystemRun
+from hybrid.simulation.progress import Progress
 from hybrid.store.checkpoint import Checkpoint, read_checkpoint
-from hybrid.store.writer import WriteMode
 from tests.combinations.networks import differences, events_differ
 from tests.combinations.pairs import END, START, S, scene_of
 from tests.problems import tables_with
@@ -73,7 +69,7 @@ class _Cut:
             raise KeyboardInterrupt
 
 
-def cut_off(scene: hybrid.Scene | hybrid.System, path: Path, t: float) -> Checkpoint:
+def cut_off(scene: hybrid.Scene, path: Path, t: float) -> Checkpoint:
     """The last checkpoint of a run that is stopped from outside after t (s)."""
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(scene, path, progress=_Cut(t))
@@ -81,15 +77,26 @@ def cut_off(scene: hybrid.Scene | hybrid.System, path: Path, t: float) -> Checkp
         return read_checkpoint(file)
 
 
-def gone_on(tables: Mapping[str, Any], t: float, folder: Path) -> tuple[hybrid.Result, hybrid.Result]:
-    """A run of a cable, and its network that goes on from where the cable was stopped after t (s)."""
-    scene = as_scene(tables_with(tables, {"output.exact": True}))
-    old = cut_off(scene, folder / "cable.h5", t)
-    assert 0.9 * t < old.state["t"] <= t + 0.05 and "lines" not in old.state
-    recording = Recording(WriteMode({}), folder / "cable.h5", planes=True, error=True, cable=Cable(scene))
-    run = SystemRun(network_of(scene), folder / "network.h5", scene_text(scene), True, None, recording)
-    run.record_motion(ProgressReporter(None, 1.0), lambda: False)
-    return hybrid.run(scene), hybrid.open(folder / "network.h5")
+class Roads:
+    """Runs of a cable by its own road, and the rest of them as networks (simulation.switch)."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+        Stopping(monkeypatch)
+        monkeypatch.setattr("hybrid.simulation.time_loop.WORK", 1)
+        self._set, self._path = monkeypatch.setenv, folder / "run.h5"
+
+    def both(self, tables: Mapping[str, Any], t: float) -> tuple[hybrid.Result, hybrid.Result]:
+        """A run of a cable, and its network that goes on from where the cable was stopped after t (s)."""
+        self._set("HYBRID_CABLES", "cable")
+        scene = as_scene(tables_with(tables, {"output.exact": True}))
+        cable, old = hybrid.run(scene), cut_off(scene, self._path, t)
+        assert 0.9 * t < old.state["t"] <= t + 0.05 and "lines" not in old.state
+        return cable, self.rest()
+
+    def rest(self) -> hybrid.Result:
+        """The network goes on."""
+        self._set("HYBRID_CABLES", "network")
+        return hybrid.resume(self._path)
 
 
 @pytest.mark.long  # 0.5 s each
@@ -98,20 +105,38 @@ def test_a_network_goes_on_where_a_cable_was_stopped(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     features, more = CASES[name]
-    Stopping(monkeypatch)
-    monkeypatch.setattr("hybrid.simulation.time_loop.WORK", 1)
-    cable, network = gone_on(tables_with(scene_of(*features), more), 0.33, tmp_path)
+    cable, network = Roads(monkeypatch, tmp_path).both(tables_with(scene_of(*features), more), 0.33)
     assert [str(x) for x in differences(cable, network)] == []
-    assert "output.errors" in more or events_differ(cable, network) == []  # of runs to compare with
+    assert events_differ(cable, network) == []
     assert len(cable.times) > 4 and np.ptp(cable.position[3:, 3:-3], axis=0).max() > 1e-4
 
 
 @pytest.mark.slow
 def test_contact_that_has_begun_by_itself_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    Stopping(monkeypatch)
-    cable, network = gone_on(led_through(), 2.4, tmp_path)
+    cable, network = Roads(monkeypatch, tmp_path).both(led_through(), 2.4)
     assert cable["energy/self_contact"].max() > 0.0
     assert [str(x) for x in differences(cable, network)] == []
+
+
+@pytest.mark.long
+def test_loads_that_have_changed_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A line that is laid, in another current from 3 s on, stopped at 4 s."""
+    roads, path = Roads(monkeypatch, tmp_path), tmp_path / "run.h5"
+    monkeypatch.setenv("HYBRID_CABLES", "cable")
+    begun = hybrid.load_scene(
+        Path(__file__).parents[2] / "examples" / "laying.yaml", ["time.duration=2", "dimension=null"]
+    )
+    hybrid.run(begun, path).close()
+    asked: dict[str, Any] = {"until": 5.0, "settings": ["environment.fluid.current=[0.4, 0.2, 0]"], "start": 3.0}
+    cable = hybrid.resume(path, tmp_path / "cable.h5", **asked)
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.resume(path, progress=_Cut(4.0), **asked)
+    with h5py.File(path) as file:
+        state = read_checkpoint(file).state
+    assert state["changes"] == 1 and "lines" not in state
+    network = roads.rest()
+    assert [str(x) for x in differences(cable, network)] == []
+    assert events_differ(cable, network) == []
 
 
 def test_what_is_of_another_line_or_of_no_cable_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
