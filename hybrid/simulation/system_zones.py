@@ -450,6 +450,8 @@ class SystemZones:
         """Carry out changes of lines, in their arrays where that can be."""
         run = self._run
         for x, change in changes:
+            if x.cells is not None and not x.cells.fits(x.switching):  # another solver has the line now
+                x.cells = run.lines[x.number].cells = None
             if x.cells is not None:
                 booked = x.cells.change() if change.same else x.cells.change_zones(change)
                 x.cells.sync()

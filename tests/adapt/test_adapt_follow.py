@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -20,12 +20,15 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, take_arcs
 from hybrid.kernels.state.state import no_sea
 from hybrid.outputs.probes import Observer
-from hybrid.simulation import initial_zones
+from hybrid.simulation import initial_zones, system_cells
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.initial_zones import shares_asked
+from hybrid.simulation.lines_cells import LineCells
+from hybrid.simulation.system_zones import SystemZones
 from hybrid.simulation.transient import Transient
 from hybrid.simulation.transient_checkpoint import zoning_of_today
 from hybrid.solve.run import CompiledRun
+from hybrid.solve.system_steps import SystemSteps
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # A line that touches down, its upper end heaving; the layer at the touchdown is 0.4 m long and goes to and fro over 20 m.
@@ -212,22 +215,29 @@ def test_a_line_that_is_watched_changes_its_cells_in_arrays_made_once(monkeypatc
         "model": {"kind": "adaptive", "curvature_error": 0.03},
         "output": {"every": 2, "points": 501, "errors": False},
     })  # fmt: skip
-    changed, change = [], Transient._switch
+    changed, change, changes = [], Transient._switch, SystemZones._switch
 
     def switch(self: Transient, how: Change) -> None:
         changed.append(how.same and self.itself.watching)
         change(self, how)
 
+    def switch_line(self: SystemZones, line: Any, how: Change, here: Any = None) -> None:
+        changed.append(how.same and self._run.lines[0].envelope.itself.on)
+        changes(self, line, how, here)
+
     monkeypatch.setattr(Transient, "_switch", switch)
+    monkeypatch.setattr(SystemZones, "_switch", switch_line)
     once = hybrid.run(scene)
     by_python = sum(changed)
     monkeypatch.setattr(CellChanges, "applies", lambda owner: False)
+    monkeypatch.setattr(LineCells, "may_change", lambda *_: False)
     anew = hybrid.run(scene)
     assert sum(changed) - by_python > 20 > 5 >= by_python
     assert [(e.t, e.kind, e.text) for e in once.events] == [(e.t, e.kind, e.text) for e in anew.events]
+    np.testing.assert_array_max_ulp(once["tension"], anew["tension"], 4)  # of outputs that are looked at together
     for name in (
         "position",
-        "tension",
+        "steps/end_force_end",
         "curvature",
         *(f"self_distance/{x}" for x in ("clearance", "s_a", "s_b", "time")),
     ):
@@ -287,13 +297,13 @@ def test_what_is_held_after_a_change_is_what_binding_would_give(monkeypatch: pyt
 def test_a_run_seldom_returns_from_compiled_code(short: hybrid.Result, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only where zones change, a step fails or buffers are full; with a return for every change the run is the same."""
     calls = []
+    for steps in (CompiledRun, SystemSteps):
 
-    def go(self: CompiledRun, *given) -> int:
-        calls.append(self)
-        return goes(self, *given)
+        def go(self: Any, *given, goes: Any = steps.go) -> int:
+            calls.append(self)
+            return goes(self, *given)
 
-    goes = CompiledRun.go
-    monkeypatch.setattr(CompiledRun, "go", go)
+        monkeypatch.setattr(steps, "go", go)
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", SHORT)
     hybrid.run(scene)
     once = len(calls)
@@ -315,6 +325,7 @@ def test_cells_that_become_one_in_a_layer_do_not_kick_the_end_force(monkeypatch:
         raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "no equilibrium on longer cells")
 
     monkeypatch.setattr(initial_zones, "_on_planned_cells", nowhere)
+    monkeypatch.setattr(system_cells, "_on_planned_cells", nowhere)
     result = hybrid.run(
         bight()
         | {
@@ -357,11 +368,10 @@ def test_cells_become_as_short_as_a_kink_that_gets_sharper() -> None:
     assert np.mean(cells) < 400 and cells[0] == 32  # a straight line asks for none
 
 
-def test_outputs_that_wait_are_not_lost_with_the_arrays_they_wait_in(
-    short: hybrid.Result, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("old_road")  # the steps of lines leave none
+def test_outputs_that_wait_are_not_lost_with_the_arrays_they_wait_in(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where a push out of the plane dies, or an end is let go, cells change in other arrays from then on."""
-    refused = []
+    refused, short = [], hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", SHORT))
 
     def still_fits(self: CellChanges) -> bool:
         waits = (bool(self._run.count.samples) or self.waits) and self._run.t > 1.0
