@@ -39,7 +39,7 @@ def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: p
             pass
 
     monkeypatch.setattr(sys, "frozen", frozen, raising=False)
-    monkeypatch.setattr(first_use, "is_warm", lambda _: False)
+    monkeypatch.setattr(first_use, "is_ready", lambda _: False)
     monkeypatch.setattr("os.cpu_count", lambda: 2)
     monkeypatch.setattr(first_use, "Thread", Started)
     first_use.compile_beside(hybrid.validate_scene(first_use.SAMPLE))
