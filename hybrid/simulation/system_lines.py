@@ -292,12 +292,12 @@ class LineResult:
             text = f"this equilibrium is the one without friction where {self._touched}"
             where = f"{text}: a run with damping that comes to rest in contact has it"
             self.events.event(0.0, 0.0, self.model.length, "static friction neglected", where)
-        why = "round-off of the bending of so short cells hides it" if self.number in found.solver.blurred else ""
+        why = "round-off of the bending of so short cells hides it" if self.number in found.blurred else ""
         if turned and line.element.any():
             why = "a moment at a point is not conservative"
         if found.unjudged and (line.element.any() or touches):
             why = f"{self._touched}; {found.unjudged}" if touches else found.unjudged
-        if found.solver.presses_bodies:
+        if found.presses_bodies:
             why = "lines touch a body that is free"
         if why:
             text = f"the stability of this equilibrium is not judged, because {why}"

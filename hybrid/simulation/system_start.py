@@ -151,14 +151,18 @@ def _each_alone(system: System, model: SystemModel, t: float) -> LinesAtRest:
 def _together(model: SystemModel, t: float, found: Sequence[Equilibrium]) -> LinesAtRest:
     """Equilibria of all lines as one."""
     rubs = frozenset(k for k, x in enumerate(found) if x.with_friction)
-    lines = [
-        x._replace(line=x.line._replace(bits=x.line.bits & ~WAVES & ~(0 if k in rubs else FRICTION)))
-        for k, x in enumerate(joined_lines(model, t))
-    ]
-    solver = SystemSolver(lines, 0, model.body_numbers(t))
-    solver.blurred = {k for k, x in enumerate(found) if x.blurred}
     states = SystemState([x.state for x in found], model.body_places)
-    solver.evaluate_forces(states, solver.anchor)
+
+    def solver() -> SystemSolver:
+        lines = [
+            x._replace(line=x.line._replace(bits=x.line.bits & ~WAVES & ~(0 if k in rubs else FRICTION)))
+            for k, x in enumerate(joined_lines(model, t))
+        ]
+        made = SystemSolver(lines, 0, model.body_numbers(t))
+        made.blurred = {k for k, x in enumerate(found) if x.blurred}
+        made.evaluate_forces(states, made.anchor)
+        return made
+
     path = max(found, key=lambda x: len(x.path)).path  # of the line that took most ways
     touches = any(x.touch.size for x in found)
     why = "a damped motion with contact, without friction, led there" if touches else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import chain
 
 from hybrid.errors import Outcome
@@ -24,13 +25,31 @@ class LinesAtRest:
     path: tuple[str, ...]
     iterations: int
     residual: float
-    solver: SystemSolver  # whose reports are those of the solution
+    made: SystemSolver | Callable[[], SystemSolver]  # whose reports are those of the solution, or what makes it
     settled: bool = False  # True where a damped motion with contact led there
     unjudged: str = ""  # where settled: why it is not known that it would stay
     with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction on the bed took part
     alone: tuple[Equilibrium, ...] = ()  # of each line where all are joined to nothing that moves: found one by one
     # By number of those that leave friction to the program, why it did not.
     not_settled: Mapping[int, str] = field(default_factory=dict)
+
+    @cached_property
+    def solver(self) -> SystemSolver:
+        """A solver whose reports are those of the solution.
+
+        Of lines that were found one by one it is made when it is asked for: that takes 1 ms.
+        """
+        return self.made if isinstance(self.made, SystemSolver) else self.made()
+
+    @property
+    def blurred(self) -> set[int]:
+        """Numbers of lines of which round-off hides whether they buckle."""
+        return {k for k, x in enumerate(self.alone) if x.blurred} if self.alone else self.solver.blurred
+
+    @property
+    def presses_bodies(self) -> bool:
+        """Whether lines touch a body that is free."""
+        return not self.alone and self.solver.presses_bodies
 
     @property
     def pushed(self) -> bool:
