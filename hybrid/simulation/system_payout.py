@@ -138,6 +138,7 @@ class SystemPayout:
         run = self._run
         for k, end in ends:
             if k in self.lines and self.lines[k].plan.side == end:
+                run.lines[k].write_down()  # with the law as it is
                 model, books = run.model.models[k], run.lines[k].books
                 before = Before(run.state.lines[k], run.t, run.loop.clock, books.tension)
                 books.work[0, b.ZONES] += self.lines[k].end(before, model.line, model.ends.at(run.t))

@@ -274,3 +274,5 @@ def test_it_is_released_from_outside_and_as_a_system() -> None:
     other = hybrid.run({**kept, "points": points, "lines": {"one": line}}).lines["one"]
     assert np.abs(other.position - whole.position).max() < 1e-6
     assert other["work/zones"][-1] == pytest.approx(whole["work/zones"][-1], rel=1e-6)
+    rate = other["payout/rate"]  # at the release it is that of the moment before
+    assert rate[8] == pytest.approx(0.8) and not rate[9:].any() and np.abs(rate - whole["payout/rate"]).max() < 1e-12
