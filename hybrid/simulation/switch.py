@@ -6,5 +6,5 @@ import os
 
 
 def as_network() -> bool:
-    """Whether a scene of a cable is computed as a network of one line."""
-    return os.environ.get("HYBRID_CABLES") == "network"
+    """Whether a scene of a cable is computed as a network of one line: always, unless HYBRID_CABLES says `cable`."""
+    return os.environ.get("HYBRID_CABLES") != "cable"
