@@ -508,8 +508,9 @@ class Network(Table, Timed):
     def _scene_of(
         self, name: str, carrying: Sequence[str], places: Mapping[str, Triple] | None = None,
         directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: Scene | None = None,
+        strict: bool = False,
     ) -> Scene:  # fmt: skip
-        """As `scene_of`, made anew."""
+        """As `scene_of`, made anew; strict: an accuracy that is asked for without errors is refused."""
         line = self.lines[name]
         first = self._places(line)
         ends: dict[str, End] = {}
@@ -563,7 +564,10 @@ class Network(Table, Timed):
         given["history"] = self.output.history.get(name)
         given["criteria"] = self.output.criteria and (name in self.adaptive or not self.adaptive)  # none: each says so
         tables["output"] = {key: value for key, value in given.items() if value is not None}
-        return Scene.model_validate(tables)
+        late = {}
+        if self.output.errors is False and not (strict and (line.accuracy or self.accuracy)):
+            late["accuracy"] = tables.pop("accuracy")  # that nobody has asked for, or a chosen model has brought along
+        return Scene.model_validate(tables).model_copy(update=late)
 
     def _free_end(self, name: str, key: Literal["start", "end"], near: Triple | None) -> End:
         """The end of a line at a point that is no more than that; near: as of `FreePoint.only_end`."""
@@ -589,7 +593,7 @@ class Network(Table, Timed):
 
     def checked_scene(self, name: str) -> Scene:
         """The scene of a line as `scene_of`, checked anew; ValidationError of pydantic: what is wrong with it."""
-        return self._scene_of(name, ())
+        return self._scene_of(name, (), strict=True)
 
     def know_scene(self, name: str, scene: Scene) -> None:
         """Make the scene of a line from that of a system that differs in numbers alone, without checking it again."""

@@ -96,8 +96,16 @@ class ShortForm:
         except ComputationError as error:
             raise self.error(error) from None
         except SceneError as error:
-            texts = ("where", "value", "expected", "fix")
-            said = [replace(x, **{key: self.text(getattr(x, key)) for key in texts}) for x in error.complaints]
+            said = [
+                replace(
+                    x,
+                    where=self.text(x.where),
+                    value=self.text(x.value),
+                    expected=self.text(x.expected),
+                    fix=self.text(x.fix),
+                )
+                for x in error.complaints
+            ]
             raise SceneError(said, error.file) from None
 
     def error(self, error: ComputationError) -> ComputationError:
@@ -145,8 +153,11 @@ def _made_of(key: _This) -> System:
     }  # fmt: skip
     same = ("title", "environment", "obstacles", "time", "accuracy", "dimension")
     tables |= {name: getattr(scene, name) for name in same if getattr(scene, name) is not None}
+    kept = {}  # an accuracy of a model that is chosen, in whose place no error figure is wanted
+    if scene.output.errors is False and "accuracy" in tables:
+        kept["accuracy"] = tables.pop("accuracy")
     try:
-        return System.model_validate(tables)
+        return System.model_validate(tables).model_copy(update=kept)
     except ValidationError as error:
         raise NotInNetwork(list(_complaints(scene, error))) from None
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 # A step in which waves of tension pass so many cells may itself leave a line slack; and by how much shorter one should
 # be that shows whether it does.
 MOST_PASSED, SHORTER = 4.0, 16.0
+# Where energy is created.
+FASTEST = "the fastest point is at this place"
 
 
 def winch_text(paying: PayingOut) -> str:
@@ -81,7 +83,7 @@ def explanation(x: Stopped) -> str:
         if x.zones_move:
             detail += "; model.force_catenary keeps it from becoming a rod"
     elif outcome == Outcome.GAINS_ENERGY:
-        detail = "the fastest point is at this place"
+        detail = FASTEST
     elif outcome == Outcome.TWISTED_TOO_FAR:
         detail = f"{model.cells} cells"
     elif outcome == Outcome.OVERSTRETCHED:

@@ -20,7 +20,6 @@ from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Equilibrium, Scene
-from hybrid.scene.short_form import network_of
 from hybrid.simulation.switch import as_network
 
 if TYPE_CHECKING:  # its tables take long to make
@@ -62,7 +61,13 @@ def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
 
 def _kernels_of_network(scene: Any) -> list[str]:
     """Of a cable that is computed as a network of one line."""
-    found = _kernels_of_lines(network_of(scene), False)
+    found = [*OF_LINES, STEPS_OF_LINES]
+    if not _is_in_space(scene, scene.dimension):
+        found = [SOLVER[0], *found, *([STABILITY] if _is_judged(scene, False) else [])]
+    if scene.model.kind == "adaptive":
+        found.append(ZONES)
+    if payout_of(scene) is not None:
+        found += PAYOUT_OF_LINES
     if scene.contact.self:
         found += [TOUCHING, TOUCHING_LINES[0]]
     if wants_errors(scene) and scene.model.kind != "rod":

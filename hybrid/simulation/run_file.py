@@ -97,6 +97,10 @@ class LinesFile:
         """Arc lengths (m) of events of the whole run: lines have none in common."""
         return 0.0, 0.0
 
+    def place(self, point: str) -> tuple[float, float]:
+        """The same of an event at a point."""
+        return self.span
+
     # --- how lines are recorded -----------------------------------------------------------------
 
     def scene_of(self, scene: Scene) -> Scene:
@@ -239,6 +243,10 @@ class CableFile(LinesFile):
     @property
     def span(self) -> tuple[float, float]:
         return 0.0, self._line.model.length
+
+    def place(self, point: str) -> tuple[float, float]:
+        s = self._line.model.length if point == "end" else 0.0
+        return s, s
 
     def scene_of(self, scene: Scene) -> Scene:
         return self._cable.scene

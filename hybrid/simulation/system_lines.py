@@ -52,6 +52,7 @@ from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
+from hybrid.simulation.failure import FASTEST
 from hybrid.simulation.kind_changes import Around
 from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
 from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED
@@ -436,10 +437,17 @@ class LineResult:
             self._unknown_until = step.t + self.model.time_scale  # that it takes the whole line to move
         self._stop_if(self.diagnostics.look(step, flags), step.t, step.state)
 
-    def _stop_if(self, stop: Stop, t: float | None, state: State) -> None:
-        if stop is not None:
-            detail = stretch_text(self.model, state) if stop[0] == Outcome.OVERSTRETCHED else ""
-            raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]), detail)
+    def _stop_if(self, stop: Stop, t: float | None, state: State | None = None) -> None:
+        """LineFailed where going on after t (s) would make no sense; state: then, where it says more."""
+        if stop is None:
+            return
+        outcome, node = stop
+        detail = FASTEST if outcome == Outcome.GAINS_ENERGY else ""
+        if outcome == Outcome.TWISTED_TOO_FAR:
+            detail = f"{self.model.cells} cells"
+        elif outcome == Outcome.OVERSTRETCHED and state is not None:
+            detail = stretch_text(self.model, state)
+        raise LineFailed(self.number, outcome, t, float(self.model.line.s[node]), detail)
 
     def sampled(self, count: int) -> Batch:
         """The outputs that steps have sampled, as many as there are in the buffer; in arrays of their own.
@@ -499,8 +507,7 @@ class LineResult:
             t = float(self._aside.waiting[-1][1].batch.t[-1])
             stop = self._aside.record(self.observer, self.recorder, watch)
             self.diagnostics.follow(self.model)
-            if stop is not None:
-                raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]))
+            self._stop_if(stop, t)
         if not self._waiting:
             return
         (waiting, self._waiting), (errors, self._errors) = (self._waiting, []), (self._errors, [])
@@ -520,8 +527,7 @@ class LineResult:
         stop = None
         if not isinstance(self.recorder, ComparisonRecorder):  # which has too little to be judged
             stop = self.diagnostics.outputs(seen, values)
-        if stop is not None:
-            raise LineFailed(self.number, stop[0], float(batch.t[-1]), float(self.model.line.s[stop[1]]))
+        self._stop_if(stop, float(batch.t[-1]))
 
     def look(self, batch: Batch) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
         """What makes values of outputs, these as computed, and the zones of all but the first where they differ."""

@@ -559,8 +559,10 @@ class SystemRun:
         elif not self.found.settled:
             refuse_within_itself(self.model, self.solver.lines, self.state, True)
         begin_where_near(self)
-        blended = [("motion blended in", text) for text in blended_of_lines(self.system) if text]
-        for kind, text in (*self._notes, *blended):
+        for point, text in blended_of_lines(self.system):
+            if text:
+                self.noted.event(0.0, *self.file.place(point), "motion blended in", text)
+        for kind, text in self._notes:
             self._note(kind, text)
         self._settle(self.solver)
         self._look_for_overlaps()
@@ -762,6 +764,8 @@ class SystemRun:
         """No shorter step is left to try: contact is given up, or the run ends.  LineFailed."""
         dt = float(self.loop.clock.tried_dt)
         if not gives_up_contact(self, dt):
+            for line in self.lines:
+                line.write_down()  # what stopped the run before comes first
             raise self._stopped(self.solver, self.loop.tried, dt)
         self.loop.try_whole()
 

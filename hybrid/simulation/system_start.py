@@ -259,14 +259,14 @@ def begin_as_placed(
         stepper.static_friction(x.sea.at(0.0), joined_ends(x.ends.at(0.0), joints), one)
 
 
-def blended_of_lines(system: System) -> Iterator[str]:
-    """Texts of simulation.blended.note_blended, of the points and bodies of several lines; empty ones of others."""
+def blended_of_lines(system: System) -> Iterator[tuple[str, str]]:
+    """Points and bodies of lines, and texts of simulation.blended.note_blended; empty ones of what has no file."""
     for name, point in system.points.items():
         if isinstance(point, FixedPoint):
-            yield blended_text(f"points.{name}", point.motion, point.position, bool(system.clamped_at(name)))
+            yield name, blended_text(f"points.{name}", point.motion, point.position, bool(system.clamped_at(name)))
     for name, body in system.bodies.items():
         if isinstance(body, FixedBody):
-            yield blended_text(f"bodies.{name}", body.motion, body.position, True)
+            yield "", blended_text(f"bodies.{name}", body.motion, body.position, True)
 
 
 def named(failed: LineFailed, model: SystemModel, first: str = "", left: Path | None = None) -> ComputationError:

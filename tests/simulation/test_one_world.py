@@ -88,3 +88,10 @@ def test_at_rest() -> None:
     cable, network = both(tables_with(scene_of("seabed"), {END: GUIDED, "time": None}), rest=True)
     assert [str(x) for x in differences(cable, network)] == []
     assert events_differ(cable, network) == []
+
+
+def test_no_errors_are_asked_of_steps_that_follow() -> None:
+    """The usual accuracy, which nobody has asked for, is no reason to want an error figure."""
+    tables = tables_with(scene_of("catenary"), {"output.errors": False, "time.step": None})
+    cable, network = both(tables)
+    assert [str(x) for x in differences(cable, network)] == []
