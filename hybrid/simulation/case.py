@@ -490,8 +490,9 @@ class Case:
         """As `resume`."""
         with opened(source) as file:
             if "self_contact" not in file and self_reach(self.scene).may:
-                self.scene = without_contact(self.scene)
+                told, self.scene = self._texts["scene"], without_contact(self.scene)
                 self.changes = tuple(replace(x, scene=without_contact(x.scene)) for x in self.changes)
+                self._told = self.scene, told  # the file keeps what was asked for
             with refused(source):
                 resolution = resolution_from(read_checkpoint(file).resolution, self.scene)
         first = self._takes_its_place(target)
