@@ -8,7 +8,7 @@ have as many of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -32,6 +32,9 @@ from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_steps import SystemSteps
 
+if TYPE_CHECKING:  # a line that is not paid out does without
+    from hybrid.simulation.payout import PayingOut
+
 
 class OfLine(Protocol):
     """What changes of cells have to know of the result of a line (simulation.system_lines)."""
@@ -46,6 +49,8 @@ class OfLine(Protocol):
     def contact(self) -> SelfContact | None: ...
     @property
     def correction(self) -> Correction | None: ...
+    @property
+    def paying(self) -> PayingOut | None: ...
     @property
     def outputs_join(self) -> bool: ...
     @property
@@ -93,8 +98,8 @@ OF_NODES, OF_CELLS = ("r", "v", "vd", "kb"), ("e", "T", "a1", "w", "h")
 def ends_alone(batches: Sequence[Batch]) -> Batch:
     """Outputs of one line on several meshes one behind the other, with their ends as the only nodes."""
     own: dict[str, list[Any]] = {name: [getattr(x, name) for x in batches] for name in Batch._fields}
-    own |= {name: [x[:, [0, -1]] for x in own[name]] for name in OF_NODES}
-    own |= {name: [x[:, :1] for x in own[name]] for name in OF_CELLS}
+    own |= {name: [x[:, [0, -1]] if x.size else x for x in own[name]] for name in OF_NODES}
+    own |= {name: [x[:, :1] if x.size else x for x in own[name]] for name in OF_CELLS}
     return Batch(**{name: np.concatenate(x) for name, x in own.items()})
 
 
@@ -150,7 +155,10 @@ class OneOfMany:
 
     of_many = True
 
-    def __init__(self, run: OfRun, number: int, switching: ZoneSwitching) -> None:
+    pays_out = True  # where a node is to enter or leave at a winch
+    correction = None
+
+    def __init__(self, run: OfRun, number: int, switching: ZoneSwitching | None = None) -> None:
         self._system, self._number, self.switching = run, number, switching
         line = run.lines[number]
         self.run, self.envelope, self.marked = self, line.envelope, line.marked
@@ -174,6 +182,11 @@ class OneOfMany:
     def pushes(self, pushes: tuple[Floats, Floats]) -> None:
         if self._plane is not None:
             self._plane.pushes = pushes
+
+    @property
+    def payout(self) -> PayingOut | None:
+        """Its length, if it is paid out."""
+        return self._system.lines[self._number].paying
 
     @property
     def model(self) -> Model:
@@ -232,6 +245,13 @@ class OneOfMany:
         self._system.adopt_cells(self._number, model, work)
 
 
+def by_itself(run: OfRun, number: int) -> bool:
+    """Whether nothing but its own steps knows of the cells of a line, in a run whose solver is attached."""
+    line, watched = run.lines[number], run.watch is not None and run.watch.is_needed
+    alone = number in run.solver.lone and not run.solver.mixes and not watched
+    return alone and line.contact is None and line.correction is None
+
+
 class LineCells(CellChanges):
     """Changes of the cells of one of several lines, and of what is rod, with the solver that it has now."""
 
@@ -244,15 +264,11 @@ class LineCells(CellChanges):
     @staticmethod
     def may_change(run: OfRun, number: int, switching: ZoneSwitching) -> bool:
         """Whether cells of a line can change so in a run whose solver is attached."""
-        if not switching.zones.clock.share > 0.0 or run.payout is not None or run.solver.mixes:
+        if not switching.zones.clock.share > 0.0 or run.payout is not None or not by_itself(run, number):
             return False
-        if number not in run.solver.lone:
-            return False
-        line, model = run.lines[number], run.model.models[number]
-        watched = run.watch is not None and run.watch.is_needed
-        plain = carries_all(model, switching) and not model.line.bits & REMEMBERS and line.contact is None
-        plain &= line.correction is None
-        return plain and not watched and switching.manager.layout.rod.size >= LEAST_CELLS
+        model = run.model.models[number]
+        plain = carries_all(model, switching) and not model.line.bits & REMEMBERS
+        return plain and switching.manager.layout.rod.size >= LEAST_CELLS
 
     def fits(self, switching: ZoneSwitching) -> bool:
         """Whether the line is solved by what the arrays were made for, and its zones are these."""

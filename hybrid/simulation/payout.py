@@ -168,6 +168,11 @@ class PayingOut:
         return self.plan.layer.size - 1
 
     @property
+    def most_cells(self) -> int:
+        """Cells that there may be, of a line whose zones stay."""
+        return int(self.plan.nodes.size) - 2 + self.rides
+
+    @property
     def solves_twice(self) -> bool:
         """Whether a winch holds a tension at the start, or at a clamp: an iteration takes another right-hand side."""
         return self.holds_tension and (not self.plan.side or self.rides > 0)
@@ -427,6 +432,10 @@ class PayingOut:
             e = self._fitting_chords(reel, line, own.e, own.T, arrays["h"][None], arrays["ck"][None])
             found.append(Output(then._replace(**arrays), zones, own._replace(e=e)))
         return found
+
+    def outputs_of_now(self, line: Line, batch: Batch) -> list[Output]:
+        """The same of the line as it is, which keep the arrays of `batch` alone."""
+        return self.outputs_in(own_arrays(line), self.reel, batch)
 
     # --- checkpoints ------------------------------------------------------------------------------
 

@@ -24,6 +24,7 @@ from hybrid.kernels.run import payout_run as f
 from hybrid.kernels.run.entry import NO_PUSH, workspace
 from hybrid.kernels.run.payout_run import NodeJob, blank_line_job, blank_node_job, blank_paid_run_job, make_line
 from hybrid.kernels.run.run import run as steps
+from hybrid.kernels.run.system import begin_line
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, sample_size
 from hybrid.kernels.state.forces import REMEMBERS
@@ -51,7 +52,6 @@ from hybrid.model.line import lines
 from hybrid.outputs.joined_lines import Output
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Kept, Shaped, blank_kept, seas
 from hybrid.simulation.envelope import marks_on
-from hybrid.simulation.payout import own_arrays
 from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.solve.stepper import HEAVY
 
@@ -86,13 +86,15 @@ class Side:
 class NodeChanges:
     """Nodes of a run (`Transient`) that enter and leave, where zones stay."""
 
+    by_parity: tuple[Table, Table] | None = None  # of one of several lines: its tables in steps of all, even and odd
+
     def __init__(self, owner: Transient) -> None:
         """Room for all; `adopt` before the first change."""
         assert owner.payout is not None
         self._owner, self._run, self._paying = owner, owner.run, owner.payout
         self._fixed_to = self._key(owner)
         plan, model, reel, damped = owner.payout.plan, owner.model, owner.payout.reel, owner.payout.damped
-        self.most = plan.nodes.size - 2 + owner.payout.rides
+        self.most = owner.payout.most_cells
         some, twice = owner.envelope is not None, owner.payout.solves_twice
         extra = int((marks_on(model.line.s, owner.marked) != 0).sum())
         shared = reel.law, reel.pieces, reel.winch, reel.layer, twice, damped
@@ -103,7 +105,8 @@ class NodeChanges:
         self._work = Room(Packed(partial(workspace, keep=twice), given=("torsion",)), self.most)
         size = sample_size(self.most)
         self._rows = max(1, min(ROWS, MOST_SAMPLED // size))
-        self._samples = np.empty(self._rows * size)  # some MB, of which a run with few outputs touches little
+        # some MB, of which a run with few outputs touches little; of one of several lines for its reels alone
+        self._samples = np.empty(MOST_WAITING * f.OF_REEL * self.most if owner.of_many else self._rows * size)
         self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
         self._itself = blank_itself(np.zeros(self.most))
         self._base = np.zeros(owner.run.books.base.size, np.int64)
@@ -116,12 +119,7 @@ class NodeChanges:
     @staticmethod
     def applies(owner: Transient) -> bool:
         """Whether nodes of a run can enter and leave so: nothing asks Python on the way."""
-        line = owner.model.line
-        plain = not any(
-            getattr(line, name).size
-            for name in ("torsion", "tension_twist", "law", "bend_law", "slip_law", "wake_law", "moved")
-        )
-        return owner.pays_out and owner.correction is None and plain and not line.bits & REMEMBERS
+        return owner.pays_out and owner.correction is None and is_plain(owner.model.line)
 
     @staticmethod
     def _key(owner: Transient) -> tuple[Any, ...]:
@@ -180,11 +178,12 @@ class NodeChanges:
         return found
 
     def _books(self, k: int, cells: int) -> Books:
-        size, used = sample_size(cells), int(self._at.used)
-        rows = min(self._rows, (self._samples.size - used) // size)
-        samples = self._samples[used : used + rows * size].reshape(rows, size)
-        kept = self._sides[k].kept.view(cells)
-        return self._run.books._replace(samples=samples, base=self._base, **kept._asdict())
+        kept = self._sides[k].kept.view(cells)._asdict()
+        if not self._owner.of_many:  # else they are in rows of the most cells
+            size, used = sample_size(cells), int(self._at.used)
+            rows = min(self._rows, (self._samples.size - used) // size)
+            kept["samples"] = self._samples[used : used + rows * size].reshape(rows, size)
+        return self._run.books._replace(base=self._base, **kept)
 
     # --- tables -------------------------------------------------------------------------------------
 
@@ -209,6 +208,10 @@ class NodeChanges:
             "was": self._push(k, 0, m), "now": self._push(k, 1, m), "work": self._work_on(m),
             "books": self._books(k, m),
         }  # fmt: skip
+
+    def _in_odd(self, k: int, _: int, m: int) -> dict[str, Any]:
+        found = self._in_run(k, _, m)
+        return found | {"old": found["new"], "new": found["old"]}
 
     def _in_paid(self, k: int, _: int, m: int) -> dict[str, Any]:
         work = self._work_on(m)
@@ -256,10 +259,12 @@ class NodeChanges:
             of_itself = shaped(blank_itself_job, self._in_itself, (0,), (1,))
             in_itself, itself = of_itself[0].places(IN_ITSELF), self._watch.table.numbers
             tables = np.array([x.numbers[:, in_itself] for x in of_itself])
-        self._tables = of_run, of_paid, of_itself, nodes  # what is bound there stays alive
+        of_odd = [] if self.by_parity is None else shaped(blank_job, self._in_odd, (0,), (1,))
+        self._tables = of_run, of_paid, of_itself, nodes, of_odd  # what is bound there stays alive
         in_run, in_paid = of_run[0].places(IN_RUN), of_paid[0].places(IN_PAID)
         numbers: dict[str, Any] = {
-            "calls": self._calls, "at": self._at, "clock": run.clock, "counts": run.count, "outputs": run.books.outputs,
+            "calls": self._calls, "at": self._at, "clock": run.clock, "own": run.books.clock, "counts": run.count,
+            "outputs": run.books.outputs,
             "winch": paying.reel.winch, "first": self._reel(0, self.most), "second": self._reel(1, self.most),
             "run": run.table.numbers, "run_places": in_run, "in_run": np.array([x.numbers[:, in_run] for x in of_run]),
             "paid": paying.table.numbers, "paid_places": in_paid,
@@ -272,17 +277,28 @@ class NodeChanges:
         at, samples = self._at, self._samples.__array_interface__["data"][0]
         at.room, at.most_rows, at.most = samples, self._rows, self.most
         at.task = run.table.part("task").start
-        at.samples_at = int(np.flatnonzero(of_run[0].numbers[0] == samples).item())
         if self._watch is not None:
             tree = self._itself.tree.__array_interface__["data"][0]
             at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
-        node = nodes[0].table
-        calls = {
-            "steps": (steps, run.table), "change": (f.change_line, node), "carry": (carry_node, Table(blank_carry_job)),
+        self._bind_calls(of_run, of_odd, nodes[0].table)
+
+    def _bind_calls(self, of_run: list[Shaped], of_odd: list[Shaped], node: Table) -> None:
+        """Addresses of what a change calls; of_odd: of one of several lines, what its table of odd steps gets."""
+        run, paying, at = self._run, self._paying, self._at
+        calls: dict[str, tuple[Any, Any]] = {
+            "change": (f.change_line, node), "carry": (carry_node, Table(blank_carry_job)),
             "fit": (f.fit_changed, node), "book": (f.book_change, node), "renew": (f.renew_run, node),
             "before_forces": (before_forces, run.table), "stand_still": (stand_still, paying.table),
             "after_forces": (after_forces, run.table),
         }  # fmt: skip
+        if self.by_parity is None:
+            at.samples_at = int(np.flatnonzero(of_run[0].numbers[0] == at.room).item())
+            calls["steps"] = steps, run.table
+        else:
+            (even, odd), in_run = self.by_parity, of_run[0].places(IN_RUN)
+            in_odd = np.array([x.numbers[:, in_run] for x in of_odd])
+            self._following.bind(even=even.numbers, odd=odd.numbers, in_odd=in_odd)
+            calls["books"], at.of_many = (begin_line, run.table), 1
         for name, (kernel, table) in calls.items():
             setattr(self._calls, name, kernel.address(table.numbers))
 
@@ -302,7 +318,7 @@ class NodeChanges:
                 self._push(0, which, n)[:] = run.pushes[which]
         _copy(model.line, self._line(0, n), ("bits", "plane", "torsion", *TENSION_TORQUE))
         _copy(model.sea.values, self._sea_on(n), REST_OF_SEA)
-        _copy(owner.stepper.work, self._work_on(n), ("torsion",))
+        _copy(owner.stepper.work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
         _copy(self._paying.reel, self._reel(0, n), OF_REEL)
         self._base[:] = run.books.base
         if self._watch is not None:
@@ -361,19 +377,24 @@ class NodeChanges:
 
     def waiting(self) -> Iterator[list[Output]]:
         """Outputs of lines of before, copied."""
-        k, paying, model = int(self._at.on), self._paying, self._owner.model
+        model = self._owner.model
         for offset, count, cells in self._waiting[: self._at.waiting].tolist():
             size = sample_size(cells)
             end = offset + count * size
             rows = self._samples[offset:end].reshape(count, size).copy()
             batch = self._run.batch_of(rows, cells, model.ends.values)
-            lacks = self._samples[end : end + f.OF_REEL * cells].reshape(f.OF_REEL, cells)
-            line, reel = lines(cells, bits=model.line.bits, plane=model.line.plane, **ABSENT), self._reel(1 - k, cells)
-            reel.numbers[:] = paying.reel.numbers
-            self._line_table.bind(line=model.line, whole=self._whole, out=line, reel=reel, nodes=paying.plan.nodes)
-            make_line(self._line_table.numbers)
-            reel.lack[:], reel.rate[:], reel.since[:], reel.span[:] = lacks
-            yield paying.outputs_in(line, reel, batch)
+            yield self._outputs_of(batch, cells, end)
+
+    def _outputs_of(self, batch: Batch, cells: int, at: int) -> list[Output]:
+        """Outputs of a line of before, of so many cells; at: where in the memory for samples is what they lacked."""
+        k, paying, model = int(self._at.on), self._paying, self._owner.model
+        lacks = self._samples[at : at + f.OF_REEL * cells].reshape(f.OF_REEL, cells)
+        line, reel = lines(cells, bits=model.line.bits, plane=model.line.plane, **ABSENT), self._reel(1 - k, cells)
+        reel.numbers[:] = paying.reel.numbers
+        self._line_table.bind(line=model.line, whole=self._whole, out=line, reel=reel, nodes=paying.plan.nodes)
+        make_line(self._line_table.numbers)
+        reel.lack[:], reel.rate[:], reel.since[:], reel.span[:] = lacks
+        return paying.outputs_in(line, reel, batch)
 
     def empty(self) -> None:
         """No output waits any longer."""
@@ -385,11 +406,17 @@ class NodeChanges:
             self.sync()
 
 
+def is_plain(line: Line) -> bool:
+    """Whether a line has nothing that a node which enters or leaves would have to carry in Python."""
+    laws = "torsion", "tension_twist", "law", "bend_law", "slip_law", "wake_law", "moved"
+    return not any(getattr(line, name).size for name in laws) and not line.bits & REMEMBERS
+
+
 def outputs_of_now(owner: Transient, batch: Batch) -> list[Output]:
     """The outputs of a batch of the line of now, copied."""
     paying, line = owner.payout, owner.model.line
     assert paying is not None
-    return paying.outputs_in(own_arrays(line), paying.reel, Batch._make(x.copy() for x in batch))
+    return paying.outputs_of_now(line, Batch._make(x.copy() for x in batch))
 
 
 def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:

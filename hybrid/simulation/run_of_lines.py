@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
+from hybrid.simulation.lines_cells import HasPlanes
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.system_lines import LineResult
 from hybrid.solve.joined import SystemState
@@ -83,7 +84,7 @@ class RunOfLines(Protocol):
     def payout(self) -> PaidLines | None: ...
 
     @property
-    def planes(self) -> Any: ...
+    def planes(self) -> HasPlanes | None: ...
 
     @property
     def recorder(self) -> Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder: ...

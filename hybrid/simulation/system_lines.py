@@ -71,6 +71,7 @@ from hybrid.store.writer import Recorder
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
     from hybrid.simulation.lines_cells import LineCells
+    from hybrid.simulation.lines_nodes import LineNodes
     from hybrid.simulation.payout import PayingOut
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
@@ -161,7 +162,7 @@ class Waiting(NamedTuple):
 class LineResult:
     """What is recorded of one line."""
 
-    cells: LineCells | None = None  # what changes cells without Python
+    cells: LineCells | LineNodes | None = None  # what changes cells, or lets nodes enter and leave, without Python
     _sampled: Sequence[Output] = ()  # of several meshes, of which `output` is still to be told
 
     def __init__(
@@ -238,6 +239,8 @@ class LineResult:
         line, layout, touches = self.model.line, self.model.layout, self.books.touch.size > 0
         more = len(line.torsion), touches, line.moved.size, sampled_size(line)
         cells = line.h.size if layout is None else int(layout.starts[-1])
+        if layout is None and self.paying is not None:
+            cells = max(cells, self.paying.most_cells)
         return sample_size(cells, layout is not None, *more) + (error_size(cells) if self.correction else 0)
 
     def make_room(self, rows: int) -> None:
@@ -326,10 +329,10 @@ class LineResult:
 
     @property
     def outputs_join(self) -> bool:
-        """Whether outputs wait though the cells that they are of change, because these follow the curvature."""
-        follows = self._moves and self.paying is None and not self.touches and follows_curvature(self.scene)
-        follows = follows and self.shown is None and self.correction is None
-        return follows and may_be_joined(self.observer, self.model.line)
+        """Whether outputs wait though the cells that they are of change, by the curvature or at a winch."""
+        change = follows_curvature(self.scene) if self.paying is None else self.model.layout is None
+        change = change and self._moves and not self.touches and self.shown is None and self.correction is None
+        return change and may_be_joined(self.observer, self.model.line)
 
     def follow(self, model: Model, other_cells: bool = False) -> None:
         """Go on with another model, after what waits has been recorded.
@@ -485,7 +488,9 @@ class LineResult:
             self._aside.put(self.model, self._sampled)
             self._sampled = ()
         elif self.outputs_join:
-            self._aside.put(self.model, outputs_in(batch, self.model.line, self.model.zones))
+            line, paying = self.model.line, self.paying
+            own = outputs_in(batch, line, self.model.zones) if paying is None else paying.outputs_of_now(line, batch)
+            self._aside.put(self.model, own)
         else:
             self._waiting.append(batch)
             self._errors.append(self._sampled_errors)

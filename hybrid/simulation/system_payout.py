@@ -16,12 +16,14 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.reel.payout import iterate, iterate_with_others, pay_out, stand_among
 from hybrid.kernels.reel.reel import ReelJob
+from hybrid.kernels.run.payout_run import ask_node, change_node
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Floats, state_for
 from hybrid.model.build import Model
 from hybrid.model.system import SystemModel
 from hybrid.simulation.failure import winch_text
+from hybrid.simulation.lines_nodes import LineNodes
 from hybrid.simulation.payout import Before, PayingOut
 from hybrid.simulation.payout_zones import PaidZones, moving_zones
 from hybrid.simulation.run_of_lines import RunOfLines
@@ -44,6 +46,10 @@ class SystemPayout:
         self._take({k: x.on(run.model.models[k], run.model.models[k].length) for k, x in self.lines.items()})
         for k, x in self.lines.items():
             x.begin_phases(run.model.models[k].line, run.state.lines[k])
+        self._rows = np.array([x.table.numbers for x in self.lines.values()])
+        for row, x in zip(self._rows, self.lines.values(), strict=True):
+            x.table.move(row)
+        self._nodes: dict[int, LineNodes] = {}  # what lets nodes enter and leave without Python
 
     def _take(self, models: Mapping[int, Model]) -> None:
         run = self._run
@@ -78,8 +84,27 @@ class SystemPayout:
         even, odd = loop.turns
         for k, x in self.lines.items():
             x.table.bind(old=even.lines[k], new=odd.lines[k])
-        tables = np.array([x.table.numbers for x in self.lines.values()])
-        loop.pay(tables, pay_out.address(tables[0]))
+            self._change_by_itself(k)
+        loop.pay(self._rows, pay_out.address(self._rows[0]))
+        jobs = [self._nodes[k].job if k in self._nodes else None for k in self.lines]
+        one = next((x for x in jobs if x is not None), None)
+        loop.change_nodes(jobs, *(() if one is None else (ask_node.address(one), change_node.address(one))))
+
+    def _change_by_itself(self, k: int) -> None:
+        """Let nodes of line k enter and leave without Python from now on, where that can be."""
+        run, nodes = self._run, self._nodes.get(k)
+        if nodes is None or not nodes.fits:
+            self._nodes.pop(k, None)
+            if not run.loop.counts.samples and LineNodes.may_change(run, k):
+                self._nodes[k] = LineNodes(run, k)
+                self._nodes[k].adopt()
+            if k not in self.zones:
+                run.lines[k].cells = self._nodes.get(k)
+
+    def sync(self) -> None:
+        """Python knows of the nodes of now."""
+        for x in self._nodes.values():
+            x.sync()
 
     @contextmanager
     def forces_on(self) -> Iterator[dict[int, Floats]]:
@@ -101,7 +126,9 @@ class SystemPayout:
             if x.at_its_end:
                 text = winch_text(x)
                 raise LineFailed(k, Outcome.WINCH_AT_END, run.t, float(run.model.models[k].line.s[-1]), text)
-            if x.due:
+            if x.due and k in self._nodes and self._nodes[k].fits:
+                self._nodes[k].change()
+            elif x.due:
                 self._change(k, x)
                 changed.append(k)
         if changed and run.zones is not None:

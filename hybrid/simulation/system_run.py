@@ -680,6 +680,8 @@ class SystemRun:
         code = self.loop.go()
         if self.zones is not None:
             self.zones.sync()
+        if self.payout is not None:
+            self.payout.sync()
         self.state, self.other = self.loop.states
         return code
 

@@ -66,7 +66,7 @@ class SystemSteps:
         self._waves = 0
         self._is_new = True  # whether nobody knows which lines are near what is free in the state of now
         self._followed = np.zeros((0, 0), np.int64)  # jobs of zones
-        self._changes = False  # whether cells of some line change in compiled steps
+        self._changes = self._winds = False  # whether cells of some line, or nodes at a winch, change in compiled steps
         clock = self.clock
         clock.rho, clock.allowed, clock.tolerance, clock.error_ratio = rho, np.inf, 1.0, 1.0
         self.controlled = largest > 0.0
@@ -179,7 +179,20 @@ class SystemSteps:
 
     def pay(self, lines: np.ndarray, payer: int) -> None:
         """These tables (W, ..) of kernels.reel.reel change the lengths of lines from now on, by pay_out at `payer`."""
-        self._job.bind(paid=lines, payer=payer)
+        self._job.bind(paid=lines, payer=payer, nodes_due=np.zeros(len(lines), np.int64))
+
+    def change_nodes(self, lines: Sequence[NDArray[np.int64] | None], asker: int = 0, reeler: int = 0) -> None:
+        """These tables of kernels.run.payout_run let nodes of lines that `pay` has enter and leave, where there is one.
+
+        asker, reeler: addresses of ask_node and change_node there.
+        """
+        known = [x for x in lines if x is not None]
+        self._winds = bool(known)
+        if known:
+            tables = np.array([np.zeros_like(known[0]) if x is None else x for x in lines])
+            self._job.bind(reeled=tables, reels=np.array([x is not None for x in lines], np.int64))
+            self._job.bind(runner=run_system.address(self._job.numbers))
+        self._job.bind(node_asker=asker if known else 0, reeler=reeler if known else 0)
 
     def take_tangents(self, job: np.ndarray, follower: int) -> None:
         """After every step this kernel takes tangents along it, with a table of kernels.run.system_tangents."""
@@ -222,7 +235,7 @@ class SystemSteps:
         if self._is_new and self._solver.mixes:
             self._solver.find_near(self.states[0], float(self.clock.now))
             self._job.bind(**self._solver.regroup())
-        self._is_new, go = False, run_lines if self._changes else run_system
+        self._is_new, go = False, run_lines if self._changes or self._winds else run_system
         while (code := int(go(self._job.numbers))) == REGROUP:
             self._job.bind(**self._solver.regroup())
         return code

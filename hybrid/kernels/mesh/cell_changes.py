@@ -73,7 +73,7 @@ class RenewJob(NamedTuple):
     books: Books
     push: Floats  # (N+1, 4) out of the plane; empty: none
     new_push: Floats  # (M+1, 4)
-    next_push: Floats  # (M+1, 4) room for the next
+    next_push: Floats  # (M+1, 4) a copy of it (written)
     envelope_s: Floats  # (E,) m, places of extremes of all meshes
     bounds: Floats  # (4, EXTREMES, E)
     stays: NDArray[np.int64]  # room for all nodes
@@ -230,7 +230,9 @@ def renew(table):
             zones.waves[k] = 0.0
     if job.push.shape[0] > 0:
         carry_push(job.push, job.s, job.line.s, job.new_push)
-        clear(job.next_push)
+        for i in range(job.new_push.shape[0]):  # of a state of either parity, as the state
+            for k in range(job.new_push.shape[1]):
+                job.next_push[i, k] = job.new_push[i, k]
     for c in range(job.width.shape[0]):
         job.width[c] = job.widths[job.of[c]]
     job.nearest[0], job.nearest[1] = -1, -1

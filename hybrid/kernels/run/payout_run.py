@@ -233,7 +233,9 @@ def renew_run(table):
     copy_state(job.carry.out, job.twin)
     if job.push.shape[0] > 0:
         carry_push(job.push, line.s, target.s, job.new_push)
-        clear(job.next_push)
+        for i in range(m + 1):  # of a state of either parity, as the state
+            for k in range(job.new_push.shape[1]):
+                job.next_push[i, k] = job.new_push[i, k]
     renew_books(job, n, m, forward, min(n, m) - job.carry.new.layer.shape[0] + 1)
     clear(job.sea.axis)
     clear(job.sea.slip)
@@ -242,7 +244,7 @@ def renew_run(table):
     clear(job.sea.flow)
     for j in range(job.work.report.shape[0]):
         job.work.report[j] = 0.0
-    clock.wave_step, clock.previous = wave_step(target, job.scale), clock.now
+    job.books.clock.wave_step, clock.previous = wave_step(target, job.scale), clock.now
     job.books.counts.parity = 0
 
 
@@ -287,6 +289,7 @@ class PaidCalls(NamedNumbers, number=np.int64):
     before_forces: int
     stand_still: int
     after_forces: int
+    books: int  # of one of several lines: of kernels.run.system.begin_line
 
 
 class PaidPlaces(NamedNumbers, number=np.int64):
@@ -303,6 +306,8 @@ class PaidPlaces(NamedNumbers, number=np.int64):
     may_wait: int  # 1 where outputs may wait although the line that they are of changes
     waiting: int  # lines whose outputs wait; numbers of their samples
     used: int
+    of_many: int  # 1 for one of several lines, whose outputs all stand in rows of the most cells, `used` of them aside
+    placed: int  # numbers of its reels that wait with them, in the memory for samples
     boxes_at: int  # where the table of kernels.contact.self_distance has the rows of its tree
 
 
@@ -317,6 +322,7 @@ class PaidRunJob(NamedTuple):
     calls: PaidCalls
     at: PaidPlaces
     clock: Clock  # of the run
+    own: Clock  # and of the line, which is another one where there are several
     counts: b.Counts
     outputs: Floats
     winch: Winch
@@ -325,6 +331,9 @@ class PaidRunJob(NamedTuple):
     run: Numbers  # table of the run
     run_places: Numbers  # of those of its numbers that follow the cells
     in_run: NDArray[np.int64]  # (2 sides, 3, run_places.size)
+    even: Numbers  # of one of several: likewise its tables in steps from states of even parity, and of odd
+    odd: Numbers
+    in_odd: NDArray[np.int64]  # likewise of those
     paid: Numbers  # likewise the table of kernels.reel.payout
     paid_places: Numbers
     in_paid: NDArray[np.int64]
@@ -341,7 +350,7 @@ def blank_paid_run_job() -> PaidRunJob:
     """A job with the types that every one has."""
     z, few, sides, reel = np.zeros, np.zeros(1, np.int64), np.zeros((2, 3, 1), np.int64), blank_reel(1)
     return PaidRunJob(
-        PaidCalls(), PaidPlaces(), b.Clock(), b.Counts(), z(0), Winch(), reel, reel,
+        PaidCalls(), PaidPlaces(), b.Clock(), b.Clock(), b.Counts(), z(0), Winch(), reel, reel, few, few, sides,
         few, few, sides, few, few, sides, few, few, sides, few, sides, z((1, 3), np.int64), z(1),
     )  # fmt: skip
 
@@ -357,7 +366,7 @@ def reel_of(job):
 
 @inner
 def put_all(job):
-    """The run goes on with the line of now; its samples come behind those that wait."""
+    """The run goes on with the line of now; samples of a single one come behind those that wait."""
     at = job.at
     k, m = at.on, at.cells
     put_at(job.in_run[k], job.run_places, m, job.run)
@@ -365,8 +374,12 @@ def put_all(job):
     if job.itself_places.shape[0] > 0:
         put_at(job.in_itself[k], job.itself_places, m, job.itself)
         job.itself[at.boxes_at] = boxes(m)
-    job.run[at.samples_at] = at.room + 8 * at.used
-    job.run[at.samples_at + 1] = min(at.most_rows, (job.room.shape[0] - at.used) // numbers_of_sample(m))
+    if at.of_many != 0:
+        put_at(job.in_run[k], job.run_places, m, job.even)
+        put_at(job.in_odd[k], job.run_places, m, job.odd)
+    else:
+        job.run[at.samples_at] = at.room + 8 * at.used
+        job.run[at.samples_at + 1] = min(at.most_rows, (job.room.shape[0] - at.used) // numbers_of_sample(m))
 
 
 @inner
@@ -383,12 +396,15 @@ def change(job):
     call(calls.renew, job.node)
     at.on, at.cells, at.changes = 1 - k, m, at.changes + 1
     put_all(job)
+    job.own.now = job.clock.now
     call(calls.before_forces, job.run)
     job.run[at.task] = ASSEMBLY
     call_solver(calls.solver, job.run)
     job.run[at.task] = RUN
     call(calls.stand_still, job.paid)
     call(calls.after_forces, job.run)
+    if calls.books != 0:
+        call(calls.books, job.run)
 
 
 @inner
@@ -414,17 +430,56 @@ def may_change(job):
 
 
 @inner
+def keep_reel(job, o):
+    """What cells of the line lack waits in the room from a number on; returns how many numbers that are."""
+    reel, n = reel_of(job), job.at.cells
+    for c in range(n):
+        job.room[o + c], job.room[o + n + c] = reel.lack[c], reel.rate[c]
+        job.room[o + 2 * n + c], job.room[o + 3 * n + c] = reel.since[c], reel.span[c]
+    return OF_REEL * n
+
+
+@inner
 def set_aside(job):
     """The outputs that have been sampled wait, with what cells of the line lacked."""
-    at, row, reel, n = job.at, job.waiting[job.at.waiting], reel_of(job), job.at.cells
-    row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, job.counts.samples, n
-    at.used += row[COUNT] * numbers_of_sample(n)
-    for c in range(n):
-        job.room[at.used + c], job.room[at.used + n + c] = reel.lack[c], reel.rate[c]
-        job.room[at.used + 2 * n + c], job.room[at.used + 3 * n + c] = reel.since[c], reel.span[c]
-    at.used += OF_REEL * n
+    at, row = job.at, job.waiting[job.at.waiting]
+    row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, job.counts.samples, at.cells
+    at.used += row[COUNT] * numbers_of_sample(at.cells)
+    at.used += keep_reel(job, at.used)
     at.waiting += 1
     job.counts.samples = 0
+
+
+@inner
+def keep_rows(job):
+    """The same of one of several lines, whose outputs wait where they are."""
+    at, some = job.at, job.counts.samples - job.at.used
+    if some > 0:
+        row = job.waiting[at.waiting]
+        row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, some, at.cells
+        at.placed += keep_reel(job, at.placed)
+        at.used += some
+        at.waiting += 1
+
+
+@kernel
+def ask_node(table):
+    """Whether a node of one of several lines is to enter or leave, and may without Python, as a number."""
+    job = read(table)
+    at = job.at
+    if reel_of(job).numbers.due == 0.0 or at_its_end(job.winch):
+        return 0
+    room = at.waiting < job.waiting.shape[0] and at.placed + OF_REEL * at.cells <= job.room.shape[0]
+    return 1 if job.counts.samples == at.used or (at.may_wait != 0 and room) else 0
+
+
+@kernel
+def change_node(table):
+    """A node of one of several lines enters or leaves, after outputs within the last step."""
+    job = read(table)
+    keep_rows(job)
+    change(job)
+    return 1
 
 
 @kernel

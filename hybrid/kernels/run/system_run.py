@@ -62,7 +62,8 @@ from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, pass
 LINE, CUT_LINE, TURNED_LINE, SLACK_LINE = range(4)
 # What a call returns beside codes of kernels.state.books: lines are to be solved with others, or by themselves, from now on.
 REGROUP = 16
-# What `run_system` returns beside codes of kernels.state.books: zones are due, of lines whose cells change without Python.
+# What `run_system` returns beside codes of kernels.state.books: zones, or nodes at a winch, are due, of lines where what
+# changes then needs no Python.
 CELLS_DUE = 32
 # Of `limits`: the reach of Newton's method, m; its iterations at most; the arm by which moments on bodies are compared
 # with forces, m.
@@ -100,6 +101,11 @@ class StepsJob(NamedTuple):
     changed: NDArray[np.int64]  # (Z, ..) tables of kernels.run.following_run.FollowingJob, of lines whose cells follow
     changes: NDArray[np.int64]  # (Z,) 1 where there is one
     paid: NDArray[np.int64]  # (W, ..) likewise of kernels.reel.reel.ReelJob, of lines that are paid out
+    nodes_due: NDArray[np.int64]  # (W,) whether a node is to enter or leave there after the last step
+    reeled: NDArray[
+        np.int64
+    ]  # (W, ..) tables of kernels.run.payout_run.PaidRunJob, of lines where that needs no Python
+    reels: NDArray[np.int64]  # (W,) 1 where there is one
     beside: NDArray[np.int64]  # of a kernels.run.system_tangents.SystemTangents
     solver: int = 0  # address of kernels.run.system.solve_system
     leader: int = 0  # of kernels.junctions.lone_lines.lead_lone; 0: no line can come near what is free
@@ -115,6 +121,8 @@ class StepsJob(NamedTuple):
     asker: int = 0
     changer: int = 0
     payer: int = 0  # of kernels.reel.payout.pay_out; 0: lines keep their lengths
+    node_asker: int = 0  # of kernels.run.payout_run.ask_node and change_node; 0: Python lets nodes enter and leave
+    reeler: int = 0
     tangents: int = 0  # of kernels.run.system_tangents.follow_system; 0: none are followed
 
 
@@ -131,7 +139,7 @@ def blank_steps_job() -> StepsJob:
     return StepsJob(
         none, none, none, none, none, lone, none, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
         np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
-        none, none, lone, none, lone, none, lone, none,
+        none, none, lone, none, lone, none, lone, none, lone, none, none,
     )  # fmt: skip
 
 
@@ -292,14 +300,14 @@ def follow_lines(steps):
 
 
 @inner
-def change_lines(steps):
-    """Other cells for all lines that ask for these and for nothing else; 0: Python has to look, and none has changed."""
-    for k in range(steps.due.shape[0]):
-        if steps.due[k] != 0 and (steps.changes[k] == 0 or call_watch(steps.asker, steps.changed[k]) == 0):
+def change_lines(due, may, tables, asker, changer):
+    """A change for all lines where it is due and nothing else is; 0: Python has to look, and none has changed."""
+    for k in range(due.shape[0]):
+        if due[k] != 0 and (may[k] == 0 or call_watch(asker, tables[k]) == 0):
             return 0
-    for k in range(steps.due.shape[0]):
-        if steps.due[k] != 0:
-            call_watch(steps.changer, steps.changed[k])
+    for k in range(due.shape[0]):
+        if due[k] != 0:
+            call_watch(changer, tables[k])
     return 1
 
 
@@ -312,7 +320,8 @@ def pay_lines(steps):
     if steps.counts.phase == SOLVE:
         take_past(steps.clock, steps.counts)
     for k in range(steps.paid.shape[0]):
-        due |= call_follower(steps.payer, steps.paid[k])
+        steps.nodes_due[k] = call_follower(steps.payer, steps.paid[k])
+        due |= steps.nodes_due[k]
     return due
 
 
@@ -449,7 +458,9 @@ def between_steps(steps, table):
         if is_due(steps, -1) and call_sample(steps.sampler, table) == 0:
             return PAUSED
         counts.phase = END_STEP
-        if steps.changer != 0 and counts.notices == ZONES_DUE and not counts.asks & ASK_STEPS:
+        zones, nodes = steps.changer != 0, steps.reeler != 0
+        due = (zones and counts.notices == ZONES_DUE) or (nodes and counts.notices == NODES_DUE)
+        if due and not counts.asks & ASK_STEPS:
             return CELLS_DUE
         if counts.notices != 0 or counts.asks & ASK_STEPS:
             return STEPPED
@@ -540,7 +551,7 @@ def run_system(table):
 
 @kernel
 def run_lines(table):
-    """`run_system`, with other cells for lines that ask for nothing else.
+    """`run_system`, with other cells, and nodes that enter or leave, of lines that ask for nothing else.
 
     These write to tables that steps take as constant, so steps are called by their address.
     """
@@ -549,6 +560,10 @@ def run_lines(table):
         code = call_watch(steps.runner, table)
         if code != CELLS_DUE:
             return code
-        if change_lines(steps) == 0:
+        if steps.counts.notices == ZONES_DUE:
+            done = change_lines(steps.due, steps.changes, steps.changed, steps.asker, steps.changer)
+        else:
+            done = change_lines(steps.nodes_due, steps.reels, steps.reeled, steps.node_asker, steps.reeler)
+        if done == 0:
             return STEPPED
         steps.counts.notices = 0
