@@ -197,7 +197,12 @@ def _with_friction(
 
 
 def _keep_turns(model: SystemModel, t: float, found: LinesAtRest) -> LinesAtRest:
-    """The same equilibrium; LineFailed where a line has lost turns by which its ends, which hold it, twist it."""
+    """The same equilibrium; LineFailed where a line has lost turns by which its ends, which hold it, twist it.
+
+    A motion with contact keeps them by itself, in the writhe of loops as well (system_contact_equilibrium.settle).
+    """
+    if found.settled:
+        return found
     for k, (name, x, state) in enumerate(zip(model.names, model.models, found.state.lines, strict=True)):
         try:
             count_turns(model.scenes[name], x, t, state, model.turns[k])
