@@ -225,7 +225,9 @@ def _same_water(there: Floats, taken: Floats) -> bool:
 
 def _starts(system: System, model: SystemModel) -> Iterator[Start]:
     """Shapes from which the equilibrium is looked for."""
-    yield "lines hung between the first places", SystemState([x.start for x in model.models], model.body_places)
+    several = len(model.models) > 1
+    shape = "lines hung between the first places" if several else model.models[0].start_shape
+    yield shape, SystemState([x.start for x in model.models], model.body_places)
     system = system.searched()
     places = balanced_places(system, model)
     if places is not None and len(model.places) + len(model.body_places):

@@ -75,6 +75,7 @@ FILES: dict[str, dict[str, Any]] = {
     "pipe": {S + "pipe": {"wall": 0.002}} | STIFF,
     "clumps and sections": FEATURES["clump"][0],
     "obstacle": FEATURES["obstacle"][0],
+    "contact": FEATURES["contact"][0],
 }
 
 
