@@ -35,11 +35,14 @@ from hybrid.simulation.stepped_points import SteppedPoints
 from hybrid.simulation.system_run import Recording, SystemRun, static_system
 from hybrid.simulation.system_start import named
 from hybrid.solve.joined import LineFailed
+from hybrid.solve.system_steps import ROWS_OUTSIDE
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
 from hybrid.store.reader import Result, open_result, written_result
 
+# s of the wall, after which the time of the processor is read again: to read it may take as long as ten steps.
+READ_OUTSIDE = 1.0
 NUMBER = (int, float, np.integer, np.floating)
 
 
@@ -109,6 +112,7 @@ class Simulation(SteppedPoints):
         self._sliver = SLIVER * self._run.resolution.one.step
         self._driven, self._next, self._wound = {}, {}, {}
         self._courses, self._moved = {}, {}
+        self._seen = int(self._run.loop.counts.output)  # outputs that readers of the file have been shown
         self._final = 0  # how often what had been recorded was made final
         self._here: Saved | None = None  # what was saved of the state as it is now
 
@@ -134,7 +138,7 @@ class Simulation(SteppedPoints):
         with nullcontext() if self._form is None else self._form.said():
             cells, text = layers_at_rest(self._system), scene_text(self.scene)
             run = SystemRun(self._system, self._target, text, True, cells, recording, criterion)
-        run.loop.counts.most_iterations = most
+        run.loop.counts.most_iterations, run.loop.most_rows, run.read_every = most, ROWS_OUTSIDE, READ_OUTSIDE
         try:
             run.begin_motion()
         except LineFailed as failed:
@@ -174,8 +178,10 @@ class Simulation(SteppedPoints):
         self._start_courses(self.t, until)
         try:
             self._go_to(until)
-            if not self._final:  # after a `save` nothing is final
+            made = int(self._run.loop.counts.output)
+            if not self._final and made != self._seen and self._run.is_due:  # after a `save` nothing is final
                 self._run.keep()
+                self._seen = made
         except LineFailed as failed:
             raise (self._fail(failed) if before is None else self._undo(failed, before)) from None
         if any(not x.is_reported and x.contradiction() for x in self._ends_set()):

@@ -230,6 +230,7 @@ class SystemRun:
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
         self._begin = clock_now()
+        self.read_every = READ_EVERY
         self._read = -np.inf, 0.0  # s of the wall, when the time of the processor was read last, and that
         self.recorder = self._go_on(source) if source is not None else self.file.begin()
 
@@ -310,6 +311,11 @@ class SystemRun:
             recorder.event(point.t, *self.file.span, OTHER_PROGRAM, why)
         self._begin, self._checked = clock_now() - self.cpu, self.steps
         return recorder
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the file is to be brought up to date, by the clock."""
+        return not isinstance(self.recorder, ComparisonRecorder) and self.recorder.due
 
     def keep(self, last: bool = False) -> None:
         """Keep a checkpoint where one is due, by the work done, and bring the file up to date; last: it is the end."""
@@ -647,6 +653,8 @@ class SystemRun:
         steps = equal_steps(self.leg, self.t, stop, self.resolution.one.step, False)
         self.leg = steps[:2]
         loop.begin_leg(stop, *steps)
+        if loop.counts.quota < LOOK:  # which a call takes from
+            loop.set_quota(ROWS)
         self._between, fitted = False, self._fitting()
         if self._fitted is None or any(x is not y for x, y in zip(fitted, self._fitted, strict=True)):
             self.record_samples()
@@ -779,9 +787,9 @@ class SystemRun:
                 model.sea.at(self.t)
 
     def _spent(self) -> float:
-        """Processor time of the run, s, to within READ_EVERY: to read it may take as long as ten steps."""
+        """Processor time of the run, s, to within `read_every`: to read it may take as long as ten steps."""
         wall = monotonic()
-        if wall - self._read[0] > READ_EVERY:
+        if wall - self._read[0] > self.read_every:
             self._read = wall, clock_now() - self._begin
         return max(self._read[1], self._logged)
 

@@ -47,10 +47,6 @@ from hybrid.solve.stepper import Stepper
 
 # Steps and samples that a call may take before Python writes them down.
 ROWS = 512
-# The same of a run that is stepped from outside in real time, where writing must be rare.
-ROWS_OUTSIDE = 4096
-# Numbers of samples, and rows of the log, that are copied for a state to come back to; more is written down before.
-MOST_KEPT, ROWS_KEPT = 200_000, 512
 # Cells times steps of a call: about 0.1 s, after which interrupts are heard and progress is reported.
 CELL_STEPS = 200_000
 # Waves that cost a cell in a step what all else does.

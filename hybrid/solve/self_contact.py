@@ -139,11 +139,6 @@ class ContactBooks:
         points = self.contact.points[: self.contact.counts.points]
         return float(points[:, DISTANCE].min())
 
-    def changing(self) -> tuple[np.ndarray, ...]:
-        """What steps change and later steps depend on."""
-        contact = self.contact
-        return (contact.numbers, contact.counts, contact.grips, contact.fresh)
-
     def checkpoint(self, t: float) -> dict[str, Any]:
         """What the steps after the time t, s, depend on."""
         contact, numbers, counts = self.contact, self.contact.numbers, self.contact.counts

@@ -38,6 +38,8 @@ from hybrid.solve.system import SystemSolver
 
 # Numbers of the log of all lines, at most.
 MOST_LOGGED = 2_000_000
+# Steps that wait to be logged of what is stepped from outside in real time, where writing must be rare.
+ROWS_OUTSIDE = 4096
 
 
 class SystemSteps:
@@ -56,6 +58,7 @@ class SystemSteps:
         that follow their errors; 0: none do; most_turn: rad, by which an end that is moved may turn in a step.
         """
         self.outputs = np.array(outputs, float)
+        self.most_rows = one_line.ROWS  # steps that wait to be logged
         self.body_samples, self.worked = np.zeros((0, 0, BODY_SAMPLE)), np.zeros((3, 0, WORK))
         self.clock, self.counts = b.Clock(), b.Counts()
         self.lines = np.zeros(4, np.int64)
@@ -87,7 +90,7 @@ class SystemSteps:
         counts.parity, self._states, self._solver = 0, (state, other), solver
         lines = len(solver.lines)
         if len(self.seen) != lines:
-            rows = max(16, min(one_line.ROWS, MOST_LOGGED // (lines * len(b.LOG))))
+            rows = max(16, min(self.most_rows, MOST_LOGGED // (lines * len(b.LOG))))
             self._log, self.seen = np.zeros((rows, lines, len(b.LOG))), np.zeros(lines, np.int64)
             counts.rows = 0
         jobs, self._is_new = solver.take_turns(self._states), True
