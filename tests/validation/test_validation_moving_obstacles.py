@@ -222,10 +222,7 @@ def test_a_run_over_a_sheave_goes_on_and_is_taken_back_bit_for_bit(rolled: Any, 
             simulation.stiffness("end")
         simulation.advance(0.9)
         drum, result = simulation.obstacle("drum"), simulation.result()
-    with hybrid.Simulation(weights(0.1)) as plain:
-        plain.advance(0.9)
-        np.testing.assert_array_equal(result.position, plain.result().position)
-    np.testing.assert_allclose(result.position, rolled.position, rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(result.position, rolled.position)
     np.testing.assert_allclose(drum.moment, rolled["obstacles/drum/moment"][-1], atol=1e-9)
     turned = np.radians(rolled["obstacles/drum/rotation"][-1, 1])  # about y, beyond a quarter turn with roll and yaw
     assert abs(drum.rotation[0, 0]) == pytest.approx(np.cos(turned), abs=1e-9)

@@ -270,12 +270,8 @@ def test_steps_are_taken_back_bit_for_bit(chute: Any) -> None:
             simulation.step()
         simulation.advance(2.0)
         drum, result = simulation.obstacle("drum"), simulation.result()
-    with hybrid.Simulation(scene) as simulation:
-        simulation.advance(2.0)
-        plain = simulation.result()
     for name in NAMES:
-        assert np.array_equal(result[name], plain[name]), name
-        np.testing.assert_allclose(result[name], one[name], rtol=1e-7, atol=1e-9, err_msg=name)
+        assert np.array_equal(result[name], one[name]), name
     np.testing.assert_allclose(drum.moment, one["obstacles/drum/moment"][-1], atol=1e-9)
 
 
