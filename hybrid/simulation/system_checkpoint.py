@@ -137,7 +137,7 @@ def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
         if "self_contact" in line:
             line["self_contact"] = None  # as many places of friction as there are
     found = matched(dict(saved), template)
-    _check_told(run, found)
+    _check_names(run, found)
     run.start_from(found["rest"])
     if run.planes is not None:
         run.planes.restore_planes(found["planes"])
@@ -152,7 +152,7 @@ def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
             line.impose_now()
 
 
-def _check_told(run: KeptRun, found: Mapping[str, Any]) -> None:
+def _check_names(run: KeptRun, found: Mapping[str, Any]) -> None:
     """ValueError: what has been told of names that the run does not have, or equal steps that cannot be."""
     if not (isinstance(found["dry"], list) and set(found["dry"]) <= set(run.system.bodies)):
         raise ValueError("dry: names of bodies were expected")
