@@ -91,3 +91,53 @@ def scene_in_motion(seed: int) -> tuple[str, dict[str, Any]]:
     tables["time"] = {"duration": period, "step": period / 80.0, "rho_inf": 0.6}
     tables["output"] = {"every": period / 40.0, "points": 21}
     return kind, tables
+
+
+def scene_at_anchor(seed: int) -> tuple[str, dict[str, Any], str]:
+    """A kind, a scene whose end is heaved and surged with fixed steps, and a number of it that matters.
+
+    Its anchor lies at the level of the bed, at the depth at which the line rests, between both, or above.
+    """
+    g = np.random.default_rng(7000 + seed)
+    model, clamp = ("catenary", "rod")[seed % 2], seed % 8 in (3, 7)
+    L, d = float(g.uniform(40.0, 250.0)), float(g.uniform(0.02, 0.08))
+    mass = np.pi / 4 * d * d * 1025 * float(g.uniform(1.5, 4.0))
+    w = (mass - np.pi / 4 * d * d * 1025) * 9.81
+    section: dict[str, Any] = {
+        "length": L, "mass": mass, "diameter": d, "axial_stiffness": float(10 ** g.uniform(6, 7.5)),
+        "drag": {"normal": float(g.uniform(0.8, 1.6)), "tangential": 0.02}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    if model == "rod":
+        section |= {"bending_stiffness": float(10 ** g.uniform(0.0, 3.0)), "torsional_stiffness": 50.0}
+    depth = L * float(g.uniform(0.25, 0.45))
+    k = w / (d * 10 ** float(g.uniform(-1.5, 0)))
+    rests = w / k  # m, the depth at which it does
+    places = (0.0, 0.0, float(g.uniform(-1, 1)) * rests / 2, float(10 ** g.uniform(-2, 0)) * rests * 3)
+    above = (*places, float(g.uniform(0.01, 0.3)) * d * 10)[seed // 2 % 5]
+    if seed // 2 % 5 == 1:
+        above = -rests * float(g.uniform(0.8, 1.2))
+    bed = {"z": -depth - above, "stiffness": k, "damping": float(g.choice([0.0, 0.1 * k]))}
+    if seed % 10 == 9:
+        bed["friction"] = float(g.uniform(0.2, 0.6))
+    start: dict[str, Any] = {"kind": "pinned", "position": [0.0, 0.0, -depth]}
+    if clamp:
+        start |= {"kind": "clamped", "tangent": [1.0, 0.0, float(g.uniform(-0.02, 0.05))]}
+    far = float(np.sqrt(L**2 - depth**2)) * float(g.uniform(0.9, 0.985))
+    period = float(g.uniform(4, 9))
+    motion: dict[str, Any] = {"ramp": 0.5 * period}
+    for axis, low, high in (("heave", 0.003, 0.01), ("surge", 0.001, 0.005)):
+        size = float(g.uniform(low, high)) * L
+        motion[axis] = {"amplitude": size, "period": period, "phase": float(g.uniform(0, 360))}
+    end = {"kind": "pinned", "position": [far, float(g.choice([0.0, 0.1])) * far, 0.0], "motion": motion}
+    keys = ["mass", "axial_stiffness", "drag.normal", "length"]
+    keys = [f"cable.sections[0].{x}" for x in keys]
+    keys += ["environment.seabed.stiffness", "ends.end.position[0]", "ends.start.position[2]"]
+    keys += ["cable.sections[0].bending_stiffness"] if model == "rod" else []
+    scene = {
+        "environment": {"fluid": {"density": 1025.0}, "seabed": bed}, "cable": {"sections": [section]},
+        "ends": {"start": start, "end": end}, "initial": "equilibrium", "model": model,
+        "mesh": {"cells": int(g.choice([30, 50, 80]))},
+        "time": {"duration": period, "step": period / 80.0, "rho_inf": 0.6},
+        "output": {"every": period / 40, "points": 21},
+    }  # fmt: skip
+    return f"{model}, {start['kind']}, {above / rests:.2g} above", scene, keys[int(g.integers(len(keys)))]

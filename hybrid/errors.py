@@ -200,6 +200,8 @@ OF_AN_END = "moment and tangent at ends."
 KINK_COUNTS = "counts as a bend"
 # Of an event "out of plane": the motion is right, because it is one in space from there on.
 IN_SPACE = "it goes on in space"
+# And of one whose line is pushed there: its way goes by that.
+PUSHED = f"{IN_SPACE}, pushed by"
 # In the texts of "error uncertain" of named quantities, which an attribute of the result has as well.
 AS_MUCH = "finer cells and steps change as much as coarser ones did"
 # Kind of the event of a run that another program had begun.
@@ -235,7 +237,7 @@ _CAUSE = {
     "and stands on it",
     Outcome.COLLAPSED: "steps have become so short that the run would not end",
     Outcome.NOT_REACHED: "what is asked of the scene is not reached from where the search began",
-    Outcome.LEFT_PLANE: "it leaves the plane in which it lies at first, and dimension is 2",
+    Outcome.LEFT_PLANE: "it leaves the plane in which it lies at first",
     Outcome.OVERSTRETCHED: "the cable is stretched, or compressed, beyond what a section bears",
 }
 

@@ -36,9 +36,8 @@ OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
 PARTS = (1e-3, 2e-3)
 # How derivatives were found.
 TANGENTS, DIFFERENCES = "tangents along the steps", "differences of runs"
-# Error of tangents that equations give to one side, in parts of a number by which another line differs from the line; a
-# result that answers by less than this, in parts by parts, has it of this.
-ONE_SIDED, WEAK = 1.5, 0.04
+# A result that answers by less than this, in parts by parts, has the error of tangents of this.
+WEAK = 0.04
 # Of the length, by which zones of two runs may differ that are the same.
 SAME_ZONE = 0.005
 # Of the length, within which a place is at the end of a section.
@@ -109,26 +108,36 @@ def by_tangents(
     asked: Scene | System, wanted: Sequence[Wanted], course: Course, numbers: Mapping[str, float],
     sizes: Mapping[str, float],
 ) -> Slopes:  # fmt: skip
-    """Derivatives by tangents along the steps of one run; Unfollowed: they are not known of it."""
+    """Derivatives by tangents along the steps of one run; Unfollowed: they are not known of it.
+
+    They are the means of those to both sides of a number, where the scene may have less of it; half of what these
+    differ by is an error.
+    """
     steps = {key: step_of(key, sizes[key]) for key in numbers}
 
     def other(key: str, d: float) -> Scene | System:
+        return scene_with(asked, [(key,)], np.array([numbers[key] + d]))
+
+    beside: list[tuple[float, tuple[Any, Any | None]]] = []  # steps of numbers; the scenes there and on the other side
+    for key, h in steps.items():
         try:
-            return scene_with(asked, [(key,)], np.array([numbers[key] + d]))
+            more, less = other(key, h), other(key, -h)
         except SceneError as error:
             if numbers[key] == 0.0:
                 raise at_a_bound(key, 0.0) from error
             raise
-
-    pairs = [
-        (other(key, h), other(key, -h) if has_two_sides([key], numbers[key]) else None) for key, h in steps.items()
-    ]
-    base, slopes, off = followed(asked, wanted, course, pairs, [*steps.values()])
-    h = np.array([*steps.values()])[:, None]
-    size = np.array([[sizes[key]] for key in numbers])
-    parts = off[:, None] + ONE_SIDED * h / size
-    errors = parts * np.maximum(np.abs(slopes), WEAK * np.abs(base.values) / size)
-    return Slopes(base.values, slopes, errors, len(numbers) * (TANGENTS,))
+        two = has_two_sides([key], numbers[key])
+        beside += [(h, (more, less if two else None)), (-h, (less, more if two else None))]
+    try:
+        base, slopes, off = followed(asked, wanted, course, [x for _, x in beside], [h for h, _ in beside])
+    except Unfollowed as why:
+        why.number = None if why.number is None else why.number // 2
+        raise
+    up, down = slopes[::2], slopes[1::2]
+    mean, size = 0.5 * (up + down), np.array([[sizes[key]] for key in numbers])
+    left = np.maximum(off[::2], off[1::2])[:, None]  # by the last corrections of tangents
+    errors = left * np.maximum(np.abs(mean), WEAK * np.abs(base.values) / size) + 0.5 * np.abs(up - down)
+    return Slopes(base.values, mean, errors, len(numbers) * (TANGENTS,))
 
 
 def followed(

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.accuracy.api import run
+from hybrid.errors import PUSHED, ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import places_of
 from hybrid.model.lines_contact import passing_each_other
@@ -44,26 +45,38 @@ class Course(NamedTuple):
         """How finely lines are computed; finer: on cells and in steps half as long."""
         return {k: _halved(x) for k, x in self.lines.items()} if finer else self.lines
 
-    def network(self, scene: Any) -> System:
-        """The network that computes a scene with other numbers in a replay; its errors are not estimated."""
+    def network(self, scene: Any, dimension: int | None = 3) -> System:
+        """The network that computes a scene with other numbers in a replay; its errors are not estimated.
+
+        dimension: tangents know no plane of a line.
+        """
         made = scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})
         if not scene.line_names:
             made = network_of(made.model_copy(update={"model": self.scene.model}))
         elif scene.output.errors:  # lines pass each other as where these are estimated
             made = made.model_copy(update={"contact": passing_each_other(self.scene).contact})
-        found: System = made.model_copy(update={"dimension": 3})  # tangents know no plane of a line
+        found: System = made.model_copy(update={"dimension": dimension})
         return found  # runs of several lines estimate no errors by themselves
 
 
 def course_of(scene: Any) -> Course:
-    """Of a run of a scene: it is made where what it does tells how finely, for steps, accuracy and cells of a layer."""
+    """How to replay the run of a scene, which is made if need be.
+
+    It is where steps, an accuracy or cells of a layer leave open how finely, and where lines lie in a plane that they
+    may leave.  ComputationError: one is pushed out of it.
+    """
     if not _is_open(scene):
         first = SystemResolution.first(scene).lines if scene.line_names else {LINE: first_resolution(scene)}
-        return _with_nodes(Course(scene, first))
+        course = Course(scene, first)
+        flat = build_system(course.network(scene, scene.dimension), SystemResolution(first)).models
+        if scene.dimension is None and any(x.plane is not None for x in flat):
+            refuse_push(run(scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})))
+        return _with_nodes(course)
     with tempfile.TemporaryDirectory(prefix="hybrid-replay-") as room:
         path = Path(room) / "run.h5"
         run(scene, path).close()
         with open_result(path) as result:
+            refuse_push(result)
             computed: Any = parse_either(result.scene_text)[0]
             part = next(x for _, x in result.each_line())
             ends = tuple(np.array(part["steps/t"], float).tolist())
@@ -76,6 +89,15 @@ def course_of(scene: Any) -> Course:
         longest = float(np.diff([0.0, *ends]).max())
         found = {k: replace(x, local=None, later=0.0, step=longest, ends=ends) for k, x in found.items()}
     return _with_nodes(Course(computed, {k: replace(x, follow=False) for k, x in found.items()}))
+
+
+def refuse_push(result: Result) -> None:
+    """ComputationError where a line was pushed out of its plane, in which replays stay."""
+    for event in result.events:
+        if event.kind == "out of plane" and PUSHED in event.text:
+            detail = "it is pushed out of the plane, and how it moves from there on goes by that push"
+            first = "a shorter time.duration"
+            raise ComputationError(Outcome.LEFT_PLANE, event.t, event.s_a, detail, first=first)
 
 
 def replay(

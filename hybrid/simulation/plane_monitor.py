@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.errors import IN_SPACE
+from hybrid.errors import IN_SPACE, PUSHED
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats, Line, State
@@ -116,7 +116,7 @@ class PlaneMonitor:
             return False
         if self.home is None:
             back = f"; in the plane again where it is within {BACK:g} of its length" if self.comes_back else ""
-            note(where, "out of plane", f"{text}; {IN_SPACE}, pushed by {HANDED_ON:g} of its length{back}")
+            note(where, "out of plane", f"{text}; {PUSHED} {HANDED_ON:g} of its length{back}")
         return True
 
     def leave(self, model: Model, run: CarriesPush, state: State) -> Model:

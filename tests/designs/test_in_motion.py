@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from derivative_scenes import scene_at_anchor
 from typer.testing import CliRunner
 
 import hybrid
@@ -220,6 +221,39 @@ def test_where_the_origin_is_does_not_matter():
         found.append(in_motion(hybrid.validate_scene(scene), ["max tension@end"], keys).derivatives[:, 0])
     assert found[1] == pytest.approx(found[0], rel=1e-5)
     assert found[0][0] == pytest.approx(-found[0][1], rel=2e-3)  # moved by both nothing changes
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [0, 12, 15])
+def test_forces_at_an_anchor_on_the_bed_against_full_runs(seed):
+    """Where these say them to 1e-5; of 40 bench/test_bench_tangents.py tells."""
+    _, tables, key = scene_at_anchor(seed)
+    scene = hybrid.validate_scene(tables)
+    number, d = number_of(scene, key), 1e-5 * (scene.length if key.endswith("]") else number_of(scene, key))
+    (ours,) = in_motion(scene, ["last tension@start", "last reaction_start.z"], [key]).derivatives
+    with (
+        hybrid.run(changed_scene(scene, key, number + d)) as more,
+        hybrid.run(changed_scene(scene, key, number - d)) as less,
+    ):
+        ends = [np.array([x.tension[-1, 0], x.reaction_start[-1, 2]]) for x in (more, less)]
+    np.testing.assert_allclose(ours, (ends[0] - ends[1]) / (2.0 * d), rtol=1e-5)
+
+
+@pytest.mark.long
+def test_the_error_is_that_of_one_side():
+    """Near the bed a force answers unevenly to the height of an anchor: tangents to either side differ by as much."""
+    _, tables, key = scene_at_anchor(34)
+    found = in_motion(hybrid.validate_scene(tables), ["last reaction_start.z"], [key])
+    assert found.derivatives[0, 0] == pytest.approx(3050.66, rel=3e-5)  # of runs that are solved to round-off
+    assert found.errors[0, 0] == pytest.approx(0.2, rel=0.5)
+
+
+@pytest.mark.long
+def test_a_run_that_is_pushed_out_of_its_plane_has_no_derivative():
+    """Tangents stay in the plane, where the line would not: they were 0.3 to 0.8 % off the run, stated as 5e-7."""
+    _, tables, key = scene_at_anchor(17)
+    with pytest.raises(hybrid.ComputationError, match=r"leaves the plane(.|\n)*goes by that push"):
+        in_motion(hybrid.validate_scene(tables), ["last tension@start"], [key])
 
 
 @pytest.mark.parametrize("key", ["time.step", "time.duration", "mesh.cells"])
