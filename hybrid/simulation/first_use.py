@@ -38,7 +38,7 @@ STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_co
 OF_LINES = ("run.system.solve_system", SOLVER[1], OUTPUTS)
 STEPS_OF_LINES, REST_OF_LINES = "run.system_run.run_system", "run.system_run.sample_system"
 TOUCHING_LINES = "junctions.system_contact.touch_system", "junctions.shared_contact.shared_task"
-PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among"
+PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "run.payout_run.change_node"
 
 # A cable for the second process to compile with; nothing is computed of it.
 SAMPLE = {

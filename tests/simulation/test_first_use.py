@@ -48,7 +48,7 @@ def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: p
 
 def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
     """All entries that take a table, of which none is forgotten, but for what a line of several and a release ask for."""
-    others = {"stand_among", "end_payout", "iterate_with_others"}
+    others = {"stand_among", "end_payout", "iterate_with_others", "ask_node", "change_node"}
     entry = type(payout_run.go_on)
     used = {
         x.__qualname__

@@ -17,8 +17,9 @@ from hybrid.errors import SceneError
 from hybrid.model.payout_law import law_of, length_at
 from hybrid.scene.payout import Payout
 from hybrid.simulation import system_lines
-from hybrid.simulation.payout import PayingOut
-from hybrid.simulation.time_loop import TimeLoop
+from hybrid.simulation.lines_nodes import LineNodes
+from hybrid.simulation.outputs_aside import OutputsAside
+from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.transient import Transient
 from tests.inside import OnlyLine
 
@@ -588,15 +589,13 @@ def test_outputs_looked_at_together_are_those_looked_at_one_by_one(model: str, m
     scene = sagging(model, EA=2e6, EI=2e4 if model == "rod" else None, duration=12.0)
     together = hybrid.run(scene)
     calls = []
-    look = PayingOut.look
-    monkeypatch.setattr(PayingOut, "look", lambda *x: (calls.append(len(x[-1].t)), look(*x))[1])
-    record = TimeLoop._record_aside
-    monkeypatch.setattr(
-        TimeLoop, "_record_aside", lambda loop: (calls.append(len(loop._aside.waiting)), record(loop))[1]
-    )
+    record = OutputsAside.record
+    monkeypatch.setattr(OutputsAside, "record", lambda x, *more: (calls.append(len(x.waiting)), record(x, *more))[1])
     again = hybrid.run(scene)
     assert max(calls) > 5  # nodes enter about every 3 s, with six outputs between
     monkeypatch.setattr(Transient, "pays_out", False)
+    monkeypatch.setattr(LineNodes, "may_change", lambda *_: False)
+    monkeypatch.setattr(LineResult, "outputs_join", False)
     monkeypatch.setattr(system_lines, "WAITING", 1)
     alone = hybrid.run(scene)
     for name in (x for x in together.names if x != "steps/cpu" and together[x].dtype.kind == "f"):
