@@ -6,6 +6,7 @@ The compiled run keeps them (kernels.watch.named_quantities); here is what it is
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,24 +25,37 @@ if TYPE_CHECKING:
     from hybrid.scene.schema import Scene
 
 
+NONE: Mapping[str, Quantity] = MappingProxyType({})
+NO_ROWS: Mapping[str, tuple[int, int]] = MappingProxyType({})
+
+
 class StepQuantities:
     """Ranges of the quantities of one line."""
 
-    def __init__(self, scene: Scene, wanted: Mapping[str, Quantity], pipes: Pipes | None = None) -> None:
-        """wanted: by name; those that are clearances to another line are left out, as known at the outputs alone.
+    def __init__(
+        self, scene: Scene, wanted: Mapping[str, Quantity], pipes: Pipes | None = None, line: str = "",
+        shown: Mapping[str, Quantity] = NONE, rows_of: Mapping[str, tuple[int, int]] = NO_ROWS,
+    ) -> None:  # fmt: skip
+        """wanted: by name; pipes: of which wall tension and stress are kept at every node, in the extremes of the line.
 
-        pipes: of which wall tension and stress are kept at every node, in the extremes of the line.
+        line: its name, of several; shown: clearances by name of two lines that stand with the other one of them, and
+        need chords of this one; rows_of: by name of such clearances rows of the path of all lines, the last excluded.
         """
         self.pipes = pipes
         self.walls = pipes.rows() if pipes is not None else np.zeros((0, 0))
-        self.wanted = {name: q for name, q in wanted.items() if q.other is None}
-        self.asked = np.zeros((len(self.wanted), k.ASKED))
-        self.reached = nothing(len(self.wanted))
+        self.wanted = dict(wanted)
+        self.asked = np.zeros((len(wanted) + len(shown), k.ASKED))
+        self.reached = nothing(len(self.asked))
         rows: list[Floats] = []
         seabed = scene.environment.seabed is not None
-        for row, reached, q in zip(self.asked, self.reached, self.wanted.values(), strict=True):
+        for row, reached, (name, q) in zip(self.asked, self.reached, [*wanted.items(), *shown.items()], strict=True):
             row[k.KIND], row[k.END] = getattr(k, q.kind.upper()), q.end == "end"
-            row[k.FIRST : k.LAST + 1] = q.range or np.nan
+            row[k.FIRST : k.LAST + 1] = q.range if q.range and q.line in (line, None) else np.nan
+            if q.other is not None:
+                row[k.PATH], row[k.PATH_END] = rows_of[name]
+                row[k.COUNTED], row[k.OF_PATH] = 1.0, q.line != line
+                row[k.KIND] = k.CHORDS if name in shown else k.CLEARANCE
+                continue
             row[k.TO_TOUCHDOWN] = q.ends_at(seabed) == "touchdown"
             if q.reference is not None:
                 reached[k.REFERENCE : k.REFERENCE + 2] = q.reference
@@ -53,9 +67,8 @@ class StepQuantities:
             if q.normal is not None:
                 row[k.IS_PLANE], row[k.POINT : k.POINT + 3] = 1.0, q.point
             elif q.kind == "clearance":
-                more = chords_of(np.array(q.path or (q.point,), float))
+                more = chords_of(np.array(q.path or (q.point,), float), 0.5 * q.diameter)
                 row[k.PATH], row[k.PATH_END] = len(rows), len(rows) + len(more)
-                row[k.RADIUS] = 0.5 * q.diameter
                 rows += [*more]
         self.path = np.array(rows).reshape(-1, k.PATH_ROW)
         whole, begin = whole_scene(scene)
@@ -64,7 +77,14 @@ class StepQuantities:
         self.radii = np.column_stack([begin + ends, 0.5 * np.nan_to_num(outer_diameter(whole, middles))])
 
     def __bool__(self) -> bool:
-        return bool(self.wanted) or bool(self.walls.size)
+        return bool(self.asked.size) or bool(self.walls.size)
+
+    def share(self, path: Floats, begin: int) -> None:
+        """Share a path with other lines; that of this one begins at a row."""
+        own = self.asked[:, k.COUNTED] == 0.0
+        self.asked[own, k.PATH] += begin
+        self.asked[own, k.PATH_END] += begin
+        self.path = path
 
     def given_to(self, books: Books) -> Books:
         """Books of a run, or of a line of several, that keep the ranges."""
@@ -97,7 +117,7 @@ class StepQuantities:
     def values(self) -> dict[str, Any]:
         """Values of those fields; NaN: not known."""
         out = {}
-        for row, (name, q) in zip(self.reached, self.wanted.items(), strict=True):
+        for row, (name, q) in zip(self.reached, self.wanted.items(), strict=False):  # behind them those that are shown
             known = bool(row[k.SMALLEST] <= row[k.LARGEST]) and bool(np.isfinite(row[: k.LARGEST + 1]).all())
             for (group, *_), at in zip(parts(q), (k.SMALLEST, k.TIMES, k.PLACES), strict=False):
                 out[f"{EXTREMES}/{group}{name}"] = row[at : at + 2].copy() if known else np.full(2, np.nan)
@@ -120,9 +140,15 @@ def nothing(count: int) -> Floats:
     return found
 
 
-def chords_of(points: Floats) -> Floats:
-    """Rows (P, PATH_ROW) of a path through points (n, 3), m; of a single one a chord without length."""
+def chords_of(points: Floats, radius: float) -> Floats:
+    """Rows (P, PATH_ROW) of a path of a radius, m, through points (n, 3), m.
+
+    Through a single point it is a chord without length.
+    """
     if len(points) == 1:
         points = np.concatenate([points, points])
     chords = np.diff(points, axis=0)
-    return np.column_stack([points[:-1], chords, np.einsum("ni,ni->n", chords, chords)])
+    rows = np.zeros((len(chords), k.PATH_ROW))
+    rows[:, : k.SQUARE] = np.column_stack([points[:-1], chords])
+    rows[:, k.SQUARE], rows[:, k.RADIUS] = np.einsum("ni,ni->n", chords, chords), radius
+    return rows

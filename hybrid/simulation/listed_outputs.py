@@ -78,9 +78,7 @@ def _with_ranges(found: list[Listed], asked: Mapping[str, Quantity]) -> list[Lis
     out = []
     for x in found:
         if x.name in asked or x.name in ("wall_tension", "von_mises"):
-            outputs = x.name in asked and asked[x.name].other is not None
-            text = "extremes and limits: at the outputs" if outputs else "extremes and limits: of every step"
-            x = x._replace(description=f"{x.description}; {text}")
+            x = x._replace(description=f"{x.description}; extremes and limits: of every step")
         out.append(x)
     return out
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hybrid.kernels.state.state import Batch, Floats
+from hybrid.kernels.watch.named_quantities import PATH_ROW
 from hybrid.model.system import SystemModel
 from hybrid.outputs.observation import Probe
 from hybrid.outputs.quantities import Quantities
@@ -17,6 +18,8 @@ from hybrid.scene.system import System
 from hybrid.simulation.result_file import limits_of
 from hybrid.simulation.system_lines import LineResult
 from hybrid.store.format import Field
+
+MORE_CELLS = 4  # times as many as at first may a line have whose chords are looked at; with more nothing is known
 
 
 def idle_ends(system: System, model: SystemModel) -> list[tuple[int, int]]:
@@ -48,12 +51,33 @@ class SystemQuantities:
                 self._of_line[line] = found, found.probes()
 
     def keep_ranges(self, lines: Sequence[LineResult]) -> None:
-        """From now on the books of the lines keep the ranges of what is asked of them, over all steps."""
+        """From now on the books of the lines keep the ranges of what is asked of them, over all steps.
+
+        Clearances of two lines stand with the later one, which is looked at when the other one has been.
+        """
+        order, first, keeper = [line.name for line in lines], dict[str, str](), dict[str, str]()
+        rows_of, rows = dict[str, tuple[int, int]](), 0
+        for name, q in self._wanted.items():
+            keeper[name] = q.line or ""
+            if q.other is not None:
+                first[name], keeper[name] = sorted([str(q.line), q.other], key=order.index)
+                most = MORE_CELLS * lines[order.index(first[name])].model.line.h.size + 2
+                rows_of[name], rows = (rows, rows + most), rows + most
+        paths = [np.zeros((rows, PATH_ROW))]
         for line in (x for x in lines if x.name in self._scenes):
-            mine = {name: q for name, q in self._wanted.items() if q.line == line.name}
-            found = StepQuantities(line.scene, mine, line.envelope.quantities.pipes)
+            mine = {name: q for name, q in self._wanted.items() if keeper[name] == line.name}
+            shown = {name: self._wanted[name] for name, x in first.items() if x == line.name}
+            pipes = line.envelope.quantities.pipes
+            found = StepQuantities(line.scene, mine, pipes, line.name, shown, rows_of)
             if found:
-                line.books, self._steps[line.name] = found.given_to(line.books), found
+                self._steps[line.name] = found
+                paths.append(found.path)
+        begins = np.cumsum([len(x) for x in paths]).tolist()
+        path = np.concatenate(paths)
+        for line in lines:
+            if line.name in self._steps:
+                self._steps[line.name].share(path, begins.pop(0))
+                line.books = self._steps[line.name].given_to(line.books)
 
     def follow(self, model: SystemModel) -> None:
         """Know from now on which ends came loose: nothing takes their pull, which has no direction."""
@@ -68,11 +92,11 @@ class SystemQuantities:
 
     def range_values(self) -> dict[str, np.ndarray]:
         """Values of those fields up to now."""
-        return {name: x for line in self._steps for name, x in self.ranges_of(line).items()}
+        return {name: x for line in self._steps.values() for name, x in line.values().items()}
 
     def ranges_of(self, line: str) -> dict[str, np.ndarray]:
         """Those of a line."""
-        return self._steps[line].values() if line in self._steps else {}
+        return {name: x for name, x in self.range_values().items() if self._wanted[name.split("/")[-1]].line == line}
 
     def checkpoint(self) -> dict[str, np.ndarray]:
         """Ranges by line, and from what excursions and azimuths count."""

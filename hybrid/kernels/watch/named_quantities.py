@@ -7,7 +7,10 @@ and angles of the pull at an end, the touchdown point, layback, and clearances o
     f        pull: force of the line on what holds its end               3       N
     a, b     first nodes of a chord of the line and of one of a path     3       m
     u, w     these chords                                                3       m
-    x        part of the chord u where it is nearest                     -       -
+    x, y     parts of the chords u and w where they are nearest          -       -
+
+A clearance of two lines stands with the later one of them, which finds the chords of the earlier one in the path that
+both have: that one has a row of its own (CHORDS), by which it puts them there.
 """
 
 from __future__ import annotations
@@ -27,11 +30,13 @@ from hybrid.kernels.watch.pipes import note_pipes
     HORIZONTAL_FORCE, VERTICAL_FORCE, FORCE_ALONG, DECLINATION, AZIMUTH, END_ANGLE, UPLIFT, UPLIFT_ANGLE, TOUCHDOWN,
     TOUCHDOWN_EXCURSION, LAYBACK, CLEARANCE,
 ) = range(12)  # fmt: skip
+CHORDS = 12  # none of a scene: chords of a line for another one
 # Columns of `asked`: kind, end (0, 1), unit direction or normal (3), whether layback goes to the touchdown point, a
-# point of the plane (3), whether it is one, range of arc lengths, m, NaN: all of the line, first and last row of `path`,
-# radius around it, m; 1 where the end is joined to a point that nothing else is at, whose pull is what Newton left.
-KIND, END, DIRECTION, TO_TOUCHDOWN, POINT, IS_PLANE, FIRST, LAST, PATH, PATH_END, RADIUS, IDLE = 0, 1, 2, 5, 6, 9, 10, 11, 12, 13, 14, 15  # fmt: skip
-ASKED = 16
+# point of the plane (3), whether it is one, range of arc lengths, m, NaN: all of the line, first and last row of `path`;
+# 1 where the end is joined to a point that nothing else is at, whose pull is what Newton left; 1 where the first row of
+# `path` has the number of chords behind it, -1 where there is no room for them; 1 where the arc length is that of `path`.
+KIND, END, DIRECTION, TO_TOUCHDOWN, POINT, IS_PLANE, FIRST, LAST, PATH, PATH_END, IDLE, COUNTED, OF_PATH = 0, 1, 2, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16  # fmt: skip
+ASKED = 17
 # Columns of `reached`: smallest, largest, when, s; arc length where a clearance was, m; the place x, y, m, from which
 # excursions count, or the azimuth, deg, from which azimuths are within half a turn, NaN: not known; the cell that was
 # nearest last.
@@ -39,9 +44,9 @@ SMALLEST, LARGEST, TIMES, PLACES, REFERENCE, NEAREST = 0, 1, 2, 4, 6, 8
 REACHED = 9
 # The first azimuth is above it, deg, and at most a turn more: lines along an axis are far from both bounds.
 LEAST_AZIMUTH = -170.0
-# Rows of `path`: first point (3), chord (3), its square.
-CHORD, SQUARE = 3, 6
-PATH_ROW = 7
+# Rows of `path`: first point (3), chord (3), its square, radius around it, m, arc length at which it begins, its length, m.
+CHORD, SQUARE, RADIUS, BEGINS, SPANS = 3, 6, 7, 8, 9
+PATH_ROW = 10
 
 
 @inner
@@ -80,7 +85,7 @@ def touch_at(job, state, k):
 
 @inner
 def apart(a, u, path, j):
-    """Distance of the chord u from row j of a path, and x."""
+    """Distance of the chord u from row j of a path, x and y."""
     b, w = (path[j, 0], path[j, 1], path[j, 2]), (path[j, 3], path[j, 4], path[j, 5])
     r, aa, bb, ab = sub(a, b), dot(u, u), path[j, SQUARE], dot(u, w)
     ar, br = dot(u, r), dot(w, r)
@@ -92,18 +97,22 @@ def apart(a, u, path, j):
     if t != held or bb <= 1e-300:
         x = min(max((ab * held - ar) / aa, 0.0), 1.0) if aa > 1e-300 else 0.0
     far = sub(add(r, scale(x, u)), scale(held, w))
-    return math.sqrt(dot(far, far)), x
+    return math.sqrt(dot(far, far)), x, held
 
 
 @inner
 def nearest_on(a, u, path, begin, end):
-    """Least distance of the chord u from rows `begin` to `end` of a path, and x."""
-    least, part = math.inf, 0.0
+    """Least distance of the chord u from the surface of a path, x, and the arc length there.
+
+    begin, end: its rows, the last excluded.
+    """
+    least, part, s = math.inf, 0.0, math.nan
     for j in range(begin, end):
-        found, x = apart(a, u, path, j)
+        found, x, y = apart(a, u, path, j)
+        found -= path[j, RADIUS]
         if found < least:
-            least, part = found, x
-    return least, part
+            least, part, s = found, x, path[j, BEGINS] + y * path[j, SPANS]
+    return least, part, s
 
 
 @inner
@@ -147,7 +156,9 @@ def from_path(job, state, asked, reached, first, last):
     Along the line a distance changes at most by the length that is passed, so that most cells need no distance.
     """
     line, radii, path = job.line, job.books.radii, job.books.path
-    begin, end, around = int(asked[PATH]), int(asked[PATH_END]), asked[RADIUS]
+    begin, end = int(asked[PATH]), int(asked[PATH_END])
+    if asked[COUNTED] != 0.0:
+        begin, end = begin + 1, begin + 1 + int(path[begin, 0])
     widest = 0.0
     for k in range(radii.shape[0]):
         widest = max(widest, radii[k, 1])
@@ -158,26 +169,51 @@ def from_path(job, state, asked, reached, first, last):
         u = get3(state.e, c)
         if k >= first:
             ahead -= math.sqrt(dot(u, u))
-            if ahead > least + widest + around:
+            if ahead > least + widest:
                 continue
-        distance, x = nearest_on(get3(state.r, c), u, path, begin, end)
-        found = distance - radius_at(radii, 0.5 * (line.s[c] + line.s[c + 1])) - around
+        distance, x, there = nearest_on(get3(state.r, c), u, path, begin, end)
+        found = distance - radius_at(radii, 0.5 * (line.s[c] + line.s[c + 1]))
         if k >= first:
             ahead = distance
         if found < least:
             least, where, nearest = found, line.s[c] + x * (line.s[c + 1] - line.s[c]), c
+            if asked[OF_PATH] != 0.0:
+                where = there
     reached[NEAREST] = nearest
     return least, where
 
 
 @inner
-def clearance(job, state, asked, reached):
-    """Least clearance, m, and its arc length."""
-    first, last, s = 0, job.line.h.shape[0], job.line.s
+def nodes_of(s, asked):
+    """First and last node of the part of a line that counts."""
+    first, last = 0, s.shape[0] - 1
     if asked[FIRST] == asked[FIRST]:
         first, last = node_near(s, asked[FIRST]), node_near(s, asked[LAST])
         first = min(first, s.shape[0] - 2)
         last = max(last, first + 1)
+    return first, last
+
+
+@inner
+def put_chords(job, state, asked):
+    """Put chords of the part that counts where a later line finds them."""
+    s, path, begin = job.line.s, job.books.path, int(asked[PATH])
+    first, last = nodes_of(s, asked)
+    path[begin, 0] = last - first
+    if last - first > int(asked[PATH_END]) - begin - 1:
+        path[begin, 0], last = -1.0, first
+    for c in range(first, last):
+        row, r, u = path[begin + 1 + c - first], get3(state.r, c), get3(state.e, c)
+        for k in range(3):
+            row[k], row[CHORD + k] = r[k], u[k]
+        row[SQUARE], row[RADIUS] = dot(u, u), radius_at(job.books.radii, 0.5 * (s[c] + s[c + 1]))
+        row[BEGINS], row[SPANS] = s[c], s[c + 1] - s[c]
+
+
+@inner
+def clearance(job, state, asked, reached):
+    """Least clearance, m, and its arc length."""
+    first, last = nodes_of(job.line.s, asked)
     if asked[IS_PLANE] != 0.0:
         return over_plane(job, state, asked, first, last)
     return from_path(job, state, asked, reached, first, last)
@@ -256,6 +292,12 @@ def note_quantities(table):
     for q in range(books.asked.shape[0]):
         asked, reached = books.asked[q], books.reached[q]
         kind, k, place = asked[KIND], int(asked[END]), math.nan
+        if kind == CHORDS:
+            put_chords(job, state, asked)
+            continue
+        if kind == CLEARANCE and asked[COUNTED] != 0.0 and books.path[int(asked[PATH]), 0] < 0.0:
+            reached[SMALLEST], reached[LARGEST] = -math.inf, math.inf  # nobody knows
+            continue
         if kind == CLEARANCE:
             x, place = clearance(job, state, asked, reached)
         elif kind >= TOUCHDOWN:
