@@ -66,7 +66,8 @@ def test_what_is_taken_back_leaves_nothing(model: str, dimension: int) -> None:
                 saved = simulation.save()
                 for _ in range(2):
                     place, speed = heave(simulation.t + 0.05)
-                    simulation.set_end("end", [205.0, 0.01, place[2]], speed)
+                    beside = [0.0, 0.01, 0.0] if dimension == 3 else [0.0, 0.0, 0.01]
+                    simulation.set_end("end", np.add(place, beside), speed)
                     simulation.step()
                     simulation.restore(saved)
             driven(simulation, 1)
