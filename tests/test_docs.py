@@ -110,7 +110,9 @@ def test_ci_reads_its_commands_from_the_readme() -> None:
     assert "first=$(block 1)" in script and "second=$(block 2)" in script
     newcomer, _, developer = script.partition('eval "$second"')
     assert "pip install" not in newcomer and "pip install -q -e '.[dev]'\n" in developer
-    assert 'HYBRID_TEST_EXTRAS=all pytest -m "not bench and (slow or long or needs)"' in developer, "no test is lost, none skips"
+    assert 'HYBRID_TEST_EXTRAS=all pytest -m "not bench and (slow or long or needs)"' in developer, (
+        "no test is lost, none skips"
+    )
 
 
 @pytest.mark.long

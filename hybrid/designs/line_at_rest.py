@@ -23,10 +23,10 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, ba
 from hybrid.linear.matrices import ANCHOR, rotation
 from hybrid.linear.memory import settle_layers
 from hybrid.model.build import Model
-from hybrid.model.output_points import jump_points
+from hybrid.model.output_points import jump_points, output_points
 from hybrid.outputs.probes import PROBES, Observer
 from hybrid.scene.schema import Scene
-from hybrid.simulation.static_case import StaticCase
+from hybrid.simulation.system_lines import WANTED, observer_of
 from hybrid.solve.joined import JoinedLine
 from hybrid.solve.stepper import POWERS
 
@@ -354,7 +354,8 @@ class LineAtRest:
 
     def _observed(self, x: Beside) -> Observer:
         """What looks at a line, at its nodes where extremes are wanted, and at places."""
-        observer = StaticCase(x.scene).observer(x.model, at=self._points(x.model))
+        points = output_points(x.scene)._replace(s=self._points(x.model))
+        observer = observer_of(x.scene, x.model, False, wanted=WANTED._replace(points=points))
         for wanted in self.wanted:
             if wanted.name not in observer.names:
                 names = ", ".join(sorted(name for name in observer.names if "/" not in name))

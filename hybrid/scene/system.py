@@ -306,7 +306,8 @@ def connection_findings(system: Network) -> Iterator[Finding]:
 def _clamp_findings(system: Network, name: str, key: str, held: ClampedConnection) -> Iterator[Finding]:
     line, point = system.lines[name], getattr(system.lines[name], key)
     at = ("lines", name, "connections", key)
-    if not (system.is_held(point) or holds_rod(line.chosen_model, key, line.cable.length)):
+    stays = system.is_held(point) or isinstance(system.points[point], GuidedPoint)
+    if not (stays or holds_rod(line.chosen_model, key, line.cable.length)):
         expected = "pinned, because this end of the line is a catenary, which has no moment"
         yield Finding(at, expected, "give `bending_stiffness` to all sections, and `model: rod`", "clamped")
     if held.tangent is None and not isinstance(system.points[point], FreePoint):

@@ -80,11 +80,15 @@ def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
         raise ComputationError(failed.outcome, None, failed.s, because, first=first) from None
 
 
-def count_turns(scene: Scene, model: Model, t: float, state: State, given: tuple[float, float] | None = None) -> None:
+def count_turns(
+    scene: Scene, model: Model, t: float, state: State, given: tuple[float, float] | None = None,
+    keeps_link: bool = False,
+) -> None:  # fmt: skip
     """ComputationError where a rod between two ends that hold it is not twisted by the turns of the scene.
 
     given: those of its start and end, of a line of several; None: as of the scene.  What its ends are clamped to may
-    have turned by less than half a turn.
+    have turned by less than half a turn.  keeps_link: whether a damped motion with contact has kept the link of the
+    start, of which a loop has a part.
 
     What closes the frames of the initial shape comes to at most half a turn, and the shape itself takes the writhe of
     the equilibrium, less than half a turn unless the cable forms a loop.
@@ -95,6 +99,8 @@ def count_turns(scene: Scene, model: Model, t: float, state: State, given: tuple
         return
     where, s = f"ends.{name}.turns: {by_end[name == 'end']:g}", model.length if name == "end" else 0.0
     if not model.line.element[1:-1].all():
+        if keeps_link:
+            return
         _count_link(model, t, state, where, s)
         return
     frames = model.ends.at(t).frame
@@ -103,7 +109,7 @@ def count_turns(scene: Scene, model: Model, t: float, state: State, given: tuple
         least = int(np.ceil(2.0 * np.pi * abs(asked) / MOST_TWIST))
         detail = f"{where}; {model.cells} cells cannot hold {asked:g} turns, which take at least {least} equal ones"
         raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
-    if abs(found - wound) > 0.5:
+    if abs(found - wound) > 0.5 and not keeps_link:
         detail = f"{where}; the rods start with {wound:.4g} turns, those of the equilibrium have {found:.4g}"
         raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
 

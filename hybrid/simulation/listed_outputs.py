@@ -16,7 +16,6 @@ from hybrid.scene.system import System
 from hybrid.simulation.case import Case
 from hybrid.simulation.pair_forces import fields_of_pairs
 from hybrid.simulation.result_file import STEP_FIELDS
-from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_lines import observer_of
 from hybrid.simulation.system_points import fields_of
 from hybrid.simulation.system_quantities import SystemQuantities
@@ -68,7 +67,7 @@ def _of_scene(scene: Scene) -> list[Listed]:
         case = Case(scene, None)
         observer = case.observer(model, isinstance(scene.model, AdaptiveModel), case.points.s, None)
     else:
-        observer = StaticCase(scene).observer(model)
+        observer = observer_of(scene, model, moves=False)
     found = _over_time(observer.fields, steps=moves)
     return _with_ranges(found, scene.output.quantities) if moves else found
 

@@ -30,7 +30,7 @@ from hybrid.store.partners import meeting_text
 # Diameters by which ways from a joint to where lines that lie along each other meet differ at most.
 ALONG = 2.0
 # Where lines are that are said to be within themselves.
-WITHOUT_CONTACT, AT_START = "in the equilibrium, which is found without contact", "at the start"
+WITHOUT_CONTACT, AT_START = "in the equilibrium without contact", "at the start"
 
 
 def refuse_within_itself(
@@ -50,11 +50,15 @@ def refuse_within_itself(
         energy = contact_energy(x.line, x.sea, x.ends, one, contact)
         if energy == 0.0 or (moves and math.isfinite(energy)):
             continue
-        given = f"self: true, and {where}, {deepest_text(contact, model)}"
+        given = f"self: true, and {where} {deepest_text(contact, model)}"
         expected = "a start in which the line is apart"
-        if where == WITHOUT_CONTACT:
-            expected = "a first shape in which the line is apart, for a damped motion with contact to lead to rest"
         fix = f"lines.{name}.initial: {{points: [...]}}, such as a wide U, a smaller diameter, or leave contact out"
+        if where == WITHOUT_CONTACT:
+            contact_energy(x.line, x.sea, x.ends, model.start, contact)
+            first = deepest_text(contact, model)
+            expected = "a first shape in which the line is apart, for a damped motion with contact to lead to rest"
+            expected += f"; in this one {first}"
+            fix += "; or `hybrid run` from a start that is apart"
         raise SceneError([Complaint(f"lines.{name}.contact", given, expected, fix)])
 
 

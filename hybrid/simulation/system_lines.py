@@ -57,6 +57,7 @@ from hybrid.simulation.kind_changes import Around
 from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
 from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
+from hybrid.simulation.slack_bends import note_laid
 from hybrid.simulation.time_loop import FORCE_COLUMNS
 from hybrid.solve.flaws import slack_cell
 from hybrid.solve.joined import JoinedLine, LineFailed
@@ -163,6 +164,7 @@ class LineResult:
     """What is recorded of one line."""
 
     cells: LineCells | LineNodes | None = None  # what changes cells, or lets nodes enter and leave, without Python
+    _at_rest: tuple[Sequence[float], State]  # the sharpest bend and twist of an equilibrium, and its state
     _sampled: Sequence[Output] = ()  # of several meshes, of which `output` is still to be told
 
     def __init__(
@@ -311,6 +313,7 @@ class LineResult:
             text = f"the line rests with a twist of {turns:+.2g} turns, and what it is clamped to may turn back"
             where = f"{text}: begin nearer to rest (initial_guess, initial_rotation), unless it is meant"
             self.events.event(0.0, 0.0, self.model.length, "several equilibria", where)
+        note_laid(self.scene, self.model, state, self.events)
         self.note_start(x, state, t)
 
     def note_start(self, x: JoinedLine, state: State, t: float | None) -> None:
@@ -525,9 +528,10 @@ class LineResult:
         ratios = np.concatenate(known) if known else None
         values = there.values_of(seen, ratios, shift)
         self.observer.first_energy = there.first_energy
+        if not self._moves:
+            self._judge_rest(seen, values)
         self.recorder.save_batch(batch.t.copy(), values, there.zone_rows, [there.rows_of(zones) for zones in more])
         if not self._moves:
-            self.diagnostics.mesh(seen)
             return
         stop = None
         if not isinstance(self.recorder, ComparisonRecorder):  # which has too little to be judged
@@ -547,8 +551,21 @@ class LineResult:
     def judge(self, t: float | None, sharp: Sequence[float], state: State) -> None:
         """Look at a state for what its mesh does not resolve (an event) and for strain beyond what a section bears."""
         watch = self.diagnostics
-        stop = watch.stretch(state) or watch.left_plane(state.r) or watch.shape(t or 0.0, sharp, state)
-        self._stop_if(stop, t, state)
+        if t is None:  # its shape is judged behind its mesh
+            self._at_rest = sharp, state
+            return
+        self._stop_if(watch.stretch(state) or watch.left_plane(state.r) or watch.shape(t, sharp, state), t, state)
+
+    def _judge_rest(self, seen: Observation, values: Mapping[str, Floats]) -> None:
+        """The same of an equilibrium that is a result, as it is computed for its output."""
+        watch, (sharp, state) = self.diagnostics, self._at_rest
+        compared = isinstance(self.recorder, ComparisonRecorder)  # which has too little for more
+        if not compared:
+            watch.mesh(seen)
+        stop = watch.stretch(state) or watch.left_plane(state.r) or watch.shape(0.0, sharp, state)
+        self._stop_if(stop, None, state)
+        if not compared:
+            watch.loops(seen.batch.t, values, seen.grid.s)
 
     def waiting(self) -> Waiting:
         """Outputs and steps that wait, to come back to."""

@@ -201,6 +201,7 @@ class SystemRun:
             wanted = Wanted(record, recording.points, error, _torque_of(manager))
             shown, outputs = self.file.scene_of(scene), len(self.times)
             self.lines.append(LineResult(k, name, shown, model, self.found, state, outputs, wanted, reels.get(k)))
+            self.lines[k].manager = manager
         if self._begins:
             for line in self.lines:
                 line.diagnostics.begin()
@@ -407,11 +408,14 @@ class SystemRun:
                 refuse_within_itself(self.model, solver.lines, self.state, moves=False)
             self._make_room(solver)
             solver.keep_books([line.books for line in self.lines])
-            solver.evaluate_forces(self.state, 0.0)
+            solver.evaluate_forces(self.state, solver.anchor)  # what nothing holds has no report without its springs
             self.watch_lines()
             self._look_for_overlaps()
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
                 line.note_equilibrium(x, state, None, self.found, self.turned)
+                if line.correction is not None:
+                    rubs = line.number in self.found.with_friction
+                    line.correction.begin(x.ends, state, at_rest=True, with_friction=rubs)
             self.renew_other()
             self.loop.attach(solver, self.state, self.other)
             self._output()

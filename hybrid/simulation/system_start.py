@@ -201,11 +201,11 @@ def _keep_turns(model: SystemModel, t: float, found: LinesAtRest) -> LinesAtRest
 
     A motion with contact keeps them by itself, in the writhe of loops as well (system_contact_equilibrium.settle).
     """
-    if found.settled:
-        return found
     for k, (name, x, state) in enumerate(zip(model.names, model.models, found.state.lines, strict=True)):
+        keeps_link = bool(x.line.bits & SELF_CONTACT) and not model.seats[k, :, TURNS].any()
+        keeps_link = found.settled and (found.alone[k].touch.size > 0 if found.alone else keeps_link)
         try:
-            count_turns(model.scenes[name], x, t, state, model.turns[k])
+            count_turns(model.scenes[name], x, t, state, model.turns[k], keeps_link)
         except ComputationError as failed:
             detail = failed.detail.replace("ends.", f"lines.{name}.connections.")
             if model.seats[k, :, TURNS].any():

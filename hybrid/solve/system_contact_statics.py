@@ -178,7 +178,7 @@ def settled_system(
     slow = [x._replace(line=damped(x.line, x.length, time_scale, DAMPING), slackens=True) for x in smooth]
     slow_bodies = damped_bodies(bodies, time_scale)
     falls = _Falls(found, time_scale)
-    first = start.copy()
+    first, failed = start.copy(), None
     if not near:  # what lies straight without tension may need the push, too
         falls.try_later(falls.nudged(start))
         first = first if falls.finds_all else falls.next(None) or first
@@ -186,8 +186,8 @@ def settled_system(
         moving = _Moving(touching_solver(slow, points, slow_bodies, contacts), first)
         for iterations in chain([0] if near else [], calming(moving, time_scale, found.length)):
             line, lost = keeps_turns(moving.state)
-            if lost:  # and will not come back
-                raise LineFailed(line, Outcome.TURNS_LOST, None, None, lost)
+            if lost:  # and will not come back; of a motion from elsewhere that says less than the first one did
+                raise failed or LineFailed(line, Outcome.TURNS_LOST, None, None, lost)
             taken, states = found.newton(moving.state)
             total += taken.iterations
             line, lost = keeps_turns(states) if taken.outcome == Outcome.OK else (taken.line, "")
@@ -206,8 +206,9 @@ def settled_system(
         near, state = False, None
         if taken.outcome == Outcome.UNSTABLE or moving.tries < STALLING:  # else it comes to no rest from elsewhere
             state = falls.next(states if taken.outcome == Outcome.UNSTABLE else None)
+        if lost:
+            taken = replace(taken, outcome=Outcome.TURNS_LOST, line=line)
+        last = _failed(smooth, taken, moving.state, path)
         if state is None:
-            if lost:
-                taken = replace(taken, outcome=Outcome.TURNS_LOST, line=line)
-            raise _failed(smooth, taken, moving.state, path)
-        first = state
+            raise last
+        first, failed = state, failed or last

@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+import hybrid
+from hybrid.scene.short_form import LINE, network_of
 from tests.combinations.networks import both, both_files, differences, events_differ, exact_scene, files_differ
 from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, S, scene_of
 from tests.problems import tables_with
@@ -23,6 +26,7 @@ SCENES: dict[str, dict[str, Any]] = {
     "a free end with a force, in water": {END: FREE, "environment.fluid": WATER} | DRAG,
     "a moment at a free end": {START: CLAMP, END: FREE | {"moment": [0, 50, 10]}} | STIFF,
     "a guided end that turns": {END: GUIDED | TURNED, "time.duration": 0.3},
+    "a guided catenary": {END: GUIDED, "model": "catenary"},
     "a vehicle": {END: {"kind": "body", "mass": 3.0, "thrust": {"value": [8, 2, 0], "until": 0.25}}},
     "thrown, both ends free": {START: {"kind": "free"}, END: {"kind": "free"}, "initial": THROWN},
     "a clamp beside a catenary": {START: CLAMP, "model": "catenary"},
@@ -96,3 +100,17 @@ def test_no_errors_are_asked_of_steps_that_follow() -> None:
     tables = tables_with(scene_of("catenary"), {"output.errors": False, "time.step": None})
     cable, network = both(tables)
     assert [str(x) for x in differences(cable, network)] == []
+
+
+def test_a_winch_at_rest_holds_its_line() -> None:
+    """With a free end: nothing but springs without force holds the network that is made of it."""
+    section = {"length": 60.0, "mass": 2.0, "axial_stiffness": 1e7}
+    winch = {"kind": "pinned", "position": [0, 0, 0], "payout": {"rate": 0.5, "ramp": 2.0}}
+    tables = {
+        "cable": {"sections": [section]}, "ends": {"start": {"kind": "free"}, "end": winch}, "mesh": {"cells": 30},
+        "initial": "equilibrium", "model": "catenary", "time": {"duration": 5.0, "step": 0.1},
+    }  # fmt: skip
+    network = hybrid.static(network_of(hybrid.validate_scene(tables))).lines[LINE]
+    cable = hybrid.static(tables)
+    np.testing.assert_allclose(network.tension, cable.tension, rtol=1e-9)
+    assert network.tension.max() > 100.0
