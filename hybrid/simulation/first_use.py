@@ -37,6 +37,7 @@ STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_co
 # Of several lines: what all of them call, steps, equilibria, those that touch, those that are paid out.
 OF_LINES = ("run.system.solve_system", SOLVER[1], OUTPUTS)
 STEPS_OF_LINES, REST_OF_LINES = "run.system_run.run_system", "run.system_run.sample_system"
+BOOKS_OF_LINES = "run.system.book_system_step"
 TOUCHING_LINES = "junctions.system_contact.touch_system", "junctions.shared_contact.shared_task"
 PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "run.payout_run.change_node"
 
@@ -61,7 +62,7 @@ def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
 
 def _kernels_of_network(scene: Any) -> list[str]:
     """Of a cable that is computed as a network of one line."""
-    found = [*OF_LINES, STEPS_OF_LINES]
+    found = [*OF_LINES, BOOKS_OF_LINES, STEPS_OF_LINES]
     if not _is_in_space(scene, scene.dimension):
         found = [SOLVER[0], *found, *([STABILITY] if _is_judged(scene, False) else [])]
     if scene.model.kind == "adaptive":
@@ -103,7 +104,7 @@ def _is_judged(scene: Scene, static: bool) -> bool:
 
 def _kernels_of_lines(system: System, static: bool) -> list[str]:
     """Of lines with names."""
-    found = [*OF_LINES, REST_OF_LINES if static else STEPS_OF_LINES]
+    found = [*OF_LINES, *((REST_OF_LINES,) if static else (BOOKS_OF_LINES, STEPS_OF_LINES))]
     joined = {name for name, x in system.lines.items() if system.is_joined(x.start) or system.is_joined(x.end)}
     scenes = [system.scene_of(name) for name in system.lines if name not in joined]
     planar = [x for x in scenes if not _is_in_space(x, system.dimension)]
@@ -153,6 +154,7 @@ def compile_beside(scene: Scene | System, static: bool = False) -> None:
         return
     if as_network() and not static:
         needed = [x for x in _kernels_of_network(scene) if x != SOLVER[1]]  # which this process begins with
+        needed.append(REST_OF_LINES)
     else:
         needed = _beside_solver(scene, static)
     if MODEL_ERROR in needed and SOLVER[1] not in needed:  # a line in a plane needs both solvers
@@ -182,7 +184,7 @@ def compile_all(names: Sequence[str]) -> None:
     from hybrid.kernels.run.run import in_space, run
 
     table = np.zeros(0, np.int64)  # of which only the type counts
-    for name in (*OF_LINES[:1], STEPS_OF_LINES, SOLVER[0], *PAYOUT_OF_LINES):
+    for name in (*OF_LINES[:1], STEPS_OF_LINES, REST_OF_LINES, BOOKS_OF_LINES, SOLVER[0], *PAYOUT_OF_LINES):
         if name in names:
             entry(name).compile_unless_busy(table)
     if STEPS in names:
