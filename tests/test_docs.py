@@ -201,7 +201,7 @@ CONSTANTS = (
     ("solve.statics", "REACH", 0.1, "0.1 L"),
     ("solve.stepper", "MOST_ITERATIONS", 20, "20 in motion"),
     ("solve.statics", "MOST_ITERATIONS", 40, "40 in statics"),
-    ("solve.statics", "LOAD_STEPS", (1, 8, 64), "1, 8, 64 steps"),
+    ("solve.search", "LOAD_STEPS", (1, 8, 64), "1, 8, 64 steps"),
     ("model.build", "SLACK_FLOOR", -1e-6, "−10⁻⁶ of the scale"),
     ("simulation.diagnostics", "UNRESOLVED", 1.0, "1 rad per cell"),
     ("solve.stepper", "HEAVY", 1e36, "10³⁶ 1/s²"),
