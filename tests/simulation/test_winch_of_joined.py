@@ -167,9 +167,10 @@ def test_a_winch_lets_a_rope_run_over_a_sheave(inertia: float) -> None:
 
 
 @pytest.mark.long
-def test_stepped_from_outside_bit_for_bit() -> None:
+@pytest.mark.parametrize("dimension", [2, 3])  # where it says none, it runs in its plane and is stepped in space
+def test_stepped_from_outside_bit_for_bit(dimension: int) -> None:
     """Every other step is taken twice, elsewhere at first."""
-    scene = lowered() | {"time": {"duration": 3.0, "step": STEP}}
+    scene = lowered() | {"time": {"duration": 3.0, "step": STEP}, "dimension": dimension}
     with hybrid.Simulation(scene) as sim:
         while sim.t < 3.0:
             saved = sim.save()
