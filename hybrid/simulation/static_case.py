@@ -38,17 +38,19 @@ class StaticCase(StaticCaseOfCable):
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         self._first: tuple[Resolution, Start] | None = None
+        # A run begins at the equilibrium of a network: of several in contact a cable's search found another one.
+        self._by_network = at_rest_as_network() or bool(scene.contact.self)
 
     def record(self, resolution: Resolution, target: Target) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it."""
-        if not at_rest_as_network():
+        if not self._by_network:
             return super().record(resolution, target)
         begin, pending = clock.process_time(), ERROR_ESTIMATE if wants_errors(self.scene) else ""
         return _sample(self._run(resolution, target, Recording(pending=pending)), begin)
 
     def sample(self, resolution: Resolution) -> RunSample:
         """Compute for comparison only."""
-        if not at_rest_as_network():
+        if not self._by_network:
             return super().sample(resolution)
         begin = clock.process_time()
         return _sample(self._run(resolution, None), begin)
@@ -58,7 +60,7 @@ class StaticCase(StaticCaseOfCable):
 
         resolution: of the result.  ComputationError: there is none, and the scene gives cells to a layer.
         """
-        if not at_rest_as_network():
+        if not self._by_network:
             return super().survey(resolution, coarse)
         try:
             model, _ = self.first_shape(coarse)
@@ -74,7 +76,7 @@ class StaticCase(StaticCaseOfCable):
 
     def first_shape(self, resolution: Resolution) -> tuple[Model, State]:
         """Model and state of an equilibrium, which are kept for a result of this resolution that comes next."""
-        if not at_rest_as_network():
+        if not self._by_network:
             return super().first_shape(resolution)
         with short_form(self.scene).said():
             start = self._start(resolution)

@@ -351,7 +351,8 @@ def test_an_equilibrium_in_contact(resting: tuple[dict[str, Any], hybrid.Result]
     """No turn of the clamps is lost, strands are apart, and what is left over shows that it is an equilibrium."""
     result = resting[1]
     assert result.status == "complete" and "damped motion with contact" in result.message
-    assert {"line touches itself", "stability not judged"} <= {event.kind for event in result.events}
+    kinds = {event.kind for event in result.events}
+    assert "line touches itself" in kinds and not kinds & {"stability not judged", "unstable"}
     assert any(e.kind == "static friction neglected" and "touches itself" in e.text for e in result.events)
     assert result["turns/link"][0] == pytest.approx(3.0, abs=1e-9)
     assert result["turns/writhe"][0] > 1.5
