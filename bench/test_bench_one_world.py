@@ -56,10 +56,8 @@ class _Exception(NamedTuple):
 
 
 ESTIMATED = _Exception(("errors/", EVENTS), np.inf, "figures of a network are estimated otherwise")
-CHANGED = _Exception(("envelope/",), 2e-2, "extremes of steps after which cells or zones have changed")
 # By part of the name of a scene, or of the digests: the first counts.
 EXCEPTIONS: dict[str, _Exception] = {
-    "zones that move + release": CHANGED,
     "steps that follow the motion": ESTIMATED,
     "rest of touchdown, 1%": ESTIMATED,
     "errors of fixed steps": ESTIMATED,

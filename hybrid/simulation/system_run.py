@@ -771,17 +771,26 @@ class SystemRun:
         assert self.zones is not None
         clock = self.loop.clock
         last = bool(0.5 * clock.tried_dt < clock.shortest)
+        self._go_back(True)
         if self.zones.wants_more_rod(self.loop.tried, float(clock.try_end), last):
             self.loop.try_again()
+        self._go_back(False)
 
     def _failed_step(self) -> None:
         """No shorter step is left to try: contact is given up, or the run ends.  LineFailed."""
         dt = float(self.loop.clock.tried_dt)
+        self._go_back(True)
         if not gives_up_contact(self, dt):
             for line in self.lines:
                 line.write_down()  # what stopped the run before comes first
             raise self._stopped(self.solver, self.loop.tried, dt)
+        self._go_back(False)
         self.loop.try_whole()
+
+    def _go_back(self, still: bool) -> None:
+        """Whether forces are found of the state before a try, which the extremes know: it counts once."""
+        for line in self.lines:
+            line.books.counts.repeats = int(still)
 
     def ends_of_now(self) -> None:
         """Let ends and sea be as they are now: compiled steps have moved them without Python."""

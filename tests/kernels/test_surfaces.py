@@ -42,6 +42,11 @@ def at(sea: Any, k: int, x: Any) -> Any:
     return d, n, surfaces.gradient_of_normal(curved, n), surfaces.bent(curved, n, (0.3, -0.5, 0.7))
 
 
+@numba.njit
+def is_far(sea: Any, k: int, x: Any, way: float) -> Any:
+    return surfaces.is_far(sea, k, x, way)
+
+
 def scene(**tables: Any) -> hybrid.Scene:
     return hybrid.validate_scene(
         {
@@ -103,6 +108,15 @@ def test_a_distance_is_that_to_the_nearest_place_and_changes_by_no_more_than_the
             _, n, _, _ = at(sea, k, tuple(p))
             assert abs(at(sea, k, tuple(p - far * np.array(n)))[0]) < 1e-12
     assert (np.abs(np.diff(d)) <= np.linalg.norm(np.diff(x, axis=0), axis=1) + 1e-12).all()
+
+
+@pytest.mark.parametrize("name", OBSTACLES)
+def test_what_is_far_by_the_size_of_an_obstacle_is_farther(name: str, sea: Around) -> None:
+    """It is known of all but planes, which have no end, and meshes, of which the size is not known."""
+    k = list(OBSTACLES).index(name)
+    for x in 4.0 * places(400):
+        assert not is_far(sea, k, tuple(x), at(sea, k, tuple(x))[0] + 1e-12)
+    assert is_far(sea, k, (3.0, -3.0, 3.0), 1.0) == (name not in ("wall", "angle"))
 
 
 def test_a_turned_box_has_turned_normals(sea: Around) -> None:

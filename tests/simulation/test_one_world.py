@@ -48,6 +48,7 @@ SCENES: dict[str, dict[str, Any]] = {
         END + ".motion": {"heave": {"amplitude": 0.05, "period": 1.0}, "ramp": 0.3},
     },
     "zones that move": {"model": {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[4, 8]]}},
+    "zones that move, with a step that is tried again": FEATURES["zones that move"][0] | FEATURES["release"][0],
     "zones of which some stay catenary": {"model": {"kind": "adaptive", "hold_time": 0.1, "force_catenary": [[4, 8]]}}
     | STIFF,
 }

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from hybrid.kernels.algebra.rotations import get3
 from hybrid.kernels.junctions.system_job import read_system
-from hybrid.kernels.laws.surfaces import surface
+from hybrid.kernels.laws.surfaces import is_far, surface
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.obstacle_rows import FREE, MEETS_FROM, MEETS_TO, ONSET_OF, PLACE, RADIUS, STRAND
 from hybrid.kernels.step.job import read
@@ -75,8 +75,11 @@ def nearness(job, rides):
     for k in range(job.line.moved.shape[0]):
         if is_free(job, rides, k):
             for i in range(r.shape[0]):
+                onset = 0.5 * rows[k, ONSET_OF]
+                if is_far(job.sea, k, get3(r, i), onset + NEARBY * rows[k, STRAND]):
+                    continue
                 gap, _, _ = surface(job.sea, k, get3(r, i))
-                gap -= 0.5 * rows[k, ONSET_OF]
+                gap -= onset
                 if not gap > 0.0:
                     return TOUCHES
                 if gap < NEARBY * rows[k, STRAND]:

@@ -15,8 +15,8 @@ from hybrid.kernels.laws.obstacle_motion import (
     way_along,
     way_with,
 )
-from hybrid.kernels.laws.obstacles import grip, half_cell, meets
-from hybrid.kernels.laws.surfaces import Z3, gradient_of_normal, surface
+from hybrid.kernels.laws.obstacles import grip, half_cell, meets, reach_of
+from hybrid.kernels.laws.surfaces import Z3, gradient_of_normal, is_far, surface
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.obstacle_rows import (
@@ -44,7 +44,12 @@ from hybrid.kernels.state.report import CONTACT_WORK, FRICTION_WORK, OBSTACLE_WO
 @inner
 def pressed(line, sea, k, i, x, state):
     """Force N of obstacle k on node i at x along its normal n, with how that bends: N, n, curvature."""
+    reach = reach_of(sea, k, i, state.e)
+    if is_far(sea, k, x, reach):
+        return 0.0, Z3, (0.0, Z3, 0.0)
     d, n, curved = surface(sea, k, x)
+    if d > reach:
+        return 0.0, n, curved
     v, moves = state.v, line.moved.shape[0] > 0
     vi = get3(v, i)
     if moves:

@@ -27,7 +27,7 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, madd, mat_ve
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.obstacle_motion import row3, surface_velocity, swept, way_along
 from hybrid.kernels.laws.seabed import contact, depth_of, stored, with_cell
-from hybrid.kernels.laws.surfaces import E9, Z3, Z9, bent, gradient_of_normal, surface
+from hybrid.kernels.laws.surfaces import E9, Z3, Z9, bent, gradient_of_normal, is_far, surface
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.obstacle_rows import (
@@ -130,12 +130,29 @@ def meets(line, sea, moves, k, c):
 
 
 @inner
+def reach_of(sea, k, i, e):
+    """Distance (m) from obstacle k beyond which node i and its neighbours do not touch.
+
+    Neighbours are nearer to it by no more than their chord: the slope of a distance is 1.
+    """
+    longest = 0.0
+    for c in range(max(i - 1, 0), min(i + 1, e.shape[0])):
+        longest = max(longest, e[c, 0] * e[c, 0] + e[c, 1] * e[c, 1] + e[c, 2] * e[c, 2])
+    return 0.5 * sea.obstacles[k, ONSET_OF] + math.sqrt(longest)
+
+
+@inner
 def normal_force(line, sea, moves, k, i, x, v, e, cv):
     """What obstacle k presses on node i at x with: N, whether it touches, n, curvature, and how N changes with x, and with
 
     the places of the neighbours before and after.
     """
+    reach = reach_of(sea, k, i, e)
+    if is_far(sea, k, x, reach):
+        return 0.0, False, Z3, (0.0, Z3, 0.0), Z3, Z3, Z3
     d, n, curved = surface(sea, k, x)
+    if d > reach:
+        return 0.0, False, n, curved, Z3, Z3, Z3
     vi = get3(v, i)
     if moves:
         vi = sub(vi, surface_velocity(sea.carried, k, x))
@@ -226,9 +243,13 @@ def stored_on_obstacles(line, sea, r):
     rows, energy, moves = sea.obstacles, 0.0, line.moved.shape[0] > 0
     for k in range(rows.shape[0]):
         stiffness, o = rows[k, STIFFNESS], rows[k, ONSET_OF]
-        p1 = depth_in(sea, k, r, 0)
+        far, p1 = is_far(sea, k, get3(r, 0), 0.5 * o), 0.0
         for i in range(line.h.shape[0]):
-            p0, p1 = p1, depth_in(sea, k, r, i + 1)
+            before, far = far, is_far(sea, k, get3(r, i + 1), 0.5 * o)
+            if before and far:
+                continue
+            p0 = depth_in(sea, k, r, i) if before or i == 0 else p1
+            p1 = depth_in(sea, k, r, i + 1)
             thin = thinner(line, rows, k, i) if rows.shape[1] > OBSTACLE else 0.0
             if (p0 > thin or p1 > thin) and meets(line, sea, moves, k, i):
                 energy = with_cell(energy, p0 - thin, p1 - thin, line.h[i], stiffness, o)
@@ -321,8 +342,10 @@ def passes(line, sea, r, u):
             if rows.shape[1] > OBSTACLE:  # of the thinner side
                 thin = thinner(line, rows, k, max(i - 1, 0))
                 thin = max(thin, thinner(line, rows, k, min(i, line.h.shape[0] - 1)))
-            before, _, _ = surface(sea, k, x)
             size, solid = math.sqrt(dot(y, y)), rows[k, STRAND] - thin
+            if is_far(sea, k, x, size):
+                continue
+            before, _, _ = surface(sea, k, x)
             most = min(before, -thin) - solid
             way = before - most
             while way < size:  # d changes by no more than the way: nothing is missed between

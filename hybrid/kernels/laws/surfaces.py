@@ -79,6 +79,21 @@ def surface(sea, k, x):
     return rho - rows[k, RADIUS], scale(1.0 / rho, y), (1.0 / rho, a, 0.0)
 
 
+@inner
+def is_far(sea, k, x, way):
+    """Whether a point is farther than a way, m, from obstacle k by the size of that.
+
+    False: it is not known.  Planes have no end, and of meshes the rows do not hold the size.
+    """
+    rows = sea.obstacles
+    if rows[k, KIND] == FLAT or rows[k, KIND] == MESH:
+        return False
+    size = way + rows[k, RADIUS] + rows[k, HALF_LENGTH] + rows[k, HALF_WIDTH] + rows[k, HALF_HEIGHT]
+    size += rows[k, RING] + rows[k, GROOVE] + 2.0 * rows[k, RIM]
+    w = (x[0] - rows[k, PLACE], x[1] - rows[k, PLACE + 1], x[2] - rows[k, PLACE + 2])
+    return dot(w, w) > size * size
+
+
 @called
 def shaped_surface(sea, k, x):
     """The same of what has axes of its own: along AXIS, along SIDE, and across both."""

@@ -317,6 +317,8 @@ def begin_books_of(table, job, t):
     find_powers(line, job.ends, books.velocity, new, report, books.power[0])
     keep_report(books, report)
     impose_now(job.ends, books.imposed)
+    if books.counts.repeats > 0:  # a state that is known, from which a step is tried once more
+        return
     if books.extremes.shape[1] > 0:
         first_strains(line, job.ends, new, books)
         note_extremes(line, job.sea, job.ends, new, books, t)

@@ -190,11 +190,11 @@ def contact_work(line, sea, old, new, u, report):
         if moves:  # what is left is the bed's
             for k in range(line.moved.shape[0]):
                 b = sub(b, mean_force(old, new, i, EACH * k))
-        ui = get3(u, i)
-        normal = normal_at(line, sea, get3(new.r, i), moves)
-        along = dot(normal, ui) * dot(normal, b)
-        report[CONTACT_WORK] += along
-        report[FRICTION_WORK] += dot(b, ui) - along
+        if b[0] != 0.0 or b[1] != 0.0 or b[2] != 0.0:
+            ui, normal = get3(u, i), normal_at(line, sea, get3(new.r, i), moves)
+            along = dot(normal, ui) * dot(normal, b)
+            report[CONTACT_WORK] += along
+            report[FRICTION_WORK] += dot(b, ui) - along
         new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
     if line.bits & REMEMBERS:
         follow_soil(line, sea, new.r, new.soil)
