@@ -54,7 +54,7 @@ def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
 
     static: those of its equilibrium, whose stability is judged where there are rods and no end moments.
     """
-    if not scene.line_names and as_network() and not static:
+    if not scene.line_names and (scene.contact.self if static else as_network()):
         return _kernels_of_network(scene)
     kernels: Any = _kernels_of_lines if scene.line_names else _kernels_of_cable
     return list(kernels(scene, static))
