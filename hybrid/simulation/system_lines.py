@@ -361,9 +361,7 @@ class LineResult:
 
     def take_cells(self, model: Model, extremes: bool = True) -> None:
         """Go on with other cells; extremes: whether those of now count."""
-        before = self.books
-        if extremes:
-            self.envelope.fold(self.model.nodes, before.extremes)
+        was, before = self.model, self.books
         self.follow(model, other_cells=True)
         names = ("asked", "reached", "path", "radii", "walls", "clock", "counts", "worst", "placed")
         same, blank = (
@@ -374,6 +372,8 @@ class LineResult:
         self.books = blank._replace(**same)
         self.books.work[:], self.books.power[:] = before.work, before.power
         self.books.velocity[:] = before.velocity
+        if extremes:
+            self.envelope.pass_on(was, before, model, self.books)
 
     def around(self, work: Work) -> Around:
         """What changes of kinds have to know of the line."""
