@@ -54,10 +54,11 @@ def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
 
     static: those of its equilibrium, whose stability is judged where there are rods and no end moments.
     """
-    if not scene.line_names and (scene.contact.self if static else as_network()):
-        return _kernels_of_network(scene)
-    kernels: Any = _kernels_of_lines if scene.line_names else _kernels_of_cable
-    return list(kernels(scene, static))
+    one: Any = scene
+    if scene.line_names:
+        return _kernels_of_lines(one, static)
+    by_network = one.contact.self if static else as_network()
+    return _kernels_of_network(one) if by_network else _kernels_of_cable(one, static)
 
 
 def _kernels_of_network(scene: Any) -> list[str]:
