@@ -37,8 +37,9 @@ STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_co
 # Of several lines: what all of them call, steps, equilibria, those that touch, those that are paid out.
 OF_LINES = ("run.system.solve_system", SOLVER[1], OUTPUTS)
 STEPS_OF_LINES, REST_OF_LINES = "run.system_run.run_system", "run.system_run.sample_system"
-BOOKS_OF_LINES = "run.system.book_system_step"
+BOOKS_OF_LINES, START_OF_LINES = "run.system.book_system_step", "run.system.begin_line"
 TOUCHING_LINES = "junctions.system_contact.touch_system", "junctions.shared_contact.shared_task"
+_OF_TOUCHING = OF_LINES[0], TOUCHING_LINES[0]  # of a line that touches itself
 PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "run.payout_run.change_node"
 
 # A cable for the second process to compile with; nothing is computed of it.
@@ -63,15 +64,16 @@ def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
 
 def _kernels_of_network(scene: Any) -> list[str]:
     """Of a cable that is computed as a network of one line."""
-    found = [*OF_LINES, BOOKS_OF_LINES, STEPS_OF_LINES]
-    if not _is_in_space(scene, scene.dimension):
-        found = [SOLVER[0], *found, *([STABILITY] if _is_judged(scene, False) else [])]
+    in_space = _is_in_space(scene, scene.dimension)
+    found = [SOLVER[in_space], STEPS_OF_LINES, START_OF_LINES, BOOKS_OF_LINES, OUTPUTS]
+    if not in_space and _is_judged(scene, False):
+        found.append(STABILITY)
     if scene.model.kind == "adaptive":
         found.append(ZONES)
     if payout_of(scene) is not None:
         found += PAYOUT_OF_LINES
     if scene.contact.self:
-        found += [TOUCHING, TOUCHING_LINES[0]]
+        found += [TOUCHING, *_OF_TOUCHING]
     if wants_errors(scene) and scene.model.kind != "rod":
         found.append(MODEL_ERROR)
     return found
@@ -87,7 +89,9 @@ def _kernels_of_cable(scene: Scene, static: bool) -> list[str]:
     if scene.dimension is None and not in_space and MODEL_ERROR in beside:
         solvers.insert(0, SOLVER[1])  # what leaving bending out does is followed in space
     more = [STABILITY] if not in_space and _is_judged(scene, static) else []
-    return [*solvers, *beside, *more, *([TOUCHING] if scene.contact.self else [])]
+    if scene.contact.self:
+        more += [TOUCHING, *((*_OF_TOUCHING, START_OF_LINES, REST_OF_LINES) if static else ())]
+    return [*solvers, *beside, *more]
 
 
 def _is_in_space(scene: Scene, dimension: int | None) -> bool:
@@ -105,7 +109,7 @@ def _is_judged(scene: Scene, static: bool) -> bool:
 
 def _kernels_of_lines(system: System, static: bool) -> list[str]:
     """Of lines with names."""
-    found = [*OF_LINES, *((REST_OF_LINES,) if static else (BOOKS_OF_LINES, STEPS_OF_LINES))]
+    found = [*OF_LINES, START_OF_LINES, *((REST_OF_LINES,) if static else (BOOKS_OF_LINES, STEPS_OF_LINES))]
     joined = {name for name, x in system.lines.items() if system.is_joined(x.start) or system.is_joined(x.end)}
     scenes = [system.scene_of(name) for name in system.lines if name not in joined]
     planar = [x for x in scenes if not _is_in_space(x, system.dimension)]
@@ -154,8 +158,7 @@ def compile_beside(scene: Scene | System, static: bool = False) -> None:
     if scene.line_names:
         return
     if as_network() and not static:
-        needed = [x for x in _kernels_of_network(scene) if x != SOLVER[1]]  # which this process begins with
-        needed.append(REST_OF_LINES)
+        needed = [*_kernels_of_network(scene)[1:], REST_OF_LINES]  # this process begins with the solver
     else:
         needed = _beside_solver(scene, static)
     if MODEL_ERROR in needed and SOLVER[1] not in needed:  # a line in a plane needs both solvers
@@ -185,7 +188,7 @@ def compile_all(names: Sequence[str]) -> None:
     from hybrid.kernels.run.run import in_space, run
 
     table = np.zeros(0, np.int64)  # of which only the type counts
-    for name in (*OF_LINES[:1], STEPS_OF_LINES, REST_OF_LINES, BOOKS_OF_LINES, SOLVER[0], *PAYOUT_OF_LINES):
+    for name in (*OF_LINES[:1], START_OF_LINES, REST_OF_LINES, BOOKS_OF_LINES, STEPS_OF_LINES, *PAYOUT_OF_LINES):
         if name in names:
             entry(name).compile_unless_busy(table)
     if STEPS in names:

@@ -99,7 +99,7 @@ def _with_catenaries(model: SystemModel, found: LinesAtRest, managers: Mapping[i
 
 
 def _solved(model: SystemModel, found: LinesAtRest, t: float, states: list[State]) -> LinesAtRest:
-    bodies = found.solver.bodies.copy()
+    bodies = found.bodies
     return solve_from(
         found, model, t, bodies, SystemState(states, found.state.bodies), "the equilibrium of other cells"
     )

@@ -218,7 +218,7 @@ def nearness_in(model: SystemModel, lines: Sequence[JoinedLine], found: LinesAtR
     each = enumerate(zip(model.models, found.state.lines, strict=True))
     near = {k: nearness(x, t, state) for k, (x, state) in each if touches_alone(model, k)}
     if model.touching is not None:
-        bodies = found.solver.bodies.copy()
+        bodies = found.bodies
         solver = touching_solver(lines, len(model.free), bodies, lambda: ([], shared_of(model)))
         assert solver.shared is not None
         near |= solver.shared.look_ahead(1.0)

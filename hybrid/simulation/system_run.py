@@ -781,6 +781,7 @@ class SystemRun:
         dt = float(self.loop.clock.tried_dt)
         self._go_back(True)
         if not gives_up_contact(self, dt):
+            self._record_last()
             for line in self.lines:
                 line.write_down()  # what stopped the run before comes first
             raise self._stopped(self.solver, self.loop.tried, dt)

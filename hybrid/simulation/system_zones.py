@@ -145,7 +145,7 @@ def _with_rods(
         models[k] = on_layout(full, full.layout._replace(rod=rod))
         states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at(t))
     other, start = replace(model, models=tuple(models)), SystemState(states, found.state.bodies)
-    return other, solve_from(found, other, t, found.solver.bodies.copy(), start, "the equilibrium of rods")
+    return other, solve_from(found, other, t, found.bodies, start, "the equilibrium of rods")
 
 
 def zones_as_placed(

@@ -13,7 +13,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.search import PUSHED, Attempt, Start, Tally, attempts, first_sound, pulled, stuck, summary_of
 from hybrid.solve.statics import Equilibrium
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.system import NO_BODIES, SystemSolver
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,11 @@ class LinesAtRest:
     alone: tuple[Equilibrium, ...] = ()  # of each line where all are joined to nothing that moves: found one by one
     # By number of those that leave friction to the program, why it did not.
     not_settled: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def bodies(self) -> Floats:
+        """(B, NUMBERS) what bodies are; where there are none, no solver is made for that."""
+        return self.solver.bodies.copy() if len(self.state.bodies) else NO_BODIES
 
     @cached_property
     def solver(self) -> SystemSolver:

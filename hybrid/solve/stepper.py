@@ -30,7 +30,7 @@ from hybrid.kernels.state.report import (
     SLACKEST_CELL,
     USED_RHO,
 )
-from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State
+from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State, Work
 from hybrid.kernels.step.step import States, friction_axes
 from hybrid.solve.workspaces import workspace_of
 
@@ -84,6 +84,14 @@ def static_friction_travel(line: Line, sea: Sea, r: Floats, force: Floats) -> Fl
         parts.append(np.divide(along, held, out=np.zeros_like(along), where=held > 0.0))
     size = np.maximum(np.hypot(*parts), 1.0)
     return np.asarray(sea.slip_length * ((parts[0] / size)[:, None] * sea.axis + (parts[1] / size)[:, None] * side))
+
+
+def lie_on_bed(line: Line, sea: Sea, work: Work, state: State) -> None:
+    """What the seabed and obstacles store, and where they are, of a state whose forces have been evaluated."""
+    work.report[SEABED_ENERGY] = stored_energy(line, sea, state.r)
+    state.bed[:] = sea.bed
+    if line.moved.size:
+        grip_obstacles(line, sea, work.u, state, state.grip, state.grip)
 
 
 OK, OUTCOMES = int(Outcome.OK), {int(x): x for x in Outcome}
@@ -188,10 +196,7 @@ class Stepper:
             for at in (FORCE_A, NET_A):
                 work.report[at : at + 6] += (force[[0, -1]] * (ends.held[:, None] != 0)).ravel()
         if self.line.bits & TOUCHES:
-            self.work.report[SEABED_ENERGY] = stored_energy(self.line, sea, state.r)
-            state.bed[:] = sea.bed
-            if self.line.moved.size:
-                grip_obstacles(self.line, sea, self.work.u, state, state.grip, state.grip)
+            lie_on_bed(self.line, sea, self.work, state)
         self.told = self.work.report.tolist()
         return Taken(Outcome.OK, 1, 0.0, -1, self.told[RESIDUAL])
 
@@ -206,8 +211,5 @@ class Stepper:
             lie_in_soil(self.line, sea, state.r, state.soil)
         entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work)
         if self.line.bits & TOUCHES:
-            self.work.report[SEABED_ENERGY] = stored_energy(self.line, sea, state.r)
-            state.bed[:] = sea.bed
-            if self.line.moved.size:
-                grip_obstacles(self.line, sea, self.work.u, state, state.grip, state.grip)
+            lie_on_bed(self.line, sea, self.work, state)
         self.told = self.work.report.tolist()

@@ -32,13 +32,14 @@ from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.reel.payout import stand_among
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.run.run import in_plane, in_space
-from hybrid.kernels.run.system import JUNCTIONS, book_system_step, solve_system
+from hybrid.kernels.run.system import JUNCTIONS, begin_line, book_system_step, solve_system
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.forces import FRICTION, PLANAR, WAVES
+from hybrid.kernels.state.forces import FRICTION, PLANAR, TOUCHES, WAVES
 from hybrid.kernels.state.obstacle_rows import FREE, MOVES
-from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
+from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, SEABED_ENERGY, USED_RHO
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, State, Work, state_for
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, Limits, Task
@@ -57,7 +58,7 @@ from hybrid.solve.statics import (
     BALANCING,
     MOST_ITERATIONS,
 )
-from hybrid.solve.stepper import HEAVY, REACH
+from hybrid.solve.stepper import HEAVY, REACH, lie_on_bed
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
 from hybrid.solve.workspaces import workspace_of
 
@@ -128,6 +129,7 @@ class SystemSolver:
         each = zip(lines, self._near, self._mixes, strict=True)
         self._winches = sum(x.winds and bool(near < 0 or mixes) for x, near, mixes in each)
         self._wound: dict[int, int] = {}
+        self._reels: dict[int, NDArray[np.int64]] = {}  # tables of lines that are paid out
         self.work = [_room(x, self._keeps(k, x)) for k, x in enumerate(lines)]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
@@ -146,7 +148,6 @@ class SystemSolver:
         # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
         self._numbers = np.zeros((2, len(lines), blank.numbers.size), np.int64)
         self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in range(len(lines))]
-        self._solver = in_space.address(self._numbers[0, 0])
         self._rooms = self._make_rooms()
         self._pushes: dict[int, list[Floats]] = {}  # out of planes, of states of even parity and of odd, by line
         self._together = self._all = JointJobs(self._rooms, self._numbers, range(len(lines)))
@@ -188,7 +189,7 @@ class SystemSolver:
         }  # fmt: skip
         floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
         own = {"fairleads": self._fairleads, "gaps": self._gaps, "floors": floors, "allowed": self.allowed}
-        apart = {"near": self._near, "alone": self._alone, "asked": self._asked, "solver": self._solver}
+        apart = {"near": self._near, "alone": self._alone, "asked": self._asked}
         begins = np.append(0, np.cumsum([x.line.s.size for x in lines])[:-1]).astype(np.int64)
         rooms = Rooms(shared, of_lines, own, apart | {"rides": self._rides, "phase": self._phase}, begins, {}, {})
         if self._rides.size:
@@ -209,7 +210,7 @@ class SystemSolver:
 
     def wind(self, number: int, alone: int, **values: Any) -> None:
         """Put values in the jobs of a line that is paid out; alone: what its iterations call where it is by itself."""
-        self._wound[number] = alone
+        self._wound[number], self._reels[number] = alone, values["reel_table"]
         self.bind_line(number, **values)
 
     def _by_itself(self, number: int, values: dict[str, Any]) -> dict[str, Any]:
@@ -238,9 +239,8 @@ class SystemSolver:
         self.lone_numbers = np.zeros((len(self.lone), self._numbers.shape[2]), np.int64)
         self._lone_tables = {}
         for k, numbers in zip(self.lone, self.lone_numbers, strict=True):
-            x, table = self.lines[k], self._tables[k][0].again(numbers)
-            task = Task(RUN, limits=Limits(REACH * x.length, x.scale, MOST_OF_STEP))
-            table.bind(task=task, **self._by_itself(k, {"line": x.line, "work": self.work[k], "iterated": 0}))
+            table, own = self._tables[k][0].again(numbers), {"line": self.lines[k].line, "work": self.work[k]}
+            table.bind(task=self._task_of_run(k), **self._by_itself(k, own | {"iterated": 0}))
             self._lone_tables[k] = table
         self._together, self._joined_tables = self._all, dict(enumerate(self._tables))
         if self.lone:
@@ -284,14 +284,42 @@ class SystemSolver:
         even, odd = self._tables[number]
         return self._lone_tables[number], even, odd
 
+    def _task_of_run(self, number: int) -> Task:
+        return Task(RUN, limits=self.limits_by_itself(number))
+
     def limits_by_itself(self, number: int) -> Limits:
         """What Newton's method works with in a line that is solved by itself."""
         return Limits(REACH * self.lines[number].length, self.lines[number].scale, MOST_OF_STEP)
 
     def marcher_of(self, number: int) -> int:
         """Address of the kernel that solves steps of a line that is solved by itself."""
-        flat = self.lines[number].line.bits & PLANAR
-        return in_plane.address(self._numbers[0, number]) if flat else self._solver
+        return self._kernel_of(number).address(self._numbers[0, number])
+
+    def _kernel_of(self, number: int) -> Any:
+        return in_plane if self.lines[number].line.bits & PLANAR else in_space
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether every line is solved by itself, whatever comes."""
+        return not (self.joined or len(self.net) or len(self.bodies) or any(self._mixes))
+
+    @property
+    def _marches_alone(self) -> bool:
+        """Whether forces of every line are found by itself, too: where it touches itself they are found with others."""
+        return self.is_apart and not self._contacts
+
+    def joint_solver(self) -> int:
+        """Address of the kernel that solves steps of lines that are joined; 0: none are, and it is not compiled."""
+        if self.is_apart:
+            return 0
+        self._let_march()
+        return solve_system.address(self._all.jobs[0].numbers)
+
+    def _let_march(self) -> None:
+        """Jobs of joined lines know the kernel that marches them, in space, which takes long to compile."""
+        self._rooms.job["solver"] = marcher = in_space.address(self._numbers[0, 0])
+        for table in (*self._all.jobs, *self._together.jobs):
+            table.bind(solver=marcher)
 
     def adopt_cells(self, number: int, line: Line, sea: Sea, work: Work, books: Books) -> None:
         """A line is in other arrays from now on, of which its jobs know."""
@@ -448,8 +476,41 @@ class SystemSolver:
             task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most,
             task.rho_before, task.fixed, t, 1.0, task.cut,
         )  # fmt: skip
+        self._let_march()
         outcome, iterations, left, line, where = solve_system(self._all.jobs[0].numbers)
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())
+
+    def _march(self, what: int, ca: float, states: SystemState, t: float = 0.0) -> SystemTaken:
+        """Forces (ASSEMBLY) or a CORRECTION of states, of lines by themselves by the kernels of their steps."""
+        task = Task(what, ca=ca, limits=Limits(1.0, 1.0, 1))
+        if not self._marches_alone:
+            return self._solve(task, states, states, t)
+        self.turns = None
+        for k, table in self._lone_tables.items():
+            work, state = self.work[k], states.lines[k]
+            work.torsion.known[:1] = -1.0  # how it answers to torques is found anew
+            table.bind(task=task, old=state, new=state)
+            outcome, iterations, left, where = self._kernel_of(k)(table.numbers)
+            table.bind(task=self._task_of_run(k))
+            # forces of a line alone are known whatever its equations are
+            known = what == ASSEMBLY and outcome == Outcome.SINGULAR and work.report[RESIDUAL] < np.inf
+            if outcome != Outcome.OK and not known:
+                return SystemTaken(Outcome(outcome), iterations, left, k, where, self.residual())
+        if what == ASSEMBLY:
+            self._begin_books(states, t)
+        return SystemTaken(Outcome.OK, 1, np.inf, -1, -1, self.residual())
+
+    def _begin_books(self, states: SystemState, t: float) -> None:
+        """Powers and extremes of lines that are solved by themselves, in states whose reports are known, at t (s)."""
+        for k, table in self._lone_tables.items():
+            x, clock = self.lines[k], self.books[k].clock
+            if x.line.bits & TOUCHES:
+                lie_on_bed(x.line, x.sea, self.work[k], states.lines[k])
+                clock.stored = self.work[k].report[SEABED_ENERGY]
+            if k in self._reels:
+                stand_among(self._reels[k])
+            clock.now = t
+            begin_line(table.numbers)
 
     def residual(self) -> float:
         """Largest residual force (N) of the last march, at a node or a point; without contact."""
@@ -620,7 +681,7 @@ class SystemSolver:
         self._at_rest[0] = 1
         for k in self._touching_lines:
             self.books[k].clock.now = t
-        taken = self._solve(Task(CORRECTION, ca=HEAVY, limits=Limits(1.0, 1.0, 1)), states, states)
+        taken = self._march(CORRECTION, HEAVY, states)
         self._at_rest[0] = 0
         for k, (x, work) in enumerate(zip(self.lines, self.work, strict=True)):
             self.bind_line(k, work=work, ends=x.ends)
@@ -632,7 +693,7 @@ class SystemSolver:
                 row[WD : WD + 3] = row[WA : WA + 3] = HEAVY * solved[3:] @ row[FRAME:V].reshape(3, 3)
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             state.vd[:] = HEAVY * work.x[:, 1:4]
-            if x.line.bits & PLANAR:  # round-off of equations in space, which steps in the plane would add up
+            if x.line.bits & PLANAR and not self._marches_alone:  # round-off in space, which steps would add up
                 state.vd[:] -= np.outer(state.vd @ x.line.plane[2], x.line.plane[2])
             state.a[:] = state.vd
             state.T[:] += work.x[1:, 0]
@@ -669,7 +730,7 @@ class SystemSolver:
             self._around(x, state, work)
             if state.soil.size:
                 lie_in_soil(x.line, x.sea, state.r, state.soil)
-        taken = self._solve(Task(ASSEMBLY, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states, t)
+        taken = self._march(ASSEMBLY, ca, states, t)
         if taken.outcome == Outcome.OK:
             self._settle_contact(states)
         return taken

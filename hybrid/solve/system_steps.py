@@ -14,7 +14,7 @@ from hybrid.kernels.junctions.members_water import stir_members
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_step import follow_zones
 from hybrid.kernels.run.following_run import ask_cells, change_cells
-from hybrid.kernels.run.system import book_system_step, solve_system
+from hybrid.kernels.run.system import book_system_step
 from hybrid.kernels.run.system_run import (
     CUT_LINE,
     LINE,
@@ -231,10 +231,10 @@ class SystemSteps:
 
     def go(self) -> int:
         """Go on until a code of kernels.state.books."""
-        if self._first is not None:
-            self._job.bind(solver=solve_system.address(self._first), book=book_system_step.address(self._first))
-            self._first = None
         assert self._solver is not None
+        if self._first is not None:
+            self._job.bind(solver=self._solver.joint_solver(), book=book_system_step.address(self._first))
+            self._first = None
         if self._is_new and self._solver.mixes:
             self._solver.find_near(self.states[0], float(self.clock.now))
             self._job.bind(**self._solver.regroup())

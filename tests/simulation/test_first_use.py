@@ -131,3 +131,16 @@ def test_an_equilibrium_in_a_plane_asks_for_no_solver_in_space() -> None:
         [sys.executable, "-c", code, json.dumps(KINDS["rod in a plane"])], capture_output=True, text=True, check=True
     )
     assert done.stdout.split() == ["1", "0", "1"]
+
+
+@pytest.mark.parametrize("kind", ["rod in a plane", "zones that move", "rod in space"])
+def test_a_line_that_is_joined_to_nothing_asks_for_no_solver_of_joined_ones(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor one in a plane for that in space: together they take longer to compile than all else."""
+    called: set[str] = set()
+    taking = KeptCode.taking
+    monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
+    hybrid.run(KINDS[kind])
+    assert "run.system.solve_system" not in called
+    assert ("run.run.in_space" in called) == (kind == "rod in space")
