@@ -11,9 +11,9 @@ import pytest
 
 import hybrid
 from hybrid.kernels.run import payout_run
-from hybrid.simulation.payout_nodes import NodeChanges
-from hybrid.simulation.transient import Transient
-from hybrid.solve.run import CompiledRun
+from hybrid.simulation.lines_nodes import LineNodes
+from hybrid.simulation.system_payout import SystemPayout
+from hybrid.solve.system_steps import SystemSteps
 from tests.simulation.test_payout import clamped, kicks
 from tests.simulation.test_payout import sagging as swung
 
@@ -48,19 +48,19 @@ def test_cost_of_paying_out(monkeypatch: pytest.MonkeyPatch) -> None:
         "paid out, 150 outputs, looked at between nodes": (sagging(True), False),
         "paid out, 2 outputs": (sagging(True, 37.5), True),
     }
-    together, taken = Transient.pays_out, {name: list[float]() for name in cases}
-    in_steps, within, go = {name: list[float]() for name in cases}, [0.0], CompiledRun.go
+    together, taken = LineNodes.may_change, {name: list[float]() for name in cases}
+    in_steps, within, go = {name: list[float]() for name in cases}, [0.0], SystemSteps.go
 
-    def timed(run: CompiledRun, *by: Any) -> int:
+    def timed(run: SystemSteps, *by: Any) -> int:
         begin = time.process_time()
         code = go(run, *by)
         within[0] += time.process_time() - begin
         return code
 
-    monkeypatch.setattr(CompiledRun, "go", timed)
+    monkeypatch.setattr(SystemSteps, "go", timed)
     for _ in range(RUNS + 1):
         for name, (scene, joined) in cases.items():
-            monkeypatch.setattr(Transient, "pays_out", together if joined else False)
+            monkeypatch.setattr(LineNodes, "may_change", staticmethod(together if joined else lambda *_: False))
             within[0] = 0.0
             begin = time.process_time()
             hybrid.run(scene)
@@ -98,21 +98,16 @@ def test_cost_of_a_node(monkeypatch: pytest.MonkeyPatch) -> None:
     compiled: list[float] = []
 
     def timed(change: Any, taken: list[float]) -> Any:
-        def wrapped(self: Any) -> None:
+        def wrapped(self: Any, *more: Any) -> None:
             begin = time.process_time_ns()
-            change(self)
+            change(self, *more)
             taken.append(1e-6 * (time.process_time_ns() - begin))
 
         return wrapped
 
-    def only_steps(self: NodeChanges) -> int:
-        code = int(self._run.go())
-        self.sync()
-        return code
-
-    monkeypatch.setattr(Transient, "_change_length", timed(Transient._change_length, taken))
-    monkeypatch.setattr(payout_run, "change_paid", timed(payout_run.change_paid, compiled))
-    monkeypatch.setattr(NodeChanges, "go", only_steps)
+    monkeypatch.setattr(SystemPayout, "_change", timed(SystemPayout._change, taken))
+    monkeypatch.setattr(SystemPayout, "_change_by_itself", timed(SystemPayout._change_by_itself, taken))
+    monkeypatch.setattr(payout_run, "change_node", timed(payout_run.change_node, compiled))
     for name, (model, section) in NODES.items():
         scene = sagging(True, 37.5).model_dump(mode="json", exclude_none=True)
         scene["model"] = model

@@ -24,7 +24,6 @@ from hybrid.simulation import initial_zones
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_run import SystemRun
 from hybrid.simulation.system_zones import SystemZones
-from hybrid.simulation.transient import Transient
 
 pytestmark = pytest.mark.bench
 ROUNDS = 3
@@ -46,7 +45,7 @@ def timed(call: Callable[..., Any], into: list[float], clock: Callable[[], float
 def test_switch(mesh: str, monkeypatch: pytest.MonkeyPatch) -> None:
     reviews, switches, first = list[float](), list[float](), list[float]()
     monkeypatch.setattr(DomainManager, "review", timed(DomainManager.review, reviews))
-    monkeypatch.setattr(Transient, "_switch", timed(Transient._switch, switches))
+    monkeypatch.setattr(SystemZones, "_switch", timed(SystemZones._switch, switches))
     text = touchdown(True)
     for _ in range(ROUNDS + 1):  # the first compiles
         begin = len(switches)

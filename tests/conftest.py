@@ -64,12 +64,6 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.fixture
-def old_road(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Cables are computed by their own run, for tests that compare that with a network's; goes with it."""
-    monkeypatch.setenv("HYBRID_CABLES", "cable")
-
-
-@pytest.fixture
 def report(request: pytest.FixtureRequest) -> Report:
     """`report(case, source, figure, acceptance)`: show a figure, and keep it for docs/evidence/validation.md."""
 

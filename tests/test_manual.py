@@ -58,7 +58,7 @@ def kinds_in_code() -> set[str]:
         for node in ast.walk(ast.parse(text)) if re.search(r"event\(|note\(|event=|_notes", text) else ():
             if isinstance(node, ast.Call):
                 name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-                place = {"event": 3, "note": 2}.get(name)
+                place = {"event": 3, "note": 2 if len(node.args) > 2 else 0}.get(name)
                 given = [] if place is None else node.args[place : place + 1]
                 given += [k.value for k in node.keywords if k.arg == "event"]
                 if name == "append" and node.args and isinstance(node.args[0], ast.Tuple):  # notes of the error figure

@@ -6,7 +6,6 @@ that it needs.  docs/zone_rules.md
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from math import ceil, isinf
 
@@ -27,7 +26,6 @@ from hybrid.model.model_costs import (
 from hybrid.model.resolution import Resolution, for_motion, model_is_free, wants_survey
 from hybrid.model.run_time import foretold_steps
 from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.scene.system import System
 from hybrid.simulation.case import Case
 from hybrid.simulation.initial_zones import HOLD
 from hybrid.simulation.layer_mesh import layered, survey_of
@@ -72,14 +70,6 @@ def choice_of(
     each = costs(scene, model, cells, catenaries, of_zones, why_not, _steps_of_zones(rods, model, resolution))
     kind = cheapest(each).kind
     return ModelChoice(kind, reasons(each)), replace(resolution, grading=gradings[kind])
-
-
-def with_models(system: System, kinds: Mapping[str, str]) -> System:
-    """The same with models of these kinds for lines by name, as of `with_model`."""
-    scenes = {name: with_model(system.scene_of(name), kind) for name, kind in kinds.items()}
-    changes = {name: {"model": x.model, "accuracy": x.accuracy} for name, x in scenes.items()}
-    lines = {name: x.model_copy(update=changes.get(name, {})) for name, x in system.lines.items()}
-    return system.model_copy(update={"lines": lines}) if kinds else system
 
 
 def _steps_of_zones(scene: Scene, model: Model, resolution: Resolution) -> float:

@@ -31,10 +31,7 @@ from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import kernels_of
-from hybrid.simulation.switch import as_network
 from hybrid.simulation.system_run import Recording, SystemRun
-from hybrid.simulation.time_loop import TimeLoop
-from hybrid.simulation.transient import Transient
 from hybrid.solve.joined import LineFailed
 from hybrid.store.comparison_recorder import ComparisonRecorder
 
@@ -112,18 +109,18 @@ class _Probe(Case):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene, None)
-        self.loop: TimeLoop | SystemRun | None = None  # the last
+        self.run: SystemRun | None = None  # the last
         self.at_rest: tuple[Model, State] | None = None  # where it begins, if that is an equilibrium
         self._end = np.inf
         self._most_steps = np.inf
-        self.seen: list[Seen] = []  # of the last loop
+        self.seen: list[Seen] = []  # of the last run
         self.interrupted = self._is_used_up
 
     def _is_used_up(self) -> bool:
         now, steps = clock.process_time(), 0
-        if self.loop is not None:
-            steps = _run_of(self.loop).steps
-            self.seen.append(Seen(now, steps, _run_of(self.loop).t))
+        if self.run is not None:
+            steps = self.run.steps
+            self.seen.append(Seen(now, steps, self.run.t))
         if steps < self._most_steps and self._end + ONCE < now < np.inf and len(self.seen) == 2:
             self._end = now + FIRST_STEPS  # what is done once, as compiling, is no cost of a step
         return steps >= self._most_steps or now > self._end
@@ -132,18 +129,14 @@ class _Probe(Case):
         """Processor time, s, and steps for what follows."""
         self._end, self._most_steps = clock.process_time() + seconds, steps
 
-    def _loop(self, *args: Any, **kwargs: Any) -> TimeLoop:
-        self.loop = super()._loop(*args, **kwargs)
-        self.seen = [Seen(clock.process_time(), 0, 0.0)]
-        return self.loop
-
     def _network_run(self, *args: Any, **kwargs: Any) -> SystemRun:
-        self.loop = super()._network_run(*args, **kwargs)
+        self.run = super()._network_run(*args, **kwargs)
         self.seen = [Seen(clock.process_time(), 0, 0.0)]
-        return self.loop
+        return self.run
 
-    def _first_steps_of_network(self, resolution: Resolution) -> tuple[SystemRun, float, float]:
-        """As `first_steps`."""
+    def first_steps(self, resolution: Resolution) -> tuple[SystemRun, float, float]:
+        """A result after its first steps; s of processor time before them, and of so many without what is done
+        once."""
         begin = begun = clock.process_time()
         self.allow(np.inf)
         run = self._network_run(resolution, None, Recording(touches=self.touches_itself))
@@ -168,27 +161,6 @@ class _Probe(Case):
         if self._is_used_up():
             raise KeyboardInterrupt
 
-    def first_steps(self, resolution: Resolution) -> tuple[TimeLoop | SystemRun, float, float]:
-        """The loop of a result after its first steps; s of processor time before them, and of so many without what is
-        done once."""
-        if as_network():
-            return self._first_steps_of_network(resolution)
-        begin = clock.process_time()
-        self.allow(np.inf)  # the budget of the pre-run may be used up, and the equilibrium has none
-        model, equilibrium, switching = self._start(resolution)
-        loop = self._loop(self.scene, model, resolution, switching, None)
-        self.at_rest = None if equilibrium is None else (model, equilibrium.state.copy())
-        begun = clock.process_time()
-        known = resolution.local is None and model.payout is None
-        self.allow(FIRST_STEPS, ENOUGH_STEPS if known else np.inf)
-        with suppress(KeyboardInterrupt):
-            loop.begin(equilibrium)
-            begun = clock.process_time()  # the first state is made once, however many steps there are
-            self.seen = [Seen(begun, loop.run.steps, loop.run.t)]
-            loop.to_the_end(self._duration, self._exact)
-        self.seen.append(Seen(clock.process_time(), loop.run.steps, loop.run.t))
-        return loop, begun - begin, loop.run.steps * _cost_of_a_step(self.seen)
-
 
 def _measured(scene: Scene, found: Plan) -> Plan:
     """The same, with what the pre-run and the first steps show.
@@ -205,17 +177,17 @@ def _measured(scene: Scene, found: Plan) -> Plan:
             choice, resolution = chosen_and_surveyed(case, first)
         except KeyboardInterrupt:
             cut = True
-        survey, coarse = clock.process_time() - begin, case.loop
+        survey, coarse = clock.process_time() - begin, case.run
         still = _still_to_come(case.seen, scene.require_time().duration) if cut and coarse is not None else 0.0
         if not is_warm(kernels_of(case.scene)):
             return found
-        loop, setup, spent = case.first_steps(resolution)
+        run, setup, spent = case.first_steps(resolution)
     except ComputationError:
         return found  # the run will say why
     duration = scene.require_time().duration
     survey += still
-    steps = _steps(scene, resolution, loop, coarse, case.seen)
-    motion = steps * _dearer(found) * spent / max(_run_of(loop).steps, 1)
+    steps = _steps(scene, resolution, run, coarse, case.seen)
+    motion = steps * _dearer(found) * spent / max(run.steps, 1)
     seconds, most = _of_passes(scene, setup, motion, duration / scene.output_interval, found)
     if scene.contact.self:  # by name: the first steps show nothing of it
         seconds, most = seconds + (TOUCHING - 1.0) * motion, most + (MOST_TOUCHING - 1.0) * motion
@@ -246,39 +218,32 @@ def _dearer(found: Plan) -> float:
     return mean / first
 
 
-def _run_of(loop: TimeLoop | SystemRun) -> Transient | SystemRun:
-    """What counts its steps."""
-    return loop if isinstance(loop, SystemRun) else loop.run
-
-
 def _steps(
-    scene: Scene, resolution: Resolution, loop: TimeLoop | SystemRun, coarse: TimeLoop | SystemRun | None,
-    seen: Sequence[Seen],
-) -> float:  # fmt: skip
-    """Steps of the result, which has come as far as its loop.
+    scene: Scene, resolution: Resolution, run: SystemRun, coarse: SystemRun | None, seen: Sequence[Seen]
+) -> float:
+    """Steps of the result, which has come as far as its run.
 
     coarse: of the mesh pre-run, whose steps, longer by one factor, show how many each part of the motion asks for.
-    seen: of its loop.
+    seen: of its run.
     """
-    run, duration = _run_of(loop), scene.require_time().duration
+    duration = scene.require_time().duration
     if run.t >= duration:
         return float(run.steps)
     if resolution.local is None:
         return float(count_steps(scene))
     rate = _steps_a_second(seen)
     if run.steps < SETTLED:  # they still grow: not shorter than the next is to be
-        steps = run.loop if isinstance(run, SystemRun) else run.run
-        rate = min(rate, 1.0 / float(steps.clock.next_dt))
+        rate = min(rate, 1.0 / float(run.loop.clock.next_dt))
     linear = run.steps + rate * (duration - run.t)
-    if coarse is None or coarse is loop or not _run_of(coarse).steps:
+    if coarse is None or coarse is run or not coarse.steps:
         return linear
-    recorder = coarse.lines[0].recorder if isinstance(coarse, SystemRun) else coarse.recorder
+    recorder = coarse.lines[0].recorder
     assert isinstance(recorder, ComparisonRecorder)
     times = recorder.steps[:, 0]
     passed = int((times <= run.t).sum())
     if not passed:
         return linear
-    return run.steps * times.size / passed * duration / max(_run_of(coarse).t, 1e-9 * duration)
+    return run.steps * times.size / passed * duration / max(coarse.t, 1e-9 * duration)
 
 
 def _of_passes(scene: Scene, setup: float, motion: float, outputs: float, found: Plan) -> tuple[float, float]:

@@ -24,7 +24,7 @@ from hybrid.accuracy.error_estimate import Estimate
 from hybrid.accuracy.error_report import accuracy_figures, effort, error_fields, known
 from hybrid.accuracy.error_statistics import statistics_of
 from hybrid.accuracy.finer_result import NOT_KEPT, Replacement, is_no_better, not_kept_text
-from hybrid.accuracy.model_choice import NEAR, choice_of, with_models
+from hybrid.accuracy.model_choice import NEAR, choice_of
 from hybrid.accuracy.passes import emptied, free_in
 from hybrid.accuracy.refinement import (
     COSTLY_ACCURACY,
@@ -36,7 +36,7 @@ from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bendi
 from hybrid.accuracy.system_samples import compared, extremes_of, sample_of, touch_unasked
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
-from hybrid.model.model_costs import NAMED, REST, ModelChoice
+from hybrid.model.model_costs import NAMED, REST, ModelChoice, with_models
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from hybrid.model.resolution import accuracy_of, holds_stress
 from hybrid.model.run_time import step_time
 from hybrid.scene.accuracy import of_unnamed_model
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, RodModel, Scene
+from hybrid.scene.system import System
 
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
 # Another model must cost less than this part of rods, which need no criterion and leave nothing out.
@@ -97,6 +98,14 @@ def with_model(scene: Scene, kind: str) -> Scene:
     if (accuracy := accuracy_of(scene)) is not None:
         changed["accuracy"] = of_unnamed_model(accuracy, holds_stress(scene.cable.sections))
     return scene.model_copy(update=changed)
+
+
+def with_models(system: System, kinds: Mapping[str, str]) -> System:
+    """The same with models of these kinds for lines by name, as of `with_model`."""
+    scenes = {name: with_model(system.scene_of(name), kind) for name, kind in kinds.items()}
+    changes = {name: {"model": x.model, "accuracy": x.accuracy} for name, x in scenes.items()}
+    lines = {name: x.model_copy(update=changes.get(name, {})) for name, x in system.lines.items()}
+    return system.model_copy(update={"lines": lines}) if kinds else system
 
 
 def structural(scene: Scene, cable: Material) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, isnan
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
@@ -271,3 +273,19 @@ def critical_torque(scene: Scene, model: Model, T: Floats) -> CriticalTorque | N
         float(radius[0]),
         of_tension,
     )
+
+
+def apart(stops: Iterable[float], t: float, step: float) -> list[float]:
+    """Stops after t in their order; of those that are the same but for round-off the last."""
+    out: list[float] = []
+    for stop in sorted([x for x in stops if x > t + SAME_STOP * step]):
+        if out and stop - out[-1] <= SAME_STOP * step:
+            out.pop()
+        out.append(stop)
+    return out
+
+
+def falls_on(stop: float, times: Sequence[float], step: float) -> bool:
+    """Whether a stop is one of the times, which are in order, but for round-off: by halves, at each of many stops."""
+    k = bisect_left(times, stop - SAME_STOP * step)
+    return k < len(times) and times[k] <= stop + SAME_STOP * step

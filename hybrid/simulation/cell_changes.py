@@ -6,10 +6,10 @@ the numbers of the other one.  What Python has of the line is made anew when the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -34,13 +34,11 @@ from hybrid.kernels.run import following_run as f
 from hybrid.kernels.run.run import run as steps
 from hybrid.kernels.run.system import begin_line
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, sample_size
-from hybrid.kernels.state.forces import REMEMBERS
-from hybrid.kernels.state.state import Batch, Line
+from hybrid.kernels.state.books import Books
+from hybrid.kernels.state.state import Line
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
-from hybrid.model.mesh import Zone
 from hybrid.simulation.cell_arrays import (
     REST_OF_SEA,
     Kept,
@@ -50,11 +48,8 @@ from hybrid.simulation.cell_arrays import (
 )
 from hybrid.simulation.cell_views import CellViews
 from hybrid.simulation.envelope import marks_on
-from hybrid.simulation.kind_changes import plain
+from hybrid.simulation.line_of_run import OneOfMany
 from hybrid.solve.stepper import HEAVY
-
-if TYPE_CHECKING:
-    from hybrid.simulation.transient import Transient
 
 LEAST_CELLS = 3  # with which tables are made
 # Of the tables of a run, what depends on the cells.
@@ -66,12 +61,12 @@ MOST_WAITING, MOST_PLACES = 256, 20_000
 
 
 class CellChanges:
-    """Changes of the cells of a run (`Transient`), and of what is rod."""
+    """Changes of the cells of a line of a run, and of what is rod."""
 
     alone = True  # whether cells change without a return to Python
     by_parity: tuple[Table, Table] | None = None  # of one of several lines: its tables in steps of all, even and odd
 
-    def __init__(self, owner: Transient) -> None:
+    def __init__(self, owner: OneOfMany) -> None:
         """Room for all; `adopt` before the first change."""
         assert owner.switching is not None and owner.model.layout is not None
         self._owner, self._run, self._switching = owner, owner.run, owner.switching
@@ -91,7 +86,6 @@ class CellChanges:
         self._spare = np.zeros(4 * b.EXTREMES * (self.most + 1 + extra))
         self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
         self._following = Table(f.blank_following_job)
-        self._rods_then: list[tuple[int, np.ndarray]] = []  # rods (n,) of the outputs that waited, up to so many
         self._waiting, self._places = np.zeros((MOST_WAITING, 3), np.int64), np.zeros(MOST_PLACES, np.int64)
         self.adopted, self._synced = False, -1  # number of changes that Python knows of
         self._shifts = np.zeros(1, bool)
@@ -118,19 +112,10 @@ class CellChanges:
         return bool(self._at.changes != self._synced)
 
     @staticmethod
-    def _key(owner: Transient) -> tuple[Any, ...]:
+    def _key(owner: OneOfMany) -> tuple[Any, ...]:
         """What the tables hold as it is."""
         model = owner.model
         return id(model.on_base), model.line.bits, id(model.line.plane), id(model.ends), bool(owner.run.push.size)
-
-    @staticmethod
-    def applies(owner: Transient) -> bool:
-        """Whether the cells of a run follow the curvature, and nothing asks Python on the way."""
-        switching = owner.switching
-        if switching is None or not switching.zones.clock.share > 0.0:
-            return False
-        remembers = owner.model.line.bits & REMEMBERS
-        return plain(owner) and not remembers and switching.manager.layout.rod.size >= LEAST_CELLS
 
     def still_fits(self) -> bool:
         """Whether the line is of the kind that the arrays were made for."""
@@ -335,56 +320,16 @@ class CellChanges:
         run.count.parity = parity
         self.sync()
 
-    def go(self, reviewed: bool = False) -> int:
-        """Steps, and changes of cells that need nothing else; a code of kernels.state.books.
-
-        reviewed: the criteria have just been reviewed after a step, and zones stay as they are.
-        """
-        self._at.alone, self._at.may_wait = self.alone, self._owner.outputs_may_wait
-        code = self._run.go(lambda: int(f.go_on(self._following.numbers, reviewed)))
-        self._run.set_quota(self.cells)
-        return code
-
     @property
     def due(self) -> bool:
         """Whether cells are to change."""
         return bool(self._switching.zones.counts.cells_due)
-
-    def unwatched(self) -> bool:
-        """After a step that Python is to look at: whether nothing is to be done but a review and a change of cells."""
-        count = self._run.count
-        if count.notices or count.asks:
-            return False
-        return not self.due or bool(f.cells_may_change(self._following.numbers))
-
-    def review_due(self) -> bool:
-        """Whether the criteria are to be reviewed."""
-        return self._switching.manager.review_due(float(self._run.clock.now))
-
-    def review(self) -> Change | None:
-        """The change of zones that follows from the criteria now; None: they stay."""
-        manager, k, n = self._switching.manager, self.side, self.cells
-        if self._stale:
-            manager.take(manager.layout, self._on.zones(k, n))
-        return manager.review(float(self._run.clock.now), self._on.state(k, int(self._run.count.parity), n))
 
     def change_zones(self, change: Change) -> float:
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
         booked = self._to_zones(change)
         self.sync()
         return booked
-
-    def change_zones_between(self, change: Change) -> float | None:
-        """The same after a step that asks for nothing else, before `sync`: the outputs of the zones of now wait.
-
-        None: there is no room for these, and nothing has changed.
-        """
-        if not f.cells_may_change(self._following.numbers):
-            return None
-        f.leave_cells(self._following.numbers)
-        if self.waits:
-            self._rods_then.append((int(self._at.waiting), self._switching.zones.rod.copy()))
-        return self._to_zones(change)
 
     def _to_zones(self, change: Change) -> float:
         """Other zones, of which Python's model knows nothing yet, and the energy, J, that is booked for it."""
@@ -397,7 +342,7 @@ class CellChanges:
                 self._clamps[k] = clamp
         booked = self.change(lambda: manager.adopt_rods(change.rod, change, t))
         manager.take(manager.layout._replace(rod=change.rod.copy()), self._on.zones(self.side, self.cells))
-        switching.limit_steps(self._run)
+        switching.limit_steps(self._run.clock)
         return booked
 
     def change(self, adopt: Callable[[], None] | None = None) -> float:
@@ -415,22 +360,6 @@ class CellChanges:
 
     # --- outputs that wait --------------------------------------------------------------------------
 
-    def waiting(self) -> Iterator[tuple[Line, Batch, tuple[Zone, ...]]]:
-        """Outputs of cells of before, with the lines and zones that they are of, in arrays that the next overwrites."""
-        layout, begin, zones = self._owner.model.layout, 0, None
-        assert layout is not None
-        then = [*self._rods_then, (MOST_WAITING, self._switching.zones.rod)]
-        for i, (offset, count, cells) in enumerate(self._waiting[: self._at.waiting].tolist()):
-            if zones is None or i == then[0][0]:
-                while i >= then[0][0]:
-                    del then[0]
-                zones = layout._replace(rod=then[0][1]).zones
-            line = self._line_of(self._places[begin : begin + cells + 1], then[0][1])
-            size = sample_size(cells, True)
-            rows = self._on.samples[offset : offset + count * size].reshape(count, size)
-            begin += cells + 1
-            yield line, self._run.batch_of(rows, cells, self._owner.model.ends.values), zones
-
     def _line_of(self, places: np.ndarray, rod: np.ndarray) -> Line:
         """The line with nodes at these places of the finest mesh, in the arrays that are not in use; rod: (n,)."""
         k, m, starts = 1 - self.side, places.size - 1, self._starts
@@ -441,15 +370,6 @@ class CellChanges:
         table[:] = self._lines[k].of(0, m)
         fill_line(table)
         return self._on.line(k, m)
-
-    def empty(self) -> None:
-        """No output waits any longer."""
-        waits, self._rods_then = self.waits, []
-        self._at.waiting = self._at.placed = self._at.used = 0
-        if waits and self.adopted:
-            self._synced = -1
-            f.put_cells(self._following.numbers)
-            self.sync()
 
     def sync(self) -> None:
         """What Python has of the line is that of now."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -32,16 +32,14 @@ from hybrid.kernels.state.state import (
     Work,
 )
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Cells, Side, blank_kept, seas, works
+from hybrid.simulation.line_of_run import OneOfMany
 from hybrid.solve.run import MOST_SAMPLED, ROWS
-
-if TYPE_CHECKING:
-    from hybrid.simulation.transient import Transient
 
 
 class CellViews:
     """Two sets of arrays (sides k = 0, 1) with room for the most cells, and views of them for a number of cells."""
 
-    def __init__(self, owner: Transient, most: int, marked: int, at: FollowingPlaces) -> None:
+    def __init__(self, owner: OneOfMany, most: int, marked: int, at: FollowingPlaces) -> None:
         """most: cells at most; marked: nodes of them beside which extremes are kept on both sides; at: numbers of the
         run (kernels.run.following_run)."""
         assert owner.switching is not None and owner.model.layout is not None

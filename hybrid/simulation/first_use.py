@@ -20,7 +20,6 @@ from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Equilibrium, Scene
-from hybrid.simulation.switch import as_network
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.system import System
@@ -58,8 +57,8 @@ def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
     one: Any = scene
     if scene.line_names:
         return _kernels_of_lines(one, static)
-    by_network = one.contact.self if static else as_network()
-    return _kernels_of_network(one) if by_network else _kernels_of_cable(one, static)
+    own = static and not one.contact.self
+    return _kernels_of_cable(one, static) if own else _kernels_of_network(one)
 
 
 def _kernels_of_network(scene: Any) -> list[str]:
@@ -157,10 +156,8 @@ def compile_beside(scene: Scene | System, static: bool = False) -> None:
     """
     if scene.line_names:
         return
-    if as_network() and not static:
-        needed = [*_kernels_of_network(scene)[1:], REST_OF_LINES]  # this process begins with the solver
-    else:
-        needed = _beside_solver(scene, static)
+    of_network = [*_kernels_of_network(scene)[1:], REST_OF_LINES]  # this process begins with the solver
+    needed = _beside_solver(scene, static) if static else of_network
     if MODEL_ERROR in needed and SOLVER[1] not in needed:  # a line in a plane needs both solvers
         needed.insert(needed.index(OUTPUTS) + 1, SOLVER[1])
     missing = [name for name in needed if not is_ready(name)]

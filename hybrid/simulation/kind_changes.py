@@ -14,7 +14,7 @@ import numpy as np
 
 from hybrid.adapt.manager import Change
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.mesh.cell_changes import after_forces, before_forces, blank_renew_job, clear_state, renew
+from hybrid.kernels.mesh.cell_changes import blank_renew_job, clear_state, renew
 from hybrid.kernels.mesh.zone_line import blank_line_job, fill_line
 from hybrid.kernels.mesh.zone_switch import (
     AFTER,
@@ -33,14 +33,11 @@ from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.fields import ROD
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import FIELDS, Ends, Line, State, Work
-from hybrid.kernels.step.newton import ASSEMBLY, RUN, Task
 from hybrid.simulation.envelope import Envelope, marks_on
 from hybrid.simulation.zone_switching import ZoneSwitching
-from hybrid.solve.stepper import HEAVY
 
 if TYPE_CHECKING:
     from hybrid.model.build import Model
-    from hybrid.simulation.transient import Transient
 
 # What of a line differs with the kinds of its cells, and lengths that are on their way.
 OF_KINDS = ("h", "spin", "element", "kb", "k0", *(name for name, field in FIELDS.items() if field.rule == ROD))
@@ -52,14 +49,6 @@ def carries_all(model: Model, switching: ZoneSwitching) -> bool:
     laws = line.torsion, line.tension_twist, line.law, line.bend_law, line.wake_law, line.moved
     bare = switching.compiled and model.payout is None and not any(x.size for x in laws)
     return bare and bool(line.bits & PLANAR or not switching.manager.twisted)
-
-
-def plain(owner: Transient) -> bool:
-    """Whether zones of a run can change in compiled code."""
-    switching = owner.switching
-    if switching is None or owner.payout is not None or owner.correction is not None:
-        return False
-    return owner.run.contact is None and carries_all(owner.model, switching)
 
 
 class Around(NamedTuple):
@@ -143,69 +132,6 @@ class LineKinds:
         self.model = replace(model, layout=layout, zones=layout.zones)
         switching.take(self.model, switching.zones)
         return float(numbers[AFTER] - numbers[BEFORE])
-
-
-class KindChanges:
-    """Changes of kinds in the arrays of a run (`Transient`) as it is attached."""
-
-    @staticmethod
-    def applies(owner: Transient) -> bool:
-        """Whether the cells of a run stay, and kinds can change so."""
-        switching = owner.switching
-        return plain(owner) and switching is not None and not switching.zones.clock.share > 0.0
-
-    def __init__(self, owner: Transient) -> None:
-        """From now on the run has a line of its own, which changes."""
-        model, switching, run, itself = owner.model, owner.switching, owner.run, owner.itself
-        assert switching is not None
-        watches = itself is not None and itself.on
-        seen = itself.itself.cells if itself is not None and watches else np.zeros(2, np.int64)
-        self._owner, self._switching = owner, switching
-        around = Around(owner.stepper.work, run.books, owner.envelope, owner.marked, seen)
-        self._kinds = LineKinds(model, switching, run.states, around, model.ends.values)
-        line = self._kinds.model.line
-        self._bound = line, run.states, run.books, model.ends.values
-        run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
-        self._task = run.table.part("task").start
-        run.table.bind(line=line)
-        switching.table.bind(line=line)
-        if itself is not None and watches:
-            itself.table.bind(line=line)
-        switching.take(self._kinds.model, switching.zones)
-        self._go_on()
-
-    @property
-    def fits(self) -> bool:
-        """Whether the run is still attached as it was."""
-        owner, (line, states, books, ends) = self._owner, self._bound
-        run, model = owner.run, owner.model
-        same = model.line is line and run.states is states and run.books is books
-        return same and model.ends.values is ends
-
-    def change(self, change: Change) -> float:
-        """Other kinds of cells from now on: nothing moves; the energy, J, that is booked."""
-        run, (first, second) = self._owner.run, self._owner.run.states
-        before, after = (second, first) if run.count.parity else (first, second)
-        copy_into(before, after)
-        if run.count.parity and run.push.size:
-            run.pushes[0][:] = run.pushes[1]
-        self._owner.model.ends.at(run.t)
-        self._kinds.model = self._owner.model
-        booked = self._kinds.change(change, run.t)
-        before_forces(run.table.numbers)
-        run.table.numbers[self._task] = ASSEMBLY
-        run.solver(run.table.numbers)
-        run.table.numbers[self._task] = RUN
-        after_forces(run.table.numbers)
-        run.books.work[0, b.ZONES] += booked
-        self._go_on()
-        return booked
-
-    def _go_on(self) -> None:
-        """Python knows of the line of now."""
-        owner = self._owner
-        self._switching.limit_steps(owner.run)
-        owner.take(self._kinds.model, owner.stepper.work)
 
 
 def _copied(line: Line) -> Line:

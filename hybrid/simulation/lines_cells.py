@@ -8,87 +8,20 @@ have as many of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.kernels.contact.self_distance import Itself
-from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.run.entry import NO_PUSH
-from hybrid.kernels.state.books import Books, Clock, Counts
 from hybrid.kernels.state.forces import REMEMBERS
-from hybrid.kernels.state.state import Batch, Floats, State, Work
-from hybrid.kernels.step.newton import Limits
-from hybrid.model.build import Model
-from hybrid.model.system import SystemModel
+from hybrid.kernels.state.state import Batch, Floats
 from hybrid.outputs.joined_lines import Output, outputs_in
-from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.cell_changes import LEAST_CELLS, CellChanges
-from hybrid.simulation.envelope import Envelope
 from hybrid.simulation.kind_changes import carries_all
-from hybrid.simulation.lines_contact import LinesWatch
+from hybrid.simulation.line_of_run import OfRun, OneOfMany
 from hybrid.simulation.zone_switching import ZoneSwitching
-from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_steps import SystemSteps
 
 if TYPE_CHECKING:  # a line that is not paid out does without
-    from hybrid.simulation.payout import PayingOut
-
-
-class OfLine(Protocol):
-    """What changes of cells have to know of the result of a line (simulation.system_lines)."""
-
-    books: Books
-
-    @property
-    def envelope(self) -> Envelope: ...
-    @property
-    def marked(self) -> Sequence[tuple[float, int]]: ...
-    @property
-    def contact(self) -> SelfContact | None: ...
-    @property
-    def correction(self) -> Correction | None: ...
-    @property
-    def paying(self) -> PayingOut | None: ...
-    @property
-    def outputs_join(self) -> bool: ...
-    @property
-    def watch_table(self) -> Table | None: ...
-    def batch_of(self, rows: Floats, cells: int) -> Batch: ...
-
-
-class HasPlane(Protocol):
-    """The plane of a line, and the push out of it."""
-
-    pushes: tuple[Floats, Floats]
-
-
-class HasPlanes(Protocol):
-    """Those of all lines."""
-
-    def of(self, k: int) -> HasPlane | None: ...
-
-
-class OfRun(Protocol):
-    """And of the run of all lines (simulation.system_run)."""
-
-    solver: SystemSolver
-    loop: SystemSteps
-    model: SystemModel
-    watch: LinesWatch | None
-
-    @property
-    def t(self) -> float: ...
-    @property
-    def lines(self) -> Sequence[OfLine]: ...
-    @property
-    def payout(self) -> object: ...
-    @property
-    def planes(self) -> HasPlanes | None: ...
-    @property
-    def asks_quantities(self) -> bool: ...
-    def adopt_cells(self, number: int, model: Model, work: Work) -> None: ...
+    pass
 
 
 # What outputs have of nodes and of cells.
@@ -101,148 +34,6 @@ def ends_alone(batches: Sequence[Batch]) -> Batch:
     own |= {name: [x[:, [0, -1]] if x.size else x for x in own[name]] for name in OF_NODES}
     own |= {name: [x[:, :1] if x.size else x for x in own[name]] for name in OF_CELLS}
     return Batch(**{name: np.concatenate(x) for name, x in own.items()})
-
-
-class LineTables:
-    """Tables of a line that change together: of its steps by itself, and of those of all lines by their parity."""
-
-    def __init__(self, alone: Table, even: Table, odd: Table) -> None:
-        self.alone, self.even, self.odd = alone, even, odd
-        self.numbers = alone.numbers
-
-    def part(self, name: str) -> slice:
-        """As of `Table`."""
-        return self.alone.part(name)
-
-    def bind(self, **values: Any) -> None:
-        """As of `Table`, of what steps of the line by itself alone have."""
-        self.alone.bind(**values)
-
-    def hold(self, *, old: State, new: State, **values: Any) -> None:
-        """As of `Table`."""
-        for table in (self.alone, self.even):
-            table.hold(old=old, new=new, **values)
-        self.odd.hold(old=new, new=old, **values)
-
-
-class WatchedLine:
-    """How near a line comes to itself, as changes of cells see it."""
-
-    on = True
-
-    def __init__(self, line: OfLine, table: Table) -> None:
-        self._watch, self.table = line.envelope.itself, table
-
-    @property
-    def itself(self) -> Itself:
-        """What is known of it."""
-        return self._watch.itself
-
-    @itself.setter
-    def itself(self, known: Itself) -> None:
-        self._watch.itself = known
-
-
-class Marching(NamedTuple):
-    """What marches a line: room, and what Newton's method works with."""
-
-    work: Work
-    limits: Limits
-
-
-class OneOfMany:
-    """A line of several, as changes of its cells see it: what `Transient` and its compiled run are to a cable."""
-
-    of_many = True
-
-    pays_out = True  # where a node is to enter or leave at a winch
-    correction = None
-
-    def __init__(self, run: OfRun, number: int, switching: ZoneSwitching | None = None) -> None:
-        self._system, self._number, self.switching = run, number, switching
-        line = run.lines[number]
-        self.run, self.envelope, self.marked = self, line.envelope, line.marked
-        self._plane = None if run.planes is None else run.planes.of(number)
-        self.table = LineTables(*run.solver.tables_by_itself(number))
-        table = line.watch_table
-        self.itself = WatchedLine(line, table) if table is not None else None
-        self.stepper = Marching(run.solver.work[number], run.solver.limits_by_itself(number))
-
-    @property
-    def push(self) -> Floats:
-        """Out of its plane, now; empty: none."""
-        return self.pushes[self.count.parity]
-
-    @property
-    def pushes(self) -> tuple[Floats, Floats]:
-        """Of states of even and of odd parity."""
-        return (NO_PUSH, NO_PUSH) if self._plane is None else self._plane.pushes
-
-    @pushes.setter
-    def pushes(self, pushes: tuple[Floats, Floats]) -> None:
-        if self._plane is not None:
-            self._plane.pushes = pushes
-
-    @property
-    def payout(self) -> PayingOut | None:
-        """Its length, if it is paid out."""
-        return self._system.lines[self._number].paying
-
-    @property
-    def model(self) -> Model:
-        """The line as it is."""
-        return self._system.model.models[self._number]
-
-    @property
-    def books(self) -> Books:
-        """Its books."""
-        return self._system.lines[self._number].books
-
-    @books.setter
-    def books(self, books: Books) -> None:
-        self._system.lines[self._number].books = books
-
-    @property
-    def states(self) -> tuple[State, State]:
-        """Its states of even and of odd parity."""
-        even, odd = self._system.loop.turns
-        return even.lines[self._number], odd.lines[self._number]
-
-    @states.setter
-    def states(self, states: tuple[State, State]) -> None:
-        for each, state in zip(self._system.loop.turns, states, strict=True):
-            cast(list[State], each.lines)[self._number] = state
-
-    @property
-    def clock(self) -> Clock:
-        """Of all lines."""
-        return self._system.loop.clock
-
-    @property
-    def count(self) -> Counts:
-        """Of all lines."""
-        return self._system.loop.counts
-
-    @property
-    def t(self) -> float:
-        """Time, s."""
-        return self._system.t
-
-    @property
-    def outputs_may_wait(self) -> bool:
-        """Whether outputs may wait although the cells that they are of have changed."""
-        return not self._system.asks_quantities and self._system.lines[self._number].outputs_join
-
-    def solver_address(self) -> int:
-        """Of the kernel that marches it."""
-        return self._system.solver.marcher_of(self._number)
-
-    def set_quota(self, cells: int) -> None:
-        """Calls go on for as long as before: that is of all lines."""
-
-    def take(self, model: Model, work: Work) -> None:
-        """Go on with the line in other cells, which the run has changed to."""
-        self._system.adopt_cells(self._number, model, work)
 
 
 def by_itself(run: OfRun, number: int) -> bool:
@@ -259,7 +50,7 @@ class LineCells(CellChanges):
         self._many, self._line, self._solver = run, run.lines[number], run.solver
         owner = OneOfMany(run, number, switching)
         self.by_parity = owner.table.even, owner.table.odd
-        super().__init__(owner)  # type: ignore[arg-type]
+        super().__init__(owner)
 
     @staticmethod
     def may_change(run: OfRun, number: int, switching: ZoneSwitching) -> bool:

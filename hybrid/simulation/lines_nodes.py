@@ -11,7 +11,8 @@ import numpy as np
 from hybrid.kernels.run import payout_run as f
 from hybrid.kernels.state.state import Batch, Floats
 from hybrid.outputs.joined_lines import Output
-from hybrid.simulation.lines_cells import OfRun, OneOfMany, by_itself, ends_alone
+from hybrid.simulation.line_of_run import OfRun, OneOfMany
+from hybrid.simulation.lines_cells import by_itself, ends_alone
 from hybrid.simulation.payout_nodes import NodeChanges, is_plain
 
 
@@ -22,7 +23,7 @@ class LineNodes(NodeChanges):
         self._many, self._of_line, self._solver = run, run.lines[number], run.solver
         owner = OneOfMany(run, number)
         self.by_parity = owner.table.even, owner.table.odd
-        super().__init__(owner)  # type: ignore[arg-type]
+        super().__init__(owner)
 
     @staticmethod
     def may_change(run: OfRun, number: int) -> bool:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from hybrid.model.build import build
-from hybrid.model.model_costs import with_model
-from hybrid.model.resolution import first_resolution, model_is_free
+from hybrid.model.model_costs import with_models
+from hybrid.model.resolution import model_is_free, wants_errors
 from hybrid.model.system import build_system
 from hybrid.scene.quantities import KINDS, Quantity
 from hybrid.scene.read import SceneLike, as_scene_or_system
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.short_form import as_network
 from hybrid.scene.system import System
-from hybrid.simulation.case import Case
 from hybrid.simulation.pair_forces import fields_of_pairs
 from hybrid.simulation.result_file import STEP_FIELDS
-from hybrid.simulation.system_lines import observer_of
+from hybrid.simulation.system_lines import Wanted, observer_of
 from hybrid.simulation.system_points import fields_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.store.format import Field
@@ -38,38 +36,26 @@ def listed_outputs(scene: SceneLike | System) -> list[Listed]:
     Of several lines: what is recorded of points and bodies, and of every line under `lines/<name>/`.
     """
     asked = as_scene_or_system(scene)
-    if isinstance(asked, Scene):
-        return _of_scene(asked)
-    model = build_system(asked)
-    guesses = asked.guesses
-    scenes = {name: asked.scene_of(name, asked.carried(name), guesses) for name in model.names}
-    found = _over_time([*fields_of(asked), *fields_of_pairs(model), *SystemQuantities(asked, scenes).fields])
-    if asked.time is not None:
-        found = _with_ranges(found, asked.output.quantities)
+    moves, named, (system, _) = asked.time is not None, bool(asked.line_names), as_network(asked)
+    free = [name for name in system.lines if model_is_free(system.scene_of(name))]
+    system = with_models(system, dict.fromkeys(free, "adaptive"))
+    model, guesses, found = build_system(system), system.guesses, list[Listed]()
+    scenes = {name: system.scene_of(name, system.carried(name), guesses) for name in model.names}
+    if named:
+        found = _over_time([*fields_of(system), *fields_of_pairs(model), *SystemQuantities(system, scenes).fields])
+    else:  # a cable is recorded by its own scene, which has its quantities
+        scenes = {name: asked.scene_of(key) for name, key in zip(scenes, asked.lines, strict=True)}
     for (name, each), built in zip(scenes.items(), model.models, strict=True):
-        fields = observer_of(each, built, asked.time is not None).fields
-        found += _over_time(fields, steps=asked.time is not None, begin=f"{GROUP}/{name}/")
-    return found
+        wanted = Wanted(error=built.follows_error and wants_errors(each))
+        fields = observer_of(each, built, moves, wanted=wanted).fields
+        found += _over_time(fields, steps=moves, begin=f"{GROUP}/{name}/" if named else "")
+    return _with_ranges(found, asked.output.quantities) if moves else found
 
 
 def kinds_of_quantities() -> list[Listed]:
     """Kinds of `output.quantities`, which are recorded where a scene asks for them."""
     words = {"end": "end given", "to": "touchdown point or other end", "what": "a point, a plane, a path or a line"}
     return [Listed(kind, unit, ("t",), text.format(**words)) for kind, (unit, text, _, _) in KINDS.items()]
-
-
-def _of_scene(scene: Scene) -> list[Listed]:
-    moves = scene.time is not None
-    if model_is_free(scene):
-        scene = with_model(scene, "adaptive")
-    model = build(scene, first_resolution(scene))
-    if moves:
-        case = Case(scene, None)
-        observer = case.observer(model, isinstance(scene.model, AdaptiveModel), case.points.s, None)
-    else:
-        observer = observer_of(scene, model, moves=False)
-    found = _over_time(observer.fields, steps=moves)
-    return _with_ranges(found, scene.output.quantities) if moves else found
 
 
 def _with_ranges(found: list[Listed], asked: Mapping[str, Quantity]) -> list[Listed]:

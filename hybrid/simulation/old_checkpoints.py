@@ -10,12 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.kernels.mesh.cell_errors import CURVATURE, QUANTITIES
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.failure import Weakness
 from hybrid.model.layout import Layout
 from hybrid.store.named_arrays import Tree, matched
 
+FIRST_WORKS = 11  # works that were booked once
+FIRST_REPORT = 34  # numbers that a report had once; later ones have more behind these
 SAME_NODE = 1e-9  # of the length: round-off of the place of a node
 # What the tree of a line calls names of the old one, and what that of the run does.
 OF_LINE = {x: x for x in ("state", "rho", "work", "power", "envelope", "ends", "first_energy", "torsion")}
@@ -121,3 +124,21 @@ def mesh_tree(model: Model) -> Tree:
     assert not isinstance(model.mesh, Layout)
     s, zones = model.mesh
     return {"s": s, "zones": [[x.kind, x.s_a, x.s_b] for x in zones]}
+
+
+def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
+    """The zones of a checkpoint, of an older version too: that had no cells that follow, or one largest curvature, or
+
+    did not look at velocities, or said nothing of kinks.
+    """
+    saved = {"following": None} | saved
+    following, manager, largest = saved["following"], saved.get("manager"), np.zeros(QUANTITIES)
+    if isinstance(following, dict) and isinstance(following.get("peak"), float):
+        largest[CURVATURE] = following["peak"]
+        saved["following"] = {name: x for name, x in following.items() if name != "peak"}
+    following = saved["following"]
+    if isinstance(following, dict) and isinstance(following.get("calm"), np.ndarray):
+        saved["following"] = {"waves": np.zeros(following["calm"].shape)} | following
+    if isinstance(manager, dict):
+        saved["manager"] = {"largest": largest, "fastest": 0.0, "kinked": False} | manager
+    return saved

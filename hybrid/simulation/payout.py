@@ -16,17 +16,15 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel.payout import (
     end_payout,
     fit_line,
-    iterate,
     lengthen,
     limit_next_step,
-    pay_out,
     put_forces_on,
     stand_still,
     take_forces_off,
 )
 from hybrid.kernels.reel.payout_layers import carry_layers
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
-from hybrid.kernels.reel.reel import MovingZones, Reel, ReelNumbers, blank_reel, blank_reel_job
+from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job
 from hybrid.kernels.run.payout_run import energy_of
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.forces import FRICTION, STIFFNESS_DAMPING, TOUCHES
@@ -43,8 +41,6 @@ from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.payout import SOURCES
 from hybrid.scene.schema import Scene
-from hybrid.solve.run import CompiledRun
-from hybrid.solve.stepper import Stepper
 from hybrid.store.named_arrays import matched
 
 ROUND_OFF = 1e-9  # of a length
@@ -133,19 +129,6 @@ class PayingOut:
         self.table.bind(reel=self.reel)
         self.leave_unbalanced()
         return energy(line, ends, before.state) - old
-
-    def attach(self, run: CompiledRun, model: Model, stepper: Stepper, moving: MovingZones) -> None:
-        """Let a run pay out its line from now on; moving: of its zones."""
-        self.layout = model.layout
-        self.table.bind(
-            line=model.line, sea=model.sea.values, ends=model.ends.values, old=run.states[0], new=run.states[1],
-            clock=run.clock, counts=run.count, work=run.books.work, velocity=run.books.velocity,
-            report=stepper.work.report, reel=self.reel, X=stepper.work.X, W=stepper.work.W,
-            zones=moving,
-        )  # fmt: skip
-        numbers = self.table.numbers
-        asked = iterate.address(numbers) if self.asks(model.line) else 0
-        run.pay_out(self.table, pay_out.address(numbers), asked)
 
     def asks(self, line: Line) -> bool:
         """Whether iterations of Newton's method need something of the reel: friction is on the material that passes."""

@@ -6,10 +6,10 @@ the numbers of the other one.  What Python has of the line is made anew when the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,11 +52,9 @@ from hybrid.model.line import lines
 from hybrid.outputs.joined_lines import Output
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Kept, Shaped, blank_kept, seas
 from hybrid.simulation.envelope import marks_on
+from hybrid.simulation.line_of_run import OneOfMany
 from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.solve.stepper import HEAVY
-
-if TYPE_CHECKING:
-    from hybrid.simulation.transient import Transient
 
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
@@ -84,11 +82,11 @@ class Side:
 
 
 class NodeChanges:
-    """Nodes of a run (`Transient`) that enter and leave, where zones stay."""
+    """Nodes of a line of a run that enter and leave, where zones stay."""
 
     by_parity: tuple[Table, Table] | None = None  # of one of several lines: its tables in steps of all, even and odd
 
-    def __init__(self, owner: Transient) -> None:
+    def __init__(self, owner: OneOfMany) -> None:
         """Room for all; `adopt` before the first change."""
         assert owner.payout is not None
         self._owner, self._run, self._paying = owner, owner.run, owner.payout
@@ -117,12 +115,7 @@ class NodeChanges:
         self.adopted, self._synced, self._bound = False, -1, False
 
     @staticmethod
-    def applies(owner: Transient) -> bool:
-        """Whether nodes of a run can enter and leave so: nothing asks Python on the way."""
-        return owner.pays_out and owner.correction is None and is_plain(owner.model.line)
-
-    @staticmethod
-    def _key(owner: Transient) -> tuple[Any, ...]:
+    def _key(owner: OneOfMany) -> tuple[Any, ...]:
         """What the tables hold as it is."""
         model, paying = owner.model, owner.payout
         assert paying is not None
@@ -331,13 +324,6 @@ class NodeChanges:
         run.count.parity = parity
         self.sync()
 
-    def go(self) -> int:
-        """Steps, and nodes that enter and leave; a code of kernels.state.books."""
-        self._at.may_wait = self._owner.outputs_may_wait
-        code = self._run.go(lambda: int(f.go_on(self._following.numbers)))
-        self.sync()
-        return code
-
     def change(self) -> None:
         """A node enters or leaves now; no outputs wait."""
         f.change_paid(self._following.numbers)
@@ -375,16 +361,6 @@ class NodeChanges:
 
     # --- outputs that wait --------------------------------------------------------------------------
 
-    def waiting(self) -> Iterator[list[Output]]:
-        """Outputs of lines of before, copied."""
-        model = self._owner.model
-        for offset, count, cells in self._waiting[: self._at.waiting].tolist():
-            size = sample_size(cells)
-            end = offset + count * size
-            rows = self._samples[offset:end].reshape(count, size).copy()
-            batch = self._run.batch_of(rows, cells, model.ends.values)
-            yield self._outputs_of(batch, cells, end)
-
     def _outputs_of(self, batch: Batch, cells: int, at: int) -> list[Output]:
         """Outputs of a line of before, of so many cells; at: where in the memory for samples is what they lacked."""
         k, paying, model = int(self._at.on), self._paying, self._owner.model
@@ -396,27 +372,11 @@ class NodeChanges:
         reel.lack[:], reel.rate[:], reel.since[:], reel.span[:] = lacks
         return paying.outputs_in(line, reel, batch)
 
-    def empty(self) -> None:
-        """No output waits any longer."""
-        waits = self.waits
-        self._at.waiting = self._at.used = 0
-        if waits and self.adopted:
-            self._synced = -1
-            f.put_paid(self._following.numbers)
-            self.sync()
-
 
 def is_plain(line: Line) -> bool:
     """Whether a line has nothing that a node which enters or leaves would have to carry in Python."""
     laws = "torsion", "tension_twist", "law", "bend_law", "slip_law", "wake_law", "moved"
     return not any(getattr(line, name).size for name in laws) and not line.bits & REMEMBERS
-
-
-def outputs_of_now(owner: Transient, batch: Batch) -> list[Output]:
-    """The outputs of a batch of the line of now, copied."""
-    paying, line = owner.payout, owner.model.line
-    assert paying is not None
-    return paying.outputs_of_now(line, Batch._make(x.copy() for x in batch))
 
 
 def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import cache
 from importlib.metadata import version
 from math import inf
@@ -22,20 +22,12 @@ import numpy as np
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.machine.cache import compiler_hash
-from hybrid.model.build import MOST_FOLLOWING, Model, build
-from hybrid.model.layout import Layout
-from hybrid.model.mesh import MOST_CELLS, Zone
+from hybrid.model.mesh import MOST_CELLS
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.output_points import OutputPoints
-from hybrid.model.plane import in_space, planar
-from hybrid.model.release import released_as
-from hybrid.model.resolution import Resolution, first_resolution, follows_curvature
-from hybrid.model.self_reach import touching
-from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.initial_zones import manager_for
+from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.scene.schema import Scene
 from hybrid.simulation.old_checkpoints import is_of_cable
-from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.store.checkpoint import Checkpoint, read_checkpoint
 from hybrid.store.hdf5_file import is_result, opened
 from hybrid.store.named_arrays import Tree, matched, pack
@@ -209,77 +201,3 @@ def restored_points(result: Result, length: float, far: float | None = None) -> 
 
 
 # --- the model ----------------------------------------------------------------------------------
-
-
-def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any]) -> tuple[Model, Model]:
-    """The model of a checkpoint; before it, one of the same mesh whose zones are all rod."""
-    mesh, layout = saved["mesh"], None
-    if isinstance(scene.model, AdaptiveModel):
-        template = {"base": np.zeros(0), "parts": np.zeros(0, int), "rod": np.zeros(0, bool), "here": None}
-        layout = Layout(**matched({"here": None} | dict(mesh), template, "mesh"))
-        _check_nodes(layout.base, scene)
-        fits = layout.parts.shape == layout.rod.shape == (layout.base.size - 1,)
-        most = MOST_FOLLOWING if follows_curvature(scene) else 1
-        fits &= layout.here is None or (layout.here.dtype == bool and layout.here.shape == (layout.parts.sum() + 1,))
-        if not (fits and 1 <= layout.parts.min() <= layout.parts.max() <= most):
-            raise ValueError("base cells that no mesh has")
-        first = build(scene, resolution, layout.finest)
-        model = on_layout(first, layout)
-    else:
-        s, zones = matched(mesh, {"s": np.zeros(0), "zones": None}, "mesh").values()
-        _check_nodes(s, scene)
-        zones = tuple(Zone(*zone) for zone in matched(zones, [["", 0.0, 0.0]] * len(zones), "zones"))
-        known = all(x.kind in ("rod", "catenary") and x.s_a < x.s_b for x in zones)
-        ends = [s[0], *(x.s_b for x in zones)]
-        if not (known and [x.s_a for x in zones] == ends[:-1] and set(ends) <= set(s.tolist()) and ends[-1] == s[-1]):
-            raise ValueError("zones that no line has")
-        first = model = build(scene, resolution, (s, zones))
-    plane = matched(saved["plane"], np.zeros((3, 3)), "plane") if saved["plane"] is not None else None
-    line = in_space(model.line) if plane is None else planar(model.line, plane)
-    if saved.get("self_contact") is not None:  # it has come near itself
-        line = touching(line, scene.contact.friction)
-    released = _released(saved)
-    return released_as(first, released, 0.0), released_as(replace(model, line=line, plane=plane), released, 0.0)
-
-
-def _released(saved: Mapping[str, Any]) -> np.ndarray:
-    """(2,) 1 where an end had been let go; a checkpoint before 0.7 does not say, and none had."""
-    ends, none = saved["ends"], np.zeros(2, int)
-    if not isinstance(ends, Mapping) or "released" not in ends:
-        return none
-    found = np.asarray(matched(ends["released"], none, "released"))
-    if not np.isin(found, (0, 1)).all():
-        raise ValueError(f"ends that are let go: {found}")
-    return found
-
-
-def _check_nodes(s: np.ndarray, scene: Scene) -> None:
-    whole = s.ndim == 1 and s.size > 1 and s[0] == 0.0 and abs(s[-1] - scene.length) <= 1e-9 * scene.length
-    if not (whole and (np.diff(s) > 1e-12 * scene.length).all() and s.size <= MOST_CELLS):
-        raise ValueError("nodes that are not those of the line")
-
-
-def restored_parts(
-    scenes: Sequence[Scene], resolution: Resolution, saved: Mapping[str, Any], criterion: UserCriterion | None
-) -> tuple[Model, ZoneSwitching | None, Correction | None]:
-    """What a run consists of, as new: its model, what moves its zones, what follows its model error.
-
-    scenes: that of the start, and those of the changes; the one that holds is saved["changes"].
-    """
-    changes = matched(saved["changes"], 0, "changes")
-    if not 0 <= changes < len(scenes):
-        raise ValueError(f"change {changes} of {len(scenes) - 1}")
-    scene, switching = scenes[changes], None
-    first, model = restored_model(scene, resolution, saved)
-    if isinstance(scene.model, AdaptiveModel):
-        assert first.layout is not None and model.layout is not None
-        # as at the start of the run, whatever loads came later: its times and tensions are those of the first scene
-        start = first if not changes else build(scenes[0], resolution, first.layout)
-        manager = manager_for(scene, start, resolution, criterion)
-        for k in np.flatnonzero(model.ends.released).tolist():
-            manager.release(k, model.cable)
-        manager.load(model.ends.moments)
-        manager.set_layout(model.layout)
-        switching = ZoneSwitching(model, manager)
-    torque = switching.torque if switching is not None else None
-    return model, switching, Correction(model, torque) if model.follows_error else None

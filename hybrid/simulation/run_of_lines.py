@@ -19,7 +19,7 @@ from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
-from hybrid.simulation.lines_cells import HasPlanes
+from hybrid.simulation.line_of_run import HasPlanes
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.system_lines import LineResult
 from hybrid.solve.joined import SystemState

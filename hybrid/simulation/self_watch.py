@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.contact.self_contact_law import INNER, OUTER
 from hybrid.kernels.contact.self_contact_pairs import WINDOW
 from hybrid.kernels.contact.self_distance import (
@@ -29,10 +28,9 @@ from hybrid.kernels.contact.self_distance import (
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT
-from hybrid.kernels.state.state import Floats, State, Work, state_for
+from hybrid.kernels.state.state import Floats, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.self_reach import COST
-from hybrid.scene.schema import Scene
 from hybrid.solve.run import CompiledRun
 from hybrid.solve.self_contact import SelfContact
 from hybrid.store.format import Field
@@ -142,11 +140,6 @@ class SelfWatch:
         )  # fmt: skip
         run.watch_itself(self._job.numbers, self._address)
 
-    def rest(self, run: CompiledRun) -> None:
-        """Watch no longer."""
-        self.on, self._address = False, UNBENT
-        run.watch_itself(np.zeros(0, np.int64), 0)
-
     def renew(self, model: Model) -> None:
         """Go on with the cells of a model; events tell of contact from now on where it is computed."""
         self.itself = blank_itself(diameters(model))._replace(found=self.itself.found)
@@ -170,12 +163,6 @@ class SelfWatch:
             self._address = watch_itself.address(self._job.numbers)
             run.watch_itself(self._job.numbers, self._address)
         return int(watch_itself(self._job.numbers))
-
-    def is_near(self, run: CompiledRun, step: float) -> bool:
-        """Whether a line that may touch itself is near itself in a state from which steps (s) are to be made."""
-        if not (self.on and self.asks and is_bent(run.state)):
-            return False
-        return self.foresees(run.state, step, lambda: self.look(run))
 
     def foresees(self, state: State, step: float, look: Callable[[], int]) -> bool:
         """Whether a look at a state, from which steps (s) are to be made, finds that the line will be near itself."""
@@ -375,17 +362,6 @@ def is_bent(state: State) -> bool:
     return not bool(((along > 0.0) & (along * along > size)).all())
 
 
-def let_touch_itself(run: CompiledRun, scene: Scene, model: Model, work: Work) -> None:
-    """The line of `model` touches itself in the run from now on; contact that there was goes on."""
-    before = run.contact
-    contact = SelfContact(
-        model.line, diameters(model), least_bending(model), model.tension_scale, scene.contact.friction
-    )
-    if before is not None:
-        contact.restore(before.checkpoint(run.t), remeshed=True)
-    run.touch_itself(contact, model.line, model.sea.values, model.ends.values, work)
-
-
 def within_itself(contact: SelfContact, model: Model) -> str:
     """Where parts of a line are in each other, and contact could not tell to which side they belong; empty: nowhere."""
     return "" if math.isfinite(contact.energy()) else deepest_text(contact, model)
@@ -400,12 +376,3 @@ def deepest_text(contact: SelfContact, model: Model) -> str:
         f"the centrelines of s = {s:.6g} m and s = {other:.6g} m are {contact.least_distance:.3g} m apart, less than "
         f"{INNER:g} of the diameter of {width:.3g} m"
     )
-
-
-def refuse_start_in_itself(contact: SelfContact, scene: Scene, model: Model) -> None:
-    """SceneError: parts of the line are in each other at the start."""
-    where = within_itself(contact, model)
-    if where:
-        given = f"{scene.initial.kind}, where {where}"
-        fix = "a start in which they are a diameter apart, a smaller diameter, or contact: {self: false}"
-        raise SceneError([Complaint("initial", given, "a start in which the line is not within itself", fix)])

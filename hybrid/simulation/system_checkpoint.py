@@ -18,7 +18,7 @@ from hybrid.scene.obstacles import files_of as obstacle_files
 from hybrid.scene.system import System
 from hybrid.simulation.lines_contact_start import touch_each_other
 from hybrid.simulation.lone_planes import LonePlanes
-from hybrid.simulation.old_checkpoints import as_of_line, is_of_cable
+from hybrid.simulation.old_checkpoints import FIRST_REPORT, FIRST_WORKS, as_of_line, is_of_cable, zoning_of_today
 from hybrid.simulation.restore import program, refused, resolution_tree
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.system_contact import evaluate_forces, let_touch
@@ -26,7 +26,6 @@ from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_points import Rotations
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_zones import SystemZones
-from hybrid.simulation.transient_checkpoint import FIRST_REPORT, FIRST_WORKS, zoning_of_today
 from hybrid.simulation.vibration_steps import VibrationsOfLines
 from hybrid.solve.run import no_extremes
 from hybrid.store.checkpoint import digest_of, read_checkpoint

@@ -9,10 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.kernels.junctions.bodies import DONE, SPRING, W
+from hybrid.kernels.march.energies import Observed, observe
+from hybrid.kernels.march.zone_torque import TURN, torsion_energy
 from hybrid.kernels.state.report import FORCE_A
-from hybrid.kernels.state.state import NO_TURN
+from hybrid.kernels.state.state import NO_TURN, State
+from hybrid.model.build import Model
 from hybrid.model.failure import Weakness, after_failure, weaknesses
-from hybrid.simulation.releases import elastic
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.joined import SystemState
 
@@ -103,3 +105,13 @@ class Failures:
         done = run.solver.body_work[:, DONE:SPRING].copy()
         run.make_solver()
         run.solver.body_work[:, DONE:SPRING] = done
+
+
+def elastic(model: Model, t: float, state: State) -> float:
+    """Energy of bending and torsion, J, at t (s), with that of zones that a torque passes through."""
+    cells, energy = model.cells, np.zeros(4)
+    observed = Observed(np.zeros((cells + 1, 3)), np.zeros((cells + 1, 3)), energy)
+    observe(model.line, model.ends.at(t), state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
+    line = model.line
+    twist = float(torsion_energy(line, state.turn[:, TURN], state.T)) if line.torsion.size else 0.0
+    return float(energy[1] + energy[2]) + twist

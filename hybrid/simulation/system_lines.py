@@ -20,6 +20,7 @@ from hybrid.kernels.state.books import (
     HIDES_ITSELF,
     IS_BENT,
     JUMPED,
+    LOG,
     MEETS_ITSELF,
     NEARS_ITSELF,
     PARTS_ITSELF,
@@ -58,7 +59,6 @@ from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
 from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.slack_bends import note_laid
-from hybrid.simulation.time_loop import FORCE_COLUMNS
 from hybrid.solve.flaws import slack_cell
 from hybrid.solve.joined import JoinedLine, LineFailed
 from hybrid.solve.lines_at_rest import LinesAtRest
@@ -75,6 +75,8 @@ if TYPE_CHECKING:
     from hybrid.simulation.lines_nodes import LineNodes
     from hybrid.simulation.payout import PayingOut
 
+# Columns of the step log that runs to compare with keep: time, forces at both ends.
+FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force_end")]
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
 WAITING = 64
 # Of the length: ends that are so near to where they were have not been moved.

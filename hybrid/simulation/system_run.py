@@ -26,7 +26,7 @@ from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
 from hybrid.model.failure import Weakness
 from hybrid.model.output_points import OutputPoints
-from hybrid.model.plan import SAME_STOP, equal_steps, output_times
+from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on, output_times
 from hybrid.model.system import SystemModel, SystemResolution, build_system
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.plane import OUT
@@ -64,13 +64,12 @@ from hybrid.simulation.system_contact import (
     tell_passages,
 )
 from hybrid.simulation.system_failures import Failures
-from hybrid.simulation.system_lines import WAITING, LineResult, LineStep, Wanted
+from hybrid.simulation.system_lines import FORCE_COLUMNS, WAITING, LineResult, LineStep, Wanted
 from hybrid.simulation.system_load_change import change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.system_points import Rotations, Sampled
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, joined_lines, named
 from hybrid.simulation.system_zones import Start, SystemZones, managers_for, start_at_rest, zones_as_placed
-from hybrid.simulation.time_loop import FORCE_COLUMNS, WORK, apart, falls_on
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
 from hybrid.solve.joined import LineFailed, SystemState, SystemTaken
 from hybrid.solve.lines_at_rest import LinesAtRest
@@ -89,6 +88,8 @@ if TYPE_CHECKING:
     from hybrid.simulation.system_payout import SystemPayout
 
 _NO_ZONES: Mapping[int, DomainManager] = {}
+# Steps times cells from one checkpoint to the next, about 5 s of computing.
+WORK = 10_000_000
 # Steps that Python has a part in, between two reports of the progress.
 LOOK = 16
 READ_EVERY = 0.01  # s of the wall, after which the time of the processor is read again
@@ -435,13 +436,16 @@ class SystemRun:
             if self._begins:
                 self.begin_motion()
 
+            def report(finished: bool = False) -> None:
+                zones, iterations = self.model.models[0].zones, int(self.loop.counts.iterations)
+                reporter(self.t, self.steps, iterations, zones, finished, self.touches)
+
             def look() -> None:
-                reporter(self.t, self.steps, 0, self.model.models[0].zones, touches=self.touches)
+                report()
                 self.keep()
                 if interrupted():
                     raise KeyboardInterrupt
 
-            reporter(self.t, self.steps, 0, self.model.models[0].zones, touches=self.touches)
             for change in self.changes[self.changed :]:
                 for stop in self.stops(change.t):
                     self.go_to(stop, look)
@@ -450,7 +454,7 @@ class SystemRun:
                 self.keep()
             for stop in self.stops():
                 self.go_to(stop, look)
-            reporter(self.t, self.steps, 0, self.model.models[0].zones, True, self.touches)
+            report(finished=True)
             self.finish()
         except LineFailed as failed:
             raise self.failed(failed) from None

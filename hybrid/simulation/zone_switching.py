@@ -15,7 +15,6 @@ from hybrid.errors import KINK_COUNTS, Outcome
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.torque_transfer import carry_torque
 from hybrid.kernels.mesh.zone_step import (
-    LOOKAHEAD,
     REJECT_RATIO,
     Zones,
     blank_zone_job,
@@ -34,12 +33,13 @@ from hybrid.kernels.mesh.zone_switch import (
     end_switch,
 )
 from hybrid.kernels.mesh.zone_transfer import Transfer
+from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
 from hybrid.simulation.events import EventLog
-from hybrid.solve.run import CompiledRun, Tried
+from hybrid.solve.run import Tried
 from hybrid.store.named_arrays import matched
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many paces.
@@ -127,23 +127,6 @@ class ZoneSwitching:
         """Whether the compiled run does all that zones ask of a step; else it asks Python at every step."""
         return self.manager.user is None
 
-    def attach(self, run: CompiledRun, every: int) -> None:
-        """Let a run follow the zones of its line from now on; every: outputs of the result to one of this run."""
-        manager, longest = self.manager, LONGEST_IN_PACE * self.manager.pace * every
-        clock = self.zones.clock
-        clock.ramp_step, clock.calm_step = longest, longest * READY
-        clock.letting_go = LETTING_GO * manager.pace
-        self.limit_steps(run)
-        line, sea, ends = self.model.line, self.model.sea.values, self.model.ends.values
-        contact = run.contact
-        manager.near = np.zeros(0) if contact is None else contact.look_ahead(LOOKAHEAD * manager.pace)
-        self.table.bind(
-            line=line, sea=sea, ends=ends, old=run.states[0], new=run.states[1], clock=run.clock, counts=run.count,
-            work=run.books.work, zones=self.zones, near=manager.near,
-        )  # fmt: skip
-        self.let_review()
-        run.follow(self.table, self.compiled)
-
     def let_review(self) -> None:
         """Steps review zones themselves where that changes nothing; of a line that is paid out Python does."""
         review = 0
@@ -152,10 +135,10 @@ class ZoneSwitching:
             review = quiet_review.address(self._review.numbers)
         self.table.bind(review_table=self._review.numbers, review=review)
 
-    def limit_steps(self, run: CompiledRun) -> None:
+    def limit_steps(self, of_run: Clock) -> None:
         """Steps are as long as what is ramped allows."""
         clock = self.zones.clock
-        run.clock.allowed = clock.ramp_step if self.manager.ramping else clock.calm_step
+        of_run.allowed = clock.ramp_step if self.manager.ramping else clock.calm_step
 
     def torque(self) -> float:
         """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
@@ -210,10 +193,6 @@ class ZoneSwitching:
             take_arcs(self._plan_table.numbers)
             zones.lack[:], zones.since[:] = zones.true - self.model.line.h, 0.0
             zones.counts.relaxing = 1
-
-    def prepare_step(self) -> None:
-        """Before a step: lengths and bending as they will be after it; of zones not compiled."""
-        follow_zones(self.table.numbers)
 
     def evaluate_criteria(self, t: float, dt: float, ends: Ends, state: State) -> None:
         """Weigh the criteria of a state at t, dt after the last one."""

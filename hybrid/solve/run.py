@@ -173,10 +173,6 @@ class CompiledRun:
             self._zones_address = follow_zones.address(zones.numbers)
         self.table.bind(zones=self._zones_address if compiled else 0, zone_table=zones.numbers)
 
-    def pay_out(self, table: Table, address: int, iterated: int) -> None:
-        """The length of the line changes from now on; addresses of reel.payout.pay_out, and of `iterate` or 0."""
-        self.table.bind(reel=address, iterated=iterated, reel_table=table.numbers)
-
     def watch_itself(self, table: np.ndarray, address: int) -> None:
         """From now on steps look how near the line comes to itself (kernels.contact.self_distance)."""
         self.table.bind(itself=address, itself_table=table)
@@ -186,12 +182,6 @@ class CompiledRun:
         table = contact.attach(line, ends, self.states, work, self.books, sea)
         self.table.bind(contact=contact.call, contact_table=table)
         self.contact = contact
-
-    def touch_no_more(self) -> None:
-        """The line does not touch itself, or no longer."""
-        if self.contact is not None:
-            self.table.bind(contact=np.zeros(3, np.int64), contact_table=np.zeros(0, np.int64))
-            self.contact = None
 
     def move(self, moves: Moves) -> None:
         """From now on the ends move otherwise, or other loads act."""

@@ -24,9 +24,8 @@ from hybrid.simulation import initial_zones, system_cells
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.initial_zones import shares_asked
 from hybrid.simulation.lines_cells import LineCells
+from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.simulation.system_zones import SystemZones
-from hybrid.simulation.transient import Transient
-from hybrid.simulation.transient_checkpoint import zoning_of_today
 from hybrid.solve.run import CompiledRun
 from hybrid.solve.system_steps import SystemSteps
 
@@ -190,7 +189,6 @@ def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monk
     monkeypatch.setattr(Observer, "look_at", look_at)
     once = hybrid.run(scene)
     assert max(map(len, together)) > 3 and len(together) < 0.1 * once.t.size
-    monkeypatch.setattr(CellChanges, "applies", lambda owner: False)
     anew = hybrid.run(scene)
     assert len({mesh.s.size for mesh in once.mesh}) > 5 and {"retry", "shrink"} <= {e.kind for e in once.events}
     assert [(e.t, e.kind, e.text) for e in once.events] == [(e.t, e.kind, e.text) for e in anew.events]
@@ -215,21 +213,15 @@ def test_a_line_that_is_watched_changes_its_cells_in_arrays_made_once(monkeypatc
         "model": {"kind": "adaptive", "curvature_error": 0.03},
         "output": {"every": 2, "points": 501, "errors": False},
     })  # fmt: skip
-    changed, change, changes = [], Transient._switch, SystemZones._switch
-
-    def switch(self: Transient, how: Change) -> None:
-        changed.append(how.same and self.itself.watching)
-        change(self, how)
+    changed, changes = [], SystemZones._switch
 
     def switch_line(self: SystemZones, line: Any, how: Change, here: Any = None) -> None:
         changed.append(how.same and self._run.lines[0].envelope.itself.on)
         changes(self, line, how, here)
 
-    monkeypatch.setattr(Transient, "_switch", switch)
     monkeypatch.setattr(SystemZones, "_switch", switch_line)
     once = hybrid.run(scene)
     by_python = sum(changed)
-    monkeypatch.setattr(CellChanges, "applies", lambda owner: False)
     monkeypatch.setattr(LineCells, "may_change", lambda *_: False)
     anew = hybrid.run(scene)
     assert sum(changed) - by_python > 20 > 5 >= by_python
@@ -369,25 +361,6 @@ def test_cells_become_as_short_as_a_kink_that_gets_sharper() -> None:
     assert np.abs(found.curvature - rods.curvature).max() < 0.035 * rods.curvature.max()
     cells = [mesh.s.size - 1 for mesh in found.mesh]
     assert np.mean(cells) < 400 and cells[0] == 32  # a straight line asks for none
-
-
-@pytest.mark.usefixtures("old_road")  # the steps of lines leave none
-def test_outputs_that_wait_are_not_lost_with_the_arrays_they_wait_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where a push out of the plane dies, or an end is let go, cells change in other arrays from then on."""
-    refused, short = [], hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", SHORT))
-
-    def still_fits(self: CellChanges) -> bool:
-        waits = (bool(self._run.count.samples) or self.waits) and self._run.t > 1.0
-        refused.extend([self] * waits)
-        return fits(self) and not waits
-
-    fits = CellChanges.still_fits
-    monkeypatch.setattr(CellChanges, "still_fits", still_fits)
-    monkeypatch.setattr(CellChanges, "alone", False)
-    found = hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", SHORT))
-    assert refused
-    for name in ("t", "position", "tension", "work/zones"):
-        np.testing.assert_array_equal(found[name], short[name], err_msg=name)
 
 
 def test_a_motion_begins_on_the_cells_of_its_equilibrium_and_keeps_its_rods(short: hybrid.Result) -> None:

@@ -17,7 +17,7 @@ from hybrid.kernels.mesh import cell_errors as e
 from hybrid.kernels.mesh.wave_lengths import TAU, WAVES, know_new_nodes
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, read, watch_waves
 from hybrid.kernels.state.state import no_sea
-from hybrid.simulation.transient_checkpoint import zoning_of_today
+from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.store.named_arrays import Tree
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -167,8 +167,7 @@ def test_a_second_signal_ends_a_run_at_once(tmp_path: Path, monkeypatch: pytest.
             reached.append(name)
             signal.raise_signal(signal.SIGINT)
 
-    for start in ("_start", "_network_start"):
-        monkeypatch.setattr(f"hybrid.simulation.case.Case.{start}", search)
+    monkeypatch.setattr("hybrid.simulation.case.Case._network_start", search)
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(WIRE, tmp_path / "run.h5")
     assert reached == ["first", "second"]

@@ -13,7 +13,7 @@ import hybrid
 import hybrid.solve.self_contact
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.step.accept import MANY, collapses
-from hybrid.simulation import contact_start, system_contact, system_run, transient
+from hybrid.simulation import system_contact, system_run
 
 GIVEN_UP, COLLAPSE = "contact given up", "steps collapse"
 
@@ -26,13 +26,12 @@ def test_it_comes_and_goes_with_the_legs(monkeypatch: pytest.MonkeyPatch) -> Non
     """An end that swings beside the other: the legs touch twice."""
     happened: list[tuple[str, float]] = []
     for name in ("begin_contact", "end_contact"):
-        for run, of_run in ((transient, contact_start), (system_run, system_contact)):
 
-            def noted(moving: Any, *more: Any, name: str = name, of_run: Any = of_run) -> None:
-                happened.append((name, moving.t))
-                getattr(of_run, name)(moving, *more)
+        def noted(moving: Any, *more: Any, name: str = name) -> None:
+            happened.append((name, moving.t))
+            getattr(system_contact, name)(moving, *more)
 
-            monkeypatch.setattr(run, name, noted)
+        monkeypatch.setattr(system_run, name, noted)
     sway = {"surge": {"amplitude": 0.26, "period": 2.0}, "ramp": 4.0}
     ends = {
         "start": {"kind": "pinned", "position": [0, 0, 0]},
@@ -113,14 +112,13 @@ def hanging(**output: Any) -> dict[str, Any]:
 @pytest.fixture
 def longest(monkeypatch: pytest.MonkeyPatch) -> None:
     """All runs have made a very long step."""
-    for of, name, steps in ((transient.Transient, "begin", "run"), (system_run.SystemRun, "begin_motion", "loop")):
-        first = getattr(of, name)
+    begin = system_run.SystemRun.begin_motion
 
-        def after_a_long_step(self: Any, *args: Any, begin: Any = first, steps: str = steps) -> None:
-            begin(self, *args)
-            getattr(self, steps).clock.longest = 1e3
+    def after_a_long_step(self: system_run.SystemRun) -> None:
+        begin(self)
+        self.loop.clock.longest = 1e3
 
-        monkeypatch.setattr(of, name, after_a_long_step)
+    monkeypatch.setattr(system_run.SystemRun, "begin_motion", after_a_long_step)
 
 
 @pytest.mark.usefixtures("longest")

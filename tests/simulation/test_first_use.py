@@ -16,7 +16,6 @@ from hybrid.kernels.reel import payout, payout_nodes
 from hybrid.kernels.run import payout_run
 from hybrid.scene.read import as_scene_or_system
 from hybrid.simulation import first_use
-from hybrid.simulation.switch import as_network
 
 
 @pytest.mark.parametrize("name", ["hybrid", "numpy", "signal"])
@@ -62,7 +61,7 @@ def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
         "cable": {"sections": [{"length": 40.0, "mass": 2.0}]}, "ends": ends, "initial": "equilibrium",
         "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 10, "step": 0.05},
     })  # fmt: skip
-    paid = first_use.PAYOUT_OF_LINES[0] if as_network() else first_use.PAYOUT
+    paid = first_use.PAYOUT_OF_LINES[0]
     assert paid in first_use.kernels_of(scene)
     assert paid not in first_use.kernels_of(scene, static=True)
 

@@ -14,8 +14,6 @@ from tests.combinations.networks import both, both_files, differences, events_di
 from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, S, scene_of
 from tests.problems import tables_with
 
-pytestmark = pytest.mark.usefixtures("old_road")
-
 FREE = {"kind": "free", "force": [40, 3, 30]}
 GUIDED = {"kind": "guided", "tangent": [1, 0.1, 0.2], "normal": [0, 1, 0], "force": [60, 3, 30]}
 STIFF = {"cable.sections.0.bending_stiffness": 2e3}

@@ -20,7 +20,6 @@ from hybrid.simulation import system_lines
 from hybrid.simulation.lines_nodes import LineNodes
 from hybrid.simulation.outputs_aside import OutputsAside
 from hybrid.simulation.system_lines import LineResult
-from hybrid.simulation.transient import Transient
 from tests.inside import OnlyLine
 
 G = 9.81
@@ -593,7 +592,6 @@ def test_outputs_looked_at_together_are_those_looked_at_one_by_one(model: str, m
     monkeypatch.setattr(OutputsAside, "record", lambda x, *more: (calls.append(len(x.waiting)), record(x, *more))[1])
     again = hybrid.run(scene)
     assert max(calls) > 5  # nodes enter about every 3 s, with six outputs between
-    monkeypatch.setattr(Transient, "pays_out", False)
     monkeypatch.setattr(LineNodes, "may_change", lambda *_: False)
     monkeypatch.setattr(LineResult, "outputs_join", False)
     monkeypatch.setattr(system_lines, "WAITING", 1)

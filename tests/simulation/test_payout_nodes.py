@@ -10,7 +10,6 @@ import pytest
 import hybrid
 from hybrid.simulation.lines_nodes import LineNodes
 from hybrid.simulation.payout import PayingOut
-from hybrid.simulation.payout_nodes import NodeChanges
 
 # What is made of forces on the ends: those of the state between a change and the next step are summed up in another
 # order, and outputs within that step lie between them; all else, and so every step, is the same to the last bit.
@@ -51,7 +50,6 @@ def test_nodes_enter_and_leave_as_by_python(
     )
     found = hybrid.run(given)
     assert not one_by_one
-    monkeypatch.setattr(NodeChanges, "applies", lambda owner: False)
     monkeypatch.setattr(LineNodes, "may_change", lambda *_: False)
     other = hybrid.run(given)
     assert len(one_by_one) >= 3

@@ -89,7 +89,8 @@ def test_a_run_that_begins_anew_is_at_its_beginning(heard: list[Progress]) -> No
     assert (heard[-1].fraction, heard[-1].run, heard[-1].runs) == (0.0, 1, 1)
 
 
-def test_the_pre_run_of_several_lines_is_a_part_of_all(heard: list[Progress]) -> None:
+def test_the_pre_run_of_several_lines_is_a_part_of_all(heard: list[Progress], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)  # a step a call
     section = {"length": 10.0, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e5}
     points = {"a": {"position": [0, 0, 0]}, "b": {"position": [8, 0, 0]}, "c": {"position": [8, 4, 0]}}
     lines = {x: {"start": "a", "end": x, "sections": [section], "model": "catenary"} for x in "bc"}

@@ -21,7 +21,6 @@ from hybrid.cli.console import Console
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
-from hybrid.simulation import case as cases
 from hybrid.simulation import system_cells, system_run
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
@@ -268,7 +267,6 @@ def test_a_stop_is_heard_while_the_equilibrium_is_searched(
         os.kill(os.getpid(), signal.SIGINT)
         reached.append("the end of a long search")
 
-    monkeypatch.setattr(cases, "equilibrium_of", long)
     monkeypatch.setattr(system_cells, "equilibrium_of_system", long)
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(scene, tmp_path / "run.h5")

@@ -13,7 +13,6 @@ from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
 import hybrid.simulation.system_run
-import hybrid.simulation.time_loop
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.short_form import network_of
@@ -128,7 +127,7 @@ def test_changes_are_made_at_their_time_however_often_it_is_stopped(name, form, 
         return scene if form is None else form(scene)
 
     more = {"settings": ["environment.fluid.current=[0.4, 0.2, 0]"], "start": 3.0}
-    monkeypatch.setattr(hybrid.simulation.time_loop, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
     monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
     hybrid.run(lasting(6), tmp_path / "long.h5").close()
     hybrid.resume(tmp_path / "long.h5", tmp_path / "anew.h5", **more).close()
@@ -316,9 +315,9 @@ def test_a_full_disk_loses_nothing(part, tmp_path):
         import resource
         from hybrid.cli.commands import main
         from hybrid.store import writer as record
-        import hybrid.simulation.time_loop
+        import hybrid.simulation.system_run
         import hybrid.solve.run
-        hybrid.simulation.time_loop.WORK = 0
+        hybrid.simulation.system_run.WORK = 0
         record._PART = 0.0
         record.pause = lambda made: 0.0
         hybrid.solve.run.CELL_STEPS = 1
@@ -517,7 +516,7 @@ def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
 def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeypatch):
     """By the work done: a run whose file is flushed at every pause has the same ones as one that never is."""
     monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 20 * 40)
-    monkeypatch.setattr(hybrid.simulation.time_loop, "WORK", 20 * 40)  # 40 steps of 20 cells
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 20 * 40)  # 40 steps of 20 cells
     monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 20 * 7)  # a pause every 7 steps
     places, kept, keep = [], [], record.Recorder.checkpoint
 

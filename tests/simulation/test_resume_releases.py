@@ -17,8 +17,10 @@ import pytest
 import hybrid
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.simulation import restore
+from hybrid.simulation.old_checkpoints import as_of_line
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
+from hybrid.store.reader import open_result
 
 DATA = Path(__file__).parents[1] / "data"
 # Another compiler, or other sources, may change the last bits of a step, and then Newton's method may stop one iteration
@@ -120,3 +122,16 @@ def test_a_file_of_1_0_is_resumed(name: str, stopped: float, tmp_path: Path) -> 
         late = result.times > point.t
         assert np.ptp(fresh.position[late], axis=0).max() > 0.05, "nothing moves after the checkpoint"
         assert [e.t for e in result.events if e.kind == OTHER_PROGRAM] == [point.t]
+
+
+def test_what_is_of_another_line_or_of_no_cable_is_refused(tmp_path: Path) -> None:
+    path = kept("result_1.0_plane.h5.gz", tmp_path)
+    with opened(path) as file, open_result(path) as result:
+        saved, scene = read_checkpoint(file).state, hybrid.parse_scene(result.scene_text)
+    model = hybrid.model.build.build(scene)
+    assert set(as_of_line(saved, "cable", model, ())["lines"]) == {"cable"}
+    with pytest.raises(ValueError, match="surplus: not in the checkpoint of any cable"):
+        as_of_line(saved | {"surplus": 1.0}, "cable", model, ())
+    longer = hybrid.model.build.build(scene.model_copy(update={"mesh": scene.mesh.model_copy(update={"cells": 7})}))
+    with pytest.raises(ValueError, match="nodes that are not those of the line"):
+        as_of_line(saved, "cable", longer, ())

@@ -26,7 +26,6 @@ from tests.combinations.networks import both_files, exact_scene, files_differ, n
 from tests.combinations.pairs import END, FEATURES, scene_of
 from tests.problems import tables_with
 
-pytestmark = pytest.mark.usefixtures("old_road")  # which files of networks are compared with
 FREE = {END: {"kind": "free", "force": [40, 3, 30]}}
 QUANTITIES = {"output.quantities": {"angle": {"kind": "azimuth", "end": "start"}}}
 

@@ -12,7 +12,6 @@ import pytest
 import hybrid
 import hybrid.solve.run
 from hybrid.simulation import system_lines
-from hybrid.simulation.time_loop import TimeLoop
 from hybrid.store.recorder import BaseRecorder
 
 ROD = {
@@ -139,7 +138,6 @@ def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(BaseRecorder, "save_batch", counted)
     many = hybrid.run(scene)
     assert max(batches) > 20  # while lengths or bending are on their way, outputs do not wait
-    monkeypatch.setattr(TimeLoop, "_may_wait", False)
     monkeypatch.setattr(system_lines, "WAITING", 1)
     batches.clear()
     one = hybrid.run(scene)

@@ -1,8 +1,8 @@
-"""Stops of a time loop, and what is due at them."""
+"""Stops of a run, and what is due at them."""
 
 from __future__ import annotations
 
-from hybrid.simulation.time_loop import SAME_STOP, falls_on
+from hybrid.model.plan import SAME_STOP, falls_on
 
 STEP = 0.05
 

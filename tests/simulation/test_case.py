@@ -1,0 +1,99 @@
+"""Runs of a case to compare with: what they keep, and where; pre-runs; what was stopped goes on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.scene.read import as_scene
+from hybrid.simulation import system_lines
+from hybrid.simulation.case import Case
+from hybrid.simulation.run_sample import RunSample
+
+SCENE: dict[str, Any] = {
+    "cable": {"sections": [{"length": 20, "mass": 1.5, "axial_stiffness": 1e6, "bending_stiffness": 50, "diameter": 0.02}]},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
+             "end": {"kind": "pinned", "position": [15, 0, 2],
+                     "motion": {"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0}}},
+    "initial": "equilibrium", "mesh": {"cells": 40}, "time": {"duration": 0.8}, "output": {"every": 0.05},
+    "accuracy": "1%",
+}  # fmt: skip
+SAME = 1e-8  # of the scale of a quantity: errors of forces are differences over 1e-4 of the shift
+
+
+def sample(case: Case, **more: Any) -> RunSample:
+    """The run of a case with the error of leaving bending out."""
+    return case.sample(finely(case), **more)
+
+
+def finely(case: Case) -> Resolution:
+    """How finely."""
+    return replace(first_resolution(case.scene), follow=True)
+
+
+def assert_same(a: RunSample, b: RunSample) -> None:
+    """All that is compared of two runs is the same."""
+    assert (a.steps, a.cells, a.every, a.bound, a.touches, a.notes) == (
+        b.steps,
+        b.cells,
+        b.every,
+        b.bound,
+        b.touches,
+        b.notes,
+    )
+    for mine, its in ((a.values, b.values), (a.model_error, b.model_error), (a.extremes, b.extremes)):
+        assert set(mine) == set(its)
+        for name in mine:
+            one, two = np.asarray(mine[name]), np.asarray(its[name])
+            assert one.shape == two.shape, name
+            assert np.abs(one - two).max(initial=0.0) <= SAME * max(float(np.abs(one).max(initial=0.0)), 1e-3), name
+    for one, two in ((a.forces, b.forces), (a.catenary, b.catenary), (a.doubt, b.doubt)):
+        np.testing.assert_allclose(one, two, rtol=1e-7, atol=1e-7)
+
+
+def test_a_pre_run_ends_before_the_run_at_places_of_its_own() -> None:
+    case = Case(as_scene(SCENE | {"model": "catenary", "dimension": 3}), None)
+    places = np.array([0.0, 3.3, 20.0])
+    found = sample(case, points=places, until=0.32)
+    assert found.values["tension"].shape == (8, 3) and found.model_error
+    assert sample(Case(as_scene(SCENE | {"model": "rod"}), None)).model_error == {}
+
+
+def test_an_output_does_not_depend_on_those_that_are_looked_at_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(as_scene(SCENE | {"model": "catenary"}), None)
+    together = sample(case)
+    monkeypatch.setattr(system_lines, "WAITING", 1)
+    assert_same(together, sample(case))
+
+
+def test_many_outputs_go_into_a_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+    case = Case(as_scene(SCENE | {"model": "catenary"}), None)
+    kept = sample(case)
+    case.beside_result = tmp_path / "run.h5"
+    monkeypatch.setattr("hybrid.simulation.case.MOST_IN_MEMORY", 10)
+    stored = sample(case)
+    assert stored.rows and len(list(tmp_path.iterdir())) == 1
+    assert_same(kept, stored)
+
+
+@pytest.mark.long
+def test_what_was_stopped_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A result is completed, with its errors."""
+    whole, path = hybrid.run(SCENE | {"model": "catenary"}, tmp_path / "whole.h5"), tmp_path / "cut.h5"
+
+    def stop(progress: Any) -> None:
+        if progress.name == "result" and progress.t > 0.3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("hybrid.simulation.progress.REPORT_EVERY", 0.0)
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(SCENE | {"model": "catenary", "output": {"every": 0.05, "exact": True}}, path, progress=stop)
+    found = hybrid.resume(path)
+    np.testing.assert_allclose(found["tension"], whole["tension"], rtol=2e-2)
+    assert found.attributes["error_total_position"] > 0.0
