@@ -12,8 +12,8 @@ import pytest
 import hybrid
 from hybrid.kernels.run import payout_run
 from hybrid.simulation.lines_nodes import LineNodes
-from hybrid.simulation.system_payout import SystemPayout
-from hybrid.solve.system_steps import SystemSteps
+from hybrid.simulation.run_payout import RunPayout
+from hybrid.solve.network_steps import NetworkSteps
 from tests.simulation.test_payout import clamped, kicks
 from tests.simulation.test_payout import sagging as swung
 
@@ -49,15 +49,15 @@ def test_cost_of_paying_out(monkeypatch: pytest.MonkeyPatch) -> None:
         "paid out, 2 outputs": (sagging(True, 37.5), True),
     }
     together, taken = LineNodes.may_change, {name: list[float]() for name in cases}
-    in_steps, within, go = {name: list[float]() for name in cases}, [0.0], SystemSteps.go
+    in_steps, within, go = {name: list[float]() for name in cases}, [0.0], NetworkSteps.go
 
-    def timed(run: SystemSteps, *by: Any) -> int:
+    def timed(run: NetworkSteps, *by: Any) -> int:
         begin = time.process_time()
         code = go(run, *by)
         within[0] += time.process_time() - begin
         return code
 
-    monkeypatch.setattr(SystemSteps, "go", timed)
+    monkeypatch.setattr(NetworkSteps, "go", timed)
     for _ in range(RUNS + 1):
         for name, (scene, joined) in cases.items():
             monkeypatch.setattr(LineNodes, "may_change", staticmethod(together if joined else lambda *_: False))
@@ -105,8 +105,8 @@ def test_cost_of_a_node(monkeypatch: pytest.MonkeyPatch) -> None:
 
         return wrapped
 
-    monkeypatch.setattr(SystemPayout, "_change", timed(SystemPayout._change, taken))
-    monkeypatch.setattr(SystemPayout, "_change_by_itself", timed(SystemPayout._change_by_itself, taken))
+    monkeypatch.setattr(RunPayout, "_change", timed(RunPayout._change, taken))
+    monkeypatch.setattr(RunPayout, "_change_by_itself", timed(RunPayout._change_by_itself, taken))
     monkeypatch.setattr(payout_run, "change_node", timed(payout_run.change_node, compiled))
     for name, (model, section) in NODES.items():
         scene = sagging(True, 37.5).model_dump(mode="json", exclude_none=True)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.solve import system_steps as compiled
+from hybrid.solve import network_steps as compiled
 
 pytestmark = pytest.mark.bench
 EXAMPLES = Path(__file__).parents[1] / "examples"

@@ -206,10 +206,10 @@ def test_cost_of_an_output(tmp_path: Path) -> None:
 
 def test_before_the_first_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Scene, model, equilibrium, file and first output of `hybrid.run` in a warm process; and all that is not steps."""
-    from hybrid.simulation.system_run import SystemRun
+    from hybrid.simulation.network_run import NetworkRun
 
     begin, before = 0.0, list[float]()
-    monkeypatch.setattr(SystemRun, "go_to", lambda self, *_: before.append(time.process_time() - begin))
+    monkeypatch.setattr(NetworkRun, "go_to", lambda self, *_: before.append(time.process_time() - begin))
 
     def run(model: str) -> None:
         nonlocal begin
@@ -248,7 +248,7 @@ def test_stepping_from_outside() -> None:
 
 def test_switches_of_zones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What watching, planning and switching take of a run whose zones move, and a switch."""
-    from hybrid.simulation.system_zones import SystemZones
+    from hybrid.simulation.run_zones import RunZones
 
     spent: dict[str, list[float]] = {}
 
@@ -262,7 +262,7 @@ def test_switches_of_zones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         return inside
 
     for method in ("wants_more_rod", "accepted", "_switch"):
-        monkeypatch.setattr(SystemZones, method, timed(method, getattr(SystemZones, method)))
+        monkeypatch.setattr(RunZones, method, timed(method, getattr(RunZones, method)))
     from test_bench_cells import CASES, DRIFT, scene_of
 
     names = ("touchdown", "s_tether", "laying")

@@ -21,9 +21,9 @@ from hybrid.adapt.manager import DomainManager
 from hybrid.errors import ZONE_EVENTS
 from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.simulation import initial_zones
-from hybrid.simulation.system_lines import LineResult
-from hybrid.simulation.system_run import SystemRun
-from hybrid.simulation.system_zones import SystemZones
+from hybrid.simulation.line_result import LineResult
+from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.run_zones import RunZones
 
 pytestmark = pytest.mark.bench
 ROUNDS = 3
@@ -45,7 +45,7 @@ def timed(call: Callable[..., Any], into: list[float], clock: Callable[[], float
 def test_switch(mesh: str, monkeypatch: pytest.MonkeyPatch) -> None:
     reviews, switches, first = list[float](), list[float](), list[float]()
     monkeypatch.setattr(DomainManager, "review", timed(DomainManager.review, reviews))
-    monkeypatch.setattr(SystemZones, "_switch", timed(SystemZones._switch, switches))
+    monkeypatch.setattr(RunZones, "_switch", timed(RunZones._switch, switches))
     text = touchdown(True)
     for _ in range(ROUNDS + 1):  # the first compiles
         begin = len(switches)
@@ -96,9 +96,9 @@ def four_lines() -> Text:
 def test_switch_of_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each line that changes, what follows for all of them included; the outputs that it has to write before apart."""
     monkeypatch.setattr(initial_zones, "shares_asked", lambda *_: {CURVATURE: SHARE})
-    written, changing, attaching, adapt = list[float](), list[float](), list[float](), SystemZones.adapt
+    written, changing, attaching, adapt = list[float](), list[float](), list[float](), RunZones.adapt
 
-    def without_outputs(zones: SystemZones) -> None:
+    def without_outputs(zones: RunZones) -> None:
         begin, before = process_time(), sum(written)
         adapt(zones)
         changing.append(1e6 * (process_time() - begin) - (sum(written) - before))
@@ -106,8 +106,8 @@ def test_switch_of_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
 
     outputs, changed = list[float](), 0
     hybrid.run(four_lines())  # the first compiles
-    monkeypatch.setattr(SystemZones, "adapt", without_outputs)
-    monkeypatch.setattr(SystemRun, "_attach", timed(SystemRun._attach, attaching, process_time))
+    monkeypatch.setattr(RunZones, "adapt", without_outputs)
+    monkeypatch.setattr(NetworkRun, "_attach", timed(NetworkRun._attach, attaching, process_time))
     monkeypatch.setattr(LineResult, "write_down", timed(LineResult.write_down, written, process_time))
     for _ in range(ROUNDS):
         result = hybrid.run(four_lines())

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from hybrid.scene.combinations import REFUSALS
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import Scene, Table
-from hybrid.scene.system import System
 
 PAGE = Path(__file__).with_name("scene.md")
 

@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
     from hybrid.modal.api import modes
     from hybrid.modal.response import response
+    from hybrid.scene.network_scene import System
     from hybrid.scene.read import load_scene, load_system, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
-    from hybrid.scene.system import System
+    from hybrid.simulation.lines_stiffness import offsets, stiffness
     from hybrid.simulation.listed_outputs import kinds_of_quantities, listed_outputs
     from hybrid.simulation.stepping import Simulation
     from hybrid.simulation.stepping import Simulation as SystemSimulation  # noqa: F401  # deprecated
-    from hybrid.simulation.system_stiffness import offsets, stiffness
     from hybrid.store.reader import Result
     from hybrid.store.reader import open_result as open
     from hybrid.store.study_file import open_study
@@ -62,7 +62,7 @@ _HOME = {
     "SceneError": ("hybrid.errors", "SceneError"),
     "Simulation": ("hybrid.simulation.stepping", "Simulation"),
     "SystemSimulation": ("hybrid.simulation.stepping", "Simulation"),  # deprecated
-    "System": ("hybrid.scene.system", "System"),
+    "System": ("hybrid.scene.network_scene", "System"),
     "compare": ("hybrid.view.comparison", "write_comparison"),
     "design": ("hybrid.designs.design", "design"),
     "export_fmu": ("hybrid.couple.fmu_export", "export_fmu"),
@@ -72,7 +72,7 @@ _HOME = {
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "load_system": ("hybrid.scene.read", "load_system"),
     "modes": ("hybrid.modal.api", "modes"),
-    "offsets": ("hybrid.simulation.system_stiffness", "offsets"),
+    "offsets": ("hybrid.simulation.lines_stiffness", "offsets"),
     "open": ("hybrid.store.reader", "open_result"),
     "openmdao_component": ("hybrid.designs.component", "openmdao_component"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
@@ -95,7 +95,7 @@ _HOME = {
     "sensitivity": ("hybrid.designs.sensitivity", "sensitivity"),
     "shares": ("hybrid.designs.shares", "shares"),
     "static": ("hybrid.accuracy.api", "static"),
-    "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
+    "stiffness": ("hybrid.simulation.lines_stiffness", "stiffness"),
     "study": ("hybrid.studies.study", "study"),
     "study_case": ("hybrid.studies.study", "case_of"),
     "open_study": ("hybrid.store.study_file", "open_study"),

@@ -56,12 +56,12 @@ BY_TABLE = {
         run.following_run.begin_cells run.following_run.end_cells run.following_run.cells_may_change
         reel.payout.stand_among""",
     "space": """run.run.in_space watch.bending_error.advance_error contact.self_contact.contact_task
-        contact.self_distance.watch_itself junctions.system_contact.touch_system
+        contact.self_distance.watch_itself junctions.lines_contact.touch_system
         watch.named_quantities.note_quantities junctions.shared_contact.shared_task
         junctions.joined_sheaves.spin_sheaves junctions.body_contact.meet_bodies""",
 }
 
-IN_TESTS = {"plane": "run.system_tangents.follow_system", "space": "run.system_run.sample_system"}
+IN_TESTS = {"plane": "run.network_tangents.follow_system", "space": "run.network_run.sample_system"}
 
 
 def main(half: str, for_tests: bool) -> None:

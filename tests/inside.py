@@ -8,8 +8,8 @@ import hybrid
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.state import State, Work
 from hybrid.model.build import Model
+from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.payout import PayingOut
-from hybrid.simulation.system_lines import LineResult
 from hybrid.solve.self_contact import SelfContact
 
 

@@ -55,7 +55,7 @@ from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE
 
 if TYPE_CHECKING:
-    from hybrid.scene.system import System
+    from hybrid.scene.network_scene import System
 
 # Why there is nothing that a criterion could ask for.
 NO_ZONES = "a criterion is for zones that move: the scene's model is not adaptive"
@@ -190,8 +190,8 @@ def _several_lines(
     moves: bool = True,
 ) -> Result:
     """The motion of several lines, or their equilibrium."""
-    from hybrid.accuracy.system_accuracy import SystemPasses, is_refined, system_with_layers
-    from hybrid.simulation.system_run import static_system
+    from hybrid.accuracy.passes_of_lines import PassesOfLines, is_refined, system_with_layers
+    from hybrid.simulation.network_run import static_system
 
     refined = is_refined(system, moves=moves)
     target = _target(output, overwrite, refined or (moves and bool(system.output.errors)))
@@ -200,7 +200,7 @@ def _several_lines(
             beside(target).unlink(missing_ok=True)  # of a run that was cut off
         if not moves and refined:
             assert not isinstance(target, MemoryTarget)
-            SystemPasses(system, target, False, ProgressReporter(None, 1.0), lambda: False).compute()
+            PassesOfLines(system, target, False, ProgressReporter(None, 1.0), lambda: False).compute()
         elif not moves:
             resolution = system_with_layers(system, False, ProgressReporter(None, 1.0), lambda: False)
             static_system(system, target, partial(scene_text, system), resolution)
@@ -216,8 +216,8 @@ def _move_lines(
     """Compute the motion of several lines; source: the result to go on with; left: what is to be done with it."""
     changes = left.changes if left is not None else ()
     source = None if left is not None and left.anew else source
-    from hybrid.accuracy.system_accuracy import SystemPasses, is_refined, system_with_layers
-    from hybrid.simulation.system_run import Recording, run_system
+    from hybrid.accuracy.passes_of_lines import PassesOfLines, is_refined, system_with_layers
+    from hybrid.simulation.network_run import Recording, run_system
 
     if criterion is not None and not system.adaptive:
         raise TypeError(NO_ZONES)
@@ -230,7 +230,7 @@ def _move_lines(
             try:
                 if is_refined(system, moves=True):
                     assert not isinstance(target, MemoryTarget), "errors are written into a file"
-                    asked = SystemPasses(system, target, True, reporter, stopped, notes, criterion, changes)
+                    asked = PassesOfLines(system, target, True, reporter, stopped, notes, criterion, changes)
                     asked.compute(source)
                     return
                 resolution = None
@@ -252,7 +252,7 @@ def _move_lines(
                 notes.append((CHOSEN, instead.text))
         if system.output.errors:
             assert not isinstance(target, MemoryTarget), "errors are written into a file"
-            from hybrid.accuracy.system_errors import write_system_errors
+            from hybrid.accuracy.errors_of_lines import write_system_errors
 
             def compare(other: System, memory: MemoryTarget) -> None:
                 text = scene_text(other)

@@ -28,11 +28,11 @@ from hybrid.linear.excitation import frequencies_of
 from hybrid.linear.loaded_line import LoadedLine
 from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_at_rest, sparse_rows
 from hybrid.linear.rest import Rest, line_at_rest, system_at_rest
-from hybrid.model.system import SystemResolution
+from hybrid.model.network import NetworkResolution
 from hybrid.scene.motion_tables import Motion
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import Scene
 from hybrid.scene.short_form import LINE
-from hybrid.scene.system import System
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.simulation.static_case import StaticCase
 
@@ -118,7 +118,7 @@ def of_cable(scene: Scene, result: RunSample) -> LostBy:
     return found.get(LINE, {})
 
 
-def of_system(system: System, resolution: SystemResolution, times: Floats) -> Mapping[str, LostBy]:
+def of_system(system: System, resolution: NetworkResolution, times: Floats) -> Mapping[str, LostBy]:
     """The same of several lines, by their names; times: (n,) s, ends of the steps of the result."""
     return lost_vibrations(system, lambda: system_at_rest(system, resolution), times)
 

@@ -19,7 +19,7 @@ from hybrid.scene.cable import Section
 from hybrid.scene.schema import Environment, Scene
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.system import System
+    from hybrid.scene.network_scene import System
 
 CHOSEN = "slack line as rods"  # of the event that says so
 CELLS = 100  # of a mesh that is not given
@@ -35,7 +35,7 @@ class Instead(NamedTuple):
     text: str
 
 
-class SystemInstead(NamedTuple):
+class LinesInstead(NamedTuple):
     """The same of several lines."""
 
     system: System
@@ -52,7 +52,7 @@ def rods_instead_of_slack(scene: Scene, error: ComputationError) -> Instead | No
     return Instead(scene.model_copy(update={"cable": cable, "model": RodModel()}), _text(error, given))
 
 
-def rods_of_system(system: System, error: ComputationError) -> SystemInstead | None:
+def rods_of_system(system: System, error: ComputationError) -> LinesInstead | None:
     """The same of the line of a system that an error names."""
     line = system.lines.get(error.line_name)
     if error.outcome != Outcome.SLACK or error.t is None or line is None or line.model is not None:
@@ -61,7 +61,7 @@ def rods_of_system(system: System, error: ComputationError) -> SystemInstead | N
     other = line.model_copy(update={"sections": sections, "model": RodModel()})
     lines = {name: other if name == error.line_name else x for name, x in system.lines.items()}
     text = f"line {error.line_name}: {_text(error, given)}" + "; no other line has changed" * (len(lines) > 1)
-    return SystemInstead(system.model_copy(update={"lines": lines}), text)
+    return LinesInstead(system.model_copy(update={"lines": lines}), text)
 
 
 def _stiffened(sections: tuple[Section, ...], around: Environment) -> tuple[tuple[Section, ...], list[float]]:

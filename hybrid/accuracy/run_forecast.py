@@ -24,19 +24,19 @@ from hybrid.model import plan as tables
 from hybrid.model.build import Model, build
 from hybrid.model.contents import with_accuracy
 from hybrid.model.model_costs import NAMED
-from hybrid.model.plan import Plan, SystemPlan, count_steps
+from hybrid.model.plan import NetworkPlan, Plan, count_steps
 from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
 from hybrid.model.run_time import COST_STEP
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import kernels_of
-from hybrid.simulation.system_run import Recording, SystemRun
+from hybrid.simulation.network_run import NetworkRun, Recording
 from hybrid.solve.joined import LineFailed
 from hybrid.store.comparison_recorder import ComparisonRecorder
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.system import System
+    from hybrid.scene.network_scene import System
 
 # s of processor time that the pre-run and the first steps of the result may take, and a pre-run that chooses the model.
 PRE_RUN, FIRST_STEPS, CHOICE = 0.2, 0.1, 1.0
@@ -60,14 +60,14 @@ MOST_FINER = 9.0
 @overload
 def plan(scene: SceneLike, *, measure: bool = True) -> Plan: ...
 @overload
-def plan(scene: System, *, measure: bool = True) -> SystemPlan: ...
-def plan(scene: SceneLike | System, *, measure: bool = True) -> Plan | SystemPlan:
+def plan(scene: System, *, measure: bool = True) -> NetworkPlan: ...
+def plan(scene: SceneLike | System, *, measure: bool = True) -> Plan | NetworkPlan:
     """What would be computed for a scene (a Scene, the path of a scene file, or a dict), and how long it would take.
 
     measure: the mesh pre-run and the first steps are computed (at most about 0.3 s of processor time, 1.1 s where they
     choose the model), so that cells, steps and processor time are those of this scene on this machine, and the model is
     that of a run; False: nothing is computed, and they are estimated from tables, as where kernels are not compiled
-    yet.  Of several lines it is a SystemPlan.
+    yet.  Of several lines it is a NetworkPlan.
     """
     scene = as_scene_or_system(scene)
     if not isinstance(scene, Scene):
@@ -109,7 +109,7 @@ class _Probe(Case):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene, None)
-        self.run: SystemRun | None = None  # the last
+        self.run: NetworkRun | None = None  # the last
         self.at_rest: tuple[Model, State] | None = None  # where it begins, if that is an equilibrium
         self._end = np.inf
         self._most_steps = np.inf
@@ -129,12 +129,12 @@ class _Probe(Case):
         """Processor time, s, and steps for what follows."""
         self._end, self._most_steps = clock.process_time() + seconds, steps
 
-    def _network_run(self, *args: Any, **kwargs: Any) -> SystemRun:
+    def _network_run(self, *args: Any, **kwargs: Any) -> NetworkRun:
         self.run = super()._network_run(*args, **kwargs)
         self.seen = [Seen(clock.process_time(), 0, 0.0)]
         return self.run
 
-    def first_steps(self, resolution: Resolution) -> tuple[SystemRun, float, float]:
+    def first_steps(self, resolution: Resolution) -> tuple[NetworkRun, float, float]:
         """A result after its first steps; s of processor time before them, and of so many without what is done
         once."""
         begin = begun = clock.process_time()
@@ -219,7 +219,7 @@ def _dearer(found: Plan) -> float:
 
 
 def _steps(
-    scene: Scene, resolution: Resolution, run: SystemRun, coarse: SystemRun | None, seen: Sequence[Seen]
+    scene: Scene, resolution: Resolution, run: NetworkRun, coarse: NetworkRun | None, seen: Sequence[Seen]
 ) -> float:
     """Steps of the result, which has come as far as its run.
 
@@ -269,13 +269,13 @@ def _grown(system: System) -> float:
     return max((getattr(x, "ramp", None) or 0.0 for x in (system.environment.waves, *moved)), default=0.0)
 
 
-def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
+def _measured_lines(system: System, found: NetworkPlan) -> NetworkPlan:
     """The same of several lines: their first steps, as often as all runs would take them."""
     if found.cells > MOST_CELLS or not is_warm(kernels_of(system)):
         return found
     time, begin = system.require_time(), clock.process_time()
     try:
-        run = SystemRun(system, None, "", moves=True, recording=Recording(planes=True))
+        run = NetworkRun(system, None, "", moves=True, recording=Recording(planes=True))
         run.begin_motion()
         first = [x.T.copy() for x in run.state.lines]
         begun = clock.process_time()

@@ -21,8 +21,8 @@ from hybrid.cli.pipe import OUTPUT, raise_lost_output
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
+    from hybrid.scene.network_scene import System
     from hybrid.scene.schema import Scene
-    from hybrid.scene.system import System
     from hybrid.store.reader import Result
 
 REFUSED, FAILED, INTERRUPTED = 1, 2, 130

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from rich.console import Console as RichConsole
 
     from hybrid.errors import ComputationError, SceneError
+    from hybrid.scene.network_scene import System
     from hybrid.scene.schema import Scene
-    from hybrid.scene.system import System
     from hybrid.simulation.progress import Progress
     from hybrid.store.records import Event
     from hybrid.studies.dispatch import StudyRunning

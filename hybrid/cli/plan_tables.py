@@ -18,10 +18,10 @@ from hybrid.scene.analysis import PER_PERIOD
 from hybrid.store.hockling import kink_torque
 
 if TYPE_CHECKING:
-    from hybrid.model.plan import Plan, SystemPlan
+    from hybrid.model.plan import NetworkPlan, Plan
     from hybrid.scene.analysis import Time
+    from hybrid.scene.network_scene import System
     from hybrid.scene.schema import Scene
-    from hybrid.scene.system import System
     from hybrid.simulation.listed_outputs import Listed
 
 NAME, COLUMNS = 13, 80  # columns of names, and of the short form
@@ -41,7 +41,7 @@ SHORT = {
 }
 
 
-def plan_facts(plan: Plan | SystemPlan) -> dict[str, Any]:
+def plan_facts(plan: Plan | NetworkPlan) -> dict[str, Any]:
     """A plan for programs."""
     found = asdict(plan)
     if "zones" in found:
@@ -97,7 +97,7 @@ def _rows_of_cable(scene: Scene, plan: Plan) -> list[str]:
     ]
 
 
-def _rows_of_system(system: System, plan: SystemPlan) -> list[str]:
+def _rows_of_system(system: System, plan: NetworkPlan) -> list[str]:
     """The plan of several lines: each of them, what joins them, and what they have in common."""
     rows = _rows_of_lines(system, plan)
     every = list(plan.lines.values())
@@ -121,7 +121,7 @@ def _rows_of_system(system: System, plan: SystemPlan) -> list[str]:
     ]
 
 
-def _rows_of_lines(system: System, plan: SystemPlan) -> dict[str, str]:
+def _rows_of_lines(system: System, plan: NetworkPlan) -> dict[str, str]:
     """A row for each line, with its ends; of many lines one for all that are alike, with their names."""
     rows: dict[str, str] = {}
     alike: dict[str, list[str]] = {}
@@ -286,7 +286,7 @@ def _hockling(plan: Plan) -> str:
     return text
 
 
-def _steps(time: Time | None, plan: Plan | SystemPlan, touches: bool = False) -> str:
+def _steps(time: Time | None, plan: Plan | NetworkPlan, touches: bool = False) -> str:
     """touches: contact of the line with itself is asked for, and nobody knows for how long it does."""
     if time is None:
         return "no motion, statics only"
@@ -299,7 +299,7 @@ def _steps(time: Time | None, plan: Plan | SystemPlan, touches: bool = False) ->
     return f"{steps} of {plan.step:.6g} s{short}; {cpu}"
 
 
-def _cpu(plan: Plan | SystemPlan, touches: bool) -> str:
+def _cpu(plan: Plan | NetworkPlan, touches: bool) -> str:
     """Processor time of all runs, and what it rests on."""
     most, every = plan.most_seconds, [*getattr(plan, "lines", {"": plan}).values()]
     why = "finer runs are needed" if any(x.most_runs > x.runs for x in every) else "a line goes slack and becomes a rod"

@@ -13,8 +13,8 @@ from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_eit
 
 if TYPE_CHECKING:
     from hybrid.designs.sensitivity import Derivative
+    from hybrid.scene.network_scene import System
     from hybrid.scene.schema import Scene
-    from hybrid.scene.system import System
 
 
 @app.command()

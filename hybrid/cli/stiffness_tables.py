@@ -31,7 +31,7 @@ def check_holding(asked: Any, stiffness: str | None, offsets: str | None, reach:
             raise SceneError([Complaint(name, at, expected, fix)])
         return
     if given:
-        from hybrid.simulation.system_stiffness import target_of
+        from hybrid.simulation.lines_stiffness import target_of
 
         for at in given.values():
             target_of(asked, at)

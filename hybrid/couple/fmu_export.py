@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ResultError, optional_package
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.short_form import ENDS
-from hybrid.scene.system import System
 from hybrid.simulation.stepping import Simulation
 from hybrid.store.selection import check_target, write_atomically
 

@@ -23,17 +23,17 @@ from hybrid.kernels.state.obstacle_rows import RADIUS
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.linear.loaded_members import stiffness_by_water
 from hybrid.model.bodies import loads_of
-from hybrid.model.system import SystemModel, bodies_of
+from hybrid.model.network import NetworkModel, bodies_of
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import Fairlead
-from hybrid.scene.system import System
-from hybrid.solve.joined import SystemState
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 
 
 class BodiesAtRest:
     """What turns by the moments of its lines, in the equilibrium of a scene."""
 
-    def __init__(self, solver: SystemSolver, states: SystemState, model: SystemModel) -> None:
+    def __init__(self, solver: NetworkSolver, states: NetworkState, model: NetworkModel) -> None:
         """solver: of the lines in their equilibrium, whose numbers of bodies are those there."""
         self._solver, self._states, self._model = solver, states, model
         self.count, self._points = len(solver.bodies), len(solver.net)
@@ -60,7 +60,7 @@ class BodiesAtRest:
         bodies = [self.body_at(l, k) for k in (0, 1)]
         return np.stack([self.axes(b) @ x if b >= 0 else np.zeros(3) for b, x in zip(bodies, fairleads, strict=True)])
 
-    def own(self, model: SystemModel) -> Floats:
+    def own(self, model: NetworkModel) -> Floats:
         """(B, 6) N, N m, on the bodies but for their lines, as a model has them where they are.
 
         ValueError: the model has other members.
@@ -85,7 +85,7 @@ class BodiesAtRest:
         if self._solver.meets:
             both = zip(self._solver.lines, lines, strict=True)
             of = [x._replace(line=smooth(y.model.line), sea=y.sea) for x, y in both]
-            solver = SystemSolver(of, self._points, self._numbers)
+            solver = NetworkSolver(of, self._points, self._numbers)
             _, _, wrench, carriers = solver.pressed_bodies(self._states)
             out[carriers] = wrench
         return out
@@ -118,7 +118,7 @@ def smooth(line: Line) -> Line:
     return line._replace(bits=line.bits & ~LEFT_OUT)
 
 
-def with_bodies(model: SystemModel, system: System) -> SystemModel:
+def with_bodies(model: NetworkModel, system: System) -> NetworkModel:
     """The model with the bodies of a changed scene, and moments on its points; its lines stay as they are."""
     free = system.free_bodies
     held = [[system.points[x] for x in (line.start, line.end)] for line in system.lines.values()]

@@ -12,8 +12,8 @@ from hybrid.designs.edges import refuse_edges
 from hybrid.designs.problem import as_asked, problem_of, refused_result
 from hybrid.errors import SceneError, optional_package
 from hybrid.scene.design import Design
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike
-from hybrid.scene.system import System
 
 if TYPE_CHECKING:
     from hybrid.designs.openmdao_component import DesignComponent

@@ -19,9 +19,9 @@ from hybrid.linear.touching import stiffness_between
 from hybrid.model.scales import tension_scale
 from hybrid.model.sections import merged_sections
 from hybrid.simulation.lines_contact import strand_in
-from hybrid.solve.joined import SystemState
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.shared_contact import TouchingLine
-from hybrid.solve.system import SystemSolver
 
 # Part of their diameters by which lines are thicker, and thinner, to tell whether they have only begun to touch.
 BEGUN = 0.01
@@ -36,7 +36,7 @@ class ContactAtRest:
     """Of the lines of a solver that touch in states at rest."""
 
     def __init__(
-        self, solver: SystemSolver, states: SystemState, names: Sequence[str], lines: Sequence[Beside]
+        self, solver: NetworkSolver, states: NetworkState, names: Sequence[str], lines: Sequence[Beside]
     ) -> None:
         """lines: those of the equilibrium.  SceneError: a line touches itself alone, or something at its very end."""
         if any(x.counts.points for x, of in solver.contacts_at(states) if len(of) == 1) or solver.shared is None:

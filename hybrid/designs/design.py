@@ -23,8 +23,8 @@ from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.design import DESIGN, Design
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike
-from hybrid.scene.system import System
 from hybrid.scene.task_file import TaskFile
 
 # Parts of the largest that limits are beyond in the nearest that was found, from which one is said to be in the way.

@@ -16,8 +16,8 @@ from hybrid.designs.numbers import changed_scene, number_of, size_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.touchdown import penetration
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 
 WAY = "differences of equilibria, from cell to cell"
 NAMES = ("touchdown", "touchdown_position", "grounded_length")

@@ -13,8 +13,8 @@ from hybrid.designs.numbers import scene_with
 from hybrid.designs.sensitivity import at_rest
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 
 AnyScene = Scene | System
 FINER = 0.5  # length of cells of the equilibria that check what was found, over that of others

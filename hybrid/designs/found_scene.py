@@ -7,9 +7,9 @@ from pathlib import Path
 
 from hybrid.designs.numbers import PART
 from hybrid.errors import SceneError
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import parse_either, scene_text, text_of
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 from hybrid.scene.yaml_source import Node, Unreadable, from_text
 
 

@@ -27,8 +27,8 @@ from hybrid.designs.tangents import Seen, Unfollowed, has_two_sides, step_of
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import Scene, Spread
-from hybrid.scene.system import System
 
 NAME = re.compile(r"^(max|min|mean|std|last|t=\S+) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
 OF_SECTION = re.compile(r"^sections\[(\d+)\]$")

@@ -26,7 +26,7 @@ from hybrid.model.build import Model
 from hybrid.model.output_points import jump_points, output_points
 from hybrid.outputs.probes import PROBES, Observer
 from hybrid.scene.schema import Scene
-from hybrid.simulation.system_lines import WANTED, observer_of
+from hybrid.simulation.line_result import WANTED, observer_of
 from hybrid.solve.joined import JoinedLine
 from hybrid.solve.stepper import POWERS
 

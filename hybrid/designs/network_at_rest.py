@@ -34,22 +34,22 @@ from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, same_nodes
 from hybrid.model.nearby_clamped import nearby_clamped, seats_know_no_shape, shaped_anew
-from hybrid.model.system import SystemModel, SystemResolution, with_surfaces
+from hybrid.model.network import NetworkModel, NetworkResolution, with_surfaces
 from hybrid.scene.analysis import Output
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.short_form import LINE, ShortForm, network_of, short_form
-from hybrid.scene.system import System
 from hybrid.simulation.layer_mesh import layered_lines
+from hybrid.simulation.network_run import static_system
 from hybrid.simulation.static_case import StaticCase
-from hybrid.simulation.system_run import static_system
-from hybrid.solve.joined import SystemState
+from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.network_solver import NetworkSolver
 
 OF_LINE = re.compile(r"^(?:(max|min) )?([^/@]+)/(.+)$")
 # Tables of a scene on which every line hangs; numbers of a free body on which none does.
@@ -67,12 +67,12 @@ Places = Mapping[str, tuple[float, ...]]
 NO_PLACES: Places = MappingProxyType({})
 
 
-def _network_of(scene: Any) -> tuple[Any, System, SystemResolution, ShortForm | None]:
+def _network_of(scene: Any) -> tuple[Any, System, NetworkResolution, ShortForm | None]:
     """The scene as it is computed, the network that does, how finely, and where keys of the scene are in that."""
     if scene.line_names:
-        return scene, scene, layered_lines(scene, SystemResolution.first(scene), False), None
+        return scene, scene, layered_lines(scene, NetworkResolution.first(scene), False), None
     case = StaticCase(scene)
-    resolution = SystemResolution({LINE: resolution_at_rest(case)})  # which chooses the model
+    resolution = NetworkResolution({LINE: resolution_at_rest(case)})  # which chooses the model
     return case.scene, network_of(case.scene), resolution, short_form(case.scene)
 
 
@@ -128,7 +128,7 @@ class NetworkAtRest(OfScene):
         ]
         self._free = [[k for k in (0, 1) if x.joints[k] >= 0] for x in joined]
         self._order = [(name, k) for name in self._names for k, (line, _) in enumerate(wanted) if line == name]
-        solver = SystemSolver(joined, len(run.found.solver.net), run.found.solver.bodies)
+        solver = NetworkSolver(joined, len(run.found.solver.net), run.found.solver.bodies)
         self._bodies, self._model = BodiesAtRest(solver, run.state, run.model), run.model
         self._network = linear_network(solver, run.state, self._names, sticks=False, quick=False)
         rows = zip(self._names, run.model.models, run.state.lines, self._free, strict=True)
@@ -152,7 +152,7 @@ class NetworkAtRest(OfScene):
         wanted_of = (l for l, x in enumerate(self.lines) if x.wanted)
         self.gradients = {l: Gradients(self.lines[l], self._bodies.turns(l)) for l in wanted_of}
 
-    def _contact(self, found: LinesAtRest, states: SystemState, of: Sequence[Wanted]) -> ContactAtRest | None:
+    def _contact(self, found: LinesAtRest, states: NetworkState, of: Sequence[Wanted]) -> ContactAtRest | None:
         """Contact of lines with each other, if they have any, in states at rest.  SceneError: a result is of it."""
         if found.solver.shared is None and not found.settled:
             return None
@@ -278,7 +278,7 @@ class NetworkAtRest(OfScene):
             out[:, k] = turned[self._bodies.body_at(l, k)].T
         return out
 
-    def _arms(self, model: SystemModel) -> Floats:
+    def _arms(self, model: NetworkModel) -> Floats:
         """(L, 2, 3) m from the origins of bodies to the ends of lines on them."""
         return np.stack([self._bodies.arms(l, x) for l, x in enumerate(model.fairleads)])
 

@@ -1,7 +1,7 @@
 """Tangents along the steps of a run: what its results answer to numbers of the scene, in one run for all numbers.
 
 Of all lines together (hybrid.designs.tangents), with the points and bodies that they are joined to
-(kernels.run.system_tangents).  A cable is the network of one line.
+(kernels.run.network_tangents).  A cable is the network of one line.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from hybrid.designs.tangents import (
 from hybrid.kernels.junctions.bodies import FRAME, MASS, PIECES, V, W, X
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.run.system_tangents import (
+from hybrid.kernels.run.network_tangents import (
     A_OF,
     TANGENTS,
     TURN_OF,
@@ -55,22 +55,22 @@ from hybrid.kernels.state.report import ASSEMBLED
 from hybrid.kernels.state.state import Batch, Floats, Line, State, batch_of_one, state_for
 from hybrid.kernels.watch.tangent_job import TANGENT_SIZES, blank_other
 from hybrid.model.ends import table_of_loads
+from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.resolution import Resolution
-from hybrid.model.system import SystemModel, SystemResolution, build_system
-from hybrid.scene.system import System
-from hybrid.simulation.system_lines import observer_of
-from hybrid.simulation.system_run import SystemRun
-from hybrid.simulation.system_start import joined_lines
-from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.scene.network_scene import System
+from hybrid.simulation.line_result import observer_of
+from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.run_start import joined_lines
+from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.run import batch_of_rows
 from hybrid.solve.stepper import HEAVY, POWERS
-from hybrid.solve.system import SystemSolver
 
 
 class _Other(NamedTuple):
     """The scene with more of a number: its model, its lines, tangents of these and of bodies (B, TANGENTS)."""
 
-    model: SystemModel
+    model: NetworkModel
     lines: list[Line]
     joined: list[JoinedLine]
     tangents: list[Tangent]
@@ -101,7 +101,7 @@ class NetworkOthers:
         lines: how finely, by name; more: arc lengths of outputs beside nodes, of one line; None: as the scene asks.
         """
         self._system, self._more = system, more
-        self._scenes, self._steps, self._resolution = list(scenes), list(steps), SystemResolution(lines)
+        self._scenes, self._steps, self._resolution = list(scenes), list(steps), NetworkResolution(lines)
         self._models = [build_system(more, self._resolution) for more, _ in scenes]
         self.sizes = np.zeros((len(scenes), len(lines), TANGENT_SIZES))
         self._first: list[list[Batch]] = []  # by number and line
@@ -109,7 +109,7 @@ class NetworkOthers:
         self._books: list[list[Books]] = []
         self._found = np.zeros((len(lines), 2), np.int64)
 
-    def begin(self, run: SystemRun) -> None:
+    def begin(self, run: NetworkRun) -> None:
         """Stand beside the state that a run begins with, and follow its steps from there on.  Unfollowed."""
         self._run, self._model = run, run.model
         refuse_system(run)
@@ -136,7 +136,7 @@ class NetworkOthers:
             )
             line.shown = lambda batch, l=l: self._base[l].append(copied(batch))
 
-    def _other(self, model: SystemModel, k: int, h: float) -> _Other:
+    def _other(self, model: NetworkModel, k: int, h: float) -> _Other:
         base = self._model
         if model.joints != base.joints or model.seats[:, :, TURNS].any() or model.rides.size:
             raise Unfollowed("the number changes what lines are joined to")
@@ -218,16 +218,16 @@ class NetworkOthers:
             reports.append(each)
         return reports
 
-    def _solver(self, rests: bool) -> SystemSolver:
+    def _solver(self, rests: bool) -> NetworkSolver:
         """For the state that the run begins with; rests: without what does not act at rest."""
         lines = joined_lines(self._model, 0.0)
         if rests:
             lines = [x._replace(line=at_rest(x.line)) for x in lines]
-        solver = SystemSolver(lines, len(self._model.free), self._run.solver.bodies.copy())
+        solver = NetworkSolver(lines, len(self._model.free), self._run.solver.bodies.copy())
         solver.keep_factors()
         return solver
 
-    def _corrections(self, solver: SystemSolver, state: SystemState, ca: float, rests: bool) -> Iterator[_Other]:
+    def _corrections(self, solver: NetworkSolver, state: NetworkState, ca: float, rests: bool) -> Iterator[_Other]:
         """Others in turn, for which the solver has corrections of tangents, which the caller adds."""
         self._tables = tables = self._bind(solver, (state, state.copy()), rests)
         if not solver.factor(state, ca):
@@ -243,7 +243,7 @@ class NetworkOthers:
     # --- what kernels work with -------------------------------------------------------------------------
 
     def _bind(
-        self, solver: SystemSolver, states: tuple[SystemState, SystemState], rests: bool = False,
+        self, solver: NetworkSolver, states: tuple[NetworkState, NetworkState], rests: bool = False,
         clock: Clock | None = None, counts: Counts | None = None,
         books: Callable[[int, int], Books] | None = None,
     ) -> _Tables:  # fmt: skip
@@ -281,7 +281,7 @@ class NetworkOthers:
         )  # fmt: skip
         return _Tables(table, asked, by, reports, own, [*kept, *jobs, *bodies])
 
-    def _bind_bodies(self, other: _Other, solver: SystemSolver, state: SystemState) -> Table:
+    def _bind_bodies(self, other: _Other, solver: NetworkSolver, state: NetworkState) -> Table:
         table, count = Table(blank_bodies), len(state.bodies)
         loads, history = table_of_loads(other.model.growing_loads(0.0))
         table.bind(
@@ -356,7 +356,7 @@ class NetworkOthers:
         return seen, self._looked_at(other, build_system(other, self._resolution), less, names)
 
     def _looked_at(
-        self, system: System, model: SystemModel, batches: Mapping[int, Batch], names: Mapping[str, Sequence[str]]
+        self, system: System, model: NetworkModel, batches: Mapping[int, Batch], names: Mapping[str, Sequence[str]]
     ) -> dict[str, Seen]:
         out = {}
         for l, batch in batches.items():
@@ -372,7 +372,7 @@ class NetworkOthers:
         return out
 
 
-def refuse_system(run: SystemRun) -> None:
+def refuse_system(run: NetworkRun) -> None:
     """Unfollowed where a run has what the kernel does not know, with what that is."""
     model, what = run.model, dict[str, bool]()
     for x in model.models:

@@ -12,9 +12,9 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.base import Invalid, Table, unit_of
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 
 AnyScene = TypeVar("AnyScene", bound=Scene | System)
 PART = re.compile(r"[^.\[\]]+")

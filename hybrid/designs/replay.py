@@ -16,16 +16,16 @@ from hybrid.errors import PUSHED, ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import places_of
 from hybrid.model.lines_contact import passing_each_other
+from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.output_points import NEAR
 from hybrid.model.resolution import Resolution, accuracy_of, first_resolution
-from hybrid.model.system import SystemResolution, build_system
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.short_form import LINE, network_of, short_form
-from hybrid.scene.system import System
+from hybrid.simulation.network_run import Recording, run_system
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import kept_resolution, resolution_from
-from hybrid.simulation.system_run import Recording, run_system
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
@@ -66,9 +66,9 @@ def course_of(scene: Any) -> Course:
     may leave.  ComputationError: one is pushed out of it.
     """
     if not _is_open(scene):
-        first = SystemResolution.first(scene).lines if scene.line_names else {LINE: first_resolution(scene)}
+        first = NetworkResolution.first(scene).lines if scene.line_names else {LINE: first_resolution(scene)}
         course = Course(scene, first)
-        flat = build_system(course.network(scene, scene.dimension), SystemResolution(first)).models
+        flat = build_system(course.network(scene, scene.dimension), NetworkResolution(first)).models
         if scene.dimension is None and any(x.plane is not None for x in flat):
             refuse_push(run(scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})))
         return _with_nodes(course)
@@ -115,7 +115,7 @@ def replay(
     with nullcontext() if scene.line_names else short_form(course.scene).said():
         run_system(
             network, target, scene_text(network), ProgressReporter(None, scene.require_time().duration), lambda: False,
-            resolution=SystemResolution(course.at(finer)), recording=Recording(begun=begun),
+            resolution=NetworkResolution(course.at(finer)), recording=Recording(begun=begun),
         )  # fmt: skip
     return written_result(target)
 
@@ -134,7 +134,7 @@ def with_outputs(
     if each_step:
         output["every"] = float(np.median(np.diff([0.0, *first.ends]))) if first.ends else first.step
     if more is not None and not scene.line_names:
-        (model,) = build_system(network, SystemResolution(course.at(finer))).models
+        (model,) = build_system(network, NetworkResolution(course.at(finer))).models
         output["points"] = {LINE: at_nodes(model.line.s, more)}
     return network.model_copy(update={"output": network.output.model_copy(update=output)})
 
@@ -148,7 +148,7 @@ def at_nodes(nodes: Floats, more: Sequence[float]) -> tuple[float, ...]:
 def _with_nodes(course: Course) -> Course:
     """With the places of the nodes of every line."""
     network = course.network(course.scene)
-    model = build_system(network, SystemResolution(course.lines))
+    model = build_system(network, NetworkResolution(course.lines))
     scenes = {name: network.scene_of(name, network.carried(name), network.guesses) for name in model.names}
     places = {name: places_of(x, scenes[name]) for name, x in zip(model.names, model.models, strict=True)}
     return course._replace(lines={k: replace(x, places=places[k]) for k, x in course.lines.items()})

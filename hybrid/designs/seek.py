@@ -12,9 +12,9 @@ from hybrid.designs.nearest import MET, Rows, Space, nearest
 from hybrid.designs.numbers import number_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from hybrid.designs.in_motion import in_motion
 from hybrid.designs.network_at_rest import NO_PLACES, NetworkAtRest, Places
 from hybrid.designs.numbers import number_of, refuse_computing
 from hybrid.errors import ComputationError, Outcome
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 from hybrid.studies.sensitivity import Influence
 from hybrid.studies.sensitivity import sensitivity as of_study
 

@@ -23,8 +23,8 @@ from hybrid.linear.drag import axes_across, of_cylinders, phases_of
 from hybrid.linear.excitation import SAME, water_of_wave
 from hybrid.linear.matrices import SHIFT, TURN, rotation
 from hybrid.model.members import Members
-from hybrid.solve.joined import SystemState
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 
 # Part of the wet length of all members over which the surface goes up and down (up to 0.24 a buoy of slender members
 # surges and pitches within 3 % of a run, at 0.47 within 12 %), and turn of a body, rad (standard deviation), beyond
@@ -122,7 +122,7 @@ def turning_doubts(name: str, q: Floats) -> Iterator[str]:
         yield f"body {name} turns by {turn:.2g} rad (standard deviation)"
 
 
-def stiffness_by_water(solver: SystemSolver, states: SystemState, b: int, members: Members) -> Floats:
+def stiffness_by_water(solver: NetworkSolver, states: NetworkState, b: int, members: Members) -> Floats:
     """(6, 6) stiffness of the water around the members of body b, which is another where it shifts and turns."""
     K, step, numbers = np.zeros((6, 6)), np.repeat([SHIFT * solver.length, TURN], 3), solver.bodies.copy()
     pieces = slice(NUMBERS, NUMBERS + PIECE * len(members.pieces))

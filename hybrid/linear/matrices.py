@@ -32,9 +32,9 @@ from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, Stat
 from hybrid.kernels.step.step import friction_axes
 from hybrid.linear.memory import by_layers, with_layers, with_soil
 from hybrid.linear.touching import TouchingLines, TouchingParts, touching_parts
-from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import ANCHOR as STATIC_ANCHOR
-from hybrid.solve.system import SystemSolver
 
 # Springs of this many 1/s^2 times the mass hold what is free while block rows are made; they are taken out again.
 ANCHOR = 1e-9
@@ -339,7 +339,7 @@ def _hat(a: Floats) -> Floats:
 
 
 def linear_network(
-    solver: SystemSolver, states: SystemState, names: Sequence[str], sticks: bool, quick: bool = True,
+    solver: NetworkSolver, states: NetworkState, names: Sequence[str], sticks: bool, quick: bool = True,
     touching: TouchingLines | None = None,
 ) -> LinearNetwork:  # fmt: skip
     """The network of lines, points and bodies that a solver holds about an equilibrium; sticks, quick: as of
@@ -410,7 +410,7 @@ def linear_network(
     )  # fmt: skip
 
 
-def _lent(lines: Sequence[LinearLine], solver: SystemSolver) -> Floats:
+def _lent(lines: Sequence[LinearLine], solver: NetworkSolver) -> Floats:
     """(all lines,) m/N: compliance that is lent to cells where modes are counted, at their tensions."""
     out = []
     for x, joined in zip(lines, solver.lines, strict=True):
@@ -440,7 +440,7 @@ def _couplings(
     return out
 
 
-def _masses(solver: SystemSolver, states: SystemState, first: int, size: int) -> sparse.csr_array:
+def _masses(solver: NetworkSolver, states: NetworkState, first: int, size: int) -> sparse.csr_array:
     """Mass and added mass of bodies, in inertial axes."""
     entries = _Entries()
     for b, (row, state) in enumerate(zip(solver.bodies, states.bodies, strict=True)):
@@ -452,7 +452,7 @@ def _masses(solver: SystemSolver, states: SystemState, first: int, size: int) ->
 
 
 def _of_bodies(
-    solver: SystemSolver, states: SystemState, extra: Sequence[tuple[int, Floats]], first: int, size: int
+    solver: NetworkSolver, states: NetworkState, extra: Sequence[tuple[int, Floats]], first: int, size: int
 ) -> sparse.csr_array:
     """Stiffness of bodies: of their weight and the water, and of forces of lines that turn with their arms."""
     entries = _Entries()
@@ -466,7 +466,7 @@ def _of_bodies(
     return entries.matrix(size, size)
 
 
-def _own_stiffness(solver: SystemSolver, states: SystemState, b: int) -> Floats:
+def _own_stiffness(solver: NetworkSolver, states: NetworkState, b: int) -> Floats:
     """(6, 6) of the weight of a body and of the water on it, against shifts and turns (inertial), by differences."""
     K, row = np.zeros((6, 6)), states.bodies[b]
     if not solver.bodies[b, 36:NUMBERS].any() and solver.bodies[b, PIECES] == 0:

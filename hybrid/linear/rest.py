@@ -13,16 +13,16 @@ from hybrid.linear.touching import TouchingLines
 from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching
+from hybrid.model.network import NetworkModel, NetworkResolution
 from hybrid.model.resolution import Resolution
-from hybrid.model.system import SystemModel, SystemResolution
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
 from hybrid.scene.short_form import LINE, network_of, short_form
-from hybrid.scene.system import System
+from hybrid.simulation.network_run import static_system
 from hybrid.simulation.static_case import StaticCase
-from hybrid.simulation.system_run import static_system
-from hybrid.solve.joined import SystemState
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class Rest:
     touching: lines that touch each other or themselves in it; may_touch: which may touch each other.
     """
 
-    solver: SystemSolver
-    states: SystemState
+    solver: NetworkSolver
+    states: NetworkState
     names: tuple[str, ...]
     models: tuple[Model, ...]
     points: tuple[str, ...] = ()
@@ -47,10 +47,10 @@ class Rest:
 def line_at_rest(case: StaticCase, resolution: Resolution) -> Rest:
     """Of a cable; ComputationError: there is no equilibrium."""
     with short_form(case.scene).said():
-        return replace(system_at_rest(network_of(case.scene), SystemResolution({LINE: resolution})), tips={})
+        return replace(system_at_rest(network_of(case.scene), NetworkResolution({LINE: resolution})), tips={})
 
 
-def system_at_rest(system: System, resolution: SystemResolution) -> Rest:
+def system_at_rest(system: System, resolution: NetworkResolution) -> Rest:
     """Several lines; errors as of `line_at_rest`."""
     run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
     assert run.found is not None
@@ -60,7 +60,7 @@ def system_at_rest(system: System, resolution: SystemResolution) -> Rest:
     for body, state, row in zip(run.model.bodies, run.state.bodies, found.bodies, strict=False):
         body.take_added_mass(state)  # as it is wet at rest
         row[MASS : MASS + 36] = body.numbers[MASS : MASS + 36]
-    solver, model = SystemSolver(lines, len(found.net), found.bodies), run.model
+    solver, model = NetworkSolver(lines, len(found.net), found.bodies), run.model
     touching = TouchingLines(found, friction_between(model)) if run.found.settled else None
     return Rest(
         solver, run.state, tuple(model.names), model.models, tuple(model.free), bodies, model.bodies, touching,
@@ -68,7 +68,7 @@ def system_at_rest(system: System, resolution: SystemResolution) -> Rest:
     )  # fmt: skip
 
 
-def _tips(system: System, model: SystemModel) -> dict[tuple[str, int], str]:
+def _tips(system: System, model: NetworkModel) -> dict[tuple[str, int], str]:
     """Free points that are the end (0, 1) of one line alone, by that."""
     ends = [
         ((name, k), getattr(system.lines[name], key)) for name in model.names for k, key in enumerate(("start", "end"))
@@ -78,7 +78,7 @@ def _tips(system: System, model: SystemModel) -> dict[tuple[str, int], str]:
     return {end: point for (end, point), joint in zip(ends, joints, strict=True) if joint < 0 and point in free}
 
 
-def friction_between(model: SystemModel) -> Floats:
+def friction_between(model: NetworkModel) -> Floats:
     """(L, L) coefficients of friction of lines with each other and with themselves."""
     found = np.diag([model.scenes[name].contact.friction for name in model.names])
     if model.touching is not None:

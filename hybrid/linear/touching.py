@@ -50,15 +50,15 @@ from hybrid.kernels.state.obstacle_rows import (
 from hybrid.kernels.state.obstacle_rows import FORCE as FORCE_OF
 from hybrid.kernels.state.state import Floats, State
 from hybrid.solve.contact_stability import contact_stiffness
-from hybrid.solve.joined import JoinedLine, SystemState
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 
 
 @dataclass(frozen=True)
 class TouchingLines:
     """Lines that touch each other or themselves in an equilibrium: its solver, and friction (L, L) between them."""
 
-    solver: SystemSolver
+    solver: NetworkSolver
     friction: Floats
 
 
@@ -125,7 +125,7 @@ def stiffness_between(contact: Contact, node_of: np.ndarray, size: int) -> spars
 
 
 def touching_parts(
-    solver: SystemSolver, states: SystemState, sticks: bool, touching: TouchingLines | None
+    solver: NetworkSolver, states: NetworkState, sticks: bool, touching: TouchingLines | None
 ) -> TouchingParts:
     """What touches in an equilibrium; sticks: whether friction holds what lies on bodies, sheaves and other lines."""
     counts = [x.line.s.size for x in solver.lines]
@@ -139,7 +139,7 @@ def touching_parts(
     if solver.meets:
         smooth = 0 if sticks else FRICTION
         of = [x._replace(line=x.line._replace(bits=x.line.bits & ~smooth)) for x in solver.lines]
-        touched = SystemSolver(of, len(solver.net), solver.bodies)
+        touched = NetworkSolver(of, len(solver.net), solver.bodies)
         for part, cv in ((K, 0.0), (C, 1.0)):
             _add_bodies(part, touched, states, cv, begins)
             if cv:  # less what does not go by the rate
@@ -172,7 +172,7 @@ def touching_parts(
 # --- bodies and sheaves -------------------------------------------------------------------------
 
 
-def _sheaves(solver: SystemSolver) -> list[int]:
+def _sheaves(solver: NetworkSolver) -> list[int]:
     """Numbers of the obstacles that turn freely."""
     return [int(k) for k in np.flatnonzero(solver.lines[0].line.moved == FREE)]
 
@@ -189,7 +189,7 @@ def _pressed(x: JoinedLine, state: State) -> Floats:
 
 
 def _add_bodies(
-    out: _Parts, solver: SystemSolver, states: SystemState, cv: float, begins: np.ndarray, part: float = 1.0
+    out: _Parts, solver: NetworkSolver, states: NetworkState, cv: float, begins: np.ndarray, part: float = 1.0
 ) -> None:
     """Add a part of what bodies and the nodes that touch them do to each other (kernels.junctions.body_contact)."""
     rows, own, _, carriers = solver.pressed_bodies(states, cv)
@@ -207,7 +207,7 @@ def _add_bodies(
 
 
 def _on_obstacles(
-    solver: SystemSolver, states: SystemState, l: int, pressed: Floats, at: tuple[np.ndarray, int, int, int],
+    solver: NetworkSolver, states: NetworkState, l: int, pressed: Floats, at: tuple[np.ndarray, int, int, int],
     sticks: bool, sheaves: Sequence[int],
 ) -> Iterator[Touch]:  # fmt: skip
     """What line l does on the obstacles that it lies on, of which bodies carry some.
@@ -245,7 +245,7 @@ def _on_obstacles(
         )  # fmt: skip
 
 
-def _spring(solver: SystemSolver, touch: Touch) -> Floats:
+def _spring(solver: NetworkSolver, touch: Touch) -> Floats:
     """(n,) N/m of friction before it slides on an obstacle; none: of one without friction."""
     rows = solver.lines[touch.of[0]].sea.obstacles
     return np.asarray(rows[touch.of[1], MU] * touch.force / touch.travel) if touch.travel.all() else np.zeros(0)
@@ -292,7 +292,7 @@ def _hats(a: Floats) -> Floats:
 
 
 def _of_lines(
-    contact: Contact, lines: Sequence[int], node_of: np.ndarray, states: SystemState, touching: TouchingLines,
+    contact: Contact, lines: Sequence[int], node_of: np.ndarray, states: NetworkState, touching: TouchingLines,
     asked: tuple[bool, int], forces: Floats,
 ) -> Iterator[tuple[Touch, Floats]]:  # fmt: skip
     """Each pair of lines that touch, and the springs (n,) N/m of its friction; their forces are added to `forces`.
@@ -325,7 +325,7 @@ def _of_lines(
 
 
 def _turning(
-    contact: Contact, node_of: np.ndarray, rows: Floats, states: SystemState, touching: TouchingLines, size: int
+    contact: Contact, node_of: np.ndarray, rows: Floats, states: NetworkState, touching: TouchingLines, size: int
 ) -> sparse.csr_array:
     """(3 n, unknowns) by how much surfaces shift against each other at points as their strands turn
 

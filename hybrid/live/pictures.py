@@ -15,14 +15,14 @@ from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import located_in, parse_either, scene_text
 from hybrid.simulation.first_use import compile_beside, kernels_of
+from hybrid.simulation.network_run import static_system
 from hybrid.simulation.static_case import StaticCase
-from hybrid.simulation.system_run import static_system
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.reader import Result, written_result
 
 if TYPE_CHECKING:
+    from hybrid.scene.network_scene import System
     from hybrid.scene.schema import Scene
-    from hybrid.scene.system import System
 
 # Points along a line in a picture: one for each cell, as far as a screen shows them apart.
 LEAST_POINTS, MOST_POINTS = 101, 401

@@ -28,9 +28,9 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from hybrid.live.session import Session
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import LARGEST_SCENE
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 
 # Bytes of a message: a scene, twice as long in JSON at worst, and what stands around it.
 LARGEST_MESSAGE = 2 * LARGEST_SCENE + 65_536

@@ -19,13 +19,13 @@ from hybrid.linear.eigen import Eigen, lowest_modes
 from hybrid.linear.matrices import LinearLine, LinearNetwork, linear_network
 from hybrid.linear.rest import Rest, line_at_rest, system_at_rest
 from hybrid.modal.touching_validity import name_of, obstacle_of
+from hybrid.model.network import NetworkResolution
 from hybrid.model.payout import payout_of
-from hybrid.model.system import SystemResolution
 from hybrid.scene.base import Table
 from hybrid.scene.motion_tables import Harmonic
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 from hybrid.simulation.layer_mesh import layered_lines
 from hybrid.simulation.static_case import StaticCase
 
@@ -184,7 +184,7 @@ def _cable_at_rest(asked: Scene, cells: float) -> Rest:
 
 
 def _network_at_rest(asked: System, cells: float) -> Rest:
-    system = layered_lines(asked, SystemResolution.first(asked), False)
+    system = layered_lines(asked, NetworkResolution.first(asked), False)
     if cells > 1.0:
         system = replace(system, lines={k: x.coarser(cells=cells) for k, x in system.lines.items()})
     return system_at_rest(asked, system)

@@ -9,9 +9,9 @@ import numpy as np
 
 from hybrid.accuracy.api import run
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import as_scene_or_system
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 
 if TYPE_CHECKING:
     from hybrid.linear.response_results import LineResponse

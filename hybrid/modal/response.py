@@ -33,8 +33,8 @@ from hybrid.modal.left_out import left_out
 from hybrid.modal.touching_validity import closing_doubts, name_of, touching_doubts
 from hybrid.modal.validity import doubts_of
 from hybrid.scene.combinations import refuse_use
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike, as_scene_or_system
-from hybrid.scene.system import System
 
 # Rounds of the linear drag, and the relative change of its largest part at which they end.
 ROUNDS, SETTLED, RELAXED = 30, 2e-3, 0.8

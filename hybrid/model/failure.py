@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.model.network import NetworkModel
 from hybrid.model.release import unclamped, without_hold
-from hybrid.model.system import SystemModel
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import Failure
-from hybrid.scene.system import System
 
 
 class Weakness(NamedTuple):
@@ -48,7 +48,7 @@ def weaknesses(system: System) -> tuple[Weakness, ...]:
     )
 
 
-def after_failure(model: SystemModel, weakness: Weakness, t: float) -> SystemModel:
+def after_failure(model: NetworkModel, weakness: Weakness, t: float) -> NetworkModel:
     """The system with the ends of a weakness loose from t (s) on.
 
     Those are, as far as they are at their point; the old system is as it was.
@@ -75,7 +75,7 @@ def after_failure(model: SystemModel, weakness: Weakness, t: float) -> SystemMod
     )  # fmt: skip
 
 
-def _with_free_end(model: SystemModel, line: int, k: int, t: float) -> SystemModel:
+def _with_free_end(model: NetworkModel, line: int, k: int, t: float) -> NetworkModel:
     """The system with an end (line, 0 or 1) that nothing holds from t (s) on."""
     joints, seats, models = [list(x) for x in model.joints], model.seats.copy(), [*model.models]
     joints[line][k], seats[line, k] = -1, 0.0

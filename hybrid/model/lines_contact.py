@@ -19,7 +19,7 @@ from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint
 from hybrid.scene.schema import Scene
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.system import System
+    from hybrid.scene.network_scene import System
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from hybrid.model.mesh_grading import Grading
 from hybrid.model.resolution import accuracy_of, holds_stress
 from hybrid.model.run_time import step_time
 from hybrid.scene.accuracy import of_unnamed_model
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, RodModel, Scene
-from hybrid.scene.system import System
 
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
 # Another model must cost less than this part of rods, which need no criterion and leave nothing out.

@@ -17,10 +17,10 @@ from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model
 from hybrid.model.clamps import seat_of, untwisted, with_clamps
 from hybrid.model.nearby import nearby
-from hybrid.model.system import SystemResolution, build_system, first_lines
+from hybrid.model.network import NetworkResolution, build_system, first_lines
 from hybrid.scene.bodies import FixedBody
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 
 ENDS = ("start", "end")
 
@@ -54,7 +54,7 @@ def nearby_clamped(
     system: System,
     name: str,
     bodies: Sequence[BodyModel],
-    resolution: SystemResolution,
+    resolution: NetworkResolution,
     without: int,
 ) -> tuple[Model, Floats] | None:
     """The model of a line of `system`, and its seats (2, SEAT), zeros where an end turns with nothing; None: its cells
@@ -85,7 +85,7 @@ def nearby_clamped(
 
 
 def shaped_anew(
-    system: System, names: Iterable[str], bodies: Sequence[BodyModel], resolution: SystemResolution
+    system: System, names: Iterable[str], bodies: Sequence[BodyModel], resolution: NetworkResolution
 ) -> dict[str, tuple[Model, Floats]]:
     """Models of some lines with their seats (2, SEAT), as first shapes have them; bodies: the free ones.
 

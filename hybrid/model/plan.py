@@ -30,7 +30,7 @@ from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 
 if TYPE_CHECKING:
-    from hybrid.scene.system import System
+    from hybrid.scene.network_scene import System
 
 
 class CriticalTorque(NamedTuple):
@@ -145,7 +145,7 @@ def count_steps(scene: Scene) -> int:
 
 
 @dataclass(frozen=True)
-class SystemPlan:
+class NetworkPlan:
     """What a system of lines requires: the plan of each line by name, and what they come to together."""
 
     lines: dict[str, Plan]
@@ -159,7 +159,7 @@ class SystemPlan:
     measured: bool = False
 
 
-def plan_system(system: System) -> SystemPlan:
+def plan_system(system: System) -> NetworkPlan:
     """What would be computed for several lines; nothing is computed."""
     plans, scenes, guesses = {}, {}, system.guesses
     for name in system.lines:
@@ -172,7 +172,7 @@ def plan_system(system: System) -> SystemPlan:
         plans[name] = replace(plans[name], contents=(*plans[name].contents, MEETS))
     every = list(plans.values())
     shortest = min(every, key=lambda x: x.step)  # all have the steps in common
-    return SystemPlan(
+    return NetworkPlan(
         plans, system.free, sum(sum(x.cells) for x in every), sum(x.unknowns for x in every), shortest.steps,
         shortest.step, sum(x.seconds for x in every),
     )  # fmt: skip
@@ -181,11 +181,11 @@ def plan_system(system: System) -> SystemPlan:
 @overload
 def plan(scene: SceneLike) -> Plan: ...
 @overload
-def plan(scene: System) -> SystemPlan: ...
-def plan(scene: SceneLike | System) -> Plan | SystemPlan:
+def plan(scene: System) -> NetworkPlan: ...
+def plan(scene: SceneLike | System) -> Plan | NetworkPlan:
     """What would be computed for a scene (a Scene, the path of a scene file, or a dict); nothing is computed.
 
-    Of several lines it is a SystemPlan.
+    Of several lines it is a NetworkPlan.
     """
     scene = as_scene_or_system(scene)
     if not isinstance(scene, Scene):

@@ -11,7 +11,7 @@ from hybrid.scene.payout import Payout
 from hybrid.scene.schema import CatenaryModel, Scene
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.system import System
+    from hybrid.scene.network_scene import System
 
 # Diameters of slack of the smallest loop: WINDOW of contact.self_contact_pairs less OUTER of contact.self_contact_law,
 # which a plan does not import.

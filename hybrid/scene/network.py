@@ -1,7 +1,7 @@
 """Several lines that meet at points and bodies: a scene with `points` and `lines` in place of `cable` and `ends`.
 
-What contradicts in it is found by `scene.system`, which checks each line as a scene of its own, between the places
-where its two points are, or are first looked for.
+What contradicts in it is found by `scene.network_scene`, which checks each line as a scene of its own, between
+the places where its two points are, or are first looked for.
 """
 
 from __future__ import annotations
@@ -206,7 +206,7 @@ LinePoints = Annotated[
 ]
 
 
-class SystemOutput(Table):
+class NetworkOutput(Table):
     """What is kept."""
 
     every: Positive | None = Field(default=None, description=EVERY)
@@ -278,7 +278,7 @@ class Network(Table, Timed):
         description="how wrong the result of each line may be: its cells and the time steps follow from it, unless "
         "they are given; parts are of how far each line moves, and of its own tensions",
     )
-    output: SystemOutput = Field(default=SystemOutput(), description="what is kept")
+    output: NetworkOutput = Field(default=NetworkOutput(), description="what is kept")
     dimension: Literal[2, 3] | None = Field(
         default=None,
         description="2: all lines lie in one plane, refused if they do not, and stopped where something leaves it; "

@@ -41,7 +41,7 @@ class RenamedKey(FutureWarning):
 
 
 if TYPE_CHECKING:
-    from hybrid.scene.system import System
+    from hybrid.scene.network_scene import System
 
 SceneLike = Scene | str | PathLike[str] | Mapping[str, Any]
 
@@ -252,7 +252,7 @@ def names_lines(data: Any) -> bool:
 
 def _system() -> type[System]:
     """The schema of several lines, which takes some time to make."""
-    from hybrid.scene.system import System
+    from hybrid.scene.network_scene import System
 
     return System
 

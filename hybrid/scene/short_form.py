@@ -28,9 +28,9 @@ from hybrid.scene.analysis import CatenaryModel, Output
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.combinations import value_at
 from hybrid.scene.ends import End, Release
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import Failure
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 
 LINE = "cable"
 ENDS = ("start", "end")

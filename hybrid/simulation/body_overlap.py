@@ -21,8 +21,8 @@ from hybrid.kernels.state.obstacle_rows import (
     STRAND,
 )
 from hybrid.kernels.state.state import Floats, Sea
-from hybrid.model.system import SystemModel
-from hybrid.simulation.system_points import Sampled
+from hybrid.model.network import NetworkModel
+from hybrid.simulation.run_points import Sampled
 
 Tell = Callable[[float, float, float, str, str], None]
 KIND_OF_EVENT, BED = "bodies overlap", "the seabed"
@@ -31,7 +31,7 @@ KIND_OF_EVENT, BED = "bodies overlap", "the seabed"
 PARTS, DEEP = np.linspace(-1.0, 1.0, 9), 0.05
 
 
-def note_overlaps(model: SystemModel, seen: Sampled, told: set[str], tell: Tell) -> None:
+def note_overlaps(model: NetworkModel, seen: Sampled, told: set[str], tell: Tell) -> None:
     """An event for each pair of bodies, or body and obstacle or bed, that are in each other.
 
     told: what has been said, to which they are added.

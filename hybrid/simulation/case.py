@@ -18,6 +18,7 @@ from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model
+from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.resolution import (
@@ -31,14 +32,15 @@ from hybrid.model.resolution import (
     wants_errors,
 )
 from hybrid.model.self_reach import self_reach, without_contact
-from hybrid.model.system import SystemResolution, build_system
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.interrupts import at_once
+from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
+from hybrid.simulation.network_run import NetworkRun, Recording, start_of
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import (
@@ -64,9 +66,7 @@ from hybrid.simulation.run_sample import (
     split_outputs,
     usual_cells,
 )
-from hybrid.simulation.system_lines import FORCE_COLUMNS, LineResult
-from hybrid.simulation.system_run import Recording, SystemRun, start_of
-from hybrid.simulation.system_zones import Start
+from hybrid.simulation.run_zones import Start
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -198,7 +198,7 @@ class Case:
     def is_unfinished(self, source: Path, resolution: Resolution) -> bool:
         """Whether a file holds a run of this case, with this resolution, that was cut off."""
         texts = self._texts["scene"], self._texts["changes"]
-        if not is_cut_off(source, texts, SystemResolution({LINE: resolution})):
+        if not is_cut_off(source, texts, NetworkResolution({LINE: resolution})):
             return False
         with open_result(source) as result:
             return np.array_equal(result["s"], self.points.s)
@@ -360,7 +360,7 @@ class Case:
 
     # --- as a network of one line -----------------------------------------------------------------
 
-    def _network_run(self, resolution: Resolution, target: Target | None, recording: Recording) -> SystemRun:
+    def _network_run(self, resolution: Resolution, target: Target | None, recording: Recording) -> NetworkRun:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
         system, changes = network_of(self.scene), [replace(x, scene=network_of(x.scene)) for x in self.changes]
         recording = recording._replace(planes=True, error=True, cable=Cable(self.scene, self.changes))
@@ -369,10 +369,10 @@ class Case:
         with short_form(self.scene).said():
             if recording.source is None:
                 recording = recording._replace(start=self._network_start(resolution))
-            finely = SystemResolution({LINE: resolution})
-            return SystemRun(system, target, self._texts["scene"], True, finely, recording, self.criterion, changes)
+            finely = NetworkResolution({LINE: resolution})
+            return NetworkRun(system, target, self._texts["scene"], True, finely, recording, self.criterion, changes)
 
-    def _move(self, run: SystemRun, begin: float, first: bool) -> RunSample:
+    def _move(self, run: NetworkRun, begin: float, first: bool) -> RunSample:
         """A result to its end; begin: s of processor time, when it was begun; first: as of `_begin_result`."""
         recorder, target = run.recorder, run.target
         assert target is not None and isinstance(recorder, Recorder | ArrayRecorder)
@@ -391,7 +391,7 @@ class Case:
             return kept[1]
         system = network_of(self.scene)
         with at_once(self.interrupted):
-            model = build_system(system, SystemResolution({LINE: resolution}))
+            model = build_system(system, NetworkResolution({LINE: resolution}))
             return start_of(system, model, True, self.criterion)
 
     # --- parts of a run -------------------------------------------------------------------------

@@ -31,8 +31,8 @@ from hybrid.kernels.mesh.zone_step import blank_zone_job
 from hybrid.kernels.mesh.zone_switch import AFTER, BEFORE, NUMBERS, begin_switch, blank_switch_job, end_switch
 from hybrid.kernels.mesh.zone_transfer import Match, Transfer
 from hybrid.kernels.run import following_run as f
+from hybrid.kernels.run.network import begin_line
 from hybrid.kernels.run.run import run as steps
-from hybrid.kernels.run.system import begin_line
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.state import Line

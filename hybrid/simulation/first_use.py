@@ -22,7 +22,7 @@ from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Equilibrium, Scene
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.system import System
+    from hybrid.scene.network_scene import System
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.run.in_plane", "run.run.in_space")
@@ -34,10 +34,10 @@ PAYOUT = "run.payout_run.go_on"
 STEPS = "run.run.run"  # around the solver of either kind
 STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
 # Of several lines: what all of them call, steps, equilibria, those that touch, those that are paid out.
-OF_LINES = ("run.system.solve_system", SOLVER[1], OUTPUTS)
-STEPS_OF_LINES, REST_OF_LINES = "run.system_run.run_system", "run.system_run.sample_system"
-BOOKS_OF_LINES, START_OF_LINES = "run.system.book_system_step", "run.system.begin_line"
-TOUCHING_LINES = "junctions.system_contact.touch_system", "junctions.shared_contact.shared_task"
+OF_LINES = ("run.network.solve_system", SOLVER[1], OUTPUTS)
+STEPS_OF_LINES, REST_OF_LINES = "run.network_run.run_system", "run.network_run.sample_system"
+BOOKS_OF_LINES, START_OF_LINES = "run.network.book_system_step", "run.network.begin_line"
+TOUCHING_LINES = "junctions.lines_contact.touch_system", "junctions.shared_contact.shared_task"
 _OF_TOUCHING = OF_LINES[0], TOUCHING_LINES[0]  # of a line that touches itself
 PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "run.payout_run.change_node"
 

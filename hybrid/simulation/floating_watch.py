@@ -8,14 +8,14 @@ from collections.abc import Callable
 import numpy as np
 
 from hybrid.errors import ComputationError, SceneError
-from hybrid.kernels.run.system_sampling import SAMPLE_AXES, SAMPLE_PLACE
+from hybrid.kernels.run.network_sampling import SAMPLE_AXES, SAMPLE_PLACE
 from hybrid.kernels.state.state import Floats, Sea
-from hybrid.model.system import SystemModel, build_system
+from hybrid.model.network import NetworkModel, build_system
 from hybrid.scene.attachments import sphere_diameter
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import FixedPoint, FreePoint
-from hybrid.scene.system import System
-from hybrid.simulation.system_points import Sampled, times
-from hybrid.simulation.system_start import equilibrium_of_system
+from hybrid.simulation.run_points import Sampled, times
+from hybrid.simulation.run_start import equilibrium_of_system
 
 Tell = Callable[[float, float, float, str, str], None]
 # Of the height of a point: what it must be below the surface to be under water, beyond round-off.
@@ -24,7 +24,7 @@ UNDER = 1e-3
 DEEPER = 3.0
 
 
-def note_dry_bodies(system: System, model: SystemModel, seen: Sampled, dry: set[str], tell: Tell) -> None:
+def note_dry_bodies(system: System, model: NetworkModel, seen: Sampled, dry: set[str], tell: Tell) -> None:
     """An event where a body that counts as submerged has risen out of the water; dry: names of those told already."""
     fluid = system.environment.fluid
     if fluid is None or fluid.surface is None:
@@ -45,7 +45,7 @@ def note_dry_bodies(system: System, model: SystemModel, seen: Sampled, dry: set[
 
 
 def note_pulled_under(
-    system: System, model: SystemModel, seen: Sampled, depths: dict[str, float], tell: Tell, *, moves: bool
+    system: System, model: NetworkModel, seen: Sampled, depths: dict[str, float], tell: Tell, *, moves: bool
 ) -> None:
     """An event where a point that floats by itself is wholly below the surface, and where it is much deeper.
 
@@ -104,7 +104,7 @@ def _net(system: System, point: FreePoint) -> float:
     return system.environment.gravity * (fluid.density * point.volume - point.mass)
 
 
-def _held(system: System, model: SystemModel, seen: Sampled, name: str) -> tuple[Floats, Floats]:
+def _held(system: System, model: NetworkModel, seen: Sampled, name: str) -> tuple[Floats, Floats]:
     """Places (nb, 3) m of a point, and by how much its lines pull it down (nb,) N."""
     pull, place = np.zeros(len(seen.t)), np.zeros((len(seen.t), 3))
     for line, end in system.lines_at(name):

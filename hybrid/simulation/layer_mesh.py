@@ -31,8 +31,8 @@ from hybrid.simulation.mesh_survey import Survey, survey_resolution
 from hybrid.simulation.section_layers import MORE
 
 if TYPE_CHECKING:  # of several lines, which most scenes do not have
-    from hybrid.model.system import SystemResolution
-    from hybrid.scene.system import System
+    from hybrid.model.network import NetworkResolution
+    from hybrid.scene.network_scene import System
     from hybrid.simulation.case import Case
     from hybrid.simulation.static_case import StaticCase
 
@@ -73,7 +73,7 @@ def layered(case: Case | StaticCase, resolution: Resolution) -> Resolution:
     return resolution if grading is None else replace(resolution, grading=grading)
 
 
-def layered_lines(system: System, resolution: SystemResolution, moves: bool) -> SystemResolution:
+def layered_lines(system: System, resolution: NetworkResolution, moves: bool) -> NetworkResolution:
     """The same of several lines, of those that leave their mesh open and ask for no pre-run.
 
     moves: the equilibrium is that with which a motion begins, else that under full loads.
@@ -93,10 +93,10 @@ def layered_lines(system: System, resolution: SystemResolution, moves: bool) -> 
     return replace(resolution, lines=lines)
 
 
-def _rest_of(system: System, resolution: SystemResolution, moves: bool) -> dict[str, tuple[Model, State]]:
+def _rest_of(system: System, resolution: NetworkResolution, moves: bool) -> dict[str, tuple[Model, State]]:
     """Models of several lines with their first states, by name; moves: as of `layered_lines`.  ComputationError."""
-    from hybrid.model.system import build_system
-    from hybrid.simulation.system_start import equilibrium_of_system
+    from hybrid.model.network import build_system
+    from hybrid.simulation.run_start import equilibrium_of_system
 
     with at_once():
         model = build_system(system, resolution=resolution)
@@ -106,7 +106,7 @@ def _rest_of(system: System, resolution: SystemResolution, moves: bool) -> dict[
     return dict(zip(model.names, zip(model.models, states, strict=True), strict=True))
 
 
-def shown_lines(system: System, resolution: SystemResolution, moves: bool) -> SystemResolution:
+def shown_lines(system: System, resolution: NetworkResolution, moves: bool) -> NetworkResolution:
     """As `shown`, of several lines that have a pre-run; moves: as of `layered_lines`."""
     if moves and system.starts_as_placed:
         return resolution

@@ -12,21 +12,21 @@ from hybrid.kernels.state.books import Books, Clock, Counts
 from hybrid.kernels.state.state import Batch, Floats, State, Work
 from hybrid.kernels.step.newton import Limits
 from hybrid.model.build import Model
-from hybrid.model.system import SystemModel
+from hybrid.model.network import NetworkModel
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.envelope import Envelope
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.zone_switching import ZoneSwitching
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_steps import SystemSteps
 
 if TYPE_CHECKING:  # a line that is not paid out does without
     from hybrid.simulation.payout import PayingOut
 
 
 class OfLine(Protocol):
-    """What changes of cells have to know of the result of a line (simulation.system_lines)."""
+    """What changes of cells have to know of the result of a line (simulation.line_result)."""
 
     books: Books
 
@@ -60,11 +60,11 @@ class HasPlanes(Protocol):
 
 
 class OfRun(Protocol):
-    """And of the run of all lines (simulation.system_run)."""
+    """And of the run of all lines (simulation.network_run)."""
 
-    solver: SystemSolver
-    loop: SystemSteps
-    model: SystemModel
+    solver: NetworkSolver
+    loop: NetworkSteps
+    model: NetworkModel
     watch: LinesWatch | None
 
     @property

@@ -27,17 +27,17 @@ from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching, joined_ends_of
-from hybrid.model.system import SystemModel
-from hybrid.scene.system import System
+from hybrid.model.network import NetworkModel
+from hybrid.scene.network_scene import System
 from hybrid.simulation.contact_equilibrium import JUMP, jumps
 from hybrid.simulation.self_watch import diameters, least_bending
-from hybrid.solve.joined import SystemState
+from hybrid.solve.joined import NetworkState
 from hybrid.solve.shared_contact import SharedContact, TouchingLine
 
 PASSED = "lines pass through each other"  # kind of an event
 
 
-def shared_of(model: SystemModel, rubs: bool = False) -> SharedContact | None:
+def shared_of(model: NetworkModel, rubs: bool = False) -> SharedContact | None:
     """Contact of the lines of a model with each other, with friction or without; None: they have none."""
     if model.touching is None:
         return None
@@ -50,7 +50,7 @@ def strand_in(x: Model) -> TouchingLine:
     return TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale, grows)
 
 
-def crossed(touching: Touching, first: SystemState, last: SystemState) -> Iterator[tuple[int, int]]:
+def crossed(touching: Touching, first: NetworkState, last: NetworkState) -> Iterator[tuple[int, int]]:
     """Numbers of lines, two each, of which one passes through the other on the straight way between two shapes."""
     for j, a in enumerate(touching.lines):
         for k, b in enumerate(touching.lines[j + 1 :], j + 1):
@@ -75,7 +75,7 @@ def _of_as_many_nodes(a: Floats, b: Floats) -> list[Floats]:
     return shapes
 
 
-def pair_text(shared: SharedContact, model: SystemModel) -> str:
+def pair_text(shared: SharedContact, model: NetworkModel) -> str:
     """Which two lines, or a line and itself, are nearest of what was looked at last, and where."""
     a, i, b, j, distance = shared.deepest_pair
     s, other = (float(model.models[k].line.s[n]) for k, n in ((a, i), (b, j)))
@@ -85,7 +85,7 @@ def pair_text(shared: SharedContact, model: SystemModel) -> str:
 # --- lines between which no contact is computed -------------------------------------------------------
 
 
-def watched_pairs(system: System, model: SystemModel) -> list[tuple[int, int]]:
+def watched_pairs(system: System, model: NetworkModel) -> list[tuple[int, int]]:
     """Numbers of lines, two each, that have diameters, and between which no contact is computed."""
     thick = [k for k, x in enumerate(model.models) if (diameters(x) > 0.0).all()]
     touching = model.touching
@@ -112,7 +112,7 @@ class LinesWatch:
     """What looks after every step whether two of such lines have met, or are near."""
 
     def __init__(
-        self, system: System, model: SystemModel, met: set[tuple[int, int]], clock: Clock,
+        self, system: System, model: NetworkModel, met: set[tuple[int, int]], clock: Clock,
         alone: Collection[tuple[int, int]] = (),
     ) -> None:  # fmt: skip
         """met: lines of which it is known; clock: of the run; alone: lines that may meet, but are let pass."""

@@ -15,9 +15,9 @@ from hybrid.model.lines_contact import touching_among
 from hybrid.model.self_reach import contact_bits
 from hybrid.scene.schema import Scene
 from hybrid.simulation.lines_contact import PASSED, pair_text
+from hybrid.simulation.lines_contact_equilibrium import crossings, energy_between
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.self_watch import diameters
-from hybrid.simulation.system_contact_equilibrium import crossings, energy_between
 
 Pair = tuple[int, int]
 BEGINS = "contact begins"

@@ -6,17 +6,17 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from hybrid.model.model_costs import with_models
+from hybrid.model.network import build_system
 from hybrid.model.resolution import model_is_free, wants_errors
-from hybrid.model.system import build_system
+from hybrid.scene.network_scene import System
 from hybrid.scene.quantities import KINDS, Quantity
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.short_form import as_network
-from hybrid.scene.system import System
+from hybrid.simulation.line_result import Wanted, observer_of
 from hybrid.simulation.pair_forces import fields_of_pairs
 from hybrid.simulation.result_file import STEP_FIELDS
-from hybrid.simulation.system_lines import Wanted, observer_of
-from hybrid.simulation.system_points import fields_of
-from hybrid.simulation.system_quantities import SystemQuantities
+from hybrid.simulation.run_points import fields_of
+from hybrid.simulation.run_quantities import RunQuantities
 from hybrid.store.format import Field
 from hybrid.store.lines import GROUP
 
@@ -42,7 +42,7 @@ def listed_outputs(scene: SceneLike | System) -> list[Listed]:
     model, guesses, found = build_system(system), system.guesses, list[Listed]()
     scenes = {name: system.scene_of(name, system.carried(name), guesses) for name in model.names}
     if named:
-        found = _over_time([*fields_of(system), *fields_of_pairs(model), *SystemQuantities(system, scenes).fields])
+        found = _over_time([*fields_of(system), *fields_of_pairs(model), *RunQuantities(system, scenes).fields])
     else:  # a cable is recorded by its own scene, which has its quantities
         scenes = {name: asked.scene_of(key) for name, key in zip(scenes, asked.lines, strict=True)}
     for (name, each), built in zip(scenes.items(), model.models, strict=True):

@@ -20,11 +20,11 @@ from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.build import Model
 from hybrid.model.plane import in_space, planar
+from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
+from hybrid.simulation.run_contact import renew_solver
 from hybrid.simulation.run_of_lines import RunOfLines, change_lines
-from hybrid.simulation.system_contact import renew_solver
-from hybrid.simulation.system_lines import LineResult
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.store.named_arrays import matched
 
 TOUCHES = "where it may touch"
@@ -39,7 +39,7 @@ class LonePlane:
         self.plane: Floats | None = None  # (3, 3) in which its steps are computed; None: in space
         self._number, self._line, self._counts = number, line, counts
         self._pushes: list[Floats] = [NO_PUSH, NO_PUSH]
-        self._solver: SystemSolver | None = None
+        self._solver: NetworkSolver | None = None
 
     @property
     def clock(self) -> b.Clock:
@@ -67,7 +67,7 @@ class LonePlane:
         if self._solver is not None:
             self._solver.carry(self._number, self._pushes)
 
-    def attach(self, solver: SystemSolver) -> None:
+    def attach(self, solver: NetworkSolver) -> None:
         """Another solver makes the steps from now on."""
         self._solver = solver
         solver.carry(self._number, self._pushes)
@@ -131,7 +131,7 @@ class LonePlanes:
                 changes[k] = partial(_as_computed, plane=plane, flat=x.plane is not None)
         change_lines(self._run, changes)
 
-    def attach(self, solver: SystemSolver) -> None:
+    def attach(self, solver: NetworkSolver) -> None:
         """Steps are made by another solver, with lines as of `put_lines`."""
         for x in self._lines.values():
             x.attach(solver)

@@ -7,18 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from hybrid.kernels.state.state import Batch, Floats
-from hybrid.model.system import SystemModel
+from hybrid.model.network import NetworkModel
 from hybrid.outputs.line_forces import KEYS, Lines, pair_fields, pair_forces
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.store.format import Field
 
 
-def fields_of_pairs(model: SystemModel) -> list[Field]:
+def fields_of_pairs(model: NetworkModel) -> list[Field]:
     """What is recorded of the pairs of lines whose contact is computed, and of these lines with themselves."""
     return pair_fields([(model.names[a], model.names[b]) for a, b in _pairs(model).values()])
 
 
-def values_of_pairs(model: SystemModel, shared: SharedContact | None, states: Sequence[Batch]) -> dict[str, Floats]:
+def values_of_pairs(model: NetworkModel, shared: SharedContact | None, states: Sequence[Batch]) -> dict[str, Floats]:
     """Values (nb, ...) of those fields, from nb states of all lines; shared: their contact, None: nothing touches."""
     found: dict[str, Floats] = {}
     nb, pairs = len(states[0].t), _pairs(model)
@@ -41,7 +41,7 @@ def values_of_pairs(model: SystemModel, shared: SharedContact | None, states: Se
     return found
 
 
-def _pairs(model: SystemModel) -> dict[tuple[int, int], tuple[int, int]]:
+def _pairs(model: NetworkModel) -> dict[tuple[int, int], tuple[int, int]]:
     """Numbers of two lines, or of one twice, by their places among the lines that touch others, first <= second.
 
     None, where nobody asks for their contact: which lines will meet is not known when a file is begun.

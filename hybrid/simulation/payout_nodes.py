@@ -22,9 +22,9 @@ from hybrid.kernels.reel.payout_nodes import CarryJob, blank_carry_job, carry_no
 from hybrid.kernels.reel.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.run import payout_run as f
 from hybrid.kernels.run.entry import NO_PUSH, workspace
+from hybrid.kernels.run.network import begin_line
 from hybrid.kernels.run.payout_run import NodeJob, blank_line_job, blank_node_job, blank_paid_run_job, make_line
 from hybrid.kernels.run.run import run as steps
-from hybrid.kernels.run.system import begin_line
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, sample_size
 from hybrid.kernels.state.forces import REMEMBERS

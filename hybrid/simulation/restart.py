@@ -29,8 +29,8 @@ from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.model.system import SystemResolution
-    from hybrid.scene.system import System
+    from hybrid.model.network import NetworkResolution
+    from hybrid.scene.network_scene import System
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
 MAY_CHANGE = (
@@ -66,7 +66,7 @@ class Remaining(Generic[S]):
     scene: S
     changes: tuple[LoadChange[S], ...]
     flat: bool
-    resolution: SystemResolution
+    resolution: NetworkResolution
     before: Tree
     anew: bool
     reached: float
@@ -165,9 +165,9 @@ def _refuse_more_out(before: Any, after: Any, until: float) -> None:
             raise _refused("until", f"{until:g} s, when {out:.6g} m are out", expected, fix)
 
 
-def _check(last: LoadChange[Any], changed: Any, resolution: SystemResolution, begin: float, end: float) -> None:
+def _check(last: LoadChange[Any], changed: Any, resolution: NetworkResolution, begin: float, end: float) -> None:
     """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
-    from hybrid.model.system import build_system
+    from hybrid.model.network import build_system
 
     _check_what_changes(last, changed, begin, end)
     (before, form), (system, _) = as_network(last.scene), as_network(changed)

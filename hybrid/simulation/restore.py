@@ -34,8 +34,8 @@ from hybrid.store.named_arrays import Tree, matched, pack
 from hybrid.store.reader import Result, open_result
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.model.system import SystemResolution
-    from hybrid.scene.system import System
+    from hybrid.model.network import NetworkResolution
+    from hybrid.scene.network_scene import System
 
 # Rooms that have a part in the numbers of a file.
 COMPUTES = ("accuracy", "adapt", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store")
@@ -147,13 +147,13 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     return Resolution(**saved | {"grading": grading} | rows)
 
 
-def kept_resolution(system: System, source: Path) -> SystemResolution:
+def kept_resolution(system: System, source: Path) -> NetworkResolution:
     """How finely a result was computed that has a checkpoint.  ResultError: it is none of this system."""
-    from hybrid.model.system import SystemResolution
+    from hybrid.model.network import NetworkResolution
 
     with opened(source) as file:
         tree = read_checkpoint(file).resolution
-    first = SystemResolution.first(system)
+    first = NetworkResolution.first(system)
     if not tree:  # of an earlier program
         return first
     with refused(source):
@@ -163,10 +163,10 @@ def kept_resolution(system: System, source: Path) -> SystemResolution:
         found = {name: resolution_from(tree[name], system.scene_of(name)) for name in system.lines}
         if len({(x.step, x.every, x.local is None) for x in found.values()}) > 1:
             raise ValueError("lines with other steps")
-        return SystemResolution(found)
+        return NetworkResolution(found)
 
 
-def is_cut_off(source: Path, texts: tuple[str, str], resolution: SystemResolution) -> bool:
+def is_cut_off(source: Path, texts: tuple[str, str], resolution: NetworkResolution) -> bool:
     """Whether a file holds a run of a scene and its changes (texts), with this resolution, that goes on."""
     if not is_result(source):
         return False

@@ -26,14 +26,14 @@ from hybrid.scene.short_form import short_form
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
 from hybrid.simulation.initial_zones import reasons_at_start
+from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.pair_forces import fields_of_pairs, values_of_pairs
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.result_file import STEP_FIELDS, mesh_fields, places_of_elevation, result_recorder
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.system_lines import LineResult
-from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, values_of
-from hybrid.simulation.system_quantities import SystemQuantities
-from hybrid.solve.joined import SystemState
+from hybrid.simulation.run_points import Rotations, Sampled, fields_of, gauges_of, values_of
+from hybrid.simulation.run_quantities import RunQuantities
+from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import Checkpoint
@@ -73,7 +73,7 @@ class RecordedRun(RunOfLines, Protocol):
     times: Sequence[float]
     changes: Sequence[LoadChange[Any]]
     rotations: Rotations
-    quantities: SystemQuantities
+    quantities: RunQuantities
     recorder: AnyRecorder
 
     @property
@@ -211,7 +211,7 @@ class LinesFile:
         """An error in the words of the scene."""
         return error
 
-    def snapshot(self, state: SystemState) -> dict[str, Any]:
+    def snapshot(self, state: NetworkState) -> dict[str, Any]:
         """What a snapshot has of a state, and the scene."""
         found: dict[str, Any] = {"scene": scene_text(self._run.system), "bodies": state.bodies}
         for line, x in zip(self._run.lines, state.lines, strict=True):
@@ -302,7 +302,7 @@ class CableFile(LinesFile):
     def in_words(self, error: ComputationError) -> ComputationError:
         return self._form.error(error)
 
-    def snapshot(self, state: SystemState) -> dict[str, Any]:
+    def snapshot(self, state: NetworkState) -> dict[str, Any]:
         return {"scene": made(self._text)} | _named(self._line, state.lines[0])
 
     def close(self, status: str, message: str) -> None:

@@ -14,19 +14,19 @@ import numpy as np
 from hybrid.adapt.manager import Change
 from hybrid.kernels.state.state import Floats, Line, Work
 from hybrid.model.build import Model
-from hybrid.model.system import SystemModel, SystemResolution
+from hybrid.model.network import NetworkModel, NetworkResolution
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
 from hybrid.simulation.line_of_run import HasPlanes
+from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.lines_contact import LinesWatch
-from hybrid.simulation.system_lines import LineResult
-from hybrid.solve.joined import SystemState
+from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_steps import SystemSteps
 from hybrid.store.array_recorder import ArrayRecorder
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.writer import Recorder
@@ -51,21 +51,21 @@ class PaidLines(Protocol):
 
     def let_go(self, ends: Iterable[tuple[int, int]]) -> None: ...
 
-    def fit_models(self, model: SystemModel) -> SystemModel: ...
+    def fit_models(self, model: NetworkModel) -> NetworkModel: ...
 
 
 class RunOfLines(Protocol):
     """A run between two steps; what is writable here, parts change, and the solver follows (`make_solver`)."""
 
     system: System
-    model: SystemModel
-    state: SystemState
-    other: SystemState  # after the next step
-    solver: SystemSolver
-    loop: SystemSteps
+    model: NetworkModel
+    state: NetworkState
+    other: NetworkState  # after the next step
+    solver: NetworkSolver
+    loop: NetworkSteps
     lines: list[LineResult]
     scenes: list[Scene]
-    resolution: SystemResolution
+    resolution: NetworkResolution
     loaded: float  # s, loads that have stopped by then act no more
     rest: Floats  # bodies when the motion began
     shared: SharedContact | None  # contact of lines with each other

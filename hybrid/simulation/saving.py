@@ -10,12 +10,12 @@ import numpy as np
 
 from hybrid.kernels.state.state import Floats
 from hybrid.model.driven_end import DrivenEnd
-from hybrid.model.system import SystemModel
+from hybrid.model.network import NetworkModel
 from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.run_checkpoint import checkpoint, set_state
 from hybrid.simulation.set_obstacles import Course
-from hybrid.simulation.system_checkpoint import checkpoint, set_state
-from hybrid.simulation.system_run import SystemRun
-from hybrid.solve.joined import SystemState
+from hybrid.solve.joined import NetworkState
 from hybrid.store.writer import Recorder
 
 
@@ -25,11 +25,11 @@ class Saved(NamedTuple):
     owner: object  # what tells one simulation from another
     number: int  # of the state that was final then
     run: Mapping[str, Any]  # arrays and plain values, as of a checkpoint
-    model: SystemModel  # with what had broken by then
+    model: NetworkModel  # with what had broken by then
     waiting: tuple[Any, ...]  # rows of each line that are not recorded yet
     marks: tuple[int, ...]  # of the recorders
     stops: tuple[float, ...]  # s, that are still to come
-    before: SystemState  # the state before the last step
+    before: NetworkState  # the state before the last step
     stood: tuple[tuple[Floats, Floats], ...]  # positions (2, 3) m and frames (2, 9) of the ends of each line
     loads: tuple[Any, ...]  # of these ends
     driven: Mapping[str, list[DrivenEnd]]  # what moves points that are set from outside, for each end there
@@ -39,7 +39,7 @@ class Saved(NamedTuple):
     wound: Mapping[int, tuple[float | None, float]]  # length (m) and rate (m/s) that lines are to have then
 
 
-def defer(run: SystemRun) -> None:
+def defer(run: NetworkRun) -> None:
     """From now on, what is recorded can be taken back."""
     if isinstance(run.recorder, DeferredRecorder):
         return
@@ -50,13 +50,13 @@ def defer(run: SystemRun) -> None:
         line.recorder = run.recorder if line.recorder is whole else DeferredRecorder(line.recorder)
 
 
-def recorders(run: SystemRun) -> list[DeferredRecorder]:
+def recorders(run: NetworkRun) -> list[DeferredRecorder]:
     """Those of the system and of its lines, once they are deferred."""
     found = dict.fromkeys((run.recorder, *(line.recorder for line in run.lines)))  # that of a cable is the only one
     return [x for x in found if isinstance(x, DeferredRecorder)]
 
 
-def commit(run: SystemRun) -> None:
+def commit(run: NetworkRun) -> None:
     """What has been recorded until now is final; it is written where that is due.
 
     LineFailed where an output says that going on would make no sense.
@@ -78,7 +78,7 @@ def commit(run: SystemRun) -> None:
         run.recorder.flush(made)
 
 
-def kept(run: SystemRun) -> dict[str, Any]:
+def kept(run: NetworkRun) -> dict[str, Any]:
     """What a run depends on, in copies: fields of `Saved`."""
     run.record_samples()
     run.write_log()
@@ -92,7 +92,7 @@ def kept(run: SystemRun) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def bring_back(run: SystemRun, saved: Saved) -> None:
+def bring_back(run: NetworkRun, saved: Saved) -> None:
     """Be as when `kept` was called; ends that are set from outside must be on their paths of then."""
     run.gather_events()
     for recorder, mark in zip(recorders(run), saved.marks, strict=True):

@@ -12,21 +12,21 @@ from hybrid.kernels.state.forces import SEABED
 from hybrid.kernels.state.state import State
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model
+from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.output_points import output_points
 from hybrid.model.resolution import Resolution, wants_errors
-from hybrid.model.system import SystemResolution, build_system
 from hybrid.outputs.edge_errors import edge_errors
 from hybrid.outputs.layer_errors import layer_errors
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.simulation.mesh_survey import Survey, survey_points
+from hybrid.simulation.network_run import ALONE, NetworkRun, Recording, start_of
 from hybrid.simulation.run_file import Cable
 from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, catenary_share, compared_cells
+from hybrid.simulation.run_zones import Start
 from hybrid.simulation.static_case_of_cable import StaticCaseOfCable
 from hybrid.simulation.switch import at_rest_as_network
-from hybrid.simulation.system_run import ALONE, Recording, SystemRun, start_of
-from hybrid.simulation.system_zones import Start
 from hybrid.store.array_recorder import ArrayRecorder, Target
 from hybrid.store.records import ERROR_ESTIMATE
 from hybrid.store.writer import Recorder
@@ -90,14 +90,14 @@ class StaticCase(StaticCaseOfCable):
         if kept is not None and kept[0] is resolution:
             return kept[1]
         system = network_of(self.scene)
-        return start_of(system, build_system(system, SystemResolution({LINE: resolution})), False, None)
+        return start_of(system, build_system(system, NetworkResolution({LINE: resolution})), False, None)
 
-    def _run(self, resolution: Resolution, target: Target | None, recording: Recording = ALONE) -> SystemRun:
+    def _run(self, resolution: Resolution, target: Target | None, recording: Recording = ALONE) -> NetworkRun:
         """The same, recorded."""
         with short_form(self.scene).said():
             recording = recording._replace(error=True, cable=Cable(self.scene), start=self._start(resolution))
             text = partial(scene_text, self.scene)
-            run = SystemRun(network_of(self.scene), target, text, False, recording=recording)
+            run = NetworkRun(network_of(self.scene), target, text, False, recording=recording)
             if not isinstance(run.recorder, Recorder | ArrayRecorder):
                 run.record_equilibrium()
                 return run
@@ -106,7 +106,7 @@ class StaticCase(StaticCaseOfCable):
         return run
 
 
-def _sample(run: SystemRun, begin: float) -> RunSample:
+def _sample(run: NetworkRun, begin: float) -> RunSample:
     """What is compared of an equilibrium that has been recorded; begin: s of processor time, when it was begun."""
     (line,), (state,), solver = run.lines, run.state.lines, run.solver
     model, correction = line.model, line.correction

@@ -19,15 +19,15 @@ from hybrid.model.build import Model
 from hybrid.model.driven_end import STILL, DrivenEnd, rotation_vector
 from hybrid.model.ends import EndConditions
 from hybrid.model.failure import Weakness
+from hybrid.model.network import NetworkModel
 from hybrid.model.sea import Surroundings
-from hybrid.model.system import SystemModel
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import Fairlead
 from hybrid.scene.short_form import ENDS, LINE, ShortForm
-from hybrid.scene.system import System
 from hybrid.simulation.interface_stiffness import interface_stiffness, step_taken
+from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.set_obstacles import Course, SettableObstacles
 from hybrid.simulation.stepped import CableState, EndForces, numbers, one_thread, triple, vector
-from hybrid.simulation.system_run import SystemRun
 from hybrid.solve.joined import LineFailed
 
 # Of the largest component: what is out of a plane by no more is in it.
@@ -62,13 +62,13 @@ class SteppedPoints(SettableObstacles):
 
     _system: System  # what is computed
     _form: ShortForm | None  # of a scene in the short form
-    _run: SystemRun
+    _run: NetworkRun
     _driven: dict[str, list[DrivenEnd]]  # of points that are set, for each end there
     _next: dict[str, Course]  # where points are to be at the end of the next step
     _wound: dict[int, tuple[float | None, float]]  # length and rate that are asked of lines
     _places: dict[str, list[tuple[int, int]]]  # of points: number of each line there, 0 or 1 for its start or end
-    _driven_of: SystemModel | None = None  # whose points those that are set were last looked for among
-    _signed: SystemModel | None = None  # of which the next are
+    _driven_of: NetworkModel | None = None  # whose points those that are set were last looked for among
+    _signed: NetworkModel | None = None  # of which the next are
     _report: Floats | None = None  # of the last step, of which the next are
     _reported: Floats  # (4, 3) forces and moments at both ends in it
     _signs: Floats  # (4, 3) what of the report of a step is a force or a moment on what holds an end, with its sign

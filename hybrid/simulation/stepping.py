@@ -18,24 +18,24 @@ from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.driven_end import DrivenEnd, contradictions
-from hybrid.model.system import SystemResolution
+from hybrid.model.network import NetworkResolution
 from hybrid.scene.motion_checks import check_motions
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.scene.short_form import network_of, short_form
-from hybrid.scene.system import System
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.layer_mesh import layered_lines
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution, with_survey
+from hybrid.simulation.network_run import NetworkRun, Recording, static_system
 from hybrid.simulation.run_file import Cable
+from hybrid.simulation.run_start import named
 from hybrid.simulation.saving import Saved, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.set_obstacles import ONE_STEP
 from hybrid.simulation.stepped import SLIVER, end_of_step, in_space, iterations_allowed, one_thread
 from hybrid.simulation.stepped_points import SteppedPoints
-from hybrid.simulation.system_run import Recording, SystemRun, static_system
-from hybrid.simulation.system_start import named
 from hybrid.solve.joined import LineFailed
-from hybrid.solve.system_steps import ROWS_OUTSIDE
+from hybrid.solve.network_steps import ROWS_OUTSIDE
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
@@ -46,14 +46,14 @@ READ_OUTSIDE = 1.0
 NUMBER = (int, float, np.integer, np.floating)
 
 
-def layers_at_rest(system: System) -> SystemResolution:
+def layers_at_rest(system: System) -> NetworkResolution:
     """Cells by the equilibrium of the start; where a line says how many cells a layer has, by that of full loads."""
     asked = [name for name, line in system.lines.items() if line.resolution is not None]
-    first = layered_lines(system, SystemResolution.first(system), True)
+    first = layered_lines(system, NetworkResolution.first(system), True)
     if not asked:
         return first
     memory = MemoryTarget()
-    coarse = SystemResolution({name: replace(survey_resolution(x), every=1) for name, x in first.lines.items()})
+    coarse = NetworkResolution({name: replace(survey_resolution(x), every=1) for name, x in first.lines.items()})
     output = system.output.model_copy(update={"points": POINTS, "quantities": {}})
     shown = system.model_copy(update={"output": output})
     run = static_system(shown, memory, partial(scene_text, shown), coarse)
@@ -62,7 +62,7 @@ def layers_at_rest(system: System) -> SystemResolution:
         line, scene, model = found.lines[name], system.scene_of(name), run.model.models[run.model.names.index(name)]
         outputs = {key: line[key] for key in ("position", "curvature", "tension")}
         lines[name] = with_survey(lines[name], scene, Survey.of(scene, lines[name], model, line.s, outputs))
-    return SystemResolution(lines)
+    return NetworkResolution(lines)
 
 
 def _that_are_set(line: Any) -> Any:
@@ -129,7 +129,7 @@ class Simulation(SteppedPoints):
             check_motions(self.scene)
             self._system, self._form = network_of(self.scene), short_form(self.scene)
 
-    def _begun(self, most: int, criterion: UserCriterion | None) -> SystemRun:
+    def _begun(self, most: int, criterion: UserCriterion | None) -> NetworkRun:
         """The run at its start; most: iterations that a step may take.  ComputationError."""
         compile_beside(self.scene)
         recording = Recording(planes=self._system.dimension == 2)  # else points may be set anywhere
@@ -137,7 +137,7 @@ class Simulation(SteppedPoints):
             recording = recording._replace(cable=Cable(self.scene))
         with nullcontext() if self._form is None else self._form.said():
             cells, text = layers_at_rest(self._system), scene_text(self.scene)
-            run = SystemRun(self._system, self._target, text, True, cells, recording, criterion)
+            run = NetworkRun(self._system, self._target, text, True, cells, recording, criterion)
         run.loop.counts.most_iterations, run.loop.most_rows, run.read_every = most, ROWS_OUTSIDE, READ_OUTSIDE
         try:
             run.begin_motion()

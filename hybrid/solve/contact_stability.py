@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from hybrid.kernels.contact.self_contact_law import ACROSS, ALONG, FOLLOWS, FORCE, NORMAL, RATES, SLOPE, WX, WY, P, Q
 from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.state.state import Floats
-from hybrid.solve.joined import SystemState
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.settling import gyration
 from hybrid.solve.stability import ANCHOR, LOST, NEUTRAL, SHIFTED, Stability, is_without_moment, stiffest_bending
-from hybrid.solve.system import SystemSolver
 
 EACH = 4  # unknowns of a node, (r, psi)
 # Sample points of contact lie a quarter of a diameter apart, and a line rests between them as in hollows: whether it
@@ -60,7 +60,7 @@ def _factor(matrix: Any) -> Any:
 class ContactStability:
     """Judges equilibria of a solver whose lines touch each other or themselves."""
 
-    def __init__(self, solver: SystemSolver) -> None:
+    def __init__(self, solver: NetworkSolver) -> None:
         self._solver, lines, points = solver, solver.lines, len(solver.net)
         # Of the last equilibrium: whether it would not stay with more sample points; whether round-off hides it.
         self.in_hollows = self.blurred = False
@@ -89,14 +89,14 @@ class ContactStability:
         """Whether nothing that moves is held here."""
         return not len(self._solver.bodies)
 
-    def holds(self, states: SystemState) -> bool:
+    def holds(self, states: NetworkState) -> bool:
         """Whether an equilibrium would stay; True too where round-off hides it, as of one line (`Stability.holds`)."""
         finer = self._contact(states, FINER)
         self.in_hollows = finer is not None and not self._is_definite(states, finer)
         self.blurred = False
         return self._is_definite(states, self._contact(states, 1))
 
-    def _is_definite(self, states: SystemState, contact: Any) -> bool:
+    def _is_definite(self, states: NetworkState, contact: Any) -> bool:
         """As of one line (`Stability.holds`), with this stiffness of contact."""
         soft = NEUTRAL / ANCHOR * self._solver.anchor
         if _factor(self._matrix(states, soft, contact)[0]) is not None:
@@ -105,7 +105,7 @@ class ContactStability:
         self.blurred = lost > soft and _factor(self._matrix(states, lost, contact)[0]) is not None
         return self.blurred
 
-    def softest_motion(self, states: SystemState) -> tuple[float, list[Floats]]:
+    def softest_motion(self, states: NetworkState) -> tuple[float, list[Floats]]:
         """Square (1/s^2, below 0: it grows) and shapes (N+1, 3) of the lines of the softest motion of an equilibrium.
 
         The largest component is 1.
@@ -138,7 +138,7 @@ class ContactStability:
             found.append(masses.ravel())
         return np.concatenate(found)
 
-    def _contact(self, states: SystemState, finer: int) -> Any:
+    def _contact(self, states: NetworkState, finer: int) -> Any:
         """Stiffness of contact in states at rest, by the unknowns of the lines; None: there is no room for its points.
 
         finer: by how much more sample points lie on each piece than the law has.
@@ -158,7 +158,7 @@ class ContactStability:
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
         return csc_array(entries, shape=(self._same.size, self._same.size))
 
-    def _matrix(self, states: SystemState, soft: float, contact: Any) -> tuple[Any, NDArray[np.bool_]]:
+    def _matrix(self, states: NetworkState, soft: float, contact: Any) -> tuple[Any, NDArray[np.bool_]]:
         """Stiffness of all, and which unknowns are none: held, or those of an end that is a point of another line.
 
         soft: 1/s^2, of springs of that times the mass; contact: `_contact` of the states.

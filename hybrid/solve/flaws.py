@@ -29,7 +29,7 @@ from hybrid.kernels.state.obstacle_rows import (
     TORUS,
 )
 from hybrid.kernels.state.state import Floats, Line, Sea, State
-from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.stability import Stability, is_judged
 
 LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign: what a catenary needs more of at rest
@@ -245,7 +245,7 @@ def slack_cell(x: JoinedLine, state: State) -> int:
     return -1 if tension > at_rest(x) else int(cell)
 
 
-def flaw_of_lines(lines: Sequence[JoinedLine], states: SystemState) -> tuple[Outcome, int, int]:
+def flaw_of_lines(lines: Sequence[JoinedLine], states: NetworkState) -> tuple[Outcome, int, int]:
     """The outcome (OK: there is none), the line, and its node or cell, as `flaw_of_line` finds them."""
     for k, (x, state) in enumerate(zip(lines, states.lines, strict=True)):
         outcome, where = flaw_of_line(x.line, x.sea, state, x.length, at_rest(x))
@@ -256,7 +256,7 @@ def flaw_of_lines(lines: Sequence[JoinedLine], states: SystemState) -> tuple[Out
     return Outcome.OK, -1, -1
 
 
-def buckling_line(lines: Sequence[JoinedLine], states: SystemState, blurred: set[int]) -> int:
+def buckling_line(lines: Sequence[JoinedLine], states: NetworkState, blurred: set[int]) -> int:
     """The first line that would buckle between what its ends are joined to, held where it is; -1: none.
 
     blurred: gets the numbers of lines of which round-off hides it.

@@ -1,4 +1,4 @@
-"""Lines that meet at points, as their solver takes them and gives them back (solve.system)."""
+"""Lines that meet at points, as their solver takes them and gives them back (solve.network_solver)."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ class JoinedLine(NamedTuple):
     serves: bool = False  # whether these serve again for what leaving bending out does
 
 
-class SystemState(NamedTuple):
+class NetworkState(NamedTuple):
     """All that a system knows of itself at a time: the states of its lines, and (B, STATE) of its free bodies."""
 
     lines: Sequence[State]
     bodies: Floats = np.zeros((0, STATE))
 
-    def copy(self) -> SystemState:
+    def copy(self) -> NetworkState:
         """The same in arrays of its own."""
-        return SystemState([x.copy() for x in self.lines], self.bodies.copy())
+        return NetworkState([x.copy() for x in self.lines], self.bodies.copy())
 
 
 @dataclass(frozen=True)
-class SystemTaken:
+class NetworkTaken:
     """How a solution went: outcome, Newton iterations, predicted next correction, line and cell or node where it was
     worst, the largest residual force at a node or point (N), the local error of a step (m), the largest of a line over
     what is allowed of it: a step of more than REFUSED (step.step_law) is in no books, and is to be repeated; and its

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from hybrid.kernels.junctions.body_contact import meet_bodies
 from hybrid.kernels.junctions.body_forces import blank_meeting_job
 from hybrid.kernels.junctions.joined_sheaves import blank_spinning_job, spin_sheaves
-from hybrid.kernels.junctions.system_contact import blank_touching_job, touch_system
-from hybrid.kernels.junctions.system_job import blank_system_job
+from hybrid.kernels.junctions.lines_contact import blank_touching_job, touch_system
+from hybrid.kernels.junctions.network_job import blank_system_job
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.state import Floats
 
@@ -22,8 +22,8 @@ class Rooms(NamedTuple):
 
     shared: dict[str, Any]  # of all kernels of joined lines
     of_lines: dict[str, Any]  # likewise, with a row for each line of the system
-    rows: dict[str, Any]  # of SystemJob alone, likewise
-    job: dict[str, Any]  # of SystemJob alone
+    rows: dict[str, Any]  # of NetworkJob alone, likewise
+    job: dict[str, Any]  # of NetworkJob alone
     begins: NDArray[np.int64]  # (L,) where nodes of lines begin
     meeting: dict[str, Any]  # of lines that touch free bodies; empty: no body has a shape
     spinning: dict[str, Any]  # of sheaves that turn freely and winches of joined lines; empty: there are none

@@ -10,10 +10,10 @@ from itertools import chain
 from hybrid.errors import Outcome
 from hybrid.kernels.state.forces import FRICTION, WAVES
 from hybrid.kernels.state.state import Floats
-from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.solve.network_solver import NO_BODIES, NetworkSolver
 from hybrid.solve.search import PUSHED, Attempt, Start, Tally, attempts, first_sound, pulled, stuck, summary_of
 from hybrid.solve.statics import Equilibrium
-from hybrid.solve.system import NO_BODIES, SystemSolver
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,11 @@ class LinesAtRest:
     """A static solution: the state, how it was found (`path`), iterations, and its proof, the largest force
     out of balance at a node or a point (N)."""
 
-    state: SystemState
+    state: NetworkState
     path: tuple[str, ...]
     iterations: int
     residual: float
-    made: SystemSolver | Callable[[], SystemSolver]  # whose reports are those of the solution, or what makes it
+    made: NetworkSolver | Callable[[], NetworkSolver]  # whose reports are those of the solution, or what makes it
     settled: bool = False  # True where a damped motion with contact led there
     unjudged: str = ""  # where settled: why it is not known that it would stay
     with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction on the bed took part
@@ -39,12 +39,12 @@ class LinesAtRest:
         return self.solver.bodies.copy() if len(self.state.bodies) else NO_BODIES
 
     @cached_property
-    def solver(self) -> SystemSolver:
+    def solver(self) -> NetworkSolver:
         """A solver whose reports are those of the solution.
 
         Of lines that were found one by one it is made when it is asked for: that takes 1 ms.
         """
-        return self.made if isinstance(self.made, SystemSolver) else self.made()
+        return self.made if isinstance(self.made, NetworkSolver) else self.made()
 
     @property
     def blurred(self) -> set[int]:
@@ -69,19 +69,19 @@ class LinesAtRest:
 
 def lines_at_rest(
     lines: Sequence[JoinedLine], points: int, bodies: Floats, starts: Iterable[Start], others: Iterable[Start] = (),
-    refused: Callable[[SystemState], tuple[Outcome, int, int]] | None = None,
+    refused: Callable[[NetworkState], tuple[Outcome, int, int]] | None = None,
 ) -> LinesAtRest:  # fmt: skip
     """Equilibrium of lines without friction; starts, others: as of `attempts`; refused: as of `first_sound`.
 
     LineFailed: no way leads to lines under tension.
     """
-    solver, tally = SystemSolver(_with_bits(lines, ()), points, bodies), Tally()
+    solver, tally = NetworkSolver(_with_bits(lines, ()), points, bodies), Tally()
     return _found(*first_sound(attempts(solver, starts, others, tally), tally, refused), solver, tally)
 
 
 def settled_with_friction(
     lines: Sequence[JoinedLine], points: int, bodies: Floats, ways: Mapping[int, str], found: LinesAtRest,
-    first: SystemState,
+    first: NetworkState,
 ) -> LinesAtRest:  # fmt: skip
     """The equilibrium with friction of the lines named in `ways`, by number.
 
@@ -89,10 +89,10 @@ def settled_with_friction(
     that in still water, then pulled tight, all such lines together; "start", and where that fails: at rest after a
     damped motion from the first shapes; "usual" for all: pulled tight, and nothing else.  LineFailed.
     """
-    solver, tally, tried = SystemSolver(_with_bits(lines, ways), points, bodies), Tally(), list[Iterable[Attempt]]()
+    solver, tally, tried = NetworkSolver(_with_bits(lines, ways), points, bodies), Tally(), list[Iterable[Attempt]]()
     tally.total = found.iterations
     if "start" not in ways.values():
-        smooth = SystemSolver(_with_bits(lines, ()), points, bodies)
+        smooth = NetworkSolver(_with_bits(lines, ()), points, bodies)
         tried.append(pulled(smooth, solver, [*ways], found.state, tally))
     if set(ways.values()) != {"usual"}:
         tried.append(stuck(solver, ways, first, "the first shapes", tally))
@@ -112,7 +112,7 @@ def _with_bits(lines: Sequence[JoinedLine], rough: Iterable[int]) -> list[Joined
 
 
 def _found(
-    path: tuple[str, ...], tried: Attempt, solver: SystemSolver, tally: Tally, rough: frozenset[int] = frozenset()
+    path: tuple[str, ...], tried: Attempt, solver: NetworkSolver, tally: Tally, rough: frozenset[int] = frozenset()
 ) -> LinesAtRest:
     residual = solver.evaluate_forces(tried.states, solver.anchor).residual
     return LinesAtRest(tried.states, path, tally.total, residual, solver, with_friction=rough)

@@ -1,6 +1,6 @@
 """Ways to equilibria of lines, of one or of several that meet: Newton from the shapes given, then slow roads.
 
-One search for all; what solves differs: one line that nothing moves (solve.statics), or a network (solve.system).
+One search for all; what solves differs: a line that nothing moves (solve.statics), or a network (solve.network_solver).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from hybrid.solve.flaws import (
     lowest_tension,
     slack_text,
 )
-from hybrid.solve.joined import JoinedLine, LineFailed, SystemState, SystemTaken
+from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, NetworkTaken
 from hybrid.solve.laid import laid_without_tension
 from hybrid.solve.settling import (
     CALM,
@@ -58,8 +58,8 @@ LIMP = 1e-3  # part of the bending stiffness with which a continuation begins
 # What a balanced state may be and yet no equilibrium; the first is what a search that found none tells.
 FLAWS = (Outcome.SLACK, Outcome.UNSTABLE, Outcome.FOLDED, Outcome.BURIED)
 
-Solution = tuple[SystemTaken, SystemState]
-Start = tuple[str, SystemState]
+Solution = tuple[NetworkTaken, NetworkState]
+Start = tuple[str, NetworkState]
 
 
 def summary_of(path: Sequence[str], iterations: int) -> str:
@@ -78,27 +78,27 @@ class Solver(Protocol):
     length: float  # m, of the longest line
     settling: float  # damping of their motion to rest, as of solve.settling.damped
 
-    def newton(self, start: SystemState) -> Solution:
+    def newton(self, start: NetworkState) -> Solution:
         """Static Newton from `start`, which stays; not OK too where what was found is no equilibrium."""
 
-    def balance(self, start: SystemState) -> Solution:
+    def balance(self, start: NetworkState) -> Solution:
         """As `newton`, whatever the state is in which forces balance."""
 
-    def turned(self, start: SystemState) -> Solution | None:
+    def turned(self, start: NetworkState) -> Solution | None:
         """As `newton`, with chords that are turned; None: it cannot."""
 
     def step(
-        self, old: SystemState, new: SystemState, dt: float, rho: float, before: float, rho_before: float
-    ) -> SystemTaken | Taken:
+        self, old: NetworkState, new: NetworkState, dt: float, rho: float, before: float, rho_before: float
+    ) -> NetworkTaken | Taken:
         """A step of dt (s) to `new`, which is overwritten."""
 
     def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> Solver:
         """The same of other lines that are joined likewise; bodies: None: of the same ones."""
 
-    def proof(self, states: SystemState) -> float:
+    def proof(self, states: NetworkState) -> float:
         """Largest force (N) that is left over in states at rest; reports follow."""
 
-    def is_balanced(self, states: SystemState, residual: float) -> bool:
+    def is_balanced(self, states: NetworkState, residual: float) -> bool:
         """Whether a largest residual force (N) is round-off of the forces in states."""
 
 
@@ -117,14 +117,14 @@ class Attempt(NamedTuple):
     """What a way led to; real: with the loads, bed and lines of the scene, not with easier ones on the way to them."""
 
     how: str
-    taken: SystemTaken
-    states: SystemState
+    taken: NetworkTaken
+    states: NetworkState
     solver: Solver
     real: bool = True
 
 
 def first_sound(
-    ways: Iterable[Attempt], tally: Tally, refused: Callable[[SystemState], tuple[Outcome, int, int]] | None = None,
+    ways: Iterable[Attempt], tally: Tally, refused: Callable[[NetworkState], tuple[Outcome, int, int]] | None = None,
     before: Sequence[str] = (),
 ) -> tuple[tuple[str, ...], Attempt]:  # fmt: skip
     """The first attempt that leads to an equilibrium, or to a slack one that is taken, and how those before it went.
@@ -179,7 +179,7 @@ def _failed(worst: Attempt, path: Sequence[str]) -> LineFailed:
 # --- with friction --------------------------------------------------------------------------------------
 
 
-def stuck(rough: Solver, lines: Iterable[int], first: SystemState, shape: str, tally: Tally) -> Iterator[Attempt]:
+def stuck(rough: Solver, lines: Iterable[int], first: NetworkState, shape: str, tally: Tally) -> Iterator[Attempt]:
     """Where friction alone keeps these lines: they settle from their start, with friction, then Newton from there."""
     out = first.copy()
     for k in lines:
@@ -189,7 +189,9 @@ def stuck(rough: Solver, lines: Iterable[int], first: SystemState, shape: str, t
     yield Attempt(f"settled with friction from {shape}", *tally.counted(rough.newton(rest)), rough)
 
 
-def pulled(smooth: Solver, rough: Solver, lines: Sequence[int], states: SystemState, tally: Tally) -> Iterator[Attempt]:
+def pulled(
+    smooth: Solver, rough: Solver, lines: Sequence[int], states: NetworkState, tally: Tally
+) -> Iterator[Attempt]:
     """These lines laid where they touch, without tension, along an equilibrium without friction, then pulled tight.
 
     Lines that a current acts on are laid in still water: what lies is held by friction before the current comes, and
@@ -212,7 +214,7 @@ def pulled(smooth: Solver, rough: Solver, lines: Sequence[int], states: SystemSt
         yield Attempt(f"{how}, while the current grows", *tally.counted(rough.newton(rest)), rough)
 
 
-def _in_still_water(smooth: Solver, states: SystemState, tally: Tally) -> SystemState | None:
+def _in_still_water(smooth: Solver, states: NetworkState, tally: Tally) -> NetworkState | None:
     """The equilibrium beside one in a current that there is without it.
 
     None: no current acts on lines, or there is none, as of one that floats.
@@ -225,8 +227,8 @@ def _in_still_water(smooth: Solver, states: SystemState, tally: Tally) -> System
 
 
 def in_slower_currents(
-    smooth: Solver, states: SystemState, parts: Sequence[float], tally: Tally
-) -> list[SystemState] | None:
+    smooth: Solver, states: NetworkState, parts: Sequence[float], tally: Tally
+) -> list[NetworkState] | None:
     """Equilibria that lead from one in a current to those in these parts of it, one from the other.
 
     None: a line has none, as one that floats.
@@ -285,7 +287,7 @@ class _Fall(NamedTuple):
     square: float
     shape: Floats
     line: int
-    states: SystemState
+    states: NetworkState
 
 
 class _Ways:
@@ -294,7 +296,7 @@ class _Ways:
     def __init__(self, solver: Solver, tally: Tally) -> None:
         self.solver, self.tally = solver, tally
         self.first: Outcome | None = None  # of the first attempt
-        self._flawed: list[tuple[int, SystemState]] = []  # the line that is, -1: a point, and the states
+        self._flawed: list[tuple[int, NetworkState]] = []  # the line that is, -1: a point, and the states
         self._pushed = self._seen = 0
 
     def _noted(self, how: str, solution: Solution, real: bool = True) -> Attempt:
@@ -305,15 +307,15 @@ class _Ways:
             self._flawed.append((taken.line, states))
         return Attempt(how, taken, states, self.solver, real)
 
-    def _are_same(self, one: SystemState, other: SystemState) -> bool:
+    def _are_same(self, one: NetworkState, other: NetworkState) -> bool:
         apart = max(float(np.abs(a.r - b.r).max()) for a, b in zip(one.lines, other.lines, strict=True))
         return apart <= SAME * self.solver.length
 
-    def newton(self, how: str, start: SystemState) -> Attempt:
+    def newton(self, how: str, start: NetworkState) -> Attempt:
         """Newton's method from a start."""
         return self._noted(how, self.tally.counted(self.solver.newton(start)))
 
-    def eased(self, states: SystemState, place: str) -> Attempt:
+    def eased(self, states: NetworkState, place: str) -> Attempt:
         """Continuation from an easy sea to the real one: soft bed and obstacles, little current, little bending.
 
         A part of the way that fails is halved.
@@ -340,7 +342,7 @@ class _Ways:
         easy += ["little bending"] if any(x.line.element.any() for x in solver.lines) else []
         return self._noted(f"from {', '.join(easy)} in {steps} steps{place}", (taken, found), last)
 
-    def hardened(self, start: SystemState, place: str) -> Attempt:
+    def hardened(self, start: NetworkState, place: str) -> Attempt:
         """From soft and short lines, stretched by their start, to the real ones: they sag from any start.
 
         The starting shapes are under the tension scale at a strain of 1.  First cells get their real length, so that
@@ -368,7 +370,7 @@ class _Ways:
         what = "soft lines" if len(solver.lines) > 1 else "a soft line"
         return self._noted(f"{what} hardened in {steps} steps{place}", (taken, found), goal == 1.0)
 
-    def loaded(self, start: SystemState) -> Iterator[Attempt]:
+    def loaded(self, start: NetworkState) -> Iterator[Attempt]:
         """End loads and moments applied in steps, each solved with turning chords, where the solver has these."""
         for steps in LOAD_STEPS:
             states = start
@@ -386,7 +388,7 @@ class _Ways:
             how = f"turning chords, end loads in {steps} step{'s' * (steps > 1)}"
             yield self._noted(how, (taken, states), k == steps)
 
-    def settled(self, start: SystemState, name: str) -> Attempt:
+    def settled(self, start: NetworkState, name: str) -> Attempt:
         """A damped motion to rest, then Newton's method."""
         rest, calm = relaxed(self.solver, start, self.tally)
         taken, states = self.tally.counted(self.solver.newton(rest))
@@ -426,7 +428,7 @@ class _Ways:
                     rest, _ = relaxed(solver, out, self.tally, longest)
                     yield self.newton(f"{PUSHED}, along its softest motion", rest)
 
-    def _fall(self, line: int, states: SystemState) -> _Fall:
+    def _fall(self, line: int, states: NetworkState) -> _Fall:
         """The softest motion of a line between its ends."""
         x = self.solver.lines[line]
         ends = x.ends._replace(held=np.minimum(x.ends.held, 1))
@@ -450,7 +452,7 @@ def _harder(x: JoinedLine, goal: float, short: Floats) -> JoinedLine:
     return x._replace(line=line._replace(h=h, ck=ck, bits=line.bits & ~AXIAL_LAW, law_at=NO_ADDRESS))
 
 
-def _taut(solver: Solver, taken: SystemTaken, states: SystemState) -> Solution:
+def _taut(solver: Solver, taken: NetworkTaken, states: NetworkState) -> Solution:
     """What balances, with the outcome SLACK where a catenary is not under tension."""
     for k, (x, state) in enumerate(zip(solver.lines, states.lines, strict=True)):
         tension, cell = lowest_tension(x.line, x.sea, state)
@@ -465,7 +467,7 @@ def _time_scale(solver: Solver) -> float:
     return float(np.sqrt(mass * solver.length / solver.scale))
 
 
-def relaxed(solver: Solver, start: SystemState, tally: Tally, longest: float = 0.0) -> tuple[SystemState, bool]:
+def relaxed(solver: Solver, start: NetworkState, tally: Tally, longest: float = 0.0) -> tuple[NetworkState, bool]:
     """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until lines hardly move; whether they did.
 
     longest: s, of the steps; at least the time scale.  Sheaves are held: without friction nothing turns them.

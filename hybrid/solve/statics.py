@@ -23,7 +23,7 @@ from hybrid.solve.flaws import (
     flaw_of_lines,
     slack_cell,
 )
-from hybrid.solve.joined import JoinedLine, LineFailed, SystemState, SystemTaken
+from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, NetworkTaken
 from hybrid.solve.search import (
     PULLED,
     PUSHED,
@@ -101,19 +101,19 @@ class LineSolver:
         """As of `Solver`."""
         return LineSolver(lines[0])
 
-    def newton(self, start: SystemState) -> Solution:
+    def newton(self, start: NetworkState) -> Solution:
         """As of `Solver`: an equilibrium out of which a rod would buckle is none that anybody will see."""
         return self._judged(start, *self._balance(start, False, True))
 
-    def turned(self, start: SystemState) -> Solution:
+    def turned(self, start: NetworkState) -> Solution:
         """As of `Solver`."""
         return self._judged(start, *self._balance(start, True, True))
 
-    def balance(self, start: SystemState) -> Solution:
+    def balance(self, start: NetworkState) -> Solution:
         """As of `Solver`, as far as Newton's method says so."""
         return self._balance(start, False, False)
 
-    def _judged(self, start: SystemState, taken: SystemTaken, new: SystemState) -> Solution:
+    def _judged(self, start: NetworkState, taken: NetworkTaken, new: NetworkState) -> Solution:
         """What was found, with what makes it no equilibrium."""
         if taken.outcome != Outcome.OK:
             return taken, new
@@ -127,7 +127,7 @@ class LineSolver:
                 outcome, where = Outcome.UNSTABLE, int(np.argmin(new.lines[0].T))
         return replace(taken, outcome=outcome, where=int(where)), new
 
-    def _balance(self, start: SystemState, turning: bool, proves: bool) -> Solution:
+    def _balance(self, start: NetworkState, turning: bool, proves: bool) -> Solution:
         (line, sea, ends, *_), total = self.lines[0], 0
         new = start.lines[0].copy()
         stop(new)
@@ -149,7 +149,7 @@ class LineSolver:
             if outcome != Outcome.OK or not proves:
                 break
             # Newton stops by turns and tensions; a very stiff seabed makes much force of little way
-            states = SystemState([new])
+            states = NetworkState([new])
             if not self.is_balanced(states, self.proof(states)):
                 outcome, where = Outcome.NOT_CONVERGED, int(self.work.report[RESIDUAL_NODE])
             elif kept is not None or not line.bits & FRICTION:
@@ -158,10 +158,10 @@ class LineSolver:
                 kept = new.copy()
         if kept is not None and outcome != Outcome.OK:
             outcome, new = Outcome.OK, kept
-        return SystemTaken(Outcome(outcome), total, np.inf, 0, int(where), np.inf), SystemState([new])
+        return NetworkTaken(Outcome(outcome), total, np.inf, 0, int(where), np.inf), NetworkState([new])
 
     def step(
-        self, old: SystemState, new: SystemState, dt: float, rho: float, before: float, rho_before: float
+        self, old: NetworkState, new: NetworkState, dt: float, rho: float, before: float, rho_before: float
     ) -> Taken:
         """As of `Solver`."""
         x = self.lines[0]
@@ -169,7 +169,7 @@ class LineSolver:
             self._stepper = Stepper(x.line, x.length, x.scale)
         return self._stepper.step(x.sea, x.ends, old.lines[0], new.lines[0], dt, rho, before, rho_before)
 
-    def proof(self, states: SystemState) -> float:
+    def proof(self, states: NetworkState) -> float:
         """As of `Solver`; infinity when it cannot be told."""
         (line, sea, ends, *_), state = self.lines[0], states.lines[0]
         if line.bits & FRICTION:
@@ -178,7 +178,7 @@ class LineSolver:
         bad = entry.assembly(line, sea, ends, state, 0.0, self.anchor, self.work)
         return float(self.work.report[RESIDUAL]) if bad < 0 else float("inf")
 
-    def is_balanced(self, states: SystemState, residual: float) -> bool:
+    def is_balanced(self, states: NetworkState, residual: float) -> bool:
         """As of `Solver`."""
         return residual <= BALANCED * (float(np.abs(states.lines[0].T).max()) + self.scale)
 
@@ -226,12 +226,12 @@ def solve_statics(
     x = JoinedLine(line._replace(bits=bits), sea, ends, length, scale, floor, (-1, -1), borne=search.borne)
     without = x._replace(line=line._replace(bits=bits & ~FRICTION), slackens=search.take_slack)
     rough, smooth = LineSolver(x), LineSolver(without)  # with friction a slack solution is not taken
-    first, tally = SystemState([start]), Tally()
-    others = [(name, SystemState([other])) for name, other in search.others]
+    first, tally = NetworkState([start]), Tally()
+    others = [(name, NetworkState([other])) for name, other in search.others]
     settle = "start" if rubs and not ends.held.any() else search.settle if rubs else ""
     refused = search.refused
 
-    def not_sought(states: SystemState) -> tuple[Outcome, int, int]:
+    def not_sought(states: NetworkState) -> tuple[Outcome, int, int]:
         outcome, where = refused(states.lines[0]) if refused is not None else (Outcome.OK, -1)
         return outcome, 0, where
 

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import as_scene_or_system, parse_either, text_of
 from hybrid.scene.schema import Scene
 from hybrid.scene.study import MOST_CASES, TAKEN, Study
-from hybrid.scene.system import System
 from hybrid.studies.csv_table import read_table
 from hybrid.studies.expressions import evaluated
 from hybrid.studies.sensitivity import DESIGNS, design

@@ -20,14 +20,14 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, take_arcs
 from hybrid.kernels.state.state import no_sea
 from hybrid.outputs.probes import Observer
-from hybrid.simulation import initial_zones, system_cells
+from hybrid.simulation import initial_zones, run_cells
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.initial_zones import shares_asked
 from hybrid.simulation.lines_cells import LineCells
 from hybrid.simulation.old_checkpoints import zoning_of_today
-from hybrid.simulation.system_zones import SystemZones
+from hybrid.simulation.run_zones import RunZones
+from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.run import CompiledRun
-from hybrid.solve.system_steps import SystemSteps
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # A line that touches down, its upper end heaving; the layer at the touchdown is 0.4 m long and goes to and fro over 20 m.
@@ -213,13 +213,13 @@ def test_a_line_that_is_watched_changes_its_cells_in_arrays_made_once(monkeypatc
         "model": {"kind": "adaptive", "curvature_error": 0.03},
         "output": {"every": 2, "points": 501, "errors": False},
     })  # fmt: skip
-    changed, changes = [], SystemZones._switch
+    changed, changes = [], RunZones._switch
 
-    def switch_line(self: SystemZones, line: Any, how: Change, here: Any = None) -> None:
+    def switch_line(self: RunZones, line: Any, how: Change, here: Any = None) -> None:
         changed.append(how.same and self._run.lines[0].envelope.itself.on)
         changes(self, line, how, here)
 
-    monkeypatch.setattr(SystemZones, "_switch", switch_line)
+    monkeypatch.setattr(RunZones, "_switch", switch_line)
     once = hybrid.run(scene)
     by_python = sum(changed)
     monkeypatch.setattr(LineCells, "may_change", lambda *_: False)
@@ -292,7 +292,7 @@ def test_what_is_held_after_a_change_is_what_binding_would_give(monkeypatch: pyt
 def test_a_run_seldom_returns_from_compiled_code(short: hybrid.Result, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only where zones change, a step fails or buffers are full; with a return for every change the run is the same."""
     calls = []
-    for steps in (CompiledRun, SystemSteps):
+    for steps in (CompiledRun, NetworkSteps):
 
         def go(self: Any, *given, goes: Any = steps.go) -> int:
             calls.append(self)
@@ -320,7 +320,7 @@ def test_cells_that_become_one_in_a_layer_do_not_kick_the_end_force(monkeypatch:
         raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "no equilibrium on longer cells")
 
     monkeypatch.setattr(initial_zones, "_on_planned_cells", nowhere)
-    monkeypatch.setattr(system_cells, "_on_planned_cells", nowhere)
+    monkeypatch.setattr(run_cells, "_on_planned_cells", nowhere)
     result = hybrid.run(
         bight()
         | {

@@ -14,7 +14,7 @@ from problems import Scene, pinned, scene
 import hybrid
 from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.simulation import initial_zones
-from hybrid.simulation.system_kinds import SystemKinds
+from hybrid.simulation.run_kinds import RunKinds
 
 BUSY = ["deep", "bend", "point", "edge"]
 PULLS = ("end_force_start", "end_force_end")
@@ -181,8 +181,8 @@ def test_compiled_reviews_and_switches_are_those_of_python(
     if share is not None:
         monkeypatch.setattr(initial_zones, "shares_asked", lambda *_: {CURVATURE: share})
     found = []
-    for applies in (SystemKinds.apply, lambda *_: False):
-        monkeypatch.setattr(SystemKinds, "apply", applies)
+    for applies in (RunKinds.apply, lambda *_: False):
+        monkeypatch.setattr(RunKinds, "apply", applies)
         found.append(hybrid.run(SCENES[name]()))
     one, other = found
     assert changes(one) and one.events == other.events

@@ -15,15 +15,15 @@ import yaml
 
 import hybrid
 from hybrid import Result, Scene
+from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import first_resolution
-from hybrid.model.system import SystemResolution
 from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.short_form import LINE, network_of
 from hybrid.simulation.case import Case
+from hybrid.simulation.network_run import NetworkRun, Recording
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_file import Cable
-from hybrid.simulation.system_run import Recording, SystemRun
 from hybrid.store.array_recorder import Target
 from hybrid.store.reader import open_result
 from hybrid.store.writer import WriteMode
@@ -67,15 +67,17 @@ def both(tables: dict[str, Any], rest: bool = False) -> tuple[Result, Result]:
     return compute(scene), compute(network_of(scene))
 
 
-def network_run(scene: Scene, target: Target, changes: Sequence[LoadChange[Scene]] = (), **recording: Any) -> SystemRun:
+def network_run(
+    scene: Scene, target: Target, changes: Sequence[LoadChange[Scene]] = (), **recording: Any
+) -> NetworkRun:
     """The run of the network of a cable, which gets the file of that; recording: fields of `Recording`."""
     asked = Recording(**{"mode": WriteMode({}), "planes": True, "cable": Cable(scene, changes)} | recording)
-    resolution = None if asked.source is not None else SystemResolution({LINE: first_resolution(scene)})
+    resolution = None if asked.source is not None else NetworkResolution({LINE: first_resolution(scene)})
     others = [LoadChange(x.t, network_of(x.scene)) for x in changes]
-    return SystemRun(network_of(scene), target, scene_text(scene), True, resolution, asked, None, others)
+    return NetworkRun(network_of(scene), target, scene_text(scene), True, resolution, asked, None, others)
 
 
-def recorded(run: SystemRun, looks: int | None = None) -> SystemRun:
+def recorded(run: NetworkRun, looks: int | None = None) -> NetworkRun:
     """A run to its end; looks: after as many reports of its progress it is interrupted."""
     left = itertools.count(0 if looks is None else -looks)
     with nullcontext() if looks is None else suppress(KeyboardInterrupt):

@@ -10,7 +10,7 @@ from hybrid.designs import network_at_rest
 from hybrid.designs.numbers import changed_scene, with_number
 from hybrid.designs.sensitivity import at_rest
 from hybrid.model.nearby_clamped import seats_know_no_shape, shaped_anew
-from hybrid.model.system import SystemResolution, bodies_of, build_system
+from hybrid.model.network import NetworkResolution, bodies_of, build_system
 from hybrid.scene.read import as_scene_or_system
 from tests.designs.test_system_derivatives import ANCHORS, BUOY, CHAIN, HOSE, SEA, moored
 
@@ -171,7 +171,7 @@ def test_arrays_of_clamped_lines_are_those_of_lines_that_are_built_anew(what, mo
 def test_lines_that_are_built_alone_are_those_of_the_whole(what):
     tables, _, _ = SCENES[what]
     system = as_scene_or_system(tables)
-    resolution = SystemResolution.first(system)
+    resolution = NetworkResolution.first(system)
     whole = build_system(system, resolution)
     model, seats = shaped_anew(system, ["hose"], bodies_of(system), resolution)["hose"]
     theirs, l = whole.models[whole.names.index("hose")], whole.names.index("hose")

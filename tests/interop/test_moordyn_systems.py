@@ -16,9 +16,9 @@ from hybrid.interop.moordyn import import_moordyn
 from hybrid.interop.moordyn.bodies import angles_of, rotation_of
 from hybrid.interop.moordyn.cables import _rotated
 from hybrid.scene.bodies import turned
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import FixedPoint, FreePoint
 from hybrid.scene.read import parse_either
-from hybrid.scene.system import System
 
 # A riser over a buoyant section, held by a tether: rods without length join its sections, a body the tether.
 RISER = """\

@@ -13,8 +13,8 @@ from test_moordyn_systems import RISER
 import hybrid
 from hybrid.interop.moordyn import export_moordyn, import_moordyn
 from hybrid.interop.moordyn.writer import deck_of
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import parse_either, scene_text
-from hybrid.scene.system import System
 
 
 class Straight:

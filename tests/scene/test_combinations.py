@@ -13,9 +13,9 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene import combinations as c
 from hybrid.scene.combinations import REFUSALS, Use, refuse_use
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import parse_either
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 from tests.problems import tables_with
 
 CABLE: dict[str, Any] = {

@@ -13,6 +13,7 @@ from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS, SUSPE
 
 from hybrid.errors import SceneError
 from hybrid.scene import yaml_nodes, yaml_source
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import as_scene, load_scene, parse_either, parse_scene, scene_text, validate_scene
 from hybrid.scene.schema import (
     Cable,
@@ -33,7 +34,6 @@ from hybrid.scene.schema import (
     ZonesModel,
     missing_time,
 )
-from hybrid.scene.system import System
 
 ALL = [SUSPENSION, OCEAN, EVERYTHING, EVERYTHING_ELSE, AT_REST, *SEAS.values()]
 

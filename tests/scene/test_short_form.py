@@ -8,11 +8,11 @@ import pytest
 
 from hybrid.errors import SceneError
 from hybrid.scene.base import Finding
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.read import as_scene, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.schema import Ends, Scene
 from hybrid.scene.short_form import LINE, POINTS, network_of, short_form
-from hybrid.scene.system import System
 from tests.combinations.pairs import CLAMP, END, FEATURES, START, scene_of
 from tests.problems import tables_with
 

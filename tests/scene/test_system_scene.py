@@ -9,10 +9,10 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene.bodies import FixedBody, FreeBody, Hydrostatics
-from hybrid.scene.network import JoinedLine, SystemOutput
+from hybrid.scene.network import JoinedLine, NetworkOutput
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
 from hybrid.scene.read import parse_either, scene_text
-from hybrid.scene.system import System
 
 PAGE = Path(__file__).parents[2] / "docs" / "scene.md"
 TEXT = """\
@@ -118,7 +118,7 @@ def test_points_farther_apart_than_lines_reach_are_refused_with_the_line() -> No
 
 
 @pytest.mark.parametrize(
-    "table", [FixedPoint, FreePoint, Fairlead, FixedBody, FreeBody, Hydrostatics, JoinedLine, SystemOutput]
+    "table", [FixedPoint, FreePoint, Fairlead, FixedBody, FreeBody, Hydrostatics, JoinedLine, NetworkOutput]
 )
 def test_every_key_is_on_the_page(table: type) -> None:
     page = PAGE.read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ import pytest
 import hybrid
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.scene.read import as_scene
-from hybrid.simulation import system_lines
+from hybrid.simulation import line_result
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample
 
@@ -68,7 +68,7 @@ def test_a_pre_run_ends_before_the_run_at_places_of_its_own() -> None:
 def test_an_output_does_not_depend_on_those_that_are_looked_at_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     case = Case(as_scene(SCENE | {"model": "catenary"}), None)
     together = sample(case)
-    monkeypatch.setattr(system_lines, "WAITING", 1)
+    monkeypatch.setattr(line_result, "WAITING", 1)
     assert_same(together, sample(case))
 
 

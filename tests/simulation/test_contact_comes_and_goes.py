@@ -13,7 +13,7 @@ import hybrid
 import hybrid.solve.self_contact
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.step.accept import MANY, collapses
-from hybrid.simulation import system_contact, system_run
+from hybrid.simulation import network_run, run_contact
 
 GIVEN_UP, COLLAPSE = "contact given up", "steps collapse"
 
@@ -29,9 +29,9 @@ def test_it_comes_and_goes_with_the_legs(monkeypatch: pytest.MonkeyPatch) -> Non
 
         def noted(moving: Any, *more: Any, name: str = name) -> None:
             happened.append((name, moving.t))
-            getattr(system_contact, name)(moving, *more)
+            getattr(run_contact, name)(moving, *more)
 
-        monkeypatch.setattr(system_run, name, noted)
+        monkeypatch.setattr(network_run, name, noted)
     sway = {"surge": {"amplitude": 0.26, "period": 2.0}, "ramp": 4.0}
     ends = {
         "start": {"kind": "pinned", "position": [0, 0, 0]},
@@ -112,13 +112,13 @@ def hanging(**output: Any) -> dict[str, Any]:
 @pytest.fixture
 def longest(monkeypatch: pytest.MonkeyPatch) -> None:
     """All runs have made a very long step."""
-    begin = system_run.SystemRun.begin_motion
+    begin = network_run.NetworkRun.begin_motion
 
-    def after_a_long_step(self: system_run.SystemRun) -> None:
+    def after_a_long_step(self: network_run.NetworkRun) -> None:
         begin(self)
         self.loop.clock.longest = 1e3
 
-    monkeypatch.setattr(system_run.SystemRun, "begin_motion", after_a_long_step)
+    monkeypatch.setattr(network_run.NetworkRun, "begin_motion", after_a_long_step)
 
 
 @pytest.mark.usefixtures("longest")

@@ -11,8 +11,8 @@ from test_system_contact import RUBS, TIME, system
 
 import hybrid
 from hybrid.simulation.case import Case
+from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.run_sample import RunSample
-from hybrid.simulation.system_run import SystemRun
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 
@@ -65,14 +65,14 @@ def test_a_tether_far_from_itself_does_not_stall() -> None:
 @pytest.mark.parametrize("duration", [0.1, TIME["duration"]])
 def test_those_of_a_system_likewise(duration: float, tail: str, monkeypatch: pytest.MonkeyPatch) -> None:
     contact: list[bool | None] = []
-    make = SystemRun.__init__
+    make = NetworkRun.__init__
 
-    def noted(self: SystemRun, given: Any, target: Any, text: Any, moves: bool, *args: Any, **more: Any) -> None:
+    def noted(self: NetworkRun, given: Any, target: Any, text: Any, moves: bool, *args: Any, **more: Any) -> None:
         if moves:
             contact.append(given.lines["hose"].contact.self)
         make(self, given, target, text, moves, *args, **more)
 
-    monkeypatch.setattr(SystemRun, "__init__", noted)
+    monkeypatch.setattr(NetworkRun, "__init__", noted)
     scene = system(contact={"friction": RUBS["friction"]})
     scene |= {"time": {**TIME, "duration": duration}, "output": {"every": 0.1, "points": 21, "errors": True}}
     scene["lines"]["tail"] |= {"model": tail, "mesh": {"cells": 20}}

@@ -141,5 +141,5 @@ def test_a_line_that_is_joined_to_nothing_asks_for_no_solver_of_joined_ones(
     taking = KeptCode.taking
     monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
     hybrid.run(KINDS[kind])
-    assert "run.system.solve_system" not in called
+    assert "run.network.solve_system" not in called
     assert ("run.run.in_space" in called) == (kind == "rod in space")

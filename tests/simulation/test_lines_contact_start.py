@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.model.system import build_system
-from hybrid.simulation import system_checkpoint
-from hybrid.simulation.system_contact import gives_up_contact
+from hybrid.model.network import build_system
+from hybrid.simulation import run_checkpoint
+from hybrid.simulation.run_contact import gives_up_contact
 from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, crossing, lowered
 from tests.validation.test_validation_obstacles_of_lines import system_of
 
@@ -311,15 +311,15 @@ def test_other_loads_change_nothing_of_what_touches(begun: Any, tmp_path: Path) 
 
 def write_as_before(patch: pytest.MonkeyPatch) -> None:
     """Let runs be those of a version that computed no contact between lines without being asked."""
-    content = system_checkpoint.content
+    content = run_checkpoint.content
 
     def as_before(run: Any) -> dict[str, Any]:
         kept = content(run)
         kept["state"] = {key: x for key, x in kept["state"].items() if key not in ("let_pass", "between")}
         return kept
 
-    patch.setattr("hybrid.model.system.that_may_meet", lambda *_: ())
-    patch.setattr("hybrid.simulation.system_run.content", as_before)
+    patch.setattr("hybrid.model.network.that_may_meet", lambda *_: ())
+    patch.setattr("hybrid.simulation.network_run.content", as_before)
 
 
 @pytest.mark.long  # 1.0 s

@@ -12,7 +12,7 @@ from test_system_contact import CLOSER, HOSE, LOW, RUBS
 from test_winch_of_joined import floating
 
 import hybrid
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.network_solver import NetworkSolver
 
 Tables = dict[str, Any]
 ROPE = {"mass": 2.0, "diameter": 0.04, "axial_stiffness": 2e5, "damping": {"mass": 0.2}}
@@ -77,14 +77,14 @@ def scene(*parts: Tables, duration: float = 1.0, step: float = 0.02, **more: Any
 def groups(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
     """Numbers of the lines that one Newton solves, whenever other ones are."""
     found: list[list[int]] = []
-    group = SystemSolver._group
+    group = NetworkSolver._group
 
-    def noted(solver: SystemSolver) -> None:
+    def noted(solver: NetworkSolver) -> None:
         group(solver)
         if [solver.joined] != found[-1:]:
             found.append(solver.joined)
 
-    monkeypatch.setattr(SystemSolver, "_group", noted)
+    monkeypatch.setattr(NetworkSolver, "_group", noted)
     return found
 
 
@@ -137,7 +137,7 @@ def test_a_line_that_touches_itself_is_solved_by_itself(groups: list[list[int]])
         assert np.abs(cable[key] - both.lines["hose"][key]).max() <= 1e-9 * scale, key
 
 
-def all_together(solver: SystemSolver, *_: Any) -> None:
+def all_together(solver: NetworkSolver, *_: Any) -> None:
     """Every line that may touch what is free moves with it always."""
     solver._near[solver._mixes] = -1
 
@@ -158,7 +158,7 @@ def test_a_body_that_comes_to_touch_a_line_moves_with_it(
     hybrid.run(part, tmp_path / "part.h5", progress=False).close()
     again = hybrid.resume(tmp_path / "part.h5", until=4.0)
     same(again, found, ["pendant", "taut", "a"])
-    monkeypatch.setattr(SystemSolver, "find_near", all_together)
+    monkeypatch.setattr(NetworkSolver, "find_near", all_together)
     together = hybrid.run(tables)
     assert groups[-1] == [0, 1, 2, 3]
     for name, x in together.lines.items():

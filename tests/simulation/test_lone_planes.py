@@ -15,7 +15,7 @@ from test_system_contact import HOSE
 import hybrid
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.scene.short_form import network_of
-from hybrid.solve.system import SystemSolver
+from hybrid.solve.network_solver import NetworkSolver
 from tests.combinations.networks import differences, events_differ
 
 Tables = dict[str, Any]
@@ -25,13 +25,13 @@ Tables = dict[str, Any]
 def flat(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
     """Numbers of the lines whose steps are made in a plane, of each solver of a motion."""
     found: list[list[int]] = []
-    take_turns = SystemSolver.take_turns
+    take_turns = NetworkSolver.take_turns
 
-    def noted(solver: SystemSolver, states: Any) -> dict[str, Any]:
+    def noted(solver: NetworkSolver, states: Any) -> dict[str, Any]:
         found.append([k for k in solver.lone if solver.lines[k].line.bits & PLANAR])
         return take_turns(solver, states)
 
-    monkeypatch.setattr(SystemSolver, "take_turns", noted)
+    monkeypatch.setattr(NetworkSolver, "take_turns", noted)
     return found
 
 

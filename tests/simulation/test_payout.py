@@ -16,10 +16,10 @@ from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import SceneError
 from hybrid.model.payout_law import law_of, length_at
 from hybrid.scene.payout import Payout
-from hybrid.simulation import system_lines
+from hybrid.simulation import line_result
+from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.lines_nodes import LineNodes
 from hybrid.simulation.outputs_aside import OutputsAside
-from hybrid.simulation.system_lines import LineResult
 from tests.inside import OnlyLine
 
 G = 9.81
@@ -594,7 +594,7 @@ def test_outputs_looked_at_together_are_those_looked_at_one_by_one(model: str, m
     assert max(calls) > 5  # nodes enter about every 3 s, with six outputs between
     monkeypatch.setattr(LineNodes, "may_change", lambda *_: False)
     monkeypatch.setattr(LineResult, "outputs_join", False)
-    monkeypatch.setattr(system_lines, "WAITING", 1)
+    monkeypatch.setattr(line_result, "WAITING", 1)
     alone = hybrid.run(scene)
     for name in (x for x in together.names if x != "steps/cpu" and together[x].dtype.kind == "f"):
         for other in (again, alone):

@@ -14,14 +14,14 @@ from test_late_file import described
 from typer.testing import CliRunner
 
 import hybrid
-from hybrid.accuracy import error_control, passes, system_accuracy
+from hybrid.accuracy import error_control, passes, passes_of_lines
 from hybrid.accuracy.refinement import Verdict
 from hybrid.cli.commands import app
 from hybrid.cli.console import Console
 from hybrid.errors import ComputationError, Outcome
+from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
-from hybrid.model.system import SystemResolution
-from hybrid.simulation import system_cells, system_run
+from hybrid.simulation import network_run, run_cells
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
 from hybrid.simulation.static_case import StaticCase
@@ -63,18 +63,18 @@ def rougher(resolution: Resolution) -> Resolution:
 @pytest.fixture
 def rough(monkeypatch: pytest.MonkeyPatch) -> None:
     """First results that are far too coarse for what is asked, so that finer ones follow."""
-    one, several = passes.Passes._surveyed, system_accuracy.SystemPasses.surveyed
+    one, several = passes.Passes._surveyed, passes_of_lines.PassesOfLines.surveyed
 
     def of_one(self: passes.Passes, resolution: Resolution) -> tuple[Any, Resolution]:
         choice, found = one(self, resolution)
         return choice, rougher(found)
 
-    def of_several(self: system_accuracy.SystemPasses, first: SystemResolution) -> SystemResolution:
-        return SystemResolution({name: rougher(x) for name, x in several(self, first).lines.items()})
+    def of_several(self: passes_of_lines.PassesOfLines, first: NetworkResolution) -> NetworkResolution:
+        return NetworkResolution({name: rougher(x) for name, x in several(self, first).lines.items()})
 
-    monkeypatch.setattr(system_run, "LOOK", 1)
+    monkeypatch.setattr(network_run, "LOOK", 1)
     monkeypatch.setattr(passes.Passes, "_surveyed", of_one)
-    monkeypatch.setattr(system_accuracy.SystemPasses, "surveyed", of_several)
+    monkeypatch.setattr(passes_of_lines.PassesOfLines, "surveyed", of_several)
 
 
 def fixed() -> dict[str, Any]:
@@ -150,7 +150,7 @@ def test_whoever_looks_at_it_is_told(
 @pytest.mark.long
 def test_stopped_in_the_errors_of_fixed_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Stopping(monkeypatch)
-    monkeypatch.setattr(system_run, "LOOK", 1)
+    monkeypatch.setattr(network_run, "LOOK", 1)
     hybrid.run(fixed(), tmp_path / "whole.h5").close()
     stopped_in(ESTIMATION, fixed(), tmp_path / "run.h5")
     with hybrid.open(tmp_path / "run.h5") as result:
@@ -195,7 +195,7 @@ def test_stopped_in_the_result_what_there_is_goes_on(
 
 @pytest.mark.long
 @pytest.mark.usefixtures("rough")
-@pytest.mark.parametrize("module", [passes, system_accuracy])
+@pytest.mark.parametrize("module", [passes, passes_of_lines])
 def test_errors_are_written_before_a_long_finer_run(
     module: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -267,7 +267,7 @@ def test_a_stop_is_heard_while_the_equilibrium_is_searched(
         os.kill(os.getpid(), signal.SIGINT)
         reached.append("the end of a long search")
 
-    monkeypatch.setattr(system_cells, "equilibrium_of_system", long)
+    monkeypatch.setattr(run_cells, "equilibrium_of_system", long)
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(scene, tmp_path / "run.h5")
     assert not reached and not list(tmp_path.iterdir())

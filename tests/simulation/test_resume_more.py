@@ -12,11 +12,11 @@ import pytest
 from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
-import hybrid.simulation.system_run
+import hybrid.simulation.network_run
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.short_form import network_of
-from hybrid.simulation import case, initial_zones, restore, system_zones
+from hybrid.simulation import case, initial_zones, restore
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, lock
 from hybrid.store import writer as record
@@ -127,8 +127,8 @@ def test_changes_are_made_at_their_time_however_often_it_is_stopped(name, form, 
         return scene if form is None else form(scene)
 
     more = {"settings": ["environment.fluid.current=[0.4, 0.2, 0]"], "start": 3.0}
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     hybrid.run(lasting(6), tmp_path / "long.h5").close()
     hybrid.resume(tmp_path / "long.h5", tmp_path / "anew.h5", **more).close()
     hybrid.run(lasting(2), tmp_path / "begun.h5").close()
@@ -315,9 +315,9 @@ def test_a_full_disk_loses_nothing(part, tmp_path):
         import resource
         from hybrid.cli.commands import main
         from hybrid.store import writer as record
-        import hybrid.simulation.system_run
+        import hybrid.simulation.network_run
         import hybrid.solve.run
-        hybrid.simulation.system_run.WORK = 0
+        hybrid.simulation.network_run.WORK = 0
         record._PART = 0.0
         record.pause = lambda made: 0.0
         hybrid.solve.run.CELL_STEPS = 1
@@ -515,8 +515,8 @@ def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
 
 def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeypatch):
     """By the work done: a run whose file is flushed at every pause has the same ones as one that never is."""
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 20 * 40)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 20 * 40)  # 40 steps of 20 cells
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 20 * 40)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 20 * 40)  # 40 steps of 20 cells
     monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 20 * 7)  # a pause every 7 steps
     places, kept, keep = [], [], record.Recorder.checkpoint
 
@@ -555,7 +555,7 @@ def test_zones_that_are_fixed_stay_so(tmp_path, monkeypatch):
             manager.held = True
             return manager
 
-        for module in (initial_zones, system_zones):
+        for module in (initial_zones, run_zones):
             patch.setattr(module, "manager_for", held)
         whole = hybrid.run(lasting(30.0))
         hybrid.run(lasting(15.0), tmp_path / "short.h5").close()

@@ -12,8 +12,8 @@ import hybrid
 from hybrid.accuracy.run_forecast import _grown
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import ComputationError, Outcome
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import as_scene_or_system
-from hybrid.scene.system import System
 
 SECTION = {"length": 10.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5}
 HEAVE = {"position": [9, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period": 0.8}, "ramp": 1.6}}

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from hybrid.errors import ComputationError
+from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import first_resolution
-from hybrid.model.system import SystemResolution
 from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.short_form import LINE, network_of
 from hybrid.simulation.case import Case
+from hybrid.simulation.network_run import NetworkRun, Recording
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_file import Cable
 from hybrid.simulation.static_case import StaticCase
-from hybrid.simulation.system_run import Recording, SystemRun
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.reader import open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE
@@ -105,8 +105,8 @@ def test_a_file_at_rest_is_that_of_a_cable(tmp_path: Path) -> None:
     scene = exact_scene(tables_with(scene_of("seabed"), {"time": None, "output.every": None} | QUANTITIES))
     cable, network = tmp_path / "cable.h5", tmp_path / "network.h5"
     StaticCase(scene).record(first_resolution(scene), cable)
-    resolution = SystemResolution({LINE: first_resolution(scene)})
-    run = SystemRun(network_of(scene), network, scene_text(scene), False, resolution, Recording(cable=Cable(scene)))
+    resolution = NetworkResolution({LINE: first_resolution(scene)})
+    run = NetworkRun(network_of(scene), network, scene_text(scene), False, resolution, Recording(cable=Cable(scene)))
     run.record_equilibrium()
     assert files_differ(cable, network) == []
 

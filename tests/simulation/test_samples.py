@@ -11,7 +11,7 @@ import pytest
 
 import hybrid
 import hybrid.solve.run
-from hybrid.simulation import system_lines
+from hybrid.simulation import line_result
 from hybrid.store.recorder import BaseRecorder
 
 ROD = {
@@ -138,7 +138,7 @@ def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(BaseRecorder, "save_batch", counted)
     many = hybrid.run(scene)
     assert max(batches) > 20  # while lengths or bending are on their way, outputs do not wait
-    monkeypatch.setattr(system_lines, "WAITING", 1)
+    monkeypatch.setattr(line_result, "WAITING", 1)
     batches.clear()
     one = hybrid.run(scene)
     assert set(batches) == {1}

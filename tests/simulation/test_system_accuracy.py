@@ -12,15 +12,15 @@ import pytest
 from bits import Stopping, differences
 
 import hybrid
-import hybrid.simulation.system_run
-from hybrid.accuracy import system_accuracy, system_errors
+import hybrid.simulation.network_run
+from hybrid.accuracy import errors_of_lines, passes_of_lines
 from hybrid.accuracy.finer_result import NOT_KEPT, Replacement
+from hybrid.accuracy.passes_of_lines import PassesOfLines
 from hybrid.accuracy.refinement import Verdict
-from hybrid.accuracy.system_accuracy import SystemPasses
 from hybrid.errors import ComputationError
-from hybrid.model.system import SystemResolution
+from hybrid.model.network import NetworkResolution
 from hybrid.scene.analysis import RodModel
-from hybrid.scene.system import System
+from hybrid.scene.network_scene import System
 from hybrid.simulation import progress as reports
 
 LEG = {"length": 70, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
@@ -102,7 +102,7 @@ def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> 
 def test_a_stopped_run_goes_on_bit_for_bit(
     result: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
     monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
     monkeypatch.setattr(hybrid.accuracy.refinement, "LITTLE", np.inf)  # an event that goes by clocks
     path = tmp_path / "stopped.h5"
@@ -151,7 +151,7 @@ def test_errors_of_leaving_bending_out_against_fine_rods(bends: dict[str, Any], 
     rods = fine_rods()
     for name, line in found.lines.items():
         assert "model error not estimated" not in {e.kind for e in line.events}
-        for quantity, called in system_errors.COMPARED.items():
+        for quantity, called in errors_of_lines.COMPARED.items():
             if quantity not in line:
                 continue
             wrong = line[quantity] - rods.lines[name][quantity]
@@ -167,7 +167,7 @@ def test_errors_of_leaving_bending_out_against_fine_rods(bends: dict[str, Any], 
 def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = bridle(accuracy=None, time={"duration": 0.5, "step": 0.05})
     scene["lines"]["tow"] |= {"model": "catenary", "accuracy": "2%"}
-    computed = system_accuracy.run_system
+    computed = passes_of_lines.run_system
 
     def without_rods(system: System, *x: Any, **more: Any) -> Any:
         if isinstance(system.lines["tow"].model, RodModel):
@@ -175,7 +175,7 @@ def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> 
         return computed(system, *x, **more)
 
     with monkeypatch.context() as patched:
-        patched.setattr(system_accuracy, "run_system", without_rods)
+        patched.setattr(passes_of_lines, "run_system", without_rods)
         found = hybrid.run(scene)
     tow = verdicts(found.lines["tow"])
     assert tow["position"]["met"] is None and tow["position"]["error"] < tow["position"]["asked"]
@@ -185,7 +185,7 @@ def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> 
     def result_alone(*x: Any) -> Any:
         return computed(*x) if "result" in x else fails()
 
-    monkeypatch.setattr(system_accuracy, "run_system", result_alone)
+    monkeypatch.setattr(passes_of_lines, "run_system", result_alone)
     found = hybrid.run(scene)
     assert all(x["met"] is None and x["error"] is None for x in verdicts(found.lines["tow"]).values())
     assert {"no error figure"} <= {e.kind for e in found.events}
@@ -224,7 +224,7 @@ def test_a_finer_run_that_is_no_better_is_not_kept(how: str, tmp_path: Path, mon
     if how == "failed":
         monkeypatch.setattr(Replacement, "finer", fails)
     else:
-        monkeypatch.setattr(system_accuracy, "is_no_better", lambda *_: Verdict(2.0, 1.0, 0.0, 0.0, "no use"))
+        monkeypatch.setattr(passes_of_lines, "is_no_better", lambda *_: Verdict(2.0, 1.0, 0.0, 0.0, "no use"))
     with hybrid.static(scene, path) as found:
         for name, line in found.lines.items():
             assert int(line.attributes["cells"]) < cells[name]
@@ -240,7 +240,7 @@ def test_cells_that_find_no_equilibrium_are_halved(
     part: float, times: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Those of the first run to compare with, and those of the result, as of one cable."""
-    scene, computed = bridle(accuracy="10%"), system_accuracy.static_system
+    scene, computed = bridle(accuracy="10%"), passes_of_lines.static_system
     del scene["time"]
     with hybrid.static(scene) as plain:
         fineness = float(plain.lines["tow"].attributes["effort_fineness"])
@@ -250,7 +250,7 @@ def test_cells_that_find_no_equilibrium_are_halved(
             raise ComputationError(hybrid.errors.Outcome.UNSTABLE, None, 0.0)
         return computed(system, target, text, resolution, *more)
 
-    monkeypatch.setattr(system_accuracy, "static_system", finds_rest)
+    monkeypatch.setattr(passes_of_lines, "static_system", finds_rest)
     with hybrid.static(scene, tmp_path / "rest.h5") as found:
         assert all(x["met"] for line in found.lines.values() for x in verdicts(line).values())
         assert found.lines["tow"].attributes["effort_fineness"] == times * fineness
@@ -280,13 +280,13 @@ def test_a_finer_result_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: py
         "output": {"every": 0.1},
         "accuracy": "0.05%",
     }
-    surveyed = SystemPasses.surveyed
+    surveyed = PassesOfLines.surveyed
 
-    def rougher(self: SystemPasses, first: SystemResolution) -> SystemResolution:
+    def rougher(self: PassesOfLines, first: NetworkResolution) -> NetworkResolution:
         found = surveyed(self, first).lines
-        return SystemResolution({n: replace(x.coarser(8.0), local=10 * (x.local or 0.0)) for n, x in found.items()})
+        return NetworkResolution({n: replace(x.coarser(8.0), local=10 * (x.local or 0.0)) for n, x in found.items()})
 
-    monkeypatch.setattr(SystemPasses, "surveyed", rougher)
+    monkeypatch.setattr(PassesOfLines, "surveyed", rougher)
     Stopping(monkeypatch)
     seen: list[float] = []
 

@@ -16,9 +16,9 @@ from test_system_payout_zones import as_system
 from test_system_zones import ROPE, SEA, mooring, slackening, stepped_again
 
 import hybrid
-import hybrid.simulation.system_run
+import hybrid.simulation.network_run
 from hybrid.simulation.lines_cells import LineCells
-from hybrid.solve.system_steps import SystemSteps
+from hybrid.solve.network_steps import NetworkSteps
 from tests.said import line_of, said
 from tests.validation.test_validation_lines_contact import force_between, lowered
 
@@ -68,8 +68,8 @@ def test_cells_change_without_python_as_those_of_a_cable(model: Tables, monkeypa
     tables = yaml.safe_load(TOUCHDOWN.read_text()) | {
         "model": model, "mesh": {"cells": 24}, "time": {"duration": 8.0, "step": 0.1}, "output": {"every": 0.1},
     }  # fmt: skip
-    calls, go = [], SystemSteps.go
-    monkeypatch.setattr(SystemSteps, "go", lambda steps: (calls.append(1), go(steps))[1])
+    calls, go = [], NetworkSteps.go
+    monkeypatch.setattr(NetworkSteps, "go", lambda steps: (calls.append(1), go(steps))[1])
     cable, whole = hybrid.run(said(tables, network=False)), hybrid.run(said(tables, network=True))
     line, compiled = line_of(whole), len(calls)
     assert cells(line) == cells(cable) and len({*cells(cable)}) > 3
@@ -129,8 +129,8 @@ def test_against_rods(three: hybrid.Result) -> None:
 def test_a_stopped_run_goes_on_bit_for_bit(
     three: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
     stopping.left = 70
     with pytest.raises(KeyboardInterrupt):

@@ -14,8 +14,8 @@ from test_system_contact_zones import system as adaptive
 
 import hybrid
 import hybrid.model.build
+from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.stepping import Simulation
-from hybrid.simulation.system_run import SystemRun
 
 RUNS_ON = {"friction": RUBS["friction"]}
 NAMES = ("position", "tension", "self_contact", "energy/self_contact", "work/friction")
@@ -46,13 +46,13 @@ def test_it_is_the_run_that_asks_for_contact(whole: Path) -> None:
 
 def test_nothing_is_computed_before_a_line_is_near_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[float] = []
-    make = SystemRun.make_solver
+    make = NetworkRun.make_solver
 
-    def counted(run: SystemRun) -> None:
+    def counted(run: NetworkRun) -> None:
         make(run)
         begun.extend(run.t for x in run.lines if x.contact is not None)
 
-    monkeypatch.setattr(SystemRun, "make_solver", counted)
+    monkeypatch.setattr(NetworkRun, "make_solver", counted)
     result = hybrid.run(system(contact=RUNS_ON), progress=False)
     touched = next(x.t for x in result.events if x.kind == "line touches itself")
     (since,) = begun

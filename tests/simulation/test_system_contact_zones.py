@@ -10,7 +10,7 @@ import pytest
 from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
-import hybrid.simulation.system_run
+import hybrid.simulation.network_run
 
 WIDTH = 0.02
 HOSE = {
@@ -90,8 +90,8 @@ def test_ends_that_are_led_through_each_other_are_told(alone_or_not: Any) -> Non
 def test_a_stopped_run_goes_on_bit_for_bit(
     whole: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     stopping, path, scene = Stopping(monkeypatch), tmp_path / "run.h5", system(0.0, 5.0)
     for k, stop in enumerate([290, 70, -1]):  # in contact
         stopping.left = stop

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.accuracy import system_errors
+from hybrid.accuracy import errors_of_lines
 from hybrid.errors import ComputationError
 from hybrid.store.limits import extreme_errors
 
@@ -81,7 +81,7 @@ def test_quantities_of_lines_have_errors_of_all_steps(more: dict[str, Any]) -> N
 
 def test_coarser_cells_keep_what_is_fixed() -> None:
     system = hybrid.System.model_validate(mooring())
-    other = system_errors.coarser(system)
+    other = errors_of_lines.coarser(system)
     nodes = other.lines["hose"].mesh.nodes
     assert 37.0 in np.round(nodes, 9) and len(nodes) <= 23 and (nodes[0], nodes[-1]) == (0.0, 100.0)
     assert len(other.lines["west"].mesh.nodes) == 11
@@ -101,7 +101,7 @@ def test_where_a_coarser_run_fails_an_event_says_so(monkeypatch: pytest.MonkeyPa
     def fails(system: hybrid.System) -> hybrid.System:
         raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
 
-    monkeypatch.setattr(system_errors, "longer_steps", fails)
+    monkeypatch.setattr(errors_of_lines, "longer_steps", fails)
     found = hybrid.run(mooring(errors=True) | {"time": {"duration": 1.0, "step": 0.1}})
     assert [e.kind for e in found.events].count("no error figure") == 1
     assert found.status == "complete" and "error_total_position" not in found.attributes

@@ -10,7 +10,7 @@ import pytest
 from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
-import hybrid.simulation.system_run
+import hybrid.simulation.network_run
 from hybrid.errors import SceneError
 
 SECTION = {"length": 12.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 20.0}
@@ -172,8 +172,8 @@ def test_a_mooring_of_a_body_breaks() -> None:
 @pytest.mark.long
 def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped before the break, between two breaks and after both."""
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     stopping = Stopping(monkeypatch)
     points = {"left": {"break_at": {"time": 0.8}}}
     made = scene({"b": {"break_at": {"time": 0.5}}}, points, time={"duration": 1.0, "step": 0.01})

@@ -12,7 +12,7 @@ from bits import FEW_STEPS, Stopping, differences
 from test_system_resume import clamped, mooring, spar
 
 import hybrid
-import hybrid.simulation.system_run
+import hybrid.simulation.network_run
 from hybrid.errors import SceneError
 from tests.combinations.pairs import as_network, scene_of
 from tests.problems import tables_with
@@ -79,8 +79,8 @@ def test_changes_are_made_at_their_time_however_often_it_is_stopped(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another current from 1 s on: computed anew, from a checkpoint at 1 s, and stopped on the way; one motion."""
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     scene = tables_with(SCENES[name](), {"time.duration": 2.0, "output.every": 0.5})
     long, anew, begun = (tmp_path / f"{x}.h5" for x in ("long", "anew", "begun"))
     hybrid.run(scene, long).close()

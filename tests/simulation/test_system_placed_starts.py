@@ -11,7 +11,7 @@ from bits import FEW_STEPS, Stopping, differences
 from scipy.optimize import brentq
 
 import hybrid
-import hybrid.simulation.system_run
+import hybrid.simulation.network_run
 from hybrid.errors import SceneError
 from tests.problems import tables_with
 
@@ -85,8 +85,8 @@ def test_an_inextensible_rope_let_go_level_falls_and_swings_as_one_cable() -> No
 def test_a_run_from_such_a_start_goes_on_bit_for_bit_and_steps_from_outside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     stopping = Stopping(monkeypatch)
     scene = between_springs(**{"lines.upper.model": "adaptive", "output.exact": True, "time.duration": 0.2})
     whole, part = tmp_path / "whole.h5", tmp_path / "part.h5"

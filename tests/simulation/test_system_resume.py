@@ -14,7 +14,7 @@ import pytest
 from bits import FEW_STEPS, Stopping, differences, went_on
 
 import hybrid
-import hybrid.simulation.system_run
+import hybrid.simulation.network_run
 from hybrid.errors import ResultError, SceneError
 from tests.combinations.pairs import as_network, scene_of
 
@@ -111,8 +111,8 @@ SCENES = {"mooring": mooring(), "spar": spar(), "clamped": clamped()}
 @pytest.fixture
 def stopping(monkeypatch: pytest.MonkeyPatch) -> Stopping:
     """Hears of every step, with a checkpoint every few and where the run is stopped."""
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     return Stopping(monkeypatch)
 
 
@@ -174,7 +174,7 @@ def test_a_run_goes_on_beyond_its_end_as_if_it_had_been_that_long(tmp_path: Path
 @pytest.mark.long
 def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every line has an output as soon as the points have it; extremes are those up to now."""
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 0)  # the file is written whenever the run looks
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 0)  # the file is written whenever the run looks
     monkeypatch.setattr(hybrid.simulation.progress, "REPORT_EVERY", 0.0)
     path, seen = tmp_path / "run.h5", []
 
@@ -194,14 +194,14 @@ def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping, mo
 KILLED = """
 import os, signal, sys, threading
 import hybrid
-from hybrid.simulation import progress, system_run
+from hybrid.simulation import progress, network_run
 
 def kill(progress):
     if progress.step >= int(step):
         threading.Timer(float(later), os.kill, (os.getpid(), signal.SIGKILL)).start()
 
 scene, path, step, later = sys.argv[1:]
-system_run.WORK, progress.REPORT_EVERY = 3000, -1.0
+network_run.WORK, progress.REPORT_EVERY = 3000, -1.0
 hybrid.run(scene, path, progress=kill)
 """
 
@@ -209,7 +209,7 @@ hybrid.run(scene, path, progress=kill)
 @pytest.mark.slow
 def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Some ms after a step that is drawn, so that it is not always between two steps."""
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 3000)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 3000)
     scene, whole = tmp_path / "float.yaml", tmp_path / "whole.h5"
     scene.write_text(hybrid.scene_text(hybrid.System.model_validate(mooring(time=LONG))))
     hybrid.run(scene, whole).close()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-import hybrid.simulation.system_run
+import hybrid.simulation.network_run
 from hybrid.simulation import progress
 
 ROPE = {
@@ -100,7 +100,7 @@ def test_outputs_and_buffers_do_not_shape_the_motion(monkeypatch: pytest.MonkeyP
     """The same bits at the same times, whatever other outputs there are, and however few of them a buffer takes."""
     many = hybrid.run(moored(0.03, 0.02, 1.2))
     few = hybrid.run(moored(0.03, 0.08, 1.2))
-    monkeypatch.setattr(hybrid.simulation.system_run, "WAITING", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WAITING", 1)
     assert_same(many, hybrid.run(moored(0.03, 0.02, 1.2)))
     assert np.array_equal(many.lines["up"]["steps/dt"], few.lines["up"]["steps/dt"])
     mine = fields(many)
@@ -119,8 +119,8 @@ def test_a_run_that_stops_between_outputs_goes_on_bit_for_bit(
     if automatic:
         scene["time"] = {"duration": 0.9}
         scene["accuracy"] = {"tension": "5%"}
-    monkeypatch.setattr(hybrid.simulation.system_run, "ROWS", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "ROWS", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 1)
     monkeypatch.setattr(progress, "REPORT_EVERY", -1.0)
     whole, path, heard = tmp_path / "whole.h5", tmp_path / "run.h5", 0
     hybrid.run(scene, whole).close()

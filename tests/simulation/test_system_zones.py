@@ -12,9 +12,9 @@ import pytest
 from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
-import hybrid.simulation.system_run
+import hybrid.simulation.network_run
 from hybrid.errors import SceneError
-from hybrid.simulation.system_kinds import SystemKinds
+from hybrid.simulation.run_kinds import RunKinds
 
 ROPE = {
     "length": 60, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100,
@@ -119,8 +119,8 @@ def test_fibre_ropes_keep_their_mean_tensions_when_zones_change(
 ) -> None:
     """As one cable does, and resumed to the bit."""
     cable, scene = of_fibres()
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     stopping, whole, path = Stopping(monkeypatch), tmp_path / "whole.h5", tmp_path / "run.h5"
     hybrid.run(scene, whole, progress=stopping).close()
     stopping.left = stopping.heard // 2
@@ -175,16 +175,16 @@ def test_kinds_that_change_in_the_arrays_of_a_run_are_those_of_a_new_solver(
     make: Callable[[], dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """To the last bit; events of one step may come in another order."""
-    made, change = list[int](), SystemKinds.change
+    made, change = list[int](), RunKinds.change
 
-    def counted(kinds: SystemKinds, number: int, *what: Any) -> Any:
+    def counted(kinds: RunKinds, number: int, *what: Any) -> Any:
         made.append(number)
         return change(kinds, number, *what)
 
-    monkeypatch.setattr(SystemKinds, "change", counted)
+    monkeypatch.setattr(RunKinds, "change", counted)
     one = hybrid.run(make(), tmp_path / "one.h5")
     assert len(made) > 10
-    monkeypatch.setattr(SystemKinds, "apply", staticmethod(lambda *_: False))
+    monkeypatch.setattr(RunKinds, "apply", staticmethod(lambda *_: False))
     other = hybrid.run(make(), tmp_path / "other.h5")
     events = [sorted((e.t, e.s_a, e.kind, e.text) for e in x.events) for x in (one, other)]
     assert events[0] == events[1]
@@ -230,8 +230,8 @@ def test_against_rods(three: hybrid.Result) -> None:
 def test_a_stopped_run_goes_on_bit_for_bit(
     three: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
     for k, stop in enumerate([70, 60, -1]):
         stopping.left = stop
@@ -343,8 +343,8 @@ def test_a_resumed_run_asks_the_same_criterion(tmp_path: Path, monkeypatch: pyte
     """It is the run that was not stopped, bit for bit; without the criterion it is refused."""
     _, system = slackening(duration=0.6)
     whole, path = tmp_path / "whole.h5", tmp_path / "run.h5"
-    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
 
     def criterion(look: hybrid.NodeState) -> np.ndarray:
         return np.where((look.s > 20) & (look.s < 30) & (look.t > 0.2), 1.5, 0.0)

@@ -15,9 +15,9 @@ from hybrid.errors import Outcome, SceneError
 from hybrid.kernels.junctions import bodies as k
 from hybrid.model.bodies import angles_of, body_model, frame_of
 from hybrid.scene.bodies import FreeBody
-from hybrid.simulation.system_run import SystemRun
-from hybrid.solve.joined import SystemState
-from hybrid.solve.system import SystemSolver
+from hybrid.simulation.network_run import NetworkRun
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 
 LEG = {"mass": 0.05, "diameter": 0.002, "axial_stiffness": 5e6}
 MASS, ADDED, HEAVE = 5e5, (2e5, 2e5, 3e5, 2e6, 2e6, 1e6), 8e5
@@ -115,15 +115,15 @@ def test_damping_takes_the_energy_that_it_says() -> None:
 # --- rotations -----------------------------------------------------------------------------------------
 
 
-def spun(rho: float, steps: int) -> tuple[SystemSolver, SystemState, list[np.ndarray]]:
+def spun(rho: float, steps: int) -> tuple[NetworkSolver, NetworkState, list[np.ndarray]]:
     """A torque-free body that tumbles about its middle axis, beside a line that it does not touch."""
-    run = SystemRun(hybrid.System.model_validate(moored()), io.BytesIO(), "", moves=False)
+    run = NetworkRun(hybrid.System.model_validate(moored()), io.BytesIO(), "", moves=False)
     x = run.found.solver.lines[0]
     ends = x.ends._replace(held=np.ones(2, np.int8), position=run.found.state.lines[0].r[[0, -1]])
     held = x._replace(joints=(-1, -1), ends=ends)
     body = FreeBody(initial_guess=(0, 0, 0), mass=4.0, inertia=(1.0, 2.0, 3.0), centre=(0.2, 0.1, -0.3))
-    solver = SystemSolver([held], 0, body_model("stone", body, 0.0, 0.0).numbers[None])
-    state = SystemState([run.found.state.lines[0].copy()], run.found.state.bodies.copy())
+    solver = NetworkSolver([held], 0, body_model("stone", body, 0.0, 0.0).numbers[None])
+    state = NetworkState([run.found.state.lines[0].copy()], run.found.state.bodies.copy())
     state.bodies[0, k.V : k.V + 3], state.bodies[0, k.W : k.W + 3] = [0.3, -0.2, 0.1], [0.2, 1.5, 0.1]
     assert solver.consistent_accelerations(state, [np.zeros((2, 3))]).outcome == Outcome.OK
     new, dt, before, momenta = state.copy(), 2.0 / steps, 0.0, []

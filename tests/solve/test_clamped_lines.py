@@ -16,7 +16,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.bodies import frame_of
 from hybrid.model.build import build
-from hybrid.simulation.system_run import SystemRun
+from hybrid.simulation.network_run import NetworkRun
 from hybrid.solve.statics import solve_statics
 
 LENGTH, CELLS, A, B = 100.0, 40, [0.0, 0.0, 0.0], [70.0, 10.0, -20.0]
@@ -65,8 +65,8 @@ def in_pieces(
     return {"environment": WATER, "points": points, "lines": lines, "output": {"points": 2}}
 
 
-def equilibrium(tables: dict[str, Any]) -> SystemRun:
-    return SystemRun(hybrid.System.model_validate(tables), io.BytesIO(), "", moves=False)
+def equilibrium(tables: dict[str, Any]) -> NetworkRun:
+    return NetworkRun(hybrid.System.model_validate(tables), io.BytesIO(), "", moves=False)
 
 
 def test_offsets_of_a_point_to_which_lines_are_clamped() -> None:

@@ -9,8 +9,8 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome
-from hybrid.model.system import build_system
-from hybrid.simulation.system_start import equilibrium_of_system
+from hybrid.model.network import build_system
+from hybrid.simulation.run_start import equilibrium_of_system
 from hybrid.solve.contact_stability import ContactStability, contact_stiffness
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.search import PUSHED

@@ -246,7 +246,7 @@ def test_friction_that_cannot_settle_is_neglected_with_a_word(several: bool, mon
     failed = ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "")
     of = (lambda x: next(iter(hybrid.static(buoy(x)).lines.values()))) if several else (lambda x: static(anchored(x)))
     plain = of("neglected")
-    name = "system_start.settled_with_friction" if several else "equilibrium.pulled_from"
+    name = "run_start.settled_with_friction" if several else "equilibrium.pulled_from"
     monkeypatch.setattr(f"hybrid.simulation.{name}", fails)
     found = of(None)
     np.testing.assert_array_equal(found.tension, plain.tension)

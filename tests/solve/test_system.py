@@ -13,11 +13,11 @@ import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import Model, build
-from hybrid.simulation.system_run import SystemRun
-from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
+from hybrid.simulation.network_run import NetworkRun
+from hybrid.solve.joined import JoinedLine, NetworkState, joined_ends
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper
-from hybrid.solve.system import SystemSolver
 
 LENGTH, CELLS = 100.0, 40
 A, B = np.zeros(3), np.array([70.0, 10.0, -20.0])
@@ -59,7 +59,7 @@ class Cut:
             held, scale = joined_ends(model.ends.at(np.inf), joints), model.tension_scale
             lines.append(JoinedLine(model.line, model.sea.at(np.inf), held, model.length, scale, -np.inf, joints))
             self.start.append(model.start)
-        self.solver = SystemSolver(lines, len(cuts))
+        self.solver = NetworkSolver(lines, len(cuts))
 
     def apart(self, states: Sequence[Any], name: str, state: Any) -> float:
         """Largest difference of an array of nodes or cells from that of the line in one piece."""
@@ -82,7 +82,7 @@ class Cut:
 def test_a_line_cut_at_any_node_is_the_same_line(kind: str, cuts: list[int], flips: tuple[int, ...]) -> None:
     """Statics to 1e-9 of the length, Newton from places 0.6 m off; a step in motion to Newton's tolerance."""
     cut = Cut(kind, cuts, flips)
-    taken, found = cut.solver.newton(SystemState(cut.start))
+    taken, found = cut.solver.newton(NetworkState(cut.start))
     states = found.lines
     assert taken.outcome == Outcome.OK and taken.iterations <= 12
     assert taken.residual < 1e-9 * np.abs(cut.state.T).max()
@@ -111,7 +111,7 @@ def test_a_line_cut_at_any_node_is_the_same_line(kind: str, cuts: list[int], fli
 def test_what_consistent_accelerations_are() -> None:
     """A heavy point let go: cut and uncut lines accelerate alike, on both sides of the cut."""
     cut = Cut("catenary", [16], (0, 0))
-    _, found = cut.solver.newton(SystemState(cut.start))
+    _, found = cut.solver.newton(NetworkState(cut.start))
     states = found.lines
     state = cut.state.copy()
     state.v[:, 2] = np.sin(np.pi * cut.whole.line.s / LENGTH)
@@ -130,11 +130,11 @@ def test_what_consistent_accelerations_are() -> None:
 # --- closed forms --------------------------------------------------------------------------------------
 
 
-def equilibrium(tables: dict[str, Any]) -> SystemRun:
+def equilibrium(tables: dict[str, Any]) -> NetworkRun:
     """The equilibrium of a system, not yet written."""
     import io
 
-    return SystemRun(hybrid.System.model_validate(tables), io.BytesIO(), "", moves=False)
+    return NetworkRun(hybrid.System.model_validate(tables), io.BytesIO(), "", moves=False)
 
 
 def test_a_bridle_without_weight_against_its_force_polygon() -> None:

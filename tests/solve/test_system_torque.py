@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.step.newton import TOLERANCE
-from hybrid.simulation import system_stiffness
+from hybrid.simulation import lines_stiffness
 
 LENGTH, CELLS, GJ = 40.0, 40, 150.0
 SECTION = {
@@ -312,6 +312,6 @@ def test_stiffness_between_equilibria_is_that_of_the_factors(monkeypatch: pytest
     scene["environment"] = {"gravity": 9.81}
     scene["bodies"]["body"]["force"] = {"value": [0, 200, 300.0]}
     exact = hybrid.stiffness(scene, "body:body").matrix
-    monkeypatch.setattr(system_stiffness, "_needs_equilibria", lambda solver: True)
+    monkeypatch.setattr(lines_stiffness, "_needs_equilibria", lambda solver: True)
     found = hybrid.stiffness(scene, "body:body").matrix
     assert np.abs(found - exact).max(axis=0) == pytest.approx(0.0, abs=1e-5 * np.abs(exact).max())

@@ -8,8 +8,8 @@ import hybrid
 from hybrid.accuracy import api
 from hybrid.errors import ResultError
 from hybrid.simulation.case import Case
-from hybrid.simulation.system_kinds import SystemKinds
-from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation.line_result import LineResult
+from hybrid.simulation.run_kinds import RunKinds
 
 
 def swinging(model, **more):
@@ -73,7 +73,7 @@ def test_the_mesh_of_zones_that_move(monkeypatch, tmp_path):
     output = LineResult.output
     monkeypatch.setattr(LineResult, "output", shown)
     monkeypatch.setattr(api, "Case", Spy)
-    monkeypatch.setattr(SystemKinds, "apply", lambda *_: False)  # outputs of other zones are recorded one by one
+    monkeypatch.setattr(RunKinds, "apply", lambda *_: False)  # outputs of other zones are recorded one by one
     result = hybrid.run(swinging("adaptive"), tmp_path / "run.h5")
     kinds = {tuple(mesh.kinds) for mesh in result.mesh}
     assert len(kinds) > 3 and len(result.mesh) == len(result.times) == len(seen)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.simulation import system_run
-from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation import network_run
+from hybrid.simulation.line_result import LineResult
 from hybrid.store import array_recorder, writer
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget
 from hybrid.store.header import Header
@@ -51,7 +51,7 @@ def test_outputs_of_lines_are_made_together(monkeypatch: pytest.MonkeyPatch) -> 
 
     The clock is asked between compiled steps: here after five outputs, or all of the run would wait in their buffer.
     """
-    monkeypatch.setattr(system_run, "ROWS", 5)
+    monkeypatch.setattr(network_run, "ROWS", 5)
     rope = {"length": 101.0, "mass": 5.0, "diameter": 0.03, "axial_stiffness": 1e6}
     points = {"a": {"position": [0, 0, 0]}, "b": {"position": [100, 0, 0]}}
     points["b"]["motion"] = {"heave": {"amplitude": 0.5, "period": 5.0}, "ramp": 10.0}

@@ -18,13 +18,13 @@ from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.obstacle_rows import EACH, FORCE, STIFFNESS
 from hybrid.model.bodies import body_model
 from hybrid.model.build import build
-from hybrid.model.system import build_system
+from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody, turned
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import as_scene_or_system
-from hybrid.scene.system import System
-from hybrid.simulation.system_start import joined_lines
-from hybrid.solve.joined import JoinedLine, SystemState
-from hybrid.solve.system import SystemSolver
+from hybrid.simulation.run_start import joined_lines
+from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 
 RADIUS, STRAND, SPAN, APART, MASS = 0.6, 0.01, 10.0, 0.2, 20.0
 Tables = dict[str, Any]
@@ -415,17 +415,17 @@ def thrown(friction: float, step: float) -> tuple[Any, list[float], Any, float]:
         model.line, model.sea.at(0.0), model.ends.at(0.0), model.length, model.tension_scale, -np.inf, (-1, -1),
         rides=np.zeros(1, np.int64),
     )  # fmt: skip
-    solver = SystemSolver([x], 0, one.numbers[None])
+    solver = NetworkSolver([x], 0, one.numbers[None])
     books = [blank_books(60)]
     books[0].clock.shortest = 1e-9
     solver.keep_books(books)
     row = np.zeros((1, STATE))
     row[0] = one.start
     row[0, W : W + 3] = (0.5, -1.0, 2.0)
-    old = SystemState([state], row)
+    old = NetworkState([state], row)
     solver.consistent_accelerations(old, [np.zeros((2, 3))])
 
-    def momenta(states: SystemState) -> Any:
+    def momenta(states: NetworkState) -> Any:
         line, b = states.lines[0], states.bodies[0]
         R, p = b[FRAME:V].reshape(3, 3), model.line.mass[:, None] * line.v
         both = one.numbers[:36].reshape(6, 6) @ np.concatenate([R.T @ b[V : V + 3], b[W : W + 3]])
@@ -433,7 +433,7 @@ def thrown(friction: float, step: float) -> tuple[Any, list[float], Any, float]:
         turning = np.cross(line.r, p).sum(axis=0) + np.cross(b[PLACE:FRAME], linear) + angular
         return np.concatenate([p.sum(axis=0) + linear, turning])
 
-    def energy(states: SystemState) -> float:
+    def energy(states: NetworkState) -> float:
         line, b, parts = states.lines[0], states.bodies[0], np.zeros(5)
         room = np.zeros((61, 3))
         observe(
@@ -478,8 +478,8 @@ def test_newtons_method_converges_quadratically() -> None:
     system = as_scene_or_system(pushed())
     assert isinstance(system, System)
     model = build_system(system)
-    solver = SystemSolver(joined_lines(model, 0.0), 0, model.body_numbers(0.0))
-    start = SystemState([x.start for x in model.models], model.body_places).copy()
+    solver = NetworkSolver(joined_lines(model, 0.0), 0, model.body_numbers(0.0))
+    start = NetworkState([x.start for x in model.models], model.body_places).copy()
     start.bodies[0, PLACE + 2] = 0.574  # 2 mm deep
     start.bodies[0, W : W + 3] = (1.0, -3.0, 2.0)
     left = []

@@ -18,14 +18,14 @@ from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import PLACE, V, W
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.obstacle_rows import STIFFNESS
-from hybrid.model.system import build_system
+from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import as_scene_or_system
-from hybrid.scene.system import System
 from hybrid.simulation.lines_contact import shared_of
-from hybrid.simulation.system_start import joined_lines
-from hybrid.solve.joined import SystemState
-from hybrid.solve.system import SystemSolver
+from hybrid.simulation.run_start import joined_lines
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 from tests.validation.test_validation_body_contact import MASS, on_two_lines, pushed
 from tests.validation.thrown_lines import WIDTH, straight, throw
 
@@ -245,12 +245,12 @@ def test_newtons_method_converges_quadratically(mass: float) -> None:
     model = build_of(tables)
     lines, found = joined_lines(model, 0.0), []
     for most in (3, 4, 5, 12):
-        solver = SystemSolver(lines, 0, model.body_numbers(0.0), shared=shared_of(model))
+        solver = NetworkSolver(lines, 0, model.body_numbers(0.0), shared=shared_of(model))
         books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
         for each in books:
             each.clock.shortest = np.inf
         solver.keep_books(books)
-        start = SystemState([x.start for x in model.models], model.body_places).copy()
+        start = NetworkState([x.start for x in model.models], model.body_places).copy()
         start.lines[0].r[:, 2] -= 0.0035  # to the edge of contact with the lower line, and 6 mm into the ball
         start.bodies[0, PLACE + 2] = 0.6125
         start.bodies[0, V + 2], start.bodies[0, W : W + 3] = -1.0, (1.0, -3.0, 2.0)

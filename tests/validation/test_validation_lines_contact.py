@@ -17,11 +17,11 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.junctions.lines_distance import APART, HAVE_MET
 from hybrid.kernels.state.books import Clock
-from hybrid.model.system import build_system
+from hybrid.model.network import build_system
 from hybrid.simulation.lines_contact import LinesWatch
-from hybrid.simulation.system_start import joined_lines
-from hybrid.solve.joined import SystemState
-from hybrid.solve.system import SystemSolver
+from hybrid.simulation.run_start import joined_lines
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 from tests.simulation.test_system_contact import HOSE, system
 from tests.validation.test_validation_obstacles_of_lines import system_of
 from tests.validation.thrown_lines import WIDTH as D
@@ -323,9 +323,9 @@ def test_legs_of_a_bridle_are_no_passage() -> None:
     }  # fmt: skip
     assert PASSAGE not in {e.kind for e in hybrid.run(tables).events}
     model = build_system(system_of(tables))
-    watch, solver = LinesWatch(system_of(tables), model, set(), Clock()), SystemSolver(joined_lines(model, 0.0), 1)
+    watch, solver = LinesWatch(system_of(tables), model, set(), Clock()), NetworkSolver(joined_lines(model, 0.0), 1)
     watch.attach(solver.line_tables)
-    solver.look_at(SystemState([x.start for x in model.models], model.body_places))
+    solver.look_at(NetworkState([x.start for x in model.models], model.body_places))
     assert not watch.begin(system_of(tables))  # they are looked at beyond the joint
 
 
@@ -375,10 +375,10 @@ def test_the_distance_of_lines_is_that_of_their_cells() -> None:
     tables = without_contact()
     model = build_system(system_of(tables))
     watch = LinesWatch(system_of(tables), model, set(), Clock())
-    solver = SystemSolver(joined_lines(model, 0.0), 0)
+    solver = NetworkSolver(joined_lines(model, 0.0), 0)
     watch.attach(solver.line_tables)
     for _ in range(5):
-        states = SystemState([x.start.copy() for x in model.models], model.body_places)
+        states = NetworkState([x.start.copy() for x in model.models], model.body_places)
         for x in states.lines:
             x.r[:] += 0.05 * random.normal(size=3) + 0.01 * random.normal(size=x.r.shape)
             x.r[:, 2] *= 0.3

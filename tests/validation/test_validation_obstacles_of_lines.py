@@ -11,9 +11,9 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.state.obstacle_rows import STIFFNESS
-from hybrid.model.system import build_system
+from hybrid.model.network import build_system
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import as_scene_or_system
-from hybrid.scene.system import System
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, Tables, drum, half_turn, over_pipe
 
 MU, WEIGHT = 0.3, 100.0

@@ -21,9 +21,9 @@ from hybrid.model.build import build
 from hybrid.model.lines_contact import Touching
 from hybrid.scene.bodies import FreeBody
 from hybrid.simulation.self_watch import diameters, least_bending
-from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.shared_contact import SharedContact, TouchingLine
-from hybrid.solve.system import SystemSolver
 
 Floats = NDArray[np.float64]
 WIDTH, STIFF = 0.02, 0.1
@@ -46,7 +46,7 @@ class Throw(NamedTuple):
     turning: Floats  # (2, 3) angular momentum likewise
     size: float  # kg m2/s, of that
     tries: int  # given up
-    states: SystemState
+    states: NetworkState
     shared: SharedContact
     model: list[Any]
     deepest: float  # in obstacles, nodes and chords, over what they may (kernels.laws.obstacles.depths_in_obstacles)
@@ -100,12 +100,12 @@ def throw(
     lines = [x._replace(line=touching.bits(x.line)) for x in lines]
     strands = [TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale) for x in models]
     shared = SharedContact(touching, strands)
-    solver = SystemSolver(lines, 0, numbers, shared=shared)
+    solver = NetworkSolver(lines, 0, numbers, shared=shared)
     books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
     for each in books:
         each.clock.shortest = 1e-9
     solver.keep_books(books)
-    old = SystemState(states, rows)
+    old = NetworkState(states, rows)
     solver.consistent_accelerations(old, [np.zeros((2, 3))] * count)
     new, t, before, rho, part, tries, deepest = old.copy(), 0.0, 0.0, 0.9, step, 0, -np.inf
     masses = [x.line.mass[:, None] for x in models]
@@ -136,7 +136,7 @@ def throw(
 
 
 def energy(
-    models: list[Any], states: SystemState, shared: SharedContact, lines: list[JoinedLine], bodies: Floats
+    models: list[Any], states: NetworkState, shared: SharedContact, lines: list[JoinedLine], bodies: Floats
 ) -> float:
     """Kinetic, elastic and contact energy, J, of lines and bodies."""
     total = float(shared.contact.numbers.energy)
@@ -158,7 +158,7 @@ def _rates(row: Floats) -> Floats:
     return np.concatenate([row[FRAME:V].reshape(3, 3).T @ row[V : V + 3], row[W : W + 3]])
 
 
-def of(models: list[Any], masses: list[Floats], states: SystemState, bodies: Floats) -> tuple[Floats, Floats]:
+def of(models: list[Any], masses: list[Floats], states: NetworkState, bodies: Floats) -> tuple[Floats, Floats]:
     """Momentum and angular momentum about the origin, with that of the sections and of bodies."""
     momentum, turning = np.zeros(3), np.zeros(3)
     for model, mass, x in zip(models, masses, states.lines, strict=True):
@@ -175,7 +175,7 @@ def of(models: list[Any], masses: list[Floats], states: SystemState, bodies: Flo
     return momentum, turning
 
 
-def nearest(before: SystemState, after: SystemState) -> float:
+def nearest(before: NetworkState, after: NetworkState) -> float:
     """The least distance, m, of the polygons of lines along straight ways of their nodes in a step."""
     least = np.inf
     for k, a in enumerate(before.lines):

@@ -260,7 +260,7 @@ def contact_task(table):
     """What is asked by `call[ASKED]` of the configuration old.r + work.u.
 
     PREPARE, LIMIT: the part of the prediction, of the correction work.x, that is safe; TOUCH: 1, or 0 where it fails; FIND: points of contact
-    alone, which kernels.junctions.system_contact solves for;
+    alone, which kernels.junctions.lines_contact solves for;
     RADIUS: the spectral radius of the step; GAIN: 1 where the try has put energy in and has to be repeated in halves,
     else 0; FINISH, and REST, where no step is tried: the energy of contact, J.
     """

@@ -16,7 +16,7 @@ Lines are eliminated (matrix A, all but P and Q) with bodies where they are, and
 y = Q x the rest is of rank 12 for every body that is touched: corrections are those without P and Q, less the responses
 to the columns of P times z and to unit forces on the bodies times y, and z and y solve a small dense system.  Its factors
 and the responses serve all corrections of an iteration: those that contact of lines makes of one are many.
-kernels.run.system and kernels.junctions.system_contact call `meet_bodies` by its address, so that systems without such bodies
+kernels.run.network and kernels.junctions.lines_contact call `meet_bodies` by its address, so that systems without such bodies
 compile none of it.
 """
 

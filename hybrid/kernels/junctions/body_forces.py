@@ -60,7 +60,7 @@ ORIGIN = (0.0, 0.0, 0.0)
 
 
 class MeetingJob(NamedTuple):
-    """Arguments of the entry: what kernels.run.system.solve_system works with, and room.
+    """Arguments of the entry: what kernels.run.network.solve_system works with, and room.
 
     S bodies with shapes, in slots; M obstacles; T nodes of all lines.
     """

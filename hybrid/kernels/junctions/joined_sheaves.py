@@ -4,7 +4,7 @@ Winches of joined lines are taken with them, and before them (kernels.junctions.
 
 Every line has the sheave among its obstacles, with its angle in its state, where all are the same.  M is the sum over the
 lines, p stands on the nodes of all, and z is how lines, points and bodies answer to it, with bodies that lines touch.
-kernels.run.system and kernels.junctions.system_contact call `spin_sheaves` by its address, so that systems without sheaves
+kernels.run.network and kernels.junctions.lines_contact call `spin_sheaves` by its address, so that systems without sheaves
 and such winches compile none of it.
 """
 
@@ -28,8 +28,8 @@ from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT
 from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions.joined_winches import draw_along, find_lengthenings, give_lengths
 from hybrid.kernels.junctions.junctions import HANDED, START
+from hybrid.kernels.junctions.network_job import NetworkTask
 from hybrid.kernels.junctions.right_sides import answer_right_sides
-from hybrid.kernels.junctions.system_job import SystemTask
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.sheaves import along, moments, roll_sheave
 from hybrid.kernels.machine.compile import called, inner, kernel
@@ -44,10 +44,10 @@ TURN, TURN_ALONG, ROLL_ON = range(3)
 
 
 class SpinningJob(NamedTuple):
-    """Arguments of the entry: what kernels.run.system.solve_system works with, and room."""
+    """Arguments of the entry: what kernels.run.network.solve_system works with, and room."""
 
     phase: NDArray[np.int64]  # (1,) what is asked
-    asked: SystemTask
+    asked: NetworkTask
     tables: NDArray[np.int64]
     joints: NDArray[np.int64]
     seats: Floats
@@ -82,7 +82,7 @@ def blank_spinning_job() -> SpinningJob:
     """A job with the types that every one has."""
     z, whole, one = np.zeros, np.int64, np.zeros(1, np.int64)
     return SpinningJob(
-        one, SystemTask(), z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), one,
+        one, NetworkTask(), z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), one,
         z((3, 1, SIZE)), z(FUNCTIONAL), z((COLUMNS, 1, SIZE)), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)),
         z((1, WORK)), z((HANDED - 1, HANDED)), z((2, 6, 6)), z((6, 2)), z(COLUMNS), one, one, z((2, SIZE)), z((1, 6)),
         z((1, 1, 6)), z((1, 1, SIZE)), z((1, 1, 6)), one,

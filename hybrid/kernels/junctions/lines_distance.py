@@ -53,7 +53,7 @@ class LinesJob(NamedTuple):
     joined: NDArray[np.int64]  # (L, 2) what the ends are joined to
     begins: NDArray[np.int64]  # (L,) where their cells begin in `width`
     width: Floats  # (N,) m, diameters of the cells of all lines
-    clock: Clock  # of all lines, as kernels.run.system_run.StepsJob has it
+    clock: Clock  # of all lines, as kernels.run.network_run.StepsJob has it
     pairs: NDArray[np.int64]  # (K, WATCHED)
     room: Floats  # (K, ROOM)
     moved: Floats  # (L, MOVED)

@@ -8,7 +8,7 @@ of it is solved by itself as without it.
 from __future__ import annotations
 
 from hybrid.kernels.algebra.rotations import get3
-from hybrid.kernels.junctions.system_job import read_system
+from hybrid.kernels.junctions.network_job import read_system
 from hybrid.kernels.laws.surfaces import is_far, surface
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.obstacle_rows import FREE, MEETS_FROM, MEETS_TO, ONSET_OF, PLACE, RADIUS, STRAND

@@ -15,7 +15,7 @@ call_meet = caller(0)
 def answer_right_sides(job, coupled):
     """Corrections of all lines and bodies to the right-hand sides in the eliminated lines; False: they are not finite.
 
-    job: as kernels.run.system.solve_system works with it, which has factored A in this iteration, with the address of
+    job: as kernels.run.network.solve_system works with it, which has factored A in this iteration, with the address of
     `meet_bodies`, 0: no body has a shape;
     coupled: whether the corrections of the iteration have been coupled to bodies that lines touch.
     """

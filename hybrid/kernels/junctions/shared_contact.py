@@ -50,7 +50,7 @@ class SharedJob(NamedTuple):
     lines: NDArray[np.int64]  # (K,) numbers of those that may touch
     begins: NDArray[np.int64]  # (K,) where their nodes begin
     starts: Floats  # (K,) m, their arc lengths as parts of the one line, less their own
-    joints: NDArray[np.int64]  # (L, 2) as kernels.junctions.system_job.SystemJob has it
+    joints: NDArray[np.int64]  # (L, 2) as kernels.junctions.network_job.NetworkJob has it
     inner: NDArray[np.int64]  # table of a ContactJob of them as one line
     pushes: Floats  # (2, N+1, 4) N, N m, forces of other lines on nodes, moments on cells
     shares: Floats  # (2, K, SHARES) of Contact, likewise

@@ -41,7 +41,7 @@ class FollowingCalls(NamedNumbers, number=np.int64):
     renew: int
     before_forces: int
     after_forces: int
-    books: int  # of kernels.run.system.begin_line, for one of several lines
+    books: int  # of kernels.run.network.begin_line, for one of several lines
 
 
 class FollowingPlaces(NamedNumbers, number=np.int64):

@@ -289,7 +289,7 @@ class PaidCalls(NamedNumbers, number=np.int64):
     before_forces: int
     stand_still: int
     after_forces: int
-    books: int  # of one of several lines: of kernels.run.system.begin_line
+    books: int  # of one of several lines: of kernels.run.network.begin_line
 
 
 class PaidPlaces(NamedNumbers, number=np.int64):

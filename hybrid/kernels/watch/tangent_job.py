@@ -57,7 +57,7 @@ class OtherLine(NamedTuple):
 
 
 class TangentJob(NamedTuple):
-    """A line of a run and those beside it (kernels.run.system_tangents)."""
+    """A line of a run and those beside it (kernels.run.network_tangents)."""
 
     line: Line
     sea: Sea  # that of the run, but with room of its own for what an assembly writes

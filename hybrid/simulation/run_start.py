@@ -15,27 +15,27 @@ from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats
+from hybrid.model.network import NetworkModel, balanced_places, starts_between
 from hybrid.model.plane import as_kept
-from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FixedBody
+from hybrid.scene.network_scene import System, floating_groups
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System, floating_groups
 from hybrid.simulation.blended import blended_text, note_drawn, rotate_ends_in
 from hybrid.simulation.contact_start import refuse_start_in_obstacles
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.equilibrium import count_turns, equilibrium_of, settling, solve_like
 from hybrid.simulation.events import EventLog
+from hybrid.simulation.lines_contact_equilibrium import settle, solve_with_contact
 from hybrid.simulation.slack_bends import slack_remedy
-from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
 from hybrid.solve.flaws import ON_BED, rubs_on
-from hybrid.solve.joined import JoinedLine, LineFailed, SystemState, joined_ends
+from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, joined_ends
 from hybrid.solve.lines_at_rest import LinesAtRest, lines_at_rest, settled_with_friction
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import Start
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
-from hybrid.solve.system import SystemSolver
 
 # Equilibria until the water around members is that of the place found, and what of the largest wetted part, velocity
 # and acceleration there counts as the same.
@@ -45,7 +45,7 @@ MOST_ROUNDS, SAME_WATER = 40, 1e-8
 FAR = 3.0
 
 
-def equilibrium_of_system(system: System, model: SystemModel, t: float, friction: bool = True) -> LinesAtRest:
+def equilibrium_of_system(system: System, model: NetworkModel, t: float, friction: bool = True) -> LinesAtRest:
     """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found.
 
     friction: whether it settles on the bed, of lines that ask for that.
@@ -59,7 +59,7 @@ def equilibrium_of_system(system: System, model: SystemModel, t: float, friction
         found = solve_with_contact(model, joined_lines(model, t), numbers, lambda: _starts(system, model))
         _keep_turns(model, t, found)
         if friction and not found.settled:
-            first = SystemState([x.start for x in model.models], model.body_places)
+            first = NetworkState([x.start for x in model.models], model.body_places)
             found = _with_friction(model, t, found, numbers, _ways(model), first)
         if not any(body.members for body in model.bodies):
             return found
@@ -102,7 +102,7 @@ def _nearer(system: System) -> str:
 
 
 def solve_from(
-    found: LinesAtRest, model: SystemModel, t: float, bodies: Floats, start: SystemState, name: str
+    found: LinesAtRest, model: NetworkModel, t: float, bodies: Floats, start: NetworkState, name: str
 ) -> LinesAtRest:
     """The equilibrium with the loads of time t from a start next to another one, with contact if that has it."""
     lines = joined_lines(model, t)
@@ -120,7 +120,7 @@ def solve_from(
     return _with_friction(model, t, found, bodies, ways, start)
 
 
-def _ways(model: SystemModel) -> dict[int, str]:
+def _ways(model: NetworkModel) -> dict[int, str]:
     """How friction of the bed settles (`settling`), by number of the lines of which it does."""
     touching = set(model.touching.lines) if model.touching is not None else set()
     each = enumerate(zip(model.names, model.models, strict=True))
@@ -128,14 +128,14 @@ def _ways(model: SystemModel) -> dict[int, str]:
     return {k: way for k, way in found.items() if way}
 
 
-def _are_alone(model: SystemModel, friction: bool) -> bool:
+def _are_alone(model: NetworkModel, friction: bool) -> bool:
     """Whether each line is joined to nothing that moves and asks for no contact: what it finds, no other line knows."""
     joined = bool(model.free or len(model.body_places)) or model.touching is not None
     touches = any(x.line.bits & SELF_CONTACT for x in model.models)
     return not (joined or touches or (not friction and _ways(model)))
 
 
-def _each_alone(system: System, model: SystemModel, t: float) -> LinesAtRest:
+def _each_alone(system: System, model: NetworkModel, t: float) -> LinesAtRest:
     """The equilibria of lines that are joined to nothing that moves, found one by one, as of one cable."""
     found = []
     for k, (name, x) in enumerate(zip(model.names, model.models, strict=True)):
@@ -148,17 +148,17 @@ def _each_alone(system: System, model: SystemModel, t: float) -> LinesAtRest:
     return _together(model, t, found)
 
 
-def _together(model: SystemModel, t: float, found: Sequence[Equilibrium]) -> LinesAtRest:
+def _together(model: NetworkModel, t: float, found: Sequence[Equilibrium]) -> LinesAtRest:
     """Equilibria of all lines as one."""
     rubs = frozenset(k for k, x in enumerate(found) if x.with_friction)
-    states = SystemState([x.state for x in found], model.body_places)
+    states = NetworkState([x.state for x in found], model.body_places)
 
-    def solver() -> SystemSolver:
+    def solver() -> NetworkSolver:
         lines = [
             x._replace(line=x.line._replace(bits=x.line.bits & ~WAVES & ~(0 if k in rubs else FRICTION)))
             for k, x in enumerate(joined_lines(model, t))
         ]
-        made = SystemSolver(lines, 0, model.body_numbers(t))
+        made = NetworkSolver(lines, 0, model.body_numbers(t))
         made.blurred = {k for k, x in enumerate(found) if x.blurred}
         made.evaluate_forces(states, made.anchor)
         return made
@@ -173,7 +173,7 @@ def _together(model: SystemModel, t: float, found: Sequence[Equilibrium]) -> Lin
 
 
 def _with_friction(
-    model: SystemModel, t: float, found: LinesAtRest, bodies: Floats, ways: Mapping[int, str], first: SystemState
+    model: NetworkModel, t: float, found: LinesAtRest, bodies: Floats, ways: Mapping[int, str], first: NetworkState
 ) -> LinesAtRest:
     """The equilibrium in which friction has settled from one without it, in these ways (`settling`) of lines.
 
@@ -196,7 +196,7 @@ def _with_friction(
     return replace(found, not_settled=why)
 
 
-def _keep_turns(model: SystemModel, t: float, found: LinesAtRest) -> LinesAtRest:
+def _keep_turns(model: NetworkModel, t: float, found: LinesAtRest) -> LinesAtRest:
     """The same equilibrium; LineFailed where a line has lost turns by which its ends, which hold it, twist it.
 
     A motion with contact keeps them by itself, in the writhe of loops as well (system_contact_equilibrium.settle).
@@ -223,18 +223,18 @@ def _same_water(there: Floats, taken: Floats) -> bool:
     )
 
 
-def _starts(system: System, model: SystemModel) -> Iterator[Start]:
+def _starts(system: System, model: NetworkModel) -> Iterator[Start]:
     """Shapes from which the equilibrium is looked for."""
     several = len(model.models) > 1
     shape = "lines hung between the first places" if several else model.models[0].start_shape
-    yield shape, SystemState([x.start for x in model.models], model.body_places)
+    yield shape, NetworkState([x.start for x in model.models], model.body_places)
     system = system.searched()
     places = balanced_places(system, model)
     if places is not None and len(model.places) + len(model.body_places):
-        yield "lines hung between places that balance", SystemState(*starts_between(system, *places, model))
+        yield "lines hung between places that balance", NetworkState(*starts_between(system, *places, model))
 
 
-def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
+def joined_lines(model: NetworkModel, t: float) -> list[JoinedLine]:
     """The lines with their ends and their sea at t (s), whose arrays `ends.at` and `sea.at` overwrite."""
     lines = []
     for x, joints, fairleads, seats in zip(model.models, model.joints, model.fairleads, model.seats, strict=True):
@@ -251,7 +251,7 @@ def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
 
 
 def begin_as_placed(
-    model: SystemModel, scenes: Sequence[Scene], state: SystemState, events: Sequence[EventLog]
+    model: NetworkModel, scenes: Sequence[Scene], state: NetworkState, events: Sequence[EventLog]
 ) -> None:
     """Make a start that is no equilibrium ready, of each line as of one cable: clamps that its shape does not fit are
 
@@ -276,7 +276,7 @@ def blended_of_lines(system: System) -> Iterator[tuple[str, str]]:
             yield "", blended_text(f"bodies.{name}", body.motion, body.position, True)
 
 
-def named(failed: LineFailed, model: SystemModel, first: str = "", left: Path | None = None) -> ComputationError:
+def named(failed: LineFailed, model: NetworkModel, first: str = "", left: Path | None = None) -> ComputationError:
     """The same with the name of the line in its detail; first: to try before the usual remedy; left: a snapshot."""
     where = f"line {model.names[failed.line]}" if failed.line >= 0 else "the points"
     detail = f"{where}; {failed.detail}" if failed.detail else where

@@ -62,9 +62,9 @@ from hybrid.simulation.slack_bends import note_laid
 from hybrid.solve.flaws import slack_cell
 from hybrid.solve.joined import JoinedLine, LineFailed
 from hybrid.solve.lines_at_rest import LinesAtRest
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.run import batch_of_rows, no_extremes
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.system import SystemSolver
 from hybrid.store.array_recorder import ArrayRecorder
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.writer import Recorder
@@ -400,7 +400,7 @@ class LineResult:
 
     # --- steps and outputs --------------------------------------------------------------------------
 
-    def attach(self, solver: SystemSolver, states: tuple[State, State], clock: Clock, counts: Counts) -> None:
+    def attach(self, solver: NetworkSolver, states: tuple[State, State], clock: Clock, counts: Counts) -> None:
         """Steps of a solver go on with the line, between two states in turn; clock, counts: of the run."""
         solver.bind_line(self.number, **self._itself.attach(states, clock, counts))
         if self.correction is not None:
@@ -413,7 +413,7 @@ class LineResult:
         """Log steps (n, len(LOG) + 1), the last column the time of the processor, s."""
         self._log.append(rows)
 
-    def look_at_itself(self, solver: SystemSolver, seen: int, t: float, dt: float, state: State) -> None:
+    def look_at_itself(self, solver: NetworkSolver, seen: int, t: float, dt: float, state: State) -> None:
         """What the step of dt (s) to t (s) has seen (bits of kernels.state.books) of how near the line is to itself."""
         if seen & IS_BENT:
             found, bound = self._itself.bends()
@@ -424,7 +424,7 @@ class LineResult:
         found = self._itself.tell(found, t, dt, state, self.events.event) | (NEARS if hides else 0)
         self.nears_itself, self.parts_itself = bool(found & NEARS), bool(found & PARTS)
 
-    def watch_itself_no_more(self, solver: SystemSolver) -> None:
+    def watch_itself_no_more(self, solver: NetworkSolver) -> None:
         """Do not look any longer how near the line comes to itself."""
         self.nears_itself = self.envelope.itself.on = False
         solver.bind_line(self.number, itself=0)

@@ -21,13 +21,13 @@ from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.solve.contact_stability import ContactStability
 from hybrid.solve.contact_statics import DAMPING, MOST_SPIN, ROAD, STALLING, calming
 from hybrid.solve.flaws import slack_cell, slack_text
-from hybrid.solve.joined import JoinedLine, LineFailed, SystemState, SystemTaken
+from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, NetworkTaken
 from hybrid.solve.lines_at_rest import LinesAtRest
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import MOST_FALLS, PUSHED, SAME, damped_bodies
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.settling import along, damped, nudged, stop
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.solve.system import SystemSolver
 
 # That of each line with itself (None: it has none), and of lines with each other, where these may touch.
 Contacts = Callable[[], tuple[Sequence[SelfContact | None], SharedContact | None]]
@@ -36,7 +36,7 @@ Contacts = Callable[[], tuple[Sequence[SelfContact | None], SharedContact | None
 class _Moving:
     """The damped motion of a system: `solve.contact_statics.Moving`."""
 
-    def __init__(self, solver: SystemSolver, start: SystemState) -> None:
+    def __init__(self, solver: NetworkSolver, start: NetworkState) -> None:
         self._solver, self._t, self.tries = solver, 0.0, 0
         self.state, self._other = start, start.copy()
 
@@ -69,9 +69,9 @@ class _Moving:
         return max(float(np.abs(state.v).max()) for state in self.state.lines)
 
 
-def touching_solver(lines: Sequence[JoinedLine], points: int, bodies: Floats, contacts: Contacts) -> SystemSolver:
+def touching_solver(lines: Sequence[JoinedLine], points: int, bodies: Floats, contacts: Contacts) -> NetworkSolver:
     """A solver of lines with contact, whose steps are not held against their energy: what moves is damped."""
-    solver = SystemSolver(lines, points, bodies, *contacts())
+    solver = NetworkSolver(lines, points, bodies, *contacts())
     books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
     for each in books:
         each.clock.shortest = np.inf
@@ -82,11 +82,11 @@ def touching_solver(lines: Sequence[JoinedLine], points: int, bodies: Floats, co
 class _Falls:
     """Equilibria with contact that would not stay, and what leads away from them."""
 
-    def __init__(self, solver: SystemSolver, time_scale: float) -> None:
+    def __init__(self, solver: NetworkSolver, time_scale: float) -> None:
         """solver: of equilibria; time_scale: s, of the damped motion."""
         self._solver, self._time_scale = solver, time_scale
         self._stability = ContactStability(solver)
-        self._known, self._left = list[SystemState](), list[SystemState]()
+        self._known, self._left = list[NetworkState](), list[NetworkState]()
 
     @property
     def finds_all(self) -> bool:
@@ -107,22 +107,22 @@ class _Falls:
             return "round-off of the bending of so short cells hides it"
         return "" if self.finds_all else "a damped motion with contact, without friction, led there"
 
-    def holds(self, states: SystemState) -> bool:
+    def holds(self, states: NetworkState) -> bool:
         """Whether an equilibrium of the solver would stay, or whether it would is not known."""
         self._stability.in_hollows = self._stability.blurred = False
         if not self._solver.in_contact() or not self._stability.judges:  # it has been judged without contact
             return True
         return self._stability.holds(states)
 
-    def is_new(self, states: SystemState) -> bool:
+    def is_new(self, states: NetworkState) -> bool:
         """Whether an equilibrium is none of those that have been left."""
         return not any(self._are_same(states, x) for x in self._known)
 
-    def try_later(self, start: SystemState) -> None:
+    def try_later(self, start: NetworkState) -> None:
         """Begin the next motion there, where the first leads nowhere."""
         self._left = [start]
 
-    def next(self, states: SystemState | None) -> SystemState | None:
+    def next(self, states: NetworkState | None) -> NetworkState | None:
         """Where the next motion begins, or None; states: an equilibrium that would not stay, None: there is none."""
         if states is not None and self.is_new(states) and len(self._known) < MOST_FALLS:
             square, shapes = self._stability.softest_motion(states)
@@ -131,26 +131,26 @@ class _Falls:
             self._left.append(self.nudged(states))  # the first, being the smallest: to the nearest rest
         return self._left.pop() if self._left else None
 
-    def _are_same(self, one: SystemState, other: SystemState) -> bool:
+    def _are_same(self, one: NetworkState, other: NetworkState) -> bool:
         apart = max(float(np.abs(a.r - b.r).max()) for a, b in zip(one.lines, other.lines, strict=True))
         return apart <= SAME * self._solver.length
 
-    def _along(self, states: SystemState, shapes: Sequence[Floats], way: float) -> SystemState:
+    def _along(self, states: NetworkState, shapes: Sequence[Floats], way: float) -> NetworkState:
         out = states.copy()
         for state, shape in zip(out.lines, shapes, strict=True):
             state.v[:] = way * along(shape, self._solver.length, self._time_scale, DAMPING)
         return out
 
-    def nudged(self, states: SystemState) -> SystemState:
+    def nudged(self, states: NetworkState) -> NetworkState:
         """States with a small push; ends stay with what they are joined to."""
         out = []
         for x, state in zip(self._solver.lines, states.lines, strict=True):
             out.append(nudged(x.line, state, x.length, self._time_scale))
             out[-1].v[[0, -1]] = 0.0
-        return SystemState(out, states.bodies.copy())
+        return NetworkState(out, states.bodies.copy())
 
 
-def _failed(lines: Sequence[JoinedLine], taken: SystemTaken, states: SystemState, path: list[str]) -> LineFailed:
+def _failed(lines: Sequence[JoinedLine], taken: NetworkTaken, states: NetworkState, path: list[str]) -> LineFailed:
     """The error of a search that ended with a motion in these states: what has no tension has no one place to find."""
     if taken.outcome == Outcome.NOT_CONVERGED:
         for k, (x, state) in enumerate(zip(lines, states.lines, strict=True)):
@@ -161,8 +161,8 @@ def _failed(lines: Sequence[JoinedLine], taken: SystemTaken, states: SystemState
 
 
 def settled_system(
-    lines: Sequence[JoinedLine], points: int, bodies: Floats, start: SystemState, contacts: Contacts,
-    keeps_turns: Callable[[SystemState], tuple[int, str]], near: bool = False,
+    lines: Sequence[JoinedLine], points: int, bodies: Floats, start: NetworkState, contacts: Contacts,
+    keeps_turns: Callable[[NetworkState], tuple[int, str]], near: bool = False,
 ) -> LinesAtRest:  # fmt: skip
     """Equilibrium of a system with contact of lines with themselves, from a start that is at rest and apart.
 

@@ -38,7 +38,7 @@ from hybrid.kernels.junctions.junctions import (
     move_joints,
     place_ends,
 )
-from hybrid.kernels.junctions.system_job import read_system, task_of
+from hybrid.kernels.junctions.network_job import read_system, task_of
 from hybrid.kernels.laws.bending_slip import BEHIND_REST, BEHIND_STEP
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_in_contact
@@ -443,7 +443,7 @@ def give_scheme(system, task, s):
 
 @kernel
 def solve_system(table):
-    """Do a task (kernels.step.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system (SystemJob).
+    """Do a task (kernels.step.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system (NetworkJob).
 
     JUNCTIONS: leave in A the equations of the tensions, points and bodies, with all else eliminated.
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.

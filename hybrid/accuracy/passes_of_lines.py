@@ -25,6 +25,7 @@ from hybrid.accuracy.error_report import accuracy_figures, effort, error_fields,
 from hybrid.accuracy.error_statistics import statistics_of
 from hybrid.accuracy.finer_result import NOT_KEPT, Replacement, is_no_better, not_kept_text
 from hybrid.accuracy.model_choice import NEAR, choice_of
+from hybrid.accuracy.model_errors_of_lines import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
 from hybrid.accuracy.passes import emptied, free_in
 from hybrid.accuracy.refinement import (
     COSTLY_ACCURACY,
@@ -32,11 +33,11 @@ from hybrid.accuracy.refinement import (
     costly,
     times_the_cost,
 )
-from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
-from hybrid.accuracy.system_samples import compared, extremes_of, sample_of, touch_unasked
+from hybrid.accuracy.samples_of_lines import compared, extremes_of, sample_of, touch_unasked
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.model_costs import NAMED, REST, ModelChoice, with_models
+from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
@@ -51,18 +52,17 @@ from hybrid.model.resolution import (
     wants_survey,
 )
 from hybrid.model.self_reach import system_without_contact
-from hybrid.model.system import SystemResolution, build_system
+from hybrid.scene.network_scene import System
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.scene.system import System
 from hybrid.simulation.layer_mesh import layered_lines, shown_lines
+from hybrid.simulation.load_change import with_loads_of
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points, survey_resolution, with_survey
+from hybrid.simulation.network_run import Recording, run_system, static_system
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import is_cut_off, kept_resolution, refused, resolution_from, resolution_tree
 from hybrid.simulation.run_sample import RunSample
-from hybrid.simulation.system_load_change import with_loads_of
-from hybrid.simulation.system_run import Recording, run_system, static_system
 from hybrid.store.amend import amend_lines
 from hybrid.store.checkpoint import read_before
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -83,7 +83,7 @@ def is_refined(system: System, moves: bool) -> bool:
     """Whether a system is computed several times, here: an accuracy is asked, or errors of steps that follow the
 
     motion, of an equilibrium, of lines that rub on obstacles, or of leaving bending out.  (Others of fixed steps:
-    accuracy.system_errors.)
+    accuracy.errors_of_lines.)
     """
     scenes = [system.scene_of(name) for name in system.lines]
     if not any(wants_errors(x) for x in scenes):
@@ -120,7 +120,7 @@ class LineController(ErrorController):
                 of_statistic.set_model_errors(found[name])
 
 
-class SystemPasses:
+class PassesOfLines:
     """All runs that the result of a system takes."""
 
     def __init__(
@@ -174,7 +174,7 @@ class SystemPasses:
         """The result, as fine as it takes, with its errors; source: a result to go on with."""
         first, result = self._goes_on(source) if source is not None else (None, None)
         if first is None:
-            first = self.surveyed(SystemResolution.first(self.system))
+            first = self.surveyed(NetworkResolution.first(self.system))
             self._expect(first)
             try:
                 resolution, result = self._first_result(first)
@@ -182,7 +182,7 @@ class SystemPasses:
                 if not self._rods_instead({error.line_name: str(error).splitlines()[0]}):
                     raise
                 emptied(self.target, error)
-                resolution, result = self._first_result(self.surveyed(SystemResolution.first(self.system)))
+                resolution, result = self._first_result(self.surveyed(NetworkResolution.first(self.system)))
         else:
             assert source is not None and result is not None
             resolution = kept_resolution(self.system, source)
@@ -192,7 +192,7 @@ class SystemPasses:
         if self._rods_instead({name: x.model_misses for name, x in self.controls.items() if x.model_misses}):
             emptied(self.target)
             self._replacement = Replacement(self.target, goes_on=self.moves)
-            self._refine(*self._first_result(self.surveyed(SystemResolution.first(self.system))))
+            self._refine(*self._first_result(self.surveyed(NetworkResolution.first(self.system))))
 
     def _rods_instead(self, failed: Mapping[str, str]) -> bool:
         """Rods for lines that were chosen to be catenaries, and why that failed; whether there is one."""
@@ -203,7 +203,7 @@ class SystemPasses:
             self._use_models(choices | {name: ModelChoice("rod", tried + failed[name]) for name in names})
         return bool(names)
 
-    def _first_result(self, first: SystemResolution) -> tuple[SystemResolution, Samples]:
+    def _first_result(self, first: NetworkResolution) -> tuple[NetworkResolution, Samples]:
         """The first result, of cells half as long where on these, or those to compare with, no equilibrium is found."""
         while True:
             try:
@@ -231,16 +231,16 @@ class SystemPasses:
             self._compare(first)
         return first, result
 
-    def _halved(self, now: SystemResolution) -> SystemResolution:
+    def _halved(self, now: NetworkResolution) -> NetworkResolution:
         """Cells half as long, of lines that leave their mesh open."""
         free = {name: mesh_is_free(scene) for name, scene in self.scenes.items()}
-        return SystemResolution({name: x.coarser(0.5) if free[name] else x for name, x in now.lines.items()})
+        return NetworkResolution({name: x.coarser(0.5) if free[name] else x for name, x in now.lines.items()})
 
     def _spend(self, result: Samples) -> None:
         if self._budget is not None:
             self._budget.spend(list(result.values()))
 
-    def _goes_on(self, source: Path) -> tuple[SystemResolution, Samples]:
+    def _goes_on(self, source: Path) -> tuple[NetworkResolution, Samples]:
         """What the runs to compare with were computed for, and the result, which is computed to its end."""
         assert isinstance(self.target, Path)
         with opened(source) as file:
@@ -249,7 +249,7 @@ class SystemPasses:
             self._costs += [0.0] * any(wants_survey(scene) for scene in self.scenes.values())
             if set(tree) != set(self.scenes):
                 raise ValueError("it was begun without an accuracy")
-            first = SystemResolution({name: resolution_from(tree[name], x) for name, x in self.scenes.items()})
+            first = NetworkResolution({name: resolution_from(tree[name], x) for name, x in self.scenes.items()})
         with open_result(source) as found:
             done = found.status == "complete" and self._is_at_end(found)
         if not done or source != self.target:
@@ -262,7 +262,7 @@ class SystemPasses:
         return len(found.times) > 0 and float(found.times[-1]) >= end * (1.0 - 1e-9)
 
     def _record(
-        self, resolution: SystemResolution | None, target: Path | io.BytesIO | None, name: str,
+        self, resolution: NetworkResolution | None, target: Path | io.BytesIO | None, name: str,
         source: Path | None = None, found: Tree | None = None, system: System | None = None,
     ) -> Samples:  # fmt: skip
         """Compute the system, or another; what is compared of its lines.  target: None: it is for that alone."""
@@ -285,14 +285,14 @@ class SystemPasses:
         self._compared_rods = {n: x.rods for n, x in recorders.items() if isinstance(x, ComparisonRecorder)}
         return {x.name: compared(x, run, self._costs[-1]) for x in run.lines}
 
-    def _record_finer(self, resolution: SystemResolution, to: Path | io.BytesIO) -> Samples:
+    def _record_finer(self, resolution: NetworkResolution, to: Path | io.BytesIO) -> Samples:
         """A finer result beside the one that is there, or the rest of it."""
         texts, source = (scene_text(self.system), changes_text(self._changes)), None
         if isinstance(to, Path) and is_cut_off(to, texts, resolution):
             source = to
         return self._record(resolution, to, REFINEMENT, source, _tree(resolution))
 
-    def _samples(self, target: Path | io.BytesIO, resolution: SystemResolution, cpu: float) -> Samples:
+    def _samples(self, target: Path | io.BytesIO, resolution: NetworkResolution, cpu: float) -> Samples:
         """What is compared of a complete result."""
         system = build_system(self.system, resolution=resolution)
         models = dict(zip(system.names, system.models, strict=True))
@@ -304,7 +304,7 @@ class SystemPasses:
                 for n, line in result.lines.items()
             }
 
-    def surveyed(self, first: SystemResolution) -> SystemResolution:
+    def surveyed(self, first: NetworkResolution) -> NetworkResolution:
         """With cells where a coarse run shows that they should be; where nothing is asked, the equilibrium."""
         first = layered_lines(self.system, first, self.moves)
         free = [name for name, scene in self.scenes.items() if wants_survey(scene)]
@@ -312,9 +312,9 @@ class SystemPasses:
             return first
         if not self.moves and (chosen := [x for x in free if model_is_free(self.scenes[x], moves=False)]):
             self._use_models(dict.fromkeys(chosen, ModelChoice("rod", REST)))
-        coarse = SystemResolution({name: survey_resolution(x) for name, x in first.lines.items()})
+        coarse = NetworkResolution({name: survey_resolution(x) for name, x in first.lines.items()})
         if not self.moves:
-            coarse = SystemResolution({name: replace(x, every=1) for name, x in coarse.lines.items()})
+            coarse = NetworkResolution({name: replace(x, every=1) for name, x in coarse.lines.items()})
         coarse = shown_lines(self.system, coarse, self.moves)
         self._expect(first, coarse)
         moving = [name for name in free if isinstance(self.scenes[name].model, AdaptiveModel)]
@@ -351,14 +351,14 @@ class SystemPasses:
                 out[name] = with_survey(first.lines[name], scene, survey)
         if choices:
             self._use_models(choices)
-        return SystemResolution(out)
+        return NetworkResolution(out)
 
     def _leaves_model(self, name: str) -> bool:
         """Whether the model of a line is still to be chosen."""
         open_yet = self.moves and self._criterion is None and not self.controls[name].choice.kind
         return open_yet and model_is_free(self.scenes[name])
 
-    def _expect(self, first: SystemResolution, coarse: SystemResolution | None = None) -> None:
+    def _expect(self, first: NetworkResolution, coarse: NetworkResolution | None = None) -> None:
         """Tell the progress which passes are to come; coarse: of a pre-run that is still to be computed."""
         if not self.moves:
             return
@@ -368,14 +368,14 @@ class SystemPasses:
             passes += [(ESTIMATION, x) for x in comparison_resolutions(first.one, self.moves)]
         self.reporter.expect(passes, first.one)
 
-    def _compare(self, first: SystemResolution) -> None:
+    def _compare(self, first: NetworkResolution) -> None:
         """The runs to compare with, as of `ErrorController`."""
         self._compared_touching = self._touches
         every = {name: comparison_resolutions(x, self.moves) for name, x in first.lines.items()}
         found: list[Samples | None] = [None, None, None]
         failed: ComputationError | None = None
         for k in (0, 1, 2) if self.moves else (0, 2):  # without steps the second is the first
-            resolution = SystemResolution({name: x[k] for name, x in every.items()})
+            resolution = NetworkResolution({name: x[k] for name, x in every.items()})
             try:
                 found[k] = self._record(resolution, None, ESTIMATION)
             except ComputationError as error:
@@ -389,7 +389,7 @@ class SystemPasses:
             control.compare_with([x[name] if x is not None else None for x in found], failed)
 
     def _with_model_errors(
-        self, runs: Samples, resolution: SystemResolution, rods_then: Mapping[str, Stretches]
+        self, runs: Samples, resolution: NetworkResolution, rods_then: Mapping[str, Stretches]
     ) -> Samples:
         """A run with what leaving bending out changes in it; resolution: of that run; rods_then: m, its rods."""
         rods, finely, names = as_rods(self.system, resolution, rods_then)
@@ -400,20 +400,20 @@ class SystemPasses:
             failed = str(error).splitlines()[0]
         return with_model_errors(runs, found, names, failed)
 
-    def _finer(self, now: SystemResolution, wanted: Mapping[str, Resolution]) -> SystemResolution:
+    def _finer(self, now: NetworkResolution, wanted: Mapping[str, Resolution]) -> NetworkResolution:
         """As fine as the finest that is wanted; what the scene gives stays."""
         cells = max(x.fineness / now.lines[name].fineness for name, x in wanted.items())
         steps = min(x.step / now.one.step if now.one.step else 1.0 for x in wanted.values())
         free = {name: cells if mesh_is_free(scene) else 1.0 for name, scene in self.scenes.items()}
         steps = steps if self._steps_free else 1.0
         zones = {name: min(x.zones, wanted[name].zones if name in wanted else x.zones) for name, x in now.lines.items()}
-        return SystemResolution(
+        return NetworkResolution(
             {name: replace(x.coarser(1.0 / free[name], steps), zones=zones[name]) for name, x in now.lines.items()}
         )
 
     # --- judgement ------------------------------------------------------------------------------
 
-    def _refine(self, resolution: SystemResolution, result: Samples) -> None:
+    def _refine(self, resolution: NetworkResolution, result: Samples) -> None:
         """Finer results until what is asked is met, or more would not help; then errors are written."""
         stopped: BaseException | None = None
         why, wanted = "", self._judged(resolution, result)
@@ -445,7 +445,7 @@ class SystemPasses:
         if stopped is not None:
             raise stopped
 
-    def _judged_finer(self, resolution: SystemResolution, result: Samples) -> tuple[dict[str, Resolution], bool]:
+    def _judged_finer(self, resolution: NetworkResolution, result: Samples) -> tuple[dict[str, Resolution], bool]:
         """As `_judged` of a finer result, and whether it takes the place of that before it.
 
         The last stays beside where the lines together are no better: they are one result.
@@ -473,7 +473,7 @@ class SystemPasses:
             if not stays:
                 self._replacement.settle(kept)
 
-    def _judged(self, resolution: SystemResolution, result: Samples) -> dict[str, Resolution]:
+    def _judged(self, resolution: NetworkResolution, result: Samples) -> dict[str, Resolution]:
         """Take over a result; how finely lines that miss what is asked of them want the next one."""
         known = {name: x.estimate for name, x in self.controls.items()}
         stricter = {
@@ -498,7 +498,7 @@ class SystemPasses:
         wanted = {name: self.controls[name].next_resolution() for name in judged}
         return {name: x for name, x in wanted.items() if x is not None}
 
-    def _renew_model_errors(self, resolution: SystemResolution, result: Samples, stricter: bool) -> None:
+    def _renew_model_errors(self, resolution: NetworkResolution, result: Samples, stricter: bool) -> None:
         """Where zones of the result are others than those whose model error is known: compare it with rods itself."""
         estimates = [x.estimate for x in self.controls.values() if x.estimate is not None]
         if not (estimates and (stricter or any(x.lacks_model_errors() for x in estimates))):
@@ -509,7 +509,7 @@ class SystemPasses:
             if control.estimate is not None:
                 control.takes_model_errors(run)
 
-    def _warn_of_costs(self, result: Samples, finer: SystemResolution) -> None:
+    def _warn_of_costs(self, result: Samples, finer: NetworkResolution) -> None:
         if not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
             self._notes += costly(self._costs, next(iter(result.values())), finer.one)
 
@@ -527,7 +527,7 @@ class SystemPasses:
 
     # --- the file -------------------------------------------------------------------------------
 
-    def _write(self, resolution: SystemResolution, result: Samples, done: bool = True) -> None:
+    def _write(self, resolution: NetworkResolution, result: Samples, done: bool = True) -> None:
         """Add errors, what was asked and whether it is met to the result of each line; done: as of `amend`."""
         cpu = clock.process_time() - self._begin
         fields, values = dict[str, list[Field]](), dict[str, dict[str, np.ndarray]]()
@@ -568,20 +568,20 @@ def _elsewhere(resolution: Resolution) -> RunSample:
     raise AssertionError("all lines are computed together")
 
 
-def _tree(resolution: SystemResolution) -> Tree:
+def _tree(resolution: NetworkResolution) -> Tree:
     return {name: resolution_tree(x) for name, x in resolution.lines.items()}
 
 
 def system_with_layers(
     system: System, moves: bool, reporter: ProgressReporter, interrupted: Callable[[], bool],
     criterion: UserCriterion | None = None,
-) -> SystemResolution:  # fmt: skip
+) -> NetworkResolution:  # fmt: skip
     """How finely a system is computed whose lines ask for no errors.
 
     As of one cable: its equilibrium shows bends and layers, or a coarse run, of lines that say how many cells these
     have.
     """
     if all(x.resolution is None for x in system.lines.values()):
-        return layered_lines(system, SystemResolution.first(system), moves)
-    passes = SystemPasses(system, io.BytesIO(), moves, reporter, interrupted, criterion=criterion)
-    return passes.surveyed(SystemResolution.first(system))
+        return layered_lines(system, NetworkResolution.first(system), moves)
+    passes = PassesOfLines(system, io.BytesIO(), moves, reporter, interrupted, criterion=criterion)
+    return passes.surveyed(NetworkResolution.first(system))

@@ -14,13 +14,13 @@ from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.newton import Limits, Task
 
 
-class SystemJob(NamedTuple):
+class NetworkJob(NamedTuple):
     """Arguments of the entries: the lines, points and bodies of a system, and room.
 
     P points, B bodies, L lines; m tensions of last cells and coordinates of points and bodies.
     """
 
-    asked: SystemTask
+    asked: NetworkTask
     tables: NDArray[np.int64]  # (L, ..) jobs of the lines (kernels.run.run), their task ASSEMBLY
     numbers: Floats  # the same memory
     joints: NDArray[np.int64]  # (L, 2) points, then bodies, that start and end are joined to, -1 where they are held
@@ -44,7 +44,7 @@ class SystemJob(NamedTuple):
     S: Floats  # (HANDED - 1, HANDED)
     G: Floats  # (2, 6, 6)
     A: Floats  # (m+5, m+1)
-    touch_table: NDArray[np.int64]  # of kernels.junctions.system_contact.touch_system
+    touch_table: NDArray[np.int64]  # of kernels.junctions.lines_contact.touch_system
     rides: NDArray[np.int64]  # (M,) the body that carries an obstacle, -1: none does; empty: no body has a shape
     phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies and spin_sheaves
     near: NDArray[np.int64]  # (L,) of all lines, how near they are to what is free (kernels.junctions.lone_lines)
@@ -57,7 +57,7 @@ class SystemJob(NamedTuple):
     spin: int = 0  # of spin_sheaves; 0: no sheave turns freely
 
 
-class SystemTask(NamedNumbers):
+class NetworkTask(NamedNumbers):
     """The task (kernels.step.newton.Task), the time of the new states, s, and the part of a correction that is made."""
 
     what: float
@@ -76,11 +76,11 @@ class SystemTask(NamedNumbers):
     cut: float  # whether a step is taken as the last iteration has left it, converged or not
 
 
-def blank_system_job() -> SystemJob:
+def blank_system_job() -> NetworkJob:
     """A job with the types that every one has."""
     z, one, two = np.zeros, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
-    return SystemJob(
-        SystemTask(), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
+    return NetworkJob(
+        NetworkTask(), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
         z((1, 1, 1)), z(1), z((1, 1, 1)), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
         z((2, 6, 6)), z((1, 1)), one, one, one, one, one, one, one,
     )  # fmt: skip

@@ -21,21 +21,21 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Floats, state_for
 from hybrid.model.build import Model
-from hybrid.model.system import SystemModel
+from hybrid.model.network import NetworkModel
 from hybrid.simulation.failure import winch_text
 from hybrid.simulation.lines_nodes import LineNodes
 from hybrid.simulation.payout import Before, PayingOut
 from hybrid.simulation.payout_zones import PaidZones, moving_zones
+from hybrid.simulation.run_contact import renew_solver
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.system_contact import renew_solver
-from hybrid.solve.joined import LineFailed, SystemState
+from hybrid.solve.joined import LineFailed, NetworkState
 
 if TYPE_CHECKING:
-    from hybrid.solve.system import SystemSolver
-    from hybrid.solve.system_steps import SystemSteps
+    from hybrid.solve.network_solver import NetworkSolver
+    from hybrid.solve.network_steps import NetworkSteps
 
 
-class SystemPayout:
+class RunPayout:
     """The lengths of all lines of a run that are paid out."""
 
     def __init__(self, run: RunOfLines) -> None:
@@ -58,7 +58,7 @@ class SystemPayout:
 
     # --- steps ------------------------------------------------------------------------------------
 
-    def bind(self, solver: SystemSolver) -> None:
+    def bind(self, solver: NetworkSolver) -> None:
         """A solver finds forces with the lengths of now, of the state of now."""
         for k, x in self.lines.items():
             x.layout = self._run.model.models[k].layout
@@ -69,7 +69,7 @@ class SystemPayout:
             with_others = iterate_with_others.address(numbers) if asked else 0
             solver.wind(k, asked, reel=stand_among.address(numbers), reel_table=numbers, iterated=with_others)
 
-    def _job(self, solver: SystemSolver, k: int) -> dict[str, Any]:
+    def _job(self, solver: NetworkSolver, k: int) -> dict[str, Any]:
         """What changes the length of a line, whose state of now is that before a step and after it."""
         run, paying, x = self._run, self.lines[k], solver.lines[k]
         books, work, state = run.lines[k].books, solver.work[k], run.state.lines[k]
@@ -79,7 +79,7 @@ class SystemPayout:
         )  # fmt: skip
         return job._asdict()
 
-    def attach(self, loop: SystemSteps) -> None:
+    def attach(self, loop: NetworkSteps) -> None:
         """Let the steps of a loop follow the lengths from now on."""
         even, odd = loop.turns
         for k, x in self.lines.items():
@@ -159,7 +159,7 @@ class SystemPayout:
             paying.leave_unbalanced()
         line.books.work[0, b.ZONES] += booked
         self._take({k: model})
-        run.state = SystemState(states, run.state.bodies)
+        run.state = NetworkState(states, run.state.bodies)
         line.take_cells(model)
 
     def let_go(self, ends: Iterable[tuple[int, int]]) -> None:
@@ -177,7 +177,7 @@ class SystemPayout:
         for x in self.lines.values():
             x.limit_step()
 
-    def fit_models(self, model: SystemModel) -> SystemModel:
+    def fit_models(self, model: NetworkModel) -> NetworkModel:
         """A model with other loads on the cells of t = 0, with the cells of now."""
         found = [*model.models]
         for k, x in self.lines.items():
@@ -200,7 +200,7 @@ class SystemPayout:
             self._take({k: model})
             states[k] = state_for(model.line)
             run.lines[k].take_cells(model, extremes=False)
-        run.state = SystemState(states, run.state.bodies)
+        run.state = NetworkState(states, run.state.bodies)
 
     def lengthen(self) -> None:
         """The lines as they are at the time of the run."""

@@ -25,34 +25,34 @@ from hybrid.kernels.step.accept import MANY
 from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
 from hybrid.model.failure import Weakness
+from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on, output_times
-from hybrid.model.system import SystemModel, SystemResolution, build_system
 from hybrid.scene.motion_checks import ramp_ends
+from hybrid.scene.network_scene import System
 from hybrid.scene.plane import OUT
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 from hybrid.simulation.body_overlap import note_overlaps
 from hybrid.simulation.collapse import COLLAPSE, GIVE_UP, TOUCH_EACH_OTHER, TOUCHES_ITSELF, collapse_text
 from hybrid.simulation.events import Sink, energy_gains_text
 from hybrid.simulation.failure import Stopped, explanation, first_remedy, touch_text, write_snapshot
 from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
 from hybrid.simulation.interrupts import at_once
+from hybrid.simulation.line_result import FORCE_COLUMNS, WAITING, LineResult, LineStep, Wanted
 from hybrid.simulation.lines_contact import LinesWatch, shared_of
 from hybrid.simulation.lines_contact_start import note_crossings
+from hybrid.simulation.load_change import change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import kept_resolution, other_program, refused, require_same
-from hybrid.simulation.run_file import Cable, CableFile, LinesFile
-from hybrid.simulation.step_events import CUTS, count_iterations, note_cut, note_iterations, note_slack
-from hybrid.simulation.system_checkpoint import (
+from hybrid.simulation.run_checkpoint import (
     content,
     files_of,
     kept_changes,
     restore,
 )
-from hybrid.simulation.system_contact import (
+from hybrid.simulation.run_contact import (
     AT_START,
     begin_between,
     begin_contact,
@@ -63,20 +63,20 @@ from hybrid.simulation.system_contact import (
     tell_meetings,
     tell_passages,
 )
-from hybrid.simulation.system_failures import Failures
-from hybrid.simulation.system_lines import FORCE_COLUMNS, WAITING, LineResult, LineStep, Wanted
-from hybrid.simulation.system_load_change import change_loads_of_lines, loaded_as, with_loads_of
-from hybrid.simulation.system_points import Rotations, Sampled
-from hybrid.simulation.system_quantities import SystemQuantities
-from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, joined_lines, named
-from hybrid.simulation.system_zones import Start, SystemZones, managers_for, start_at_rest, zones_as_placed
+from hybrid.simulation.run_failures import Failures
+from hybrid.simulation.run_file import Cable, CableFile, LinesFile
+from hybrid.simulation.run_points import Rotations, Sampled
+from hybrid.simulation.run_quantities import RunQuantities
+from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, joined_lines, named
+from hybrid.simulation.run_zones import RunZones, Start, managers_for, start_at_rest, zones_as_placed
+from hybrid.simulation.step_events import CUTS, count_iterations, note_cut, note_iterations, note_slack
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
-from hybrid.solve.joined import LineFailed, SystemState, SystemTaken
+from hybrid.solve.joined import LineFailed, NetworkState, NetworkTaken
 from hybrid.solve.lines_at_rest import LinesAtRest
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.run import MOST_SAMPLED, ROWS, Tried
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_steps import SystemSteps
 from hybrid.store.array_recorder import Target
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -85,7 +85,7 @@ from hybrid.store.header import Text
 from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 
 if TYPE_CHECKING:
-    from hybrid.simulation.system_payout import SystemPayout
+    from hybrid.simulation.run_payout import RunPayout
 
 _NO_ZONES: Mapping[int, DomainManager] = {}
 # Steps times cells from one checkpoint to the next, about 5 s of computing.
@@ -111,7 +111,7 @@ class Recording(NamedTuple):
     source: Path | None = None
     pending: str = ""
     notes: Sequence[tuple[str, str]] = ()
-    begun: Callable[[SystemRun], None] | None = None
+    begun: Callable[[NetworkRun], None] | None = None
     planes: bool = False
     start: Start | None = None
     points: OutputPoints | None = None
@@ -124,12 +124,12 @@ class Recording(NamedTuple):
 ALONE = Recording()
 
 
-class SystemRun:
+class NetworkRun:
     """One system, computed into a file or into memory."""
 
     def __init__(
         self, system: System, target: Target | None, text: Text, moves: bool,
-        resolution: SystemResolution | None = None, recording: Recording = ALONE,
+        resolution: NetworkResolution | None = None, recording: Recording = ALONE,
         criterion: UserCriterion | None = None, changes: Sequence[LoadChange[System]] = (),
     ) -> None:  # fmt: skip
         """target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether
@@ -170,25 +170,25 @@ class SystemRun:
             self.times = [*(t for t in self.times if t < self.end), self.end]
         rho = system.require_time().rho_inf if moves else 0.0
         turn = min(x.turn for x in self.resolution.lines.values())
-        self.loop = SystemSteps(rho, [0.0, *self.times], *follow, turn)
+        self.loop = NetworkSteps(rho, [0.0, *self.times], *follow, turn)
         self.found: LinesAtRest | None = None
         managers, self._begins = _NO_ZONES, source is None  # whether there is a start, and no checkpoint
         if source is not None:
             blank = [state_for(x.line) for x in self.model.models]
-            self.state = SystemState(blank, np.zeros_like(self.model.body_places))
+            self.state = NetworkState(blank, np.zeros_like(self.model.body_places))
             managers = managers_for(scenes, first, criterion)  # as at the start, whatever loads came later
             for k, x in managers.items():
                 x.load(self.model.models[k].ends.moments)
         else:
             self.model, self.found, managers = recording.start or start_of(system, self.model, moves, criterion)
-            placed = SystemState([x.start for x in self.model.models], self.model.body_places)
+            placed = NetworkState([x.start for x in self.model.models], self.model.body_places)
             self.state = (placed if self.found is None else self.found.state).copy()
         self.start_from(self.state.bodies if self._begins else self.model.body_places)
-        self.payout: SystemPayout | None = None  # of lines that are paid out
+        self.payout: RunPayout | None = None  # of lines that are paid out
         if moves and any(x.payout is not None for x in self.model.models):
-            from hybrid.simulation.system_payout import SystemPayout
+            from hybrid.simulation.run_payout import RunPayout
 
-            self.payout = SystemPayout(me)
+            self.payout = RunPayout(me)
         reels = self.payout.lines if self.payout is not None else {}
         self.rotations = Rotations(system, self.model)
         form = LinesFile if recording.cable is None else CableFile
@@ -214,7 +214,7 @@ class SystemRun:
         self.let_pass: set[tuple[int, int]] = set()  # of lines that may meet, those between which it is not computed
         shaken = zip(scenes.items(), self.resolution.lines.values(), strict=True)
         self.vibrations = VibrationsOfLines({name: VibrationSteps(scene, x) for (name, scene), x in shaken})
-        self.quantities = SystemQuantities(system, self.file.of_quantities(scenes))
+        self.quantities = RunQuantities(system, self.file.of_quantities(scenes))
         if moves:
             self.quantities.keep_ranges(self.lines)
         self.cpu = 0.0  # s, of the processor, in earlier parts of the run
@@ -227,7 +227,7 @@ class SystemRun:
         self.overlaps: set[str] = set()  # and what has been said to be in each other
         self.under: dict[str, float] = {}  # depth (m) of points that have been said to be pulled under it
         self.failures = Failures(me)
-        self.zones = SystemZones(me, managers, self.payout) if managers and moves else None
+        self.zones = RunZones(me, managers, self.payout) if managers and moves else None
         self.loaded = 0.0  # s, loads that have stopped by then act no more
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
@@ -492,7 +492,7 @@ class SystemRun:
             line.held = np.minimum(x.ends.held, 1)
         follows = [line.correction is not None for line in self.lines]
         lines = [x._replace(serves=x.serves or y) for x, y in zip(lines, follows, strict=True)]
-        self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
+        self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
         if self.planes is not None:
@@ -526,7 +526,7 @@ class SystemRun:
             self.passed |= self.watch.begin(self.system)
         note_crossings(self)
 
-    def _make_room(self, solver: SystemSolver) -> None:
+    def _make_room(self, solver: NetworkSolver) -> None:
         """Room for samples of the lines and bodies as they are."""
         rows = max(1, min(WAITING, MOST_SAMPLED // sum(line.sample_size for line in self.lines)))
         for line in self.lines:
@@ -940,7 +940,7 @@ class SystemRun:
         content: dict[str, Any] = {"t": self.t, "dt": float(self.loop.clock.tried_dt), "outcome": outcome.name}
         return write_snapshot(self.target, content | self.file.snapshot(self.state))
 
-    def _settle(self, solver: SystemSolver) -> None:
+    def _settle(self, solver: NetworkSolver) -> None:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
         step = self.resolution.one.step if self.moves else 1.0
         accelerations: list[Floats] = []
@@ -957,7 +957,7 @@ class SystemRun:
         if taken.outcome != Outcome.OK:
             raise self._stopped(solver, taken, 0.0)
 
-    def _stopped(self, solver: SystemSolver, taken: SystemTaken, dt: float) -> LineFailed:
+    def _stopped(self, solver: NetworkSolver, taken: NetworkTaken, dt: float) -> LineFailed:
         """Why no step leads on."""
         if taken.line < 0:
             detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
@@ -1020,13 +1020,13 @@ class SystemRun:
             raise LineFailed(line.number, Outcome.COLLAPSED, self.t, s, text)
 
 
-def line_scenes(system: System, model: SystemModel) -> dict[str, Scene]:
+def line_scenes(system: System, model: NetworkModel) -> dict[str, Scene]:
     """Scenes of the lines of a system by name, between points as they are first looked for."""
     guesses, known = system.guesses, model.scenes
     return {name: system.scene_of(name, system.carried(name), guesses, scene=known[name]) for name in model.names}
 
 
-def start_of(system: System, model: SystemModel, moves: bool, criterion: UserCriterion | None) -> Start:
+def start_of(system: System, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:
     """The first state of a system, with its zones; moves: whether a motion begins there, else it is at rest."""
     scenes = line_scenes(system, model)
     if moves and system.starts_as_placed:
@@ -1043,26 +1043,26 @@ def _torque_of(manager: DomainManager | None) -> Callable[[], float] | None:
 
 def run_system(
     system: System, target: Target | None, text: str, reporter: ProgressReporter,
-    interrupted: Callable[[], bool], name: str = RESULT, resolution: SystemResolution | None = None,
+    interrupted: Callable[[], bool], name: str = RESULT, resolution: NetworkResolution | None = None,
     recording: Recording = ALONE, criterion: UserCriterion | None = None,
     changes: Sequence[LoadChange[System]] = (),
-) -> SystemRun:  # fmt: skip
+) -> NetworkRun:  # fmt: skip
     """Compute the motion of a system into a file with checkpoints, into memory, or (target None) to be compared with.
 
-    name: of the pass; resolution, recording, criterion, changes: as of `SystemRun`.
+    name: of the pass; resolution, recording, criterion, changes: as of `NetworkRun`.
     """
     mode = recording.mode._replace(before=recording.mode.before or {})  # it can be resumed
     recording = recording._replace(mode=mode, planes=recording.begun is None)  # what is followed beside is in space
-    run = SystemRun(system, target, text, True, resolution, recording, criterion, changes)
+    run = NetworkRun(system, target, text, True, resolution, recording, criterion, changes)
     reporter.begin(name, run.resolution.one)
     run.record_motion(reporter, interrupted)
     return run
 
 
 def static_system(
-    system: System, target: Target | None, text: Text, resolution: SystemResolution | None = None, pending: str = ""
-) -> SystemRun:
+    system: System, target: Target | None, text: Text, resolution: NetworkResolution | None = None, pending: str = ""
+) -> NetworkRun:
     """Compute the equilibrium of a system under full loads; target, resolution, pending: as of `run_system`."""
-    run = SystemRun(system, target, text, False, resolution, Recording(pending=pending))
+    run = NetworkRun(system, target, text, False, resolution, Recording(pending=pending))
     run.record_equilibrium()
     return run

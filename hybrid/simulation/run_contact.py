@@ -13,17 +13,17 @@ from hybrid.errors import Complaint, Outcome, SceneError
 from hybrid.kernels.state.books import ZONES
 from hybrid.kernels.state.forces import MAY_TOUCH
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
+from hybrid.model.network import NetworkModel
 from hybrid.model.self_reach import touching, touching_no_more
-from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.contact_start import GIVEN_UP, given_up
 from hybrid.simulation.lines_contact import PASSED, pair_text
+from hybrid.simulation.lines_contact_equilibrium import energy_between, touches_alone
 from hybrid.simulation.lines_contact_start import given_up_text, lines_near, touch_each_other, touching_now
 from hybrid.simulation.run_of_lines import RunOfLines, change_lines
 from hybrid.simulation.self_watch import deepest_text, diameters
-from hybrid.simulation.system_contact_equilibrium import energy_between, touches_alone
 from hybrid.solve.contact_statics import contact_energy
-from hybrid.solve.joined import JoinedLine, LineFailed, SystemState
+from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.store.partners import meeting_text
 
@@ -34,7 +34,7 @@ WITHOUT_CONTACT, AT_START = "in the equilibrium without contact", "at the start"
 
 
 def refuse_within_itself(
-    system: SystemModel, lines: Sequence[JoinedLine], state: SystemState, moves: bool, where: str = WITHOUT_CONTACT
+    system: NetworkModel, lines: Sequence[JoinedLine], state: NetworkState, moves: bool, where: str = WITHOUT_CONTACT
 ) -> None:
     """SceneError: a line for which contact is asked is within itself at the start; where: what that is.
 
@@ -63,7 +63,7 @@ def refuse_within_itself(
 
 
 def _refuse_within_others(
-    system: SystemModel, lines: Sequence[JoinedLine], state: SystemState, moves: bool, where: str
+    system: NetworkModel, lines: Sequence[JoinedLine], state: NetworkState, moves: bool, where: str
 ) -> None:
     """The same of lines that touch each other."""
     energy, shared = energy_between(system, lines, system.body_numbers(0.0), state)

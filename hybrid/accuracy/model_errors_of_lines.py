@@ -13,10 +13,10 @@ import numpy as np
 
 from hybrid.accuracy.error_order import magnitude
 from hybrid.model.build import Model
-from hybrid.model.system import SystemModel, SystemResolution, build_system
+from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.scene.analysis import CatenaryZone, Mesh, RodModel, RodZone, ZonesModel
 from hybrid.scene.network import JoinedLine
-from hybrid.scene.system import System
+from hybrid.scene.network_scene import System
 from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample
 from hybrid.store.reader import Result
 
@@ -34,8 +34,8 @@ def leaves_bending_out(line: JoinedLine) -> bool:
 
 
 def as_rods(
-    system: System, resolution: SystemResolution, rods: Mapping[str, Stretches]
-) -> tuple[System, SystemResolution, list[str]]:
+    system: System, resolution: NetworkResolution, rods: Mapping[str, Stretches]
+) -> tuple[System, NetworkResolution, list[str]]:
     """The same with rods in place of catenaries, how finely, and the names of the lines that this changes.
 
     resolution: of a run of the system; rods: stretches of its lines that were rod at some time in it.
@@ -53,7 +53,7 @@ def as_rods(
         update = {"model": _rods(system.lines[name]), "mesh": Mesh(nodes=tuple(nodes.tolist()))}
         lines[name] = system.lines[name].model_copy(update=update)
         finely[name] = replace(resolution.lines[name], fineness=1.0, grading=None)
-    return system.model_copy(update={"lines": lines}), SystemResolution(finely), names
+    return system.model_copy(update={"lines": lines}), NetworkResolution(finely), names
 
 
 def with_model_errors(
@@ -82,7 +82,7 @@ def _difference(run: RunSample, rods: RunSample) -> dict[str, np.ndarray]:
     }
 
 
-def _model_of(model: SystemModel, name: str) -> Model:
+def _model_of(model: NetworkModel, name: str) -> Model:
     return model.models[model.names.index(name)]
 
 

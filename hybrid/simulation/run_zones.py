@@ -24,9 +24,9 @@ from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Ends, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
-from hybrid.model.system import SystemModel
+from hybrid.model.network import NetworkModel
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.scene.system import System
 from hybrid.simulation.initial_zones import (
     MOST_ROUNDS,
     STRICTER,
@@ -35,14 +35,14 @@ from hybrid.simulation.initial_zones import (
     zones_without_equilibrium,
 )
 from hybrid.simulation.lines_cells import LineCells
+from hybrid.simulation.lines_contact_equilibrium import nearness_in
+from hybrid.simulation.run_cells import equilibrium_on_cells, following
+from hybrid.simulation.run_contact import go_on_as_attached, renew_solver
+from hybrid.simulation.run_kinds import RunKinds
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.system_cells import equilibrium_on_cells, following
-from hybrid.simulation.system_contact import go_on_as_attached, renew_solver
-from hybrid.simulation.system_contact_equilibrium import nearness_in
-from hybrid.simulation.system_kinds import SystemKinds
-from hybrid.simulation.system_start import joined_lines, solve_from
+from hybrid.simulation.run_start import joined_lines, solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
-from hybrid.solve.joined import SystemState, SystemTaken
+from hybrid.solve.joined import NetworkState, NetworkTaken
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.run import Tried
 from hybrid.store.named_arrays import matched
@@ -50,8 +50,8 @@ from hybrid.store.named_arrays import matched
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
     from hybrid.simulation.payout_zones import PaidZones
-    from hybrid.simulation.system_payout import SystemPayout
-    from hybrid.solve.system_steps import SystemSteps
+    from hybrid.simulation.run_payout import RunPayout
+    from hybrid.solve.network_steps import NetworkSteps
 
 HELD = (
     "zones stay rod: in equilibrium, catenary where the criteria allow it is further from the rod than the tolerance; "
@@ -65,13 +65,13 @@ AFTER_CHANGE = "after a change of zones"
 class Start(NamedTuple):
     """Zones of a system at rest."""
 
-    model: SystemModel
+    model: NetworkModel
     found: LinesAtRest | None  # None: a motion begins as the scene says
     managers: Mapping[int, DomainManager]  # by the number of the line
 
 
 def managers_for(
-    scenes: Mapping[str, Scene], model: SystemModel, criterion: UserCriterion | None
+    scenes: Mapping[str, Scene], model: NetworkModel, criterion: UserCriterion | None
 ) -> dict[int, DomainManager]:
     """The domain managers of lines that are rod wherever they may be; at a clamp to what is free they stay rod."""
     managers = {
@@ -85,7 +85,7 @@ def managers_for(
 
 
 def start_at_rest(
-    system: System, scenes: Mapping[str, Scene], model: SystemModel, moves: bool, criterion: UserCriterion | None
+    system: System, scenes: Mapping[str, Scene], model: NetworkModel, moves: bool, criterion: UserCriterion | None
 ) -> Start:
     """Equilibrium with its zones and cells; moves: whether a motion begins there, else it has loads of full size."""
     t, managers = (0.0 if moves else np.inf), managers_for(scenes, model, criterion)
@@ -95,8 +95,8 @@ def start_at_rest(
 
 
 def _zones_at_rest(
-    model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
-) -> tuple[SystemModel, LinesAtRest]:
+    model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
+) -> tuple[NetworkModel, LinesAtRest]:
     """Zones for the equilibrium of a system whose lines with managers are all rod: rod only where it is needed.
 
     As of one cable (simulation.initial_zones): where the two equilibria are further apart than the tolerance of a line
@@ -125,8 +125,8 @@ def _zones_at_rest(
 
 
 def _most_rod(
-    model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
-) -> tuple[SystemModel, LinesAtRest]:
+    model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
+) -> tuple[NetworkModel, LinesAtRest]:
     """The most rod that scenes let lines have, and its equilibrium, from that of lines that are all rod."""
     free = {k: manager.given >= 0 for k, manager in managers.items()}
     if all(x.all() for x in free.values()):
@@ -135,8 +135,8 @@ def _most_rod(
 
 
 def _with_rods(
-    model: SystemModel, found: LinesAtRest, rods: Mapping[int, np.ndarray], t: float
-) -> tuple[SystemModel, LinesAtRest]:
+    model: NetworkModel, found: LinesAtRest, rods: Mapping[int, np.ndarray], t: float
+) -> tuple[NetworkModel, LinesAtRest]:
     """Lines of which these base cells are rod, by their numbers, at rest, from lines that are all rod."""
     models, states = [*model.models], [*found.state.lines]
     for k, rod in rods.items():
@@ -144,13 +144,13 @@ def _with_rods(
         assert full.layout is not None
         models[k] = on_layout(full, full.layout._replace(rod=rod))
         states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at(t))
-    other, start = replace(model, models=tuple(models)), SystemState(states, found.state.bodies)
+    other, start = replace(model, models=tuple(models)), NetworkState(states, found.state.bodies)
     return other, solve_from(found, other, t, found.bodies, start, "the equilibrium of rods")
 
 
 def zones_as_placed(
-    scenes: Mapping[str, Scene], model: SystemModel, criterion: UserCriterion | None
-) -> tuple[SystemModel, dict[int, DomainManager]]:
+    scenes: Mapping[str, Scene], model: NetworkModel, criterion: UserCriterion | None
+) -> tuple[NetworkModel, dict[int, DomainManager]]:
     """Zones of a start that is no equilibrium, as of one cable: rod, but for what a line wants to be catenary."""
     managers, models = managers_for(scenes, model, criterion), [*model.models]
     for k, manager in managers.items():
@@ -172,8 +172,8 @@ def _take_rods(manager: DomainManager, model: Model) -> None:
 
 
 def _within(
-    model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
-) -> tuple[SystemModel, LinesAtRest] | None:
+    model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
+) -> tuple[NetworkModel, LinesAtRest] | None:
     """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
     rods = _asked(managers, model, found, t)
     for _ in range(MOST_ROUNDS):
@@ -190,7 +190,7 @@ def _within(
 
 
 def _asked(
-    managers: Mapping[int, DomainManager], system: SystemModel, found: LinesAtRest, t: float
+    managers: Mapping[int, DomainManager], system: NetworkModel, found: LinesAtRest, t: float
 ) -> dict[int, np.ndarray]:
     """Base cells that the criteria want to be rod in an equilibrium, by number of the line."""
     near, rods = nearness_in(system, joined_lines(system, t), found, t), {}
@@ -202,7 +202,7 @@ def _asked(
     return rods
 
 
-def _apart(k: int, model: SystemModel, found: LinesAtRest, other: SystemModel, answer: LinesAtRest) -> float:
+def _apart(k: int, model: NetworkModel, found: LinesAtRest, other: NetworkModel, answer: LinesAtRest) -> float:
     """Largest distance (m) of base nodes of a line between two equilibria, the first of them all rod."""
     full, few = model.models[k].layout, other.models[k].layout
     assert full is not None and few is not None
@@ -234,7 +234,7 @@ class _LineZones:
         )  # fmt: skip
         follow_zones(self.switching.table.numbers)
 
-    def bind(self, run: RunOfLines, loop: SystemSteps) -> Table:
+    def bind(self, run: RunOfLines, loop: NetworkSteps) -> Table:
         """What follows the zones within the compiled steps of a loop."""
         model, (even, odd) = self.switching.model, loop.turns
         self.switching.table.bind(
@@ -246,16 +246,14 @@ class _LineZones:
         return self.switching.table
 
 
-class SystemZones:
+class RunZones:
     """The zones of all lines of a run whose zones move.
 
     Steps follow them compiled, and Python looks at them where something is due; a criterion of the user's own is asked
     around every try, contact after every step, and outputs of criteria are written before the next one.
     """
 
-    def __init__(
-        self, run: RunOfLines, managers: Mapping[int, DomainManager], payout: SystemPayout | None = None
-    ) -> None:
+    def __init__(self, run: RunOfLines, managers: Mapping[int, DomainManager], payout: RunPayout | None = None) -> None:
         every = run.resolution.one.every
         self._run = run
         # (L,) J, of each line with itself and others, after the last accepted step
@@ -267,9 +265,9 @@ class SystemZones:
             self._pay(payout)
         self._rescues, self._rescued = 0, 0  # of the step that is tried, after so many
         self._compiled = all(x.switching.compiled for x in self.lines)
-        self._kinds: SystemKinds | None = None  # of cells that stay, with the solver of now
+        self._kinds: RunKinds | None = None  # of cells that stay, with the solver of now
 
-    def _pay(self, payout: SystemPayout) -> None:
+    def _pay(self, payout: RunPayout) -> None:
         """Zones know of the winches of their lines, and these of them."""
         from hybrid.simulation.payout_zones import PaidZones
 
@@ -281,7 +279,7 @@ class SystemZones:
                 x.paid = PaidZones(run.scenes[x.number], paying, x.switching, turning.tolist())
                 payout.zones[x.number] = x.paid
 
-    def attach(self, loop: SystemSteps) -> None:
+    def attach(self, loop: NetworkSteps) -> None:
         """Let the steps of a loop follow the zones from now on, or ask for what they do."""
         run = self._run
         loop.clock.allowed = self.longest
@@ -402,7 +400,7 @@ class SystemZones:
         for x in self.lines if not self._compiled else ():
             x.follow(run, b.SOLVE, run.t, end, run.state.lines[x.number], run.other.lines[x.number])
 
-    def wants_more_rod(self, taken: SystemTaken, end: float, last: bool) -> bool:
+    def wants_more_rod(self, taken: NetworkTaken, end: float, last: bool) -> bool:
         """After a try to `end` (s): whether lines have got more rod, with which the step is to be repeated.
 
         last: no shorter step is left to try.
@@ -459,13 +457,13 @@ class SystemZones:
         changes = [(x, change) for x, change in changes if x.cells is None]
         if not changes:
             return
-        if not SystemKinds.apply(run, [x.switching for x, _ in changes]):
+        if not RunKinds.apply(run, [x.switching for x, _ in changes]):
             for x, change in changes:
                 self._switch(x, change)
             self.go_on()
             return
         if self._kinds is None or not self._kinds.fits:
-            self._kinds = SystemKinds(run)
+            self._kinds = RunKinds(run)
         self._kinds.begin()
         for x, change in changes:
             run.lines[x.number].write_down()

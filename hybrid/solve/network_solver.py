@@ -1,6 +1,6 @@
 """Lines that meet at points: their equilibrium, their consistent accelerations, and their steps in time.
 
-One Newton for all of them (kernels.run.system).  States go in and come out as of a single line (solve.stepper); a free
+One Newton for all of them (kernels.run.network).  States go in and come out as of a single line (solve.stepper); a free
 point has none of its own, it is the last or first node of every line that is joined to it.  A body has a row of numbers
 (kernels.junctions.bodies).
 """
@@ -25,17 +25,17 @@ from hybrid.kernels.junctions.body_forces import EACH_BODY, TOUCHED
 from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions.junctions import HANDED
+from hybrid.kernels.junctions.lines_contact import room_for_products
 from hybrid.kernels.junctions.lone_lines import find_near, lead_lone
-from hybrid.kernels.junctions.system_contact import room_for_products
-from hybrid.kernels.junctions.system_job import SystemTask
+from hybrid.kernels.junctions.network_job import NetworkTask
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel.payout import stand_among
 from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_system_step, solve_system
 from hybrid.kernels.run.run import in_plane, in_space
-from hybrid.kernels.run.system import JUNCTIONS, begin_line, book_system_step, solve_system
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.forces import FRICTION, PLANAR, TOUCHES, WAVES
 from hybrid.kernels.state.obstacle_rows import FREE, MOVES
@@ -48,7 +48,7 @@ from hybrid.kernels.step.step_law import REFUSED
 from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.contact_statics import DAMPING, left_over
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
-from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
+from hybrid.solve.joined import JoinedLine, NetworkState, NetworkTaken
 from hybrid.solve.joint_jobs import JointJobs, Rooms
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
@@ -91,7 +91,7 @@ def _room(x: JoinedLine, touches: bool = False) -> Work:
     return work._replace(X=np.zeros((cells + 1) * ROW + kept), rows=rows)
 
 
-class SystemSolver:
+class NetworkSolver:
     """Solves for all lines of a system at once; owns the work arrays, not the states.
 
     It works in space, but for steps of lines that are joined to nothing and are marked as planar.
@@ -134,7 +134,7 @@ class SystemSolver:
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
         self.blurred: set[int] = set()  # lines of the last equilibrium of which round-off hides whether they buckle
-        self.turns: tuple[SystemState, SystemState] | None = None  # states between which steps go back and forth
+        self.turns: tuple[NetworkState, NetworkState] | None = None  # states between which steps go back and forth
         self.net = np.zeros((points, 3))
         mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
         self.scale = max(x.scale for x in lines)
@@ -143,7 +143,7 @@ class SystemSolver:
         self._pressing: NDArray[np.int64] = np.zeros(0, np.int64)
         self._pressed: dict[str, Any] = {}
         self._touched: tuple[Any, ...] = ()  # what jobs get where lines touch themselves or each other
-        self._phase, self._at_rest, self._asked = np.zeros(1, np.int64), np.zeros(1, np.int64), SystemTask()
+        self._phase, self._at_rest, self._asked = np.zeros(1, np.int64), np.zeros(1, np.int64), NetworkTask()
         blank = Table(blank_job)
         # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
         self._numbers = np.zeros((2, len(lines), blank.numbers.size), np.int64)
@@ -258,7 +258,7 @@ class SystemSolver:
         """Whether a line may come near what is free, with which it is then solved."""
         return any(self._mixes)
 
-    def find_near(self, now: SystemState, t: float) -> None:
+    def find_near(self, now: NetworkState, t: float) -> None:
         """Find which lines are near what is free in the state of now, t (s), and solve these with it from now on."""
         self._bind_states(0, now, now)
         for x in self.lines:
@@ -382,7 +382,7 @@ class SystemSolver:
         """(2, L, ..) jobs of all lines, of steps of even and of odd parity."""
         return self._numbers
 
-    def look_at(self, states: SystemState) -> None:
+    def look_at(self, states: NetworkState) -> None:
         """Let the jobs of even parity lead from states to the same."""
         self.turns = None
         self._bind_states(0, states, states)
@@ -411,8 +411,8 @@ class SystemSolver:
         if self._contacts or self.shared is not None:
             self._touch()
 
-    def take_turns(self, states: tuple[SystemState, SystemState]) -> dict[str, Any]:
-        """Steps lead from the first state to the second and back from now on: what run.system_run.StepsJob has."""
+    def take_turns(self, states: tuple[NetworkState, NetworkState]) -> dict[str, Any]:
+        """Steps lead from the first state to the second and back from now on: what run.network_run.StepsJob has."""
         self.turns = states
         return self._bind_turns()
 
@@ -456,7 +456,7 @@ class SystemSolver:
             pushes.reverse()
             self._bind_pushes(number)
 
-    def _bind_states(self, parity: int, old: SystemState, new: SystemState) -> None:
+    def _bind_states(self, parity: int, old: NetworkState, new: NetworkState) -> None:
         for tables, a, b in zip(self._tables, old.lines, new.lines, strict=True):
             tables[parity].bind(old=a, new=b)
         self._all.bind_bodies(parity, old.bodies, new.bodies)
@@ -465,7 +465,7 @@ class SystemSolver:
                 tables[parity].bind(old=old.lines[k], new=new.lines[k])
             self._together.bind_bodies(parity, old.bodies, new.bodies)
 
-    def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
+    def _solve(self, task: Task, old: NetworkState, new: NetworkState, t: float = 0.0) -> NetworkTaken:
         self.turns = None
         self._bind_states(0, old, new)
         for k, contact in self._contacts.items():
@@ -478,9 +478,9 @@ class SystemSolver:
         )  # fmt: skip
         self._let_march()
         outcome, iterations, left, line, where = solve_system(self._all.jobs[0].numbers)
-        return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())
+        return NetworkTaken(Outcome(outcome), iterations, left, line, where, self.residual())
 
-    def _march(self, what: int, ca: float, states: SystemState, t: float = 0.0) -> SystemTaken:
+    def _march(self, what: int, ca: float, states: NetworkState, t: float = 0.0) -> NetworkTaken:
         """Forces (ASSEMBLY) or a CORRECTION of states, of lines by themselves by the kernels of their steps."""
         task = Task(what, ca=ca, limits=Limits(1.0, 1.0, 1))
         if not self._marches_alone:
@@ -495,12 +495,12 @@ class SystemSolver:
             # forces of a line alone are known whatever its equations are
             known = what == ASSEMBLY and outcome == Outcome.SINGULAR and work.report[RESIDUAL] < np.inf
             if outcome != Outcome.OK and not known:
-                return SystemTaken(Outcome(outcome), iterations, left, k, where, self.residual())
+                return NetworkTaken(Outcome(outcome), iterations, left, k, where, self.residual())
         if what == ASSEMBLY:
             self._begin_books(states, t)
-        return SystemTaken(Outcome.OK, 1, np.inf, -1, -1, self.residual())
+        return NetworkTaken(Outcome.OK, 1, np.inf, -1, -1, self.residual())
 
-    def _begin_books(self, states: SystemState, t: float) -> None:
+    def _begin_books(self, states: NetworkState, t: float) -> None:
         """Powers and extremes of lines that are solved by themselves, in states whose reports are known, at t (s)."""
         for k, table in self._lone_tables.items():
             x, clock = self.lines[k], self.books[k].clock
@@ -542,7 +542,7 @@ class SystemSolver:
         """Whether a line touched a free body in the last march."""
         return bool(self._pressing.any())
 
-    def pressed_bodies(self, states: SystemState, cv: float = 0.0) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
+    def pressed_bodies(self, states: NetworkState, cv: float = 0.0) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
         """What lines that touch bodies do to them in states at rest: rows (n, TOUCHED) of nodes, how that changes as
         each body moves (S, 36), what it is (S, 6), and the numbers of these bodies (S,).  cv: 1/s, of the damping.
         """
@@ -564,12 +564,12 @@ class SystemSolver:
         found = [*self._contacts.values(), *([] if self.shared is None else [self.shared])]
         return min((x.narrowest for x in found if x.touches), default=np.inf)
 
-    def proof(self, states: SystemState) -> float:
+    def proof(self, states: NetworkState) -> float:
         """Largest force (N) that is left over at a node, a point or a body, with that of contact; reports follow."""
         residual = self.evaluate_forces(states, self.anchor).residual
         return self._largest(*self.unbalanced(states, self.anchor)) if self.in_contact() else residual
 
-    def unbalanced(self, states: SystemState, ca: float) -> tuple[list[float], Floats, Floats]:
+    def unbalanced(self, states: NetworkState, ca: float) -> tuple[list[float], Floats, Floats]:
         """What does not balance, with contact, in states that have just been evaluated: the largest force (N) at a node
 
         of each line, forces (P, 3) N on points, forces and moments (B, 6) N, N m on bodies.  ca: as of them.
@@ -589,14 +589,14 @@ class SystemSolver:
                     left[joint - points] += np.concatenate([force, np.cross(arm, force)])
         return inside, net, left
 
-    def _push(self, states: SystemState) -> dict[int, Floats]:
+    def _push(self, states: NetworkState) -> dict[int, Floats]:
         """Forces (N+1, 3) N on lines that may touch each other, by number, in states at rest."""
         assert self.shared is not None
         self.look_at(states)
         self.shared.rest_energy(self.work)
         return self.shared.forces()
 
-    def contacts_at(self, states: SystemState, finer: int = 1) -> list[tuple[Contact, Sequence[int]]]:
+    def contacts_at(self, states: NetworkState, finer: int = 1) -> list[tuple[Contact, Sequence[int]]]:
         """Contact in states at rest, with the numbers of its lines, whose nodes it has in turn.
 
         finer: by how much more sample points lie on each piece of a line than the law has.
@@ -614,7 +614,7 @@ class SystemSolver:
             contact.samples[:] //= finer
         return found
 
-    def contact_energy(self, states: SystemState) -> float:
+    def contact_energy(self, states: NetworkState) -> float:
         """Energy, J, of contact of lines with each other in states at rest; infinite: they are in each other."""
         assert self.shared is not None
         self.look_at(states)
@@ -623,13 +623,13 @@ class SystemSolver:
     # --- motion -------------------------------------------------------------------------------------
 
     def step(
-        self, old: SystemState, new: SystemState, dt: float, rho: float, before: float, rho_before: float,
+        self, old: NetworkState, new: NetworkState, dt: float, rho: float, before: float, rho_before: float,
         t: float = 0.0, most: int = MOST_OF_STEP, fixed: bool = False,
-    ) -> SystemTaken:  # fmt: skip
+    ) -> NetworkTaken:  # fmt: skip
         """From `old` to `new` (overwritten) over dt, with the ends and the sea of the new time in the lines' arrays.
 
         before, rho_before: the length, s, of the step that led to `old`, 0 if it is a start, and its spectral radius,
-        `SystemTaken.rho` of it.  t: s, of `new`, for extremes.  fixed: whether steps have a fixed length, but for
+        `NetworkTaken.rho` of it.  t: s, of `new`, for extremes.  fixed: whether steps have a fixed length, but for
         parts of one.
         """
         limits = Limits(REACH * self.length, 1.0, most)
@@ -644,9 +644,9 @@ class SystemSolver:
         return replace(taken, error=float(errors.max()), ratio=ratio, rho=used)
 
     def consistent_accelerations(
-        self, states: SystemState, accelerations: Sequence[Floats], t: float = 0.0,
+        self, states: NetworkState, accelerations: Sequence[Floats], t: float = 0.0,
         lengthening: Mapping[int, Floats] = MappingProxyType({}),
-    ) -> SystemTaken:  # fmt: skip
+    ) -> NetworkTaken:  # fmt: skip
         """Give `states` the accelerations and tensions that positions, velocities and loads imply (solve.stepper).
 
         accelerations: (2, 3) m/s2 of the held ends of each line; lengthening: (N,) m/s2, second rates of the lengths of
@@ -703,7 +703,7 @@ class SystemSolver:
             state.wa[:] = state.wd
         return self.forces_in_motion(states, t)
 
-    def _turning_gaps(self, states: SystemState) -> None:
+    def _turning_gaps(self, states: NetworkState) -> None:
         """What fairleads accelerate beside the acceleration of their bodies, towards the axis of rotation."""
         self._gaps[:] = 0.0
         for l, x in enumerate(self.lines):
@@ -714,7 +714,7 @@ class SystemSolver:
                     spin = R @ row[W : W + 3]
                     self._gaps[l, k] = np.cross(spin, np.cross(spin, R @ x.fairleads[k])) / HEAVY
 
-    def evaluate_forces(self, states: SystemState, ca: float, t: float = 0.0) -> SystemTaken:
+    def evaluate_forces(self, states: NetworkState, ca: float, t: float = 0.0) -> NetworkTaken:
         """The forces, reports, powers and residuals of states at rest as they are, at t (s).
 
         ca: 1/s2, of springs of that times the mass.
@@ -735,11 +735,11 @@ class SystemSolver:
             self._settle_contact(states)
         return taken
 
-    def forces_in_motion(self, states: SystemState, t: float) -> SystemTaken:
+    def forces_in_motion(self, states: NetworkState, t: float) -> NetworkTaken:
         """The same of states between two steps, at t (s): mean tensions of ropes stay what they are."""
         return self.evaluate_forces(states, HEAVY, t)
 
-    def _settle_contact(self, states: SystemState) -> None:
+    def _settle_contact(self, states: NetworkState) -> None:
         """Put what contact does to held ends into the reports and powers of states that have just been evaluated."""
         for k, contact in self._contacts.items():
             x, books, report = self.lines[k], self.books[k], self.work[k].report
@@ -770,7 +770,7 @@ class SystemSolver:
 
     # --- equilibrium --------------------------------------------------------------------------------
 
-    def compliance(self, states: SystemState, ca: float) -> Floats | None:
+    def compliance(self, states: NetworkState, ca: float) -> Floats | None:
         """How points and bodies give way to forces on them: (n, n) m/N, rad/N, .., of the points (3 each), then of the
         bodies (3 of the origin, 3 of the rotation), of an equilibrium, from the factors of its lines.  Friction is
         left out.  ca: 1/s2, of springs of that times the mass.  None: the system is singular.
@@ -794,7 +794,7 @@ class SystemSolver:
         first = int((self.joints[:, 1] >= 0).sum())
         return np.asarray(-inverse[first:, first:])
 
-    def is_stable(self, states: SystemState) -> bool:
+    def is_stable(self, states: NetworkState) -> bool:
         """Whether points and bodies come back to an equilibrium when they are moved a little; False also if neither.
 
         The springs that hold what nothing else does are a part of NEUTRAL of what a force of the tension scale does
@@ -821,7 +821,7 @@ class SystemSolver:
             self._near[self._mixes], self._mixes = -1, [False] * len(self.lines)
             self._group()
 
-    def factor(self, states: SystemState, ca: float) -> bool:
+    def factor(self, states: NetworkState, ca: float) -> bool:
         """Leave the factors of states as they are where `keep_factors` keeps them; ca: as of `evaluate_forces`.
 
         False: the system is singular.
@@ -833,7 +833,7 @@ class SystemSolver:
         taken = self._solve(Task(CORRECTION, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states)
         return taken.outcome == Outcome.OK
 
-    def newton_round(self, states: SystemState) -> SystemTaken:
+    def newton_round(self, states: NetworkState) -> NetworkTaken:
         """Static Newton from states at rest, which it overwrites; springs of `anchor` times their mass hold nodes and
 
         bodies where they are, so that what is found balances with these.
@@ -857,14 +857,14 @@ class SystemSolver:
             settle_in_soil(x.line, x.sea, state.r, state.soil)
         return taken
 
-    def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> SystemSolver:
+    def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> NetworkSolver:
         """As of `solve.statics.Solver`, without contact."""
-        return SystemSolver(lines, len(self.net), self.bodies if bodies is None else bodies)
+        return NetworkSolver(lines, len(self.net), self.bodies if bodies is None else bodies)
 
-    def turned(self, start: SystemState) -> None:
+    def turned(self, start: NetworkState) -> None:
         """As of `solve.statics.Solver`: chords are not turned."""
 
-    def newton(self, start: SystemState) -> tuple[SystemTaken, SystemState]:
+    def newton(self, start: NetworkState) -> tuple[NetworkTaken, NetworkState]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.
 
         An outcome other than OK also where what was found is no equilibrium (`flaw`).
@@ -875,14 +875,14 @@ class SystemSolver:
             taken = replace(taken, outcome=outcome, line=line, where=where)
         return taken, new
 
-    def balance(self, start: SystemState) -> tuple[SystemTaken, SystemState]:
+    def balance(self, start: NetworkState) -> tuple[NetworkTaken, NetworkState]:
         """As `newton`, whatever the state is in which all forces balance."""
         new = start.copy()
         for state in new.lines:
             for still in (state.v, state.a, state.vd, state.w, state.wa, state.wd, state.sheave):
                 still[:] = 0.0
         new.bodies[:, V:] = 0.0
-        taken = SystemTaken(Outcome.NOT_CONVERGED, 0, np.inf, -1, -1, np.inf)
+        taken = NetworkTaken(Outcome.NOT_CONVERGED, 0, np.inf, -1, -1, np.inf)
         iterations, kept, rubs = 0, None, any(x.line.bits & FRICTION for x in self.lines)
         for _ in range(BALANCING):
             taken = self.newton_round(new)
@@ -890,7 +890,7 @@ class SystemSolver:
             if taken.outcome != Outcome.OK:
                 break
             proof = self.proof(new)
-            taken = SystemTaken(taken.outcome, iterations, taken.correction, taken.line, taken.where, proof)
+            taken = NetworkTaken(taken.outcome, iterations, taken.correction, taken.line, taken.where, proof)
             if not self.is_balanced(new, proof):
                 taken = replace(taken, outcome=Outcome.NOT_CONVERGED)
             elif kept is not None or (not rubs and (not self.in_contact() or self.is_balanced(new, CLOSER * proof))):
@@ -902,12 +902,12 @@ class SystemSolver:
             self.proof(new)
         return taken, new
 
-    def is_balanced(self, states: SystemState, residual: float) -> bool:
+    def is_balanced(self, states: NetworkState, residual: float) -> bool:
         """Whether a largest residual force (N) is round-off of the forces in states."""
         greatest = max(float(np.abs(state.T).max()) for state in states.lines)
         return residual <= BALANCED * (greatest + self.scale)
 
-    def flaw(self, states: SystemState) -> tuple[Outcome, int, int]:
+    def flaw(self, states: NetworkState) -> tuple[Outcome, int, int]:
         """Why a balanced state is no equilibrium (OK: it is one), the line (-1: a point or body), and its node or cell.
 
         It is stable where lines would not buckle between joints that are held, and points and bodies come back with

@@ -9,11 +9,11 @@ import numpy as np
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution, follows_curvature, has_limits
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
+from hybrid.scene.network_scene import System
 from hybrid.scene.schema import AdaptiveModel
-from hybrid.scene.system import System
+from hybrid.simulation.line_result import LineResult
+from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.run_sample import COMPARED, RunSample, catenary_share, compared_cells, split_outputs, usual_cells
-from hybrid.simulation.system_lines import LineResult
-from hybrid.simulation.system_run import SystemRun
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.envelope import GROUP as ENVELOPE
 from hybrid.store.limits import EXTREMES, extremes_about
@@ -21,7 +21,7 @@ from hybrid.store.reader import Result
 from hybrid.store.records import THERE
 
 
-def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
+def compared(line: LineResult, run: NetworkRun, cpu: float) -> RunSample:
     """What is compared of a line in a run that is only to be compared with; cpu: s, of all lines."""
     found, resolution = line.recorder, run.resolution.lines[line.name]
     assert isinstance(found, ComparisonRecorder)

@@ -16,7 +16,7 @@ from hybrid.kernels.state.state import NO_TURN, State
 from hybrid.model.build import Model
 from hybrid.model.failure import Weakness, after_failure, weaknesses
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.solve.joined import SystemState
+from hybrid.solve.joined import NetworkState
 
 SAME_TIME = 1e-6  # of a step: a time so near is now
 
@@ -101,7 +101,7 @@ class Failures:
         ]
         for point in run.model.unheld:
             run.state.bodies[len(run.model.bodies) + point, W:] = 0.0
-        run.state = SystemState(states, run.state.bodies)
+        run.state = NetworkState(states, run.state.bodies)
         done = run.solver.body_work[:, DONE:SPRING].copy()
         run.make_solver()
         run.solver.body_work[:, DONE:SPRING] = done

@@ -1,4 +1,4 @@
-"""Steps of several lines, many in a call: what kernels.run.system_run works with, and its clock for Python."""
+"""Steps of several lines, many in a call: what kernels.run.network_run works with, and its clock for Python."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from hybrid.kernels.junctions.members_water import stir_members
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_step import follow_zones
 from hybrid.kernels.run.following_run import ask_cells, change_cells
-from hybrid.kernels.run.system import book_system_step
-from hybrid.kernels.run.system_run import (
+from hybrid.kernels.run.network import book_system_step
+from hybrid.kernels.run.network_run import (
     CUT_LINE,
     LINE,
     REGROUP,
@@ -26,15 +26,15 @@ from hybrid.kernels.run.system_run import (
     run_system,
     sample_system,
 )
-from hybrid.kernels.run.system_sampling import BODY_SAMPLE
+from hybrid.kernels.run.network_sampling import BODY_SAMPLE
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats, Moves
 from hybrid.kernels.step.sampling import SAME_TIME
 from hybrid.kernels.step.step_law import FIRST, WARY
 from hybrid.solve import run as one_line
-from hybrid.solve.joined import SystemState, SystemTaken
+from hybrid.solve.joined import NetworkState, NetworkTaken
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import MOST_ITERATIONS, REACH
-from hybrid.solve.system import SystemSolver
 
 # Numbers of the log of all lines, at most.
 MOST_LOGGED = 2_000_000
@@ -42,7 +42,7 @@ MOST_LOGGED = 2_000_000
 ROWS_OUTSIDE = 4096
 
 
-class SystemSteps:
+class NetworkSteps:
     """Steps of all lines of a system. Lengths follow errors where a largest one is given, else they are equal."""
 
     def __init__(
@@ -62,9 +62,9 @@ class SystemSteps:
         self.body_samples, self.worked = np.zeros((0, 0, BODY_SAMPLE)), np.zeros((3, 0, WORK))
         self.clock, self.counts = b.Clock(), b.Counts()
         self.lines = np.zeros(4, np.int64)
-        self._job, self._states, self._cells = Table(blank_steps_job), (SystemState([]), SystemState([])), 0
+        self._job, self._states, self._cells = Table(blank_steps_job), (NetworkState([]), NetworkState([])), 0
         self._log, self.seen = np.zeros((0, 0, len(b.LOG))), np.zeros(0, np.int64)
-        self._solver: SystemSolver | None = None
+        self._solver: NetworkSolver | None = None
         self._first: np.ndarray | None = None  # a job of the solver, until the kernels of its steps are known
         self._waves = 0
         self._is_new = True  # whether nobody knows which lines are near what is free in the state of now
@@ -79,7 +79,7 @@ class SystemSteps:
 
     # --- what steps lead from and to ----------------------------------------------------------------
 
-    def attach(self, solver: SystemSolver, state: SystemState, other: SystemState) -> bool:
+    def attach(self, solver: NetworkSolver, state: NetworkState, other: NetworkState) -> bool:
         """Steps of a solver go on from `state`, with room in `other` for the next; False: they do so already."""
         counts = self.counts
         now, then = self.states
@@ -122,7 +122,7 @@ class SystemSteps:
         self.clock.previous, self.counts.parity = self.clock.now, 0
         self.worked[0] = self._solver.body_work
 
-    def move(self, solver: SystemSolver, moves: Sequence[Moves]) -> None:
+    def move(self, solver: NetworkSolver, moves: Sequence[Moves]) -> None:
         """The ends of the lines move so from now on, by their kernels."""
         for k, each in enumerate(moves):
             solver.bind_line(k, moves=each)
@@ -198,7 +198,7 @@ class SystemSteps:
         self._job.bind(node_asker=asker if known else 0, reeler=reeler if known else 0)
 
     def take_tangents(self, job: np.ndarray, follower: int) -> None:
-        """After every step this kernel takes tangents along it, with a table of kernels.run.system_tangents."""
+        """After every step this kernel takes tangents along it, with a table of kernels.run.network_tangents."""
         self._job.bind(beside=job, tangents=follower)
 
     def watch_nothing(self) -> None:
@@ -206,12 +206,12 @@ class SystemSteps:
         self._job.bind(watcher=0)
 
     @property
-    def turns(self) -> tuple[SystemState, SystemState]:
+    def turns(self) -> tuple[NetworkState, NetworkState]:
         """The states that are those of now at even parity and at odd."""
         return self._states
 
     @property
-    def states(self) -> tuple[SystemState, SystemState]:
+    def states(self) -> tuple[NetworkState, NetworkState]:
         """The state now, and the other one, before the last step."""
         parity = self.counts.parity
         return self._states[parity], self._states[1 - parity]
@@ -294,11 +294,11 @@ class SystemSteps:
     # --- what is known --------------------------------------------------------------------------------
 
     @property
-    def tried(self) -> SystemTaken:
+    def tried(self) -> NetworkTaken:
         """How the last try ended."""
         outcome, it, where = int(self.counts.outcome), int(self.counts.tries), int(self.counts.where)
         correction = float(self.clock.correction)
-        return SystemTaken(Outcome(outcome), it, correction, int(self.lines[LINE]), where, np.nan)
+        return NetworkTaken(Outcome(outcome), it, correction, int(self.lines[LINE]), where, np.nan)
 
     @property
     def last_cut(self) -> tuple[int, int]:

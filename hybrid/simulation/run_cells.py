@@ -11,24 +11,24 @@ from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import refined
-from hybrid.model.system import SystemModel
-from hybrid.scene.system import System
+from hybrid.model.network import NetworkModel
+from hybrid.scene.network_scene import System
 from hybrid.simulation.initial_zones import MOST_ROUNDS, on_fewer, planned_cells, with_fewer_cells
-from hybrid.simulation.system_start import equilibrium_of_system, solve_from
+from hybrid.simulation.run_start import equilibrium_of_system, solve_from
 from hybrid.simulation.zone_switching import on_layout
-from hybrid.solve.joined import SystemState
+from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 
-Rest = tuple[SystemModel, LinesAtRest]
+Rest = tuple[NetworkModel, LinesAtRest]
 
 
-def following(model: SystemModel, managers: Mapping[int, DomainManager]) -> dict[int, DomainManager]:
+def following(model: NetworkModel, managers: Mapping[int, DomainManager]) -> dict[int, DomainManager]:
     """Those of lines whose cells follow the curvature from the start on; at a winch they begin to with the motion."""
     share = {k: x.zones.clock.share for k, x in managers.items()}
     return {k: x for k, x in managers.items() if share[k] > 0.0 and model.models[k].payout is None}
 
 
-def equilibrium_on_cells(system: System, model: SystemModel, managers: Mapping[int, DomainManager], t: float) -> Rest:
+def equilibrium_on_cells(system: System, model: NetworkModel, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """Equilibrium of a system, rod wherever it may be; of lines with managers on the cells that it asks for.
 
     managers: by number of the line, of cells that follow.  Lines that touch themselves, are turned or are catenary
@@ -51,17 +51,17 @@ def equilibrium_on_cells(system: System, model: SystemModel, managers: Mapping[i
     return _with_catenaries(model, equilibrium_of_system(system, model, t), managers, t)
 
 
-def _may_have_fewer(model: SystemModel, k: int, manager: DomainManager) -> bool:
+def _may_have_fewer(model: NetworkModel, k: int, manager: DomainManager) -> bool:
     bound = any(model.turns[k]) or model.models[k].line.bits & SELF_CONTACT
     return bool((manager.given >= 0).all()) and not bound
 
 
-def _with(model: SystemModel, others: Mapping[int, Model]) -> SystemModel:
+def _with(model: NetworkModel, others: Mapping[int, Model]) -> NetworkModel:
     """The same system with other models of some lines, by number."""
     return replace(model, models=tuple(others.get(k, x) for k, x in enumerate(model.models)))
 
 
-def _on_planned_cells(model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
+def _on_planned_cells(model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """The equilibrium with cells as its curvature asks for, from one with others.  ComputationError: there is none."""
     before = {k: planned_cells(model.models[k], x, found.state.lines[k], t) for k, x in managers.items()}
     for _ in range(MOST_ROUNDS):
@@ -80,7 +80,7 @@ def _on_planned_cells(model: SystemModel, found: LinesAtRest, managers: Mapping[
     raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "cells become shorter and shorter")
 
 
-def _with_catenaries(model: SystemModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
+def _with_catenaries(model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """The same where scenes say that lines are catenary, in the equilibrium with that."""
     others, states = dict[int, Model](), [*found.state.lines]
     for k, manager in managers.items():
@@ -98,8 +98,8 @@ def _with_catenaries(model: SystemModel, found: LinesAtRest, managers: Mapping[i
     return model, _solved(model, found, t, states)
 
 
-def _solved(model: SystemModel, found: LinesAtRest, t: float, states: list[State]) -> LinesAtRest:
+def _solved(model: NetworkModel, found: LinesAtRest, t: float, states: list[State]) -> LinesAtRest:
     bodies = found.bodies
     return solve_from(
-        found, model, t, bodies, SystemState(states, found.state.bodies), "the equilibrium of other cells"
+        found, model, t, bodies, NetworkState(states, found.state.bodies), "the equilibrium of other cells"
     )

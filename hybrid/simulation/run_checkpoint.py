@@ -14,18 +14,18 @@ from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE
 from hybrid.scene.bodies import FixedBody, FreeBody
+from hybrid.scene.network_scene import System
 from hybrid.scene.obstacles import files_of as obstacle_files
-from hybrid.scene.system import System
 from hybrid.simulation.lines_contact_start import touch_each_other
 from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.old_checkpoints import FIRST_REPORT, FIRST_WORKS, as_of_line, is_of_cable, zoning_of_today
 from hybrid.simulation.restore import program, refused, resolution_tree
+from hybrid.simulation.run_contact import evaluate_forces, let_touch
+from hybrid.simulation.run_failures import Failures
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.system_contact import evaluate_forces, let_touch
-from hybrid.simulation.system_failures import Failures
-from hybrid.simulation.system_points import Rotations
-from hybrid.simulation.system_quantities import SystemQuantities
-from hybrid.simulation.system_zones import SystemZones
+from hybrid.simulation.run_points import Rotations
+from hybrid.simulation.run_quantities import RunQuantities
+from hybrid.simulation.run_zones import RunZones
 from hybrid.simulation.vibration_steps import VibrationsOfLines
 from hybrid.solve.run import no_extremes
 from hybrid.store.checkpoint import digest_of, read_checkpoint
@@ -33,7 +33,7 @@ from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:  # what a run without winches does not load
-    from hybrid.simulation.system_payout import SystemPayout
+    from hybrid.simulation.run_payout import RunPayout
 
 
 REFERENCES = "first_places", "first_turns"  # of outputs of a line
@@ -43,7 +43,7 @@ class KeptRun(RunOfLines, Protocol):
     """A run with all that its checkpoint keeps."""
 
     failures: Failures
-    quantities: SystemQuantities
+    quantities: RunQuantities
     rotations: Rotations
     vibrations: VibrationsOfLines
     criterion: UserCriterion | None
@@ -55,12 +55,12 @@ class KeptRun(RunOfLines, Protocol):
     under: dict[str, float]
 
     @property
-    def zones(self) -> SystemZones | None: ...
+    def zones(self) -> RunZones | None: ...
     @property
     def planes(self) -> LonePlanes | None: ...
 
     @property
-    def payout(self) -> SystemPayout | None: ...
+    def payout(self) -> RunPayout | None: ...
 
     @property
     def interval(self) -> float: ...

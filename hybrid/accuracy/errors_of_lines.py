@@ -17,16 +17,16 @@ import numpy as np
 
 from hybrid.accuracy.error_report import CAUSES, UNITS
 from hybrid.accuracy.extreme_errors import errors_by_cause, figures
-from hybrid.accuracy.system_samples import extremes_of, touch_unasked
+from hybrid.accuracy.samples_of_lines import extremes_of, touch_unasked
 from hybrid.errors import AS_MUCH, ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.lines_contact import passing_each_other
+from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import system_without_contact
-from hybrid.model.system import SystemResolution, build_system
 from hybrid.outputs.edge_errors import EDGE_ERRORS
 from hybrid.scene.base import Invalid
-from hybrid.scene.system import System
+from hybrid.scene.network_scene import System
 from hybrid.store.amend import amend_lines
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.format import Field
@@ -55,7 +55,7 @@ TOO_COARSE = {
 }
 
 
-def coarser(system: System, resolution: SystemResolution | None = None) -> System:
+def coarser(system: System, resolution: NetworkResolution | None = None) -> System:
     """The same with half the cells of every line; nodes at changes of section, at what is attached, and where zones
     meet stay.  resolution: how finely it was computed; None: as its meshes say.
     """
@@ -81,7 +81,7 @@ def longer_steps(system: System) -> System:
 
 
 def write_system_errors(
-    system: System, target: Path | io.BytesIO, compute: Compute, resolution: SystemResolution
+    system: System, target: Path | io.BytesIO, compute: Compute, resolution: NetworkResolution
 ) -> None:
     """Add errors to a complete result, of every line; compute: makes a run to compare with.
 

@@ -8,21 +8,21 @@ import numpy as np
 
 from hybrid.kernels.state.state import Batch, Floats
 from hybrid.kernels.watch.named_quantities import PATH_ROW
-from hybrid.model.system import SystemModel
+from hybrid.model.network import NetworkModel
 from hybrid.outputs.observation import Probe
 from hybrid.outputs.quantities import Quantities
 from hybrid.outputs.step_quantities import StepQuantities
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import FreePoint
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
+from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.result_file import limits_of
-from hybrid.simulation.system_lines import LineResult
 from hybrid.store.format import Field
 
 MORE_CELLS = 4  # times as many as at first may a line have whose chords are looked at; with more nothing is known
 
 
-def idle_ends(system: System, model: SystemModel) -> list[tuple[int, int]]:
+def idle_ends(system: System, model: NetworkModel) -> list[tuple[int, int]]:
     """Ends (line, 0 or 1) that are alone at a free point on which nothing acts, or have come loose."""
     found = []
     for number, (name, x, joints) in enumerate(zip(model.names, model.models, model.joints, strict=True)):
@@ -34,7 +34,7 @@ def idle_ends(system: System, model: SystemModel) -> list[tuple[int, int]]:
     return found
 
 
-class SystemQuantities:
+class RunQuantities:
     """The quantities of all lines, each computed from a state of its line."""
 
     def __init__(self, system: System, scenes: Mapping[str, Scene]) -> None:
@@ -79,7 +79,7 @@ class SystemQuantities:
                 self._steps[line.name].share(path, begins.pop(0))
                 line.books = self._steps[line.name].given_to(line.books)
 
-    def follow(self, model: SystemModel) -> None:
+    def follow(self, model: NetworkModel) -> None:
         """Know from now on which ends came loose: nothing takes their pull, which has no direction."""
         self._idle = frozenset((model.names[line], k) for line, k in idle_ends(self._system, model))
         for name, x in self._steps.items():

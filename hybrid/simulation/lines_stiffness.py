@@ -19,23 +19,23 @@ from hybrid.kernels.state.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
 from hybrid.model.clamps import seat_of, seated
-from hybrid.model.system import SystemModel, build_system
+from hybrid.model.network import NetworkModel, build_system
 from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.bodies import FixedBody, FreeBody, HeldBody
 from hybrid.scene.body_shapes import BodyShape
 from hybrid.scene.network import JoinedLine
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.suggestions import nearest
-from hybrid.scene.system import System
 from hybrid.simulation.envelope import marks_of
-from hybrid.simulation.system_contact import refuse_within_itself
-from hybrid.simulation.system_contact_equilibrium import contacts_of
-from hybrid.simulation.system_start import equilibrium_of_system
-from hybrid.solve.joined import SystemState
+from hybrid.simulation.lines_contact_equilibrium import contacts_of
+from hybrid.simulation.run_contact import refuse_within_itself
+from hybrid.simulation.run_start import equilibrium_of_system
+from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
-from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_contact_statics import touching_solver
+from hybrid.solve.lines_contact_statics import touching_solver
+from hybrid.solve.network_solver import NetworkSolver
 
 VERTICAL = np.array([0.0, 0.0, 1.0])
 # Where the stiffness is that between equilibria: how far these are apart, of the longest line, and rad; where lines
@@ -118,7 +118,7 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     return Stiffness(at, matrix, np.asarray(matrix - own, float), position, rotation)
 
 
-def _equilibrium(system: System, model: SystemModel) -> LinesAtRest:
+def _equilibrium(system: System, model: NetworkModel) -> LinesAtRest:
     """Under full loads, without friction.  SceneError: a line that contact is asked for is within itself in it."""
     found = equilibrium_of_system(system, model, np.inf, friction=False)
     if not found.settled:
@@ -126,9 +126,9 @@ def _equilibrium(system: System, model: SystemModel) -> LinesAtRest:
     return found
 
 
-def _stiffness(solver: SystemSolver, state: SystemState, first: int, size: int, points: int) -> Floats | None:
-    """(size, size) N/m, N/rad, .. of the point or body that begins at `first` of `SystemSolver.compliance`; points: how
-    many there are.  None: the system is singular.
+def _stiffness(solver: NetworkSolver, state: NetworkState, first: int, size: int, points: int) -> Floats | None:
+    """(size, size) N/m, N/rad, .. of the point or body that begins at `first` of `NetworkSolver.compliance`; points:
+    how many there are.  None: the system is singular.
 
     From the factors; where a torque passes through catenaries, which they know roughly, or lines touch themselves or
     bodies, from equilibria under small forces and moments both ways.
@@ -180,19 +180,19 @@ def _inverse(C: Floats) -> Floats | None:
         return None
 
 
-def _needs_equilibria(solver: SystemSolver) -> bool:
+def _needs_equilibria(solver: NetworkSolver) -> bool:
     """Whether the factors know the answer of some line only roughly, or not that it touches itself or a body."""
     return any(x.line.torsion.size for x in solver.lines) or bool(solver.in_contact()) or solver.presses_bodies
 
 
-def _narrowest(solver: SystemSolver) -> float:
+def _narrowest(solver: NetworkSolver) -> float:
     """The least diameter, m, of lines that touch; infinite: none does."""
     if solver.presses_bodies:
         return 2.0 * float(solver.lines[0].sea.obstacles[:, STRAND].min())
     return solver.narrowest
 
 
-def _load_on(solver: SystemSolver, points: int, first: int, state: SystemState) -> Floats:
+def _load_on(solver: NetworkSolver, points: int, first: int, state: NetworkState) -> Floats:
     """The force, and of a body the moment behind it, that act from outside on a point or body: a view to change."""
     if first >= 3 * points:
         return np.asarray(solver.bodies[(first - 3 * points) // 6, FORCE : FORCE + 6])
@@ -200,7 +200,7 @@ def _load_on(solver: SystemSolver, points: int, first: int, state: SystemState) 
     return np.asarray(line.ends.force[end])
 
 
-def _settled(solver: SystemSolver, state: SystemState) -> SystemState:
+def _settled(solver: NetworkSolver, state: NetworkState) -> NetworkState:
     """An equilibrium of these lines, with what was held and is free now loaded as it was held."""
     solver.evaluate_forces(state, 0.0)
     _, points, bodies = solver.unbalanced(state, 0.0)
@@ -213,7 +213,7 @@ def _settled(solver: SystemSolver, state: SystemState) -> SystemState:
     return found
 
 
-def _place_of(solver: SystemSolver, state: SystemState, before: SystemState, point: int, b: int) -> Floats:
+def _place_of(solver: NetworkSolver, state: NetworkState, before: NetworkState, point: int, b: int) -> Floats:
     """(6,) how far a point (-1: body b) has moved and turned, m and rad."""
     if point >= 0:
         line, end = next((n, k) for n, x in enumerate(solver.lines) for k in (0, 1) if x.joints[k] == point)
@@ -297,7 +297,7 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     )  # fmt: skip
 
 
-def _largest_tension(found: LinesAtRest, model: SystemModel, system: System, l: int) -> float:
+def _largest_tension(found: LinesAtRest, model: NetworkModel, system: System, l: int) -> float:
     """Of the cells of line l, and of its ends, where the force of what holds it is known, N."""
     state, report, line = found.state.lines[l], found.solver.work[l].report, model.models[l]
     marks = marks_of(system.scene_of(model.names[l]), line)
@@ -346,13 +346,13 @@ def _points_of(system: System, kind: str, name: str) -> list[str]:
     return [p for p, point in system.points.items() if isinstance(point, Fairlead) and point.body == name]
 
 
-def _place(system: System, model: SystemModel, found: LinesAtRest, point: str) -> Floats:
+def _place(system: System, model: NetworkModel, found: LinesAtRest, point: str) -> Floats:
     """Where a point is in an equilibrium."""
     line, end = system.lines_at(point)[0]
     return np.asarray(found.state.lines[model.names.index(line)].r[-(end == "end")]).copy()
 
 
-def _clamped_as_they_lie(system: System, model: SystemModel, found: LinesAtRest, point: str) -> dict[str, JoinedLine]:
+def _clamped_as_they_lie(system: System, model: NetworkModel, found: LinesAtRest, point: str) -> dict[str, JoinedLine]:
     """The lines, with inertial directions of an equilibrium for those that are clamped to a free point."""
     axes = found.state.bodies[len(model.bodies) + model.rigid.index(point), FRAME:V].reshape(3, 3)
     lines = dict(system.lines)
@@ -390,7 +390,7 @@ def _held(system: System, kind: str, name: str, pose: tuple[Floats, Floats], sha
     return moved.model_copy(update={"bodies": {**moved.bodies, name: held}})
 
 
-def _make_as_hard(moved: System, there: SystemModel, system: System, model: SystemModel) -> None:
+def _make_as_hard(moved: System, there: NetworkModel, system: System, model: NetworkModel) -> None:
     """Let obstacles be as hard as they were with a body or point that presses lines on them, and is held now."""
     before = list(system.surfaces)
     same = [before.index(x) for x in moved.surfaces]
@@ -414,8 +414,8 @@ def _contact_on(found: LinesAtRest, system: System, body: str, origin: Floats) -
 
 
 def _let_go(
-    system: System, model: SystemModel, found: LinesAtRest, kind: str, name: str
-) -> tuple[SystemSolver, SystemState]:
+    system: System, model: NetworkModel, found: LinesAtRest, kind: str, name: str
+) -> tuple[NetworkSolver, NetworkState]:
     """The lines of an equilibrium as they are, with what is held at a point or body free to move."""
     points, bodies = len(model.free), found.solver.bodies
     which = _points_of(system, kind, name)
@@ -446,8 +446,8 @@ def _let_go(
     if found.settled:
         solver = touching_solver(lines, points, numbers, lambda: contacts_of(model))
     else:
-        solver = SystemSolver(lines, points, numbers)
-    return solver, SystemState(found.state.lines, rows)
+        solver = NetworkSolver(lines, points, numbers)
+    return solver, NetworkState(found.state.lines, rows)
 
 
 def _own_stiffness(numbers: Floats, row: Floats) -> Floats:

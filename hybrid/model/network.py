@@ -38,10 +38,10 @@ from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.body_shapes import way_out
+from hybrid.scene.network_scene import System
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import Connections, Fairlead
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 
 MOST_ROUNDS = 100  # of Newton's method for the first places of the points
 SAME_FORCE = 1e-5  # of the largest force at a point: what may be left there of what does not balance
@@ -50,13 +50,13 @@ FARTHEST = 0.25  # of the shortest line: how far a point goes in a round
 
 
 @dataclass(frozen=True)
-class SystemResolution:
+class NetworkResolution:
     """How finely several lines are computed: each its cells and the error allowed per step, all the same steps."""
 
     lines: Mapping[str, Resolution]  # by name
 
     @classmethod
-    def first(cls, system: System) -> SystemResolution:
+    def first(cls, system: System) -> NetworkResolution:
         """The resolution for the accuracy of each line, before anything is known of its errors."""
         found = {name: first_resolution(system.scene_of(name)) for name in system.lines}
         step, later = min(x.step for x in found.values()), min(x.later or x.step for x in found.values())
@@ -74,7 +74,7 @@ class SystemResolution:
 
 
 @dataclass(frozen=True)
-class SystemModel:
+class NetworkModel:
     """A system of lines made ready to compute."""
 
     names: tuple[str, ...]  # of the lines
@@ -89,7 +89,7 @@ class SystemModel:
     seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.junctions.carried_frames)
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
     scenes: Mapping[str, Scene]  # of the lines by name, with their points where the system has them
-    resolution: SystemResolution
+    resolution: NetworkResolution
     moments: tuple[tuple[EndLoad, ...], ...]  # that are given to each of the points in `rigid`
     turns: tuple[tuple[float, float], ...]  # by which the start and the end of each line are twisted
     touching: Touching | None = None  # which lines touch each other
@@ -177,8 +177,8 @@ class SystemModel:
 
 
 def build_system(
-    system: System, resolution: SystemResolution | None = None, like: SystemModel | None = None
-) -> SystemModel:
+    system: System, resolution: NetworkResolution | None = None, like: NetworkModel | None = None
+) -> NetworkModel:
     """Make the model that a system requires, with its points and bodies where the scene has them first.
 
     resolution: how finely, None: as the scene asks for; like: a model of the same lines, whose meshes are taken.
@@ -186,7 +186,7 @@ def build_system(
     """
     made = bodies_of(system)
     free, places, bodies = first_places(system, made)
-    resolution = resolution or SystemResolution.first(system)
+    resolution = resolution or NetworkResolution.first(system)
     joined = _joined(system, places, bodies)
     joint, fairleads = joined.joint, joined.fairleads
     maker = FirstLines(system, joined, bodies, resolution)
@@ -213,7 +213,7 @@ def build_system(
     for name, body in system.bodies.items():
         if isinstance(body, FixedBody) and name not in known:
             known[name] = KnownMotion(body, models[0].sea)
-    return SystemModel(
+    return NetworkModel(
         tuple(system.lines), tuple(models), free, system.rigid, joints, places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
@@ -234,7 +234,7 @@ def with_surfaces(system: System, models: Sequence[Model], bodies: Sequence[Body
 
 
 def _in_space(system: System, name: str, model: Model, joints: tuple[int, int]) -> Model:
-    """The model of a line, without its plane where it is not computed in that; joints: of `SystemModel`."""
+    """The model of a line, without its plane where it is not computed in that; joints: of `NetworkModel`."""
     line = system.lines[name]
     carriers = [x for x in map(system.body_of, (line.start, line.end)) if isinstance(x, FixedBody)]
     if max(joints) >= 0:
@@ -280,7 +280,7 @@ def first_places(system: System, made: Sequence[BodyModel]) -> tuple[tuple[str, 
     return free, np.array([system.first_place(x) for x in free], float).reshape(-1, 3), bodies
 
 
-def first_lines(system: System, made: Sequence[BodyModel], resolution: SystemResolution) -> FirstLines:
+def first_lines(system: System, made: Sequence[BodyModel], resolution: NetworkResolution) -> FirstLines:
     """What makes lines between first places of points and bodies, with free points that are not turned yet."""
     _, places, bodies = first_places(system, made)
     return FirstLines(system, _joined(system, places, bodies), bodies, resolution)
@@ -405,7 +405,7 @@ def _joined(system: System, places: Floats, bodies: Floats) -> _Joined:
     return _Joined(at, joint, fairleads, {x: joint[x] - len(free) for x in fairleads})
 
 
-def starts_between(system: System, places: Floats, bodies: Floats, model: SystemModel) -> tuple[list[State], Floats]:
+def starts_between(system: System, places: Floats, bodies: Floats, model: NetworkModel) -> tuple[list[State], Floats]:
     """Shapes of the lines of a model to begin with, hung between other places of its points and bodies.
 
     places: (P, 3) m of the free points; bodies: (B, STATE), which are returned too, with the axes of points that lines
@@ -420,8 +420,8 @@ class FirstLines:
     """Makes the models of lines, with their clamps."""
 
     def __init__(
-        self, system: System, joined: _Joined, bodies: Floats, resolution: SystemResolution,
-        before: SystemModel | None = None,
+        self, system: System, joined: _Joined, bodies: Floats, resolution: NetworkResolution,
+        before: NetworkModel | None = None,
     ) -> None:  # fmt: skip
         """before: a model that was made before, whose seats and scenes hold; None: as the first shapes lie."""
         seats, scenes = (None, {}) if before is None else (before.seats, before.scenes)
@@ -529,7 +529,7 @@ class FirstLines:
         return model
 
 
-def balanced_places(system: System, model: SystemModel) -> tuple[Floats, Floats] | None:
+def balanced_places(system: System, model: NetworkModel) -> tuple[Floats, Floats] | None:
     """Places (P, 3) m of the free points and (B, STATE) of the bodies at which elastic catenaries balance there; None:
     they are not found.
 

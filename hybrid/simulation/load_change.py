@@ -8,10 +8,10 @@ from dataclasses import replace
 from hybrid.kernels.junctions.bodies import DONE, SPRING
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.model.build import Model
+from hybrid.model.network import NetworkModel, build_system
 from hybrid.model.release import unclamped, without_hold
 from hybrid.model.self_reach import touching
-from hybrid.model.system import SystemModel, build_system
-from hybrid.scene.system import System
+from hybrid.scene.network_scene import System
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.zone_switching import on_layout
 
@@ -25,8 +25,8 @@ def with_loads_of(system: System, other: System) -> System:
 
 
 def loaded_as(
-    model: SystemModel, system: System, t: float, fit: Callable[[SystemModel], SystemModel] | None = None
-) -> SystemModel:
+    model: NetworkModel, system: System, t: float, fit: Callable[[NetworkModel], NetworkModel] | None = None
+) -> NetworkModel:
     """The same network from t (s) on with the loads and motions of a system; what is joined or loose stays so.
 
     fit: gives lines that are paid out the cells of now, in place of those of t = 0.

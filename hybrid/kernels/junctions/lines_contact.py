@@ -2,7 +2,7 @@
 
 As kernels.contact.self_contact_solve, with the matrix A of all lines, points and bodies in place of that of one line: a product
 with A^-1 carries a right-hand side on the nodes in contact through the kept factors of the lines, the junctions and back.
-kernels.run.system calls `touch_system` by its address, so that systems without contact compile none of it.
+kernels.run.network calls `touch_system` by its address, so that systems without contact compile none of it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from hybrid.kernels.step.newton import ADDRESS, FIND, REST, ask_contact
 
 
 class TouchingJob(NamedTuple):
-    """Arguments of the entry: what kernels.run.system.solve_system works with, and room."""
+    """Arguments of the entry: what kernels.run.network.solve_system works with, and room."""
 
     tables: NDArray[np.int64]
     joints: NDArray[np.int64]

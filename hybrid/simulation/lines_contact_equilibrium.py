@@ -18,20 +18,20 @@ from hybrid.model.build import Model
 from hybrid.model.first_state import HUNG, first_state
 from hybrid.model.initial_shape import GIVEN, hung
 from hybrid.model.lines_contact import touching_among
-from hybrid.model.system import SystemModel
-from hybrid.scene.system import System
+from hybrid.model.network import NetworkModel
+from hybrid.scene.network_scene import System
 from hybrid.simulation.contact_equilibrium import KEPT, contact_of, nearness, passes_itself
 from hybrid.simulation.lines_contact import crossed, shared_of, watched_pairs
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.flaws import behind_obstacles, passed_obstacles
-from hybrid.solve.joined import JoinedLine, LineFailed, SystemState
+from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest, lines_at_rest
+from hybrid.solve.lines_contact_statics import settled_system, touching_solver
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import Start, Tally, in_slower_currents
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.softened import is_in_current
-from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_contact_statics import settled_system, touching_solver
 
 # Turns by which an equilibrium without contact may differ from its start, whose shape may have a writhe of its own.
 OF_SHAPE = 0.5
@@ -40,7 +40,7 @@ SLOWER = tuple(np.linspace(0.875, 0.0, 8).tolist())
 
 
 def solve_with_contact(
-    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Callable[[], Iterator[Start]]
+    model: NetworkModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Callable[[], Iterator[Start]]
 ) -> LinesAtRest:
     """As `lines_at_rest`; of lines that contact is asked for, and that would touch, have lost turns of their
     ends or have passed through each other on the way from their first shapes, that to which a damped motion with
@@ -74,7 +74,7 @@ def solve_with_contact(
 
 
 def _passes_another(
-    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, first: SystemState, found: SystemState
+    model: NetworkModel, lines: Sequence[JoinedLine], bodies: Floats, first: NetworkState, found: NetworkState
 ) -> bool:
     """Whether a line passes through another one from its first shape to an equilibrium that knows no contact.
 
@@ -86,12 +86,12 @@ def _passes_another(
     way = [found]
     if any(is_in_current(lines[k].line, lines[k].sea) for k in model.touching.lines):
         smooth = [x._replace(line=x.line._replace(bits=x.line.bits & ~FRICTION)) for x in lines]
-        solver = SystemSolver(smooth, len(model.free), bodies.copy())
+        solver = NetworkSolver(smooth, len(model.free), bodies.copy())
         way += in_slower_currents(solver, found, SLOWER, Tally()) or []
     return any(True for a, b in pairwise((first, *way[::-1])) for _ in crossed(model.touching, a, b))
 
 
-def crossings(system: System, model: SystemModel, rest: SystemState) -> list[tuple[int, int]]:
+def crossings(system: System, model: NetworkModel, rest: NetworkState) -> list[tuple[int, int]]:
     """Numbers of lines, two each, without contact, that cross on the straight way from first shapes to an equilibrium.
 
     A first shape says on which side of another line one lies where the scene gives it, or it hangs between held places.
@@ -107,7 +107,7 @@ def crossings(system: System, model: SystemModel, rest: SystemState) -> list[tup
     return [*crossed(touching, _before_current(replace(model, touching=touching)), rest)]
 
 
-def _before_current(model: SystemModel) -> SystemState:
+def _before_current(model: NetworkModel) -> NetworkState:
     """The first shapes of all lines, of those that touch others as they hang in still water.
 
     They say on which side of another line each lies: a current that comes then drives it against the other one, and
@@ -121,11 +121,11 @@ def _before_current(model: SystemModel) -> SystemState:
             shape = hung(scene, x.line, sea._replace(current=np.zeros_like(sea.current)))
             if shape is not None:
                 states[k] = first_state(scene, x.line, x.cable, x.sea, x.tension_scale, shape)[0]
-    return SystemState(states, model.body_places)
+    return NetworkState(states, model.body_places)
 
 
 def _on_the_side_of_the_span(
-    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Callable[[], Iterator[Start]]
+    model: NetworkModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Callable[[], Iterator[Start]]
 ) -> LinesAtRest:
     """As `lines_at_rest`, and where a way leads there, with lines that hang on obstacles on the side of their
 
@@ -134,7 +134,7 @@ def _on_the_side_of_the_span(
     there = [k for k, x in enumerate(model.models) if x.line.bits & OBSTACLES and len(x.sea.values.obstacles)]
     hung, given = ([k for k in there if model.models[k].start_shape == shape] for shape in (HUNG, GIVEN))
 
-    def behind(states: SystemState) -> tuple[Outcome, int, int]:
+    def behind(states: NetworkState) -> tuple[Outcome, int, int]:
         for k in hung:
             x = model.models[k]
             for _, node in behind_obstacles(x.line, x.sea.values, states.lines[k]):
@@ -154,30 +154,30 @@ def _on_the_side_of_the_span(
     return lines_at_rest(lines, len(model.free), bodies, starts())
 
 
-def _other_starts(model: SystemModel, hung: Sequence[int]) -> Iterator[Start]:
+def _other_starts(model: NetworkModel, hung: Sequence[int]) -> Iterator[Start]:
     """The first shapes with arcs, then with straight spans, for the lines of these numbers."""
     for name in dict.fromkeys(name for k in hung for name, _ in model.models[k].other_starts):
         first = [x.start.copy() for x in model.models]
         for k in hung:
             first[k] = dict(model.models[k].other_starts).get(name, first[k]).copy()
-        yield f"{name} of lines on obstacles", SystemState(first, model.body_places)
+        yield f"{name} of lines on obstacles", NetworkState(first, model.body_places)
 
 
 def settle(
-    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, start: SystemState, near: bool = False
+    model: NetworkModel, lines: Sequence[JoinedLine], bodies: Floats, start: NetworkState, near: bool = False
 ) -> LinesAtRest:
     """The equilibrium with contact that a damped motion reaches from a start that is apart; near: as of that."""
     keeps = _keeps_turns(lines, start, KEPT)
     return settled_system(lines, len(model.free), bodies.copy(), start, lambda: contacts_of(model), keeps, near)
 
 
-def contacts_of(model: SystemModel) -> tuple[list[SelfContact | None], SharedContact | None]:
+def contacts_of(model: NetworkModel) -> tuple[list[SelfContact | None], SharedContact | None]:
     """Contact without friction of each line that it is asked for, and of lines with each other."""
     own = [contact_of(x) if touches_alone(model, k) else None for k, x in enumerate(model.models)]
     return own, shared_of(model)
 
 
-def touches_alone(model: SystemModel, number: int) -> bool:
+def touches_alone(model: NetworkModel, number: int) -> bool:
     """Whether contact is asked for of a line with itself, and not with others."""
     others = model.touching.lines if model.touching is not None else ()
     return bool(model.models[number].line.bits & SELF_CONTACT) and number not in others
@@ -192,7 +192,7 @@ def _touch(lines: Iterable[JoinedLine]) -> list[bool]:
     return [bool(x.line.bits & SELF_CONTACT) for x in lines]
 
 
-def _largest_energy(model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, state: SystemState) -> float:
+def _largest_energy(model: NetworkModel, lines: Sequence[JoinedLine], bodies: Floats, state: NetworkState) -> float:
     """Of all lines that contact is asked for, J."""
     each = enumerate(zip(lines, model.models, state.lines, strict=True))
     found = [energy_of(*x) for k, x in each if touches_alone(model, k)]
@@ -202,7 +202,7 @@ def _largest_energy(model: SystemModel, lines: Sequence[JoinedLine], bodies: Flo
 
 
 def energy_between(
-    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, state: SystemState
+    model: NetworkModel, lines: Sequence[JoinedLine], bodies: Floats, state: NetworkState
 ) -> tuple[float, SharedContact]:
     """Energy, J, of contact of lines with each other at rest, and that contact; infinite: they are in each other."""
     solver = touching_solver(lines, len(model.free), bodies, lambda: ([], shared_of(model)))
@@ -210,7 +210,7 @@ def energy_between(
     return solver.contact_energy(state), solver.shared
 
 
-def nearness_in(model: SystemModel, lines: Sequence[JoinedLine], found: LinesAtRest, t: float) -> dict[int, Floats]:
+def nearness_in(model: NetworkModel, lines: Sequence[JoinedLine], found: LinesAtRest, t: float) -> dict[int, Floats]:
     """How near nodes (N+1,) of lines at rest are to what they may touch, by number: above 1, nearer than two diameters.
 
     Lines that touch neither themselves nor others are not in it.
@@ -227,24 +227,24 @@ def nearness_in(model: SystemModel, lines: Sequence[JoinedLine], found: LinesAtR
 
 
 def _first_apart(
-    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Iterable[Start]
-) -> SystemState | None:
+    model: NetworkModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Iterable[Start]
+) -> NetworkState | None:
     """The first start in which no line is within itself, or another."""
     return next((state for _, state in starts if math.isfinite(_largest_energy(model, lines, bodies, state))), None)
 
 
-def _has_lost(lines: Sequence[JoinedLine], hung: SystemState, found: LinesAtRest) -> bool:
+def _has_lost(lines: Sequence[JoinedLine], hung: NetworkState, found: LinesAtRest) -> bool:
     """Whether an equilibrium that knows no contact has lost turns, against its lines hung between first places."""
     return bool(_keeps_turns(lines, hung, OF_SHAPE)(found.state)[1])
 
 
 def _keeps_turns(
-    lines: Sequence[JoinedLine], start: SystemState, within: float
-) -> Callable[[SystemState], tuple[int, str]]:
+    lines: Sequence[JoinedLine], start: NetworkState, within: float
+) -> Callable[[NetworkState], tuple[int, str]]:
     """What tells of the first line whose link in a state is not that of the start."""
     asked = {k: _link(x, start.lines[k]) for k, x in enumerate(lines) if _holds_turns(x)}
 
-    def lost(states: SystemState) -> tuple[int, str]:
+    def lost(states: NetworkState) -> tuple[int, str]:
         for k, link in asked.items():
             has = _link(lines[k], states.lines[k])
             if abs(has - link) > within:

@@ -55,12 +55,12 @@ from hybrid.kernels.junctions.bodies import (
 from hybrid.kernels.junctions.joined_lines import last_block, substitute_dense
 from hybrid.kernels.junctions.junctions import END, correct_all, count_tensions, first_unknown, gather_right_sides
 from hybrid.kernels.junctions.junctions import START as BEGIN
-from hybrid.kernels.junctions.system_job import read_system, task_of
+from hybrid.kernels.junctions.network_job import read_system, task_of
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.left_over import left_over_in_space
-from hybrid.kernels.run.system_run import load_bodies
+from hybrid.kernels.run.network_run import load_bodies
 from hybrid.kernels.state.books import (
     HEAD,
     SAMPLE_POSITION,
@@ -99,7 +99,7 @@ class OtherBodies(NamedTuple):
 
     numbers: Floats  # (B, NUMBERS)
     fairleads: Floats  # (J, 2, 3) m, of lines that are joined to what moves with them
-    loads: Floats  # as kernels.run.system_run.StepsJob.loads, history
+    loads: Floats  # as kernels.run.network_run.StepsJob.loads, history
     history: Floats
     rates: Floats  # (B, TANGENTS) named above, of the last step's end
     before: Floats  # the same before the step
@@ -110,10 +110,10 @@ class OtherBodies(NamedTuple):
     h: float
 
 
-class SystemTangents(NamedTuple):
+class NetworkTangents(NamedTuple):
     """Arguments of `follow_system` and `correct_beside`."""
 
-    even: NDArray[np.int64]  # of a SystemJob of the lines that are joined to what moves with them, as of StepsJob
+    even: NDArray[np.int64]  # of a NetworkJob of the lines that are joined to what moves with them, as of StepsJob
     odd: NDArray[np.int64]
     joined: NDArray[np.int64]  # (J,) their numbers
     lone: NDArray[np.int64]  # and those of the others
@@ -134,10 +134,10 @@ def blank_bodies() -> OtherBodies:
     )  # fmt: skip
 
 
-def blank_system_tangents() -> SystemTangents:
+def blank_system_tangents() -> NetworkTangents:
     """With the types that every one has."""
     one, two = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    return SystemTangents(one, one, one, one, two, two, Clock(), Counts(), one, np.zeros(2))
+    return NetworkTangents(one, one, one, one, two, two, Clock(), Counts(), one, np.zeros(2))
 
 
 read_bodies, read_tangents = reader(blank_bodies()), reader(blank_system_tangents())
@@ -455,7 +455,7 @@ def advance(system, net, p, s):
 
 @kernel
 def follow_system(table):
-    """Tangents of all lines and bodies through the last step of their run; table: of SystemTangents.  Returns 0."""
+    """Tangents of all lines and bodies through the last step of their run; table: of NetworkTangents.  Returns 0."""
     net = read_tangents(table)
     own = net.even
     if net.counts.parity == 0:

@@ -1,4 +1,4 @@
-"""Steps of several lines that meet at points, many in a call: the compiled loop around kernels.run.system.
+"""Steps of several lines that meet at points, many in a call: the compiled loop around kernels.run.network.
 
 Phases, lengths of steps, halvings and codes are those of one cable (kernels.state.books, kernels.step.step_control), with a clock
 and counts that all lines have in common.  The states of lines and bodies take turns: SystemJobs of both parities are
@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK
 from hybrid.kernels.junctions.lone_lines import is_grouped_otherwise, is_touched_alone
 from hybrid.kernels.junctions.members_water import read_members
-from hybrid.kernels.junctions.system_job import (
+from hybrid.kernels.junctions.network_job import (
     read_system,
 )
 from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.powers import pull
+from hybrid.kernels.run.network import error_ratio
+from hybrid.kernels.run.network_sampling import BODY_SAMPLE, is_due, keep_bodies, sample_now, sample_within
 from hybrid.kernels.run.run import watch_itself
-from hybrid.kernels.run.system import error_ratio
-from hybrid.kernels.run.system_sampling import BODY_SAMPLE, is_due, keep_bodies, sample_now, sample_within
 from hybrid.kernels.state.books import (
     ASK_BEFORE,
     ASK_STEPS,
@@ -73,7 +73,9 @@ OF_REACH, OF_ITERATIONS, OF_ARM = 0, 1, 2
 class StepsJob(NamedTuple):
     """Arguments of the entry."""
 
-    even: NDArray[np.int64]  # of a kernels.run.system.SystemJob that leads from the states of even parity to the others
+    even: NDArray[
+        np.int64
+    ]  # of a kernels.run.network.NetworkJob that leads from the states of even parity to the others
     odd: NDArray[np.int64]  # and of one that leads back
     joined_even: NDArray[np.int64]  # the same of the lines that are joined to what moves with them
     joined_odd: NDArray[np.int64]
@@ -106,8 +108,8 @@ class StepsJob(NamedTuple):
         np.int64
     ]  # (W, ..) tables of kernels.run.payout_run.PaidRunJob, of lines where that needs no Python
     reels: NDArray[np.int64]  # (W,) 1 where there is one
-    beside: NDArray[np.int64]  # of a kernels.run.system_tangents.SystemTangents
-    solver: int = 0  # address of kernels.run.system.solve_system
+    beside: NDArray[np.int64]  # of a kernels.run.network_tangents.NetworkTangents
+    solver: int = 0  # address of kernels.run.network.solve_system
     leader: int = 0  # of kernels.junctions.lone_lines.lead_lone; 0: no line can come near what is free
     finder: int = 0  # and of find_near
     book: int = 0  # of book_system_step
@@ -123,7 +125,7 @@ class StepsJob(NamedTuple):
     payer: int = 0  # of kernels.reel.payout.pay_out; 0: lines keep their lengths
     node_asker: int = 0  # of kernels.run.payout_run.ask_node and change_node; 0: Python lets nodes enter and leave
     reeler: int = 0
-    tangents: int = 0  # of kernels.run.system_tangents.follow_system; 0: none are followed
+    tangents: int = 0  # of kernels.run.network_tangents.follow_system; 0: none are followed
 
 
 def no_loads() -> tuple[Floats, Floats]:

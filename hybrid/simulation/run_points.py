@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.run.system_sampling import (
+from hybrid.kernels.run.network_sampling import (
     SAMPLE_AXES,
     SAMPLE_DONE,
     SAMPLE_ENERGIES,
@@ -19,11 +19,11 @@ from hybrid.kernels.run.system_sampling import (
 from hybrid.kernels.state.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state.state import Batch, Floats
 from hybrid.model.bodies import angles_of
-from hybrid.model.system import SystemModel
+from hybrid.model.network import NetworkModel
 from hybrid.outputs.probes import elevation, elevation_field
 from hybrid.scene.bodies import FreeBody
+from hybrid.scene.network_scene import System
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, Point
-from hybrid.scene.system import System
 from hybrid.store.format import Field
 
 WORKS = ("lines", "damping", "loads")
@@ -82,7 +82,7 @@ class Sampled(NamedTuple):
     """Outputs of a system: nb states of its lines and bodies."""
 
     lines: Sequence[Batch]
-    bodies: Floats  # (nb, B, BODY_SAMPLE) of kernels.run.system_sampling
+    bodies: Floats  # (nb, B, BODY_SAMPLE) of kernels.run.network_sampling
 
     @property
     def t(self) -> Floats:
@@ -103,7 +103,7 @@ def times(frames: Floats, x: Floats) -> Floats:
     return np.asarray(frames[..., 0] * x[..., :1] + frames[..., 1] * x[..., 1:2] + frames[..., 2] * x[..., 2:])
 
 
-def values_of(system: System, model: SystemModel, seen: Sampled) -> dict[str, Floats]:
+def values_of(system: System, model: NetworkModel, seen: Sampled) -> dict[str, Floats]:
     """The values (nb, ...) of all fields for outputs."""
     values: dict[str, Floats] = {}
     t, count = seen.t, len(seen.bodies)
@@ -150,7 +150,7 @@ def values_of(system: System, model: SystemModel, seen: Sampled) -> dict[str, Fl
 class Rotations:
     """Roll, pitch and yaw of bodies and points that go on from output to output, beyond half a turn."""
 
-    def __init__(self, system: System, model: SystemModel) -> None:
+    def __init__(self, system: System, model: NetworkModel) -> None:
         """They begin within half a turn of what the scene gives for bodies, and of 0 for points."""
         begin = {f"points/{name}/rotation": np.zeros(3) for name in model.rigid}
         for name, body in system.bodies.items():
@@ -176,7 +176,7 @@ def nearest_angles(angles: Floats, before: Floats) -> Floats:
     return min(both, key=lambda x: float(((x - before) ** 2).sum()))
 
 
-def _clamp_moment(system: System, model: SystemModel, seen: Sampled, point: str) -> Floats | None:
+def _clamp_moment(system: System, model: NetworkModel, seen: Sampled, point: str) -> Floats | None:
     """Moment (nb, 3) N m of the lines that are clamped at a point, about it; None: there are none."""
     here = system.clamped_at(point)
     if not here:
@@ -192,7 +192,7 @@ def _clamp_moment(system: System, model: SystemModel, seen: Sampled, point: str)
 
 
 def _place(
-    model: SystemModel, seen: Sampled, point: Point, first: tuple[int, int], here: Sequence[tuple[int, int]]
+    model: NetworkModel, seen: Sampled, point: Point, first: tuple[int, int], here: Sequence[tuple[int, int]]
 ) -> tuple[Floats, Floats]:
     """Positions and velocities (nb, 3) of a point; first: line and node that began there, here: those still there."""
     if here:

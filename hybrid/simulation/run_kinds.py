@@ -11,7 +11,7 @@ from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.zone_switching import ZoneSwitching
 
 
-class SystemKinds:
+class RunKinds:
     """Changes of kinds in the lines of a run, with the solver, the states and the books that it has now."""
 
     def __init__(self, run: RunOfLines) -> None:
