@@ -252,7 +252,7 @@ def test_jacobian_of_lift(zones, bits):
 def in_soil(line, sea, st):
     """The same on soil that remembers: some nodes in it for the first time, some on their way up, some down again."""
     g = np.random.default_rng(2)
-    soil = np.array([1.0, 0.3, 1.5, 0.25, 4.0, 0.6, 1.0, 0.5, 0.4, 0.6, 0.5, 0.7])
+    soil = np.array([1.0, 0.3, 1.5, 0.25, 4.0, 0.6, 1.0, 0.5, 0.4, 0.6, 0.5, 0.7, 0.8])
     past = np.zeros((N + 1, 6))
     past[:, 0] = g.uniform(0.2, 1.5, N + 1)
     past[:, 2] = past[:, 0] + g.uniform(0.1, 0.5, N + 1)
