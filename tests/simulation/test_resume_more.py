@@ -16,7 +16,7 @@ import hybrid.simulation.network_run
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.short_form import network_of
-from hybrid.simulation import case, initial_zones, restore
+from hybrid.simulation import case, initial_zones, restore, run_zones
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, lock
 from hybrid.store import writer as record
