@@ -32,7 +32,6 @@ from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.reel.payout import stand_among
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_system_step, solve_system
 from hybrid.kernels.run.run import in_plane, in_space
@@ -508,6 +507,8 @@ class NetworkSolver:
                 lie_on_bed(x.line, x.sea, self.work[k], states.lines[k])
                 clock.stored = self.work[k].report[SEABED_ENERGY]
             if k in self._reels:
+                from hybrid.kernels.reel.payout import stand_among  # which a scene without payout does without
+
                 stand_among(self._reels[k])
             clock.now = t
             begin_line(table.numbers)
