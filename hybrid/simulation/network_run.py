@@ -231,6 +231,7 @@ class NetworkRun:
         self.loaded = 0.0  # s, loads that have stopped by then act no more
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
+        self.stepped_outside = False  # whether steps are asked for one by one (simulation.stepping)
         self._begin = clock_now()
         self.read_every = READ_EVERY
         self._read = -np.inf, 0.0  # s of the wall, when the time of the processor was read last, and that
@@ -267,6 +268,8 @@ class NetworkRun:
         """Be between two steps, at t (s)."""
         clock = self.loop.clock
         clock.now, clock.last_dt, clock.last_rho, self.loop.counts.steps = t, last_step, last_rho, steps
+        for line in self.lines:
+            line.books.counts.repeats = 0  # of a step that was tried when it was taken back
         self.loop.stand_between(interval, self.resolution.one.step)
         self._logged = self._spent()
 
@@ -785,7 +788,8 @@ class NetworkRun:
         dt = float(self.loop.clock.tried_dt)
         self._go_back(True)
         if not gives_up_contact(self, dt):
-            self._record_last()
+            if not self.stepped_outside:  # else the step may be taken back
+                self._record_last()
             for line in self.lines:
                 line.write_down()  # what stopped the run before comes first
             raise self._stopped(self.solver, self.loop.tried, dt)

@@ -139,6 +139,7 @@ class Simulation(SteppedPoints):
             cells, text = layers_at_rest(self._system), scene_text(self.scene)
             run = NetworkRun(self._system, self._target, text, True, cells, recording, criterion)
         run.loop.counts.most_iterations, run.loop.most_rows, run.read_every = most, ROWS_OUTSIDE, READ_OUTSIDE
+        run.stepped_outside = True
         try:
             run.begin_motion()
         except LineFailed as failed:

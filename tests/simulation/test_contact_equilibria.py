@@ -66,7 +66,8 @@ def test_zones_of_an_equilibrium_in_contact() -> None:
     result = hybrid.static(hybrid.validate_scene(tables))
     rods = hybrid.static(hybrid.validate_scene(hanging({"kind": "adaptive", "force_rod": [[0.0, LENGTH]]}, **mesh)))
     assert {z.kind for z in rods.zones[0]} == {"rod"} and {z.kind for z in result.zones[0]} == {"rod", "catenary"}
-    assert {"line touches itself", "stability not judged"} <= {e.kind for e in result.events}
+    kinds = {e.kind for e in result.events}
+    assert "line touches itself" in kinds and "stability not judged" not in kinds
     touching = result.s[result["self_contact"][0] > 0.0]
     assert touching.size and result["energy/self_contact"][0] > 0.0
     assert all(any(z.kind == "rod" and z.s_a <= s <= z.s_b for z in result.zones[0]) for s in touching)
