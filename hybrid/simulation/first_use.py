@@ -20,6 +20,7 @@ from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Equilibrium, Scene
+from hybrid.simulation.switch import at_rest_as_network
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.network_scene import System
@@ -57,19 +58,20 @@ def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
     one: Any = scene
     if scene.line_names:
         return _kernels_of_lines(one, static)
-    own = static and not one.contact.self
-    return _kernels_of_cable(one, static) if own else _kernels_of_network(one)
+    own = static and not at_rest_as_network(one)
+    return _kernels_of_cable(one, static) if own else _kernels_of_network(one, static)
 
 
-def _kernels_of_network(scene: Any) -> list[str]:
+def _kernels_of_network(scene: Any, static: bool) -> list[str]:
     """Of a cable that is computed as a network of one line."""
     in_space = _is_in_space(scene, scene.dimension)
-    found = [SOLVER[in_space], STEPS_OF_LINES, START_OF_LINES, BOOKS_OF_LINES, OUTPUTS]
-    if not in_space and _is_judged(scene, False):
+    steps = [REST_OF_LINES] if static else [STEPS_OF_LINES, BOOKS_OF_LINES]
+    found = [SOLVER[in_space], START_OF_LINES, *steps, OUTPUTS]
+    if not in_space and _is_judged(scene, static):
         found.append(STABILITY)
-    if scene.model.kind == "adaptive":
-        found.append(ZONES)
-    if payout_of(scene) is not None:
+    if scene.time is not None and scene.model.kind == "adaptive":
+        found.append(CRITERIA if static else ZONES)
+    if not static and payout_of(scene) is not None:
         found += PAYOUT_OF_LINES
     if scene.contact.self:
         found += [TOUCHING, *_OF_TOUCHING]
@@ -156,8 +158,10 @@ def compile_beside(scene: Scene | System, static: bool = False) -> None:
     """
     if scene.line_names:
         return
-    of_network = [*_kernels_of_network(scene)[1:], REST_OF_LINES]  # this process begins with the solver
-    needed = _beside_solver(scene, static) if static else of_network
+    one: Any = scene
+    own = static and not at_rest_as_network(one)
+    of_network = [*_kernels_of_network(one, static)[1:], *([] if static else [REST_OF_LINES])]  # beside the solver
+    needed = _beside_solver(one, static) if own else of_network
     if MODEL_ERROR in needed and SOLVER[1] not in needed:  # a line in a plane needs both solvers
         needed.insert(needed.index(OUTPUTS) + 1, SOLVER[1])
     missing = [name for name in needed if not is_ready(name)]

@@ -38,8 +38,7 @@ class StaticCase(StaticCaseOfCable):
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         self._first: tuple[Resolution, Start] | None = None
-        # A run begins at the equilibrium of a network: of several in contact a cable's search found another one.
-        self._by_network = at_rest_as_network() or bool(scene.contact.self)
+        self._by_network = at_rest_as_network(scene)
 
     def record(self, resolution: Resolution, target: Target) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it."""

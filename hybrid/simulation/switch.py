@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import os
 
+from hybrid.scene.schema import Scene
 
-def at_rest_as_network() -> bool:
-    """Whether the equilibrium of a cable is that of its network: not yet, unless HYBRID_CABLES says `network`.
 
-    In a plane it would compile the solver in space as well.
+def at_rest_as_network(scene: Scene) -> bool:
+    """Whether the equilibrium of a cable is that of its network.
+
+    Of several equilibria in contact with itself a cable's search finds another one than its run begins at, and it does
+    not compute what presses on obstacles.  Else not yet, unless HYBRID_CABLES says `network`: in a plane it would
+    compile the solver in space as well.
     """
-    return os.environ.get("HYBRID_CABLES") == "network"
+    return os.environ.get("HYBRID_CABLES") == "network" or bool(scene.contact.self or scene.obstacles)

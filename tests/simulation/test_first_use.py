@@ -94,6 +94,7 @@ KINDS = {
     "zones that move": one(WIRE, "adaptive"),
     "error of bending": one(WIRE, "catenary", output={"errors": True}),
     "contact with itself": one(WIRE, "rod", contact={"self": True}),
+    "on a floor": one(WIRE, "rod", obstacles={"floor": {"kind": "plane", "at": [0, 0, -1], "normal": [0, 0, 1]}}),
     "two lines": two(),
     "two lines that touch": two(contact={"friction": 0.2}),
     "two lines whose zones move": two(WIRE, {"model": "adaptive"}),

@@ -94,6 +94,14 @@ def test_at_rest() -> None:
     assert events_differ(cable, network) == []
 
 
+def test_obstacles_at_rest_carry_what_they_do_as_a_run_begins() -> None:
+    tables = tables_with(scene_of("sheave"), {"initial": "equilibrium"})
+    rest, moves = hybrid.static(tables), hybrid.run(tables)
+    for name in (x for x in rest.names if x.startswith("obstacles/")):
+        np.testing.assert_allclose(rest[name][0], moves[name][0], rtol=1e-9, atol=1e-9, err_msg=name)
+    assert rest["obstacles/pipe/force"][0, 2] < -20.0  # N
+
+
 def test_no_errors_are_asked_of_steps_that_follow() -> None:
     """The usual accuracy, which nobody has asked for, is no reason to want an error figure."""
     tables = tables_with(scene_of("catenary"), {"output.errors": False, "time.step": None})
