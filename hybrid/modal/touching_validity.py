@@ -19,7 +19,7 @@ from hybrid.simulation.self_watch import diameters
 # Part of the force of a contact that is borne where it opens, or slides, within two standard deviations, beyond which
 # it is told; of the length, how much may come to lie on what is touched already.
 OPENS, LIFTS = 0.25, 0.02
-# Cells from a common joint within which lines do not touch (docs/lines.md).
+# Cells from a common joint within which lines do not touch (docs/points.md).
 BESIDE = 4
 
 

@@ -7,7 +7,7 @@ import yaml
 
 import hybrid
 
-PAGE = (Path(__file__).parents[2] / "docs" / "lines.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "points.md").read_text(encoding="utf-8")
 SCENE = next(x.partition("```")[0] for x in PAGE.split("```yaml\n")[1:] if x.startswith("# cantilever.yaml"))
 
 
