@@ -40,7 +40,6 @@ from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.progress import (
-    ESTIMATION,
     Listener,
     ProgressReporter,
     listener_of,
@@ -52,7 +51,6 @@ from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
 from hybrid.store.reader import Result, open_result, written_result
-from hybrid.store.records import ERROR_ESTIMATE
 
 if TYPE_CHECKING:
     from hybrid.scene.network_scene import System
@@ -193,8 +191,8 @@ def _several_lines(
     from hybrid.accuracy.passes_of_lines import PassesOfLines, is_refined, system_with_layers
     from hybrid.simulation.network_run import static_system
 
-    refined = is_refined(system, moves=moves)
-    target = _target(output, overwrite, refined or (moves and bool(system.output.errors)))
+    refined = is_refined(system)
+    target = _target(output, overwrite, refined)
     with locked(_path(output)):
         if isinstance(target, Path):
             beside(target).unlink(missing_ok=True)  # of a run that was cut off
@@ -225,10 +223,9 @@ def _move_lines(
     tell_of_compiling(listener, kernels_of(system))
     with interrupts() as stopped, ProgressReporter(listener, duration) as reporter:
         notes: list[tuple[str, str]] = []
-        pending = ERROR_ESTIMATE if system.output.errors else ""
         while True:
             try:
-                if is_refined(system, moves=True):
+                if is_refined(system):
                     assert not isinstance(target, MemoryTarget), "errors are written into a file"
                     asked = PassesOfLines(system, target, True, reporter, stopped, notes, criterion, changes)
                     asked.compute(source)
@@ -236,12 +233,12 @@ def _move_lines(
                 resolution = None
                 if source is None:
                     resolution = system_with_layers(system, True, reporter, stopped, criterion)
-                recording = Recording(source=source, pending=pending, notes=notes)
-                computed = run_system(
+                recording = Recording(source=source, notes=notes)
+                run_system(
                     system, target, scene_text(system), reporter, stopped, resolution=resolution, recording=recording,
                     criterion=criterion, changes=changes,
                 )  # fmt: skip
-                break
+                return
             except ComputationError as error:
                 instead = rods_of_system(system, error) if source is None else None
                 if instead is None:
@@ -250,18 +247,6 @@ def _move_lines(
                 reporter.begin_anew()
                 system = instead.system
                 notes.append((CHOSEN, instead.text))
-        if system.output.errors:
-            assert not isinstance(target, MemoryTarget), "errors are written into a file"
-            from hybrid.accuracy.errors_of_lines import write_system_errors
-
-            def compare(other: System, memory: MemoryTarget) -> None:
-                text = scene_text(other)
-                cells = system_with_layers(other, True, reporter, stopped, criterion)
-                run_system(
-                    other, memory, text, reporter, stopped, ESTIMATION, cells, criterion=criterion, changes=changes
-                )  # fmt: skip
-
-            write_system_errors(system, target, compare, computed.resolution)
 
 
 def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelChoice, Resolution]:

@@ -447,7 +447,7 @@ class ErrorController:
         self.extremes = ExtremeErrors.of(result, *self.comparisons) if result.extremes and self.moves else None
         self._set_statistics(result, *self.comparisons)
         if not estimate.has_mesh:
-            few = f"{result.cells} cells are so few that there is nothing coarser to compare with"
+            few = f"{result.cells} cells are so few that there is nothing coarser to compare with; mesh: at least 8"
             if self.free.follows:
                 few = (
                     "cells follow the curvature, and nearly all are base cells, which stay: coarser runs have the same "

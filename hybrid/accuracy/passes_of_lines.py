@@ -25,7 +25,7 @@ from hybrid.accuracy.error_report import accuracy_figures, effort, error_fields,
 from hybrid.accuracy.error_statistics import statistics_of
 from hybrid.accuracy.finer_result import NOT_KEPT, Replacement, is_no_better, not_kept_text
 from hybrid.accuracy.model_choice import NEAR, choice_of
-from hybrid.accuracy.model_errors_of_lines import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
+from hybrid.accuracy.model_errors_of_lines import Stretches, as_rods, rods_of, with_model_errors
 from hybrid.accuracy.passes import emptied, free_in
 from hybrid.accuracy.refinement import (
     COSTLY_ACCURACY,
@@ -79,23 +79,9 @@ if TYPE_CHECKING:
 Samples = dict[str, RunSample]  # of the lines, by name
 
 
-def is_refined(system: System, moves: bool) -> bool:
-    """Whether a system is computed several times, here: an accuracy is asked, or errors of steps that follow the
-
-    motion, of an equilibrium, of lines that rub on obstacles, or of leaving bending out.  (Others of fixed steps:
-    accuracy.errors_of_lines.)
-    """
-    scenes = [system.scene_of(name) for name in system.lines]
-    if not any(wants_errors(x) for x in scenes):
-        return False
-    if any(x.resolution is not None for x in system.lines.values()):
-        return True
-    open_steps = moves and system.require_time().controlled
-    if not moves or open_steps or any(rubs_on_obstacles(x) for x in scenes):
-        return True
-    if any(leaves_bending_out(x) for x in system.lines.values()):
-        return True
-    return any(requested_accuracy(x) is not None for x in scenes)
+def is_refined(system: System) -> bool:
+    """Whether errors of a line are estimated, for which it is computed several times."""
+    return any(wants_errors(system.scene_of(name)) for name in system.lines)
 
 
 class LineController(ErrorController):
@@ -247,9 +233,9 @@ class PassesOfLines:
             tree = read_before(file)
         with refused(source):
             self._costs += [0.0] * any(wants_survey(scene) for scene in self.scenes.values())
-            if set(tree) != set(self.scenes):
-                raise ValueError("it was begun without an accuracy")
-            first = NetworkResolution({name: resolution_from(tree[name], x) for name, x in self.scenes.items()})
+            first = kept_resolution(self.system, source)  # as it is where nothing else was kept
+            if tree:
+                first = NetworkResolution({name: resolution_from(tree[name], x) for name, x in self.scenes.items()})
         with open_result(source) as found:
             done = found.status == "complete" and self._is_at_end(found)
         if not done or source != self.target:
@@ -364,7 +350,7 @@ class PassesOfLines:
             return
         passes = [(PRE_RUN, coarse.one)] if coarse is not None else []
         passes += [(RESULT, first.one)]
-        if is_refined(self.system, self.moves):
+        if is_refined(self.system):
             passes += [(ESTIMATION, x) for x in comparison_resolutions(first.one, self.moves)]
         self.reporter.expect(passes, first.one)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.accuracy import errors_of_lines
+from hybrid.accuracy import passes_of_lines
 from hybrid.errors import ComputationError
 from hybrid.store.limits import extreme_errors
 
@@ -79,14 +79,6 @@ def test_quantities_of_lines_have_errors_of_all_steps(more: dict[str, Any]) -> N
     assert off < extreme_errors(result)["lift largest"] < 0.1 * lift.value
 
 
-def test_coarser_cells_keep_what_is_fixed() -> None:
-    system = hybrid.System.model_validate(mooring())
-    other = errors_of_lines.coarser(system)
-    nodes = other.lines["hose"].mesh.nodes
-    assert 37.0 in np.round(nodes, 9) and len(nodes) <= 23 and (nodes[0], nodes[-1]) == (0.0, 100.0)
-    assert len(other.lines["west"].mesh.nodes) == 11
-
-
 @pytest.mark.long
 def test_a_longer_run_has_figures_of_all_of_it(result: hybrid.Result, tmp_path: Path) -> None:
     assert result.file is not None
@@ -98,26 +90,32 @@ def test_a_longer_run_has_figures_of_all_of_it(result: hybrid.Result, tmp_path: 
 
 
 def test_where_a_coarser_run_fails_an_event_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(system: hybrid.System) -> hybrid.System:
-        raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
+    computed = passes_of_lines.run_system
 
-    monkeypatch.setattr(errors_of_lines, "longer_steps", fails)
+    def result_alone(*x: Any) -> Any:
+        if "result" not in x:
+            raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
+        return computed(*x)
+
+    monkeypatch.setattr(passes_of_lines, "run_system", result_alone)
     found = hybrid.run(mooring(errors=True) | {"time": {"duration": 1.0, "step": 0.1}})
-    assert [e.kind for e in found.events].count("no error figure") == 1
+    for line in found.lines.values():
+        assert [e.kind for e in line.events].count("no error figure") == 1
     assert found.status == "complete" and "error_total_position" not in found.attributes
 
 
 @pytest.mark.parametrize(
-    ("cells", "time", "said"),
+    ("cells", "time", "kind", "said"),
     [
-        (2, {"duration": 0.4, "step": 0.1}, "line west has too few cells"),
-        (8, {"duration": 0.1, "step": 0.1}, "too few steps"),
+        (2, {"duration": 0.4, "step": 0.1}, "no error figure", "2 cells are so few that there is nothing coarser"),
+        (8, {"duration": 0.1, "step": 0.1}, "error uncertain", "the share of the time step is not known"),
     ],
 )
-def test_nothing_coarser_to_compare_with(cells: int, time: dict[str, float], said: str) -> None:
-    """The result stays, and an event says why it has no figure and what to do."""
+def test_nothing_coarser_to_compare_with(cells: int, time: dict[str, float], kind: str, said: str) -> None:
+    """The result stays, and an event says why it has no figure, or one that leaves something out, and what to do."""
     scene = mooring(cells, errors=True, every=0.1)
     result = hybrid.run(scene | {"time": time})
-    event = next(x for x in result.events if x.kind == "no error figure")
-    assert said in event.text and ("mesh:" in event.text or "time.step:" in event.text)
-    assert "error_total_position" not in result.attributes and result.status == "complete"
+    event = next(x for x in result.lines["west"].events if x.kind == kind)
+    assert said in event.text and ("mesh:" in event.text or "time.step" in event.text)
+    assert ("error_total_position" in result.lines["west"].attributes) is (kind == "error uncertain")
+    assert result.status == "complete"
