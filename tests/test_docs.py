@@ -180,6 +180,19 @@ def test_cited_files_exist() -> None:
             assert (ROOT / name).exists() or name == "docs/evidence/validation.md", f"{page.name} names {name}"
 
 
+def test_architecture_names_what_is_there() -> None:
+    """Files, below hybrid/ or by their name alone, and names in the sources."""
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    files = [*(ROOT / "hybrid").rglob("*.py")]
+    sources = "".join(x.read_text(encoding="utf-8") for x in (*files, ROOT / "tests" / "test_house.py"))
+    for name in re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL)):
+        if "/" in name or name.endswith(".py"):
+            places = [ROOT / "hybrid" / name, ROOT / name, *(x for x in files if x.name == name)]
+            assert any(x.exists() for x in places), name
+        else:
+            assert re.search(rf"\b{re.escape(name)}\b", sources), name
+
+
 def test_cited_equations_exist() -> None:
     """Equations are numbered without a gap, and docstrings cite none that is not there."""
     text = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
