@@ -20,7 +20,7 @@ import hybrid
 from hybrid.designs.network_at_rest import Places
 from hybrid.designs.numbers import with_number
 from hybrid.designs.sensitivity import at_rest
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from tests.designs.test_body_derivatives import SCENES as SCENES_OF_BODIES
 
 pytestmark = pytest.mark.bench
@@ -86,7 +86,7 @@ def test_a_derivative_over_its_equilibrium(model: str, cells: int) -> None:
 def test_a_derivative_beside_bodies(what: str) -> None:
     """Lines that turn freely at a body, and hoses that are clamped to bodies and points; every number alone."""
     tables, of, keys = SCENES_OF_BODIES[what]
-    scene = as_scene_or_system(tables)
+    scene = as_scene(tables)
     rest = at_rest(scene, of)
     for key in [*keys, *(["bodies.hull.mass"] if "bodies" in tables else [])]:
         calls = lambda: hybrid.static(scene), lambda k=key: rest.by([k]), lambda k=key: rest.by(6 * [k])

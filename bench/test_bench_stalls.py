@@ -22,8 +22,7 @@ ALONE = "contact={self: false}"
 
 def ran(name: str, *sets: str, times: int = 2) -> tuple[float, hybrid.Result]:
     """The least processor time, s, of some runs of a scene, and the last result."""
-    load = hybrid.load_system if name.startswith("line") else hybrid.load_scene
-    least, scene = np.inf, load(DEFECTS / f"{name}.yaml", [*sets])
+    least, scene = np.inf, hybrid.load_scene(DEFECTS / f"{name}.yaml", [*sets])
     for _ in range(times):
         begin = time.process_time()
         result = hybrid.run(scene, progress=False)

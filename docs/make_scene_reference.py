@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from hybrid.scene.combinations import REFUSALS
-from hybrid.scene.network_scene import System
-from hybrid.scene.schema import Scene, Table
+from hybrid.scene.network_scene import Network
+from hybrid.scene.schema import LineScene, Table
 
 PAGE = Path(__file__).with_name("scene.md")
 
@@ -29,7 +29,7 @@ A scene is a YAML file, or the same tables in Python: `hybrid.validate_scene({..
 SI units; the inertial frame has z up; arc length s is unstretched and runs from `ends.start` to `ends.end`.
 Angles are in degrees, as people write them.
 A table that is left out is not there, and a key that does not exist is refused.
-`hybrid schema` (`--lines`: of several lines) prints the JSON schema, with which editors complete and check a scene as
+`hybrid schema` prints the JSON schema, with which editors complete and check a scene as
 you type;
 `hybrid run scene.yaml --set time.step=0.005` changes a value without touching the file.
 
@@ -539,7 +539,7 @@ def page() -> str:
     """The whole page."""
     order: list[str] = []
     lines = [HEAD]
-    for title, schema in (("Scene", Scene.model_json_schema()), ("Several lines", System.model_json_schema())):
+    for title, schema in (("Scene", LineScene.model_json_schema()), ("Several lines", Network.model_json_schema())):
         tables = schema.pop("$defs")
         known = len(order)
 

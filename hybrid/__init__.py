@@ -30,9 +30,10 @@ if TYPE_CHECKING:
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
     from hybrid.modal.api import modes
     from hybrid.modal.response import response
-    from hybrid.scene.network_scene import System
-    from hybrid.scene.read import load_scene, load_system, parse_scene, scene_text, validate_scene
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
+    from hybrid.scene.read import load_scene as load_system  # noqa: F401  # deprecated
+    from hybrid.scene.root import Scene
+    from hybrid.scene.root import Scene as System  # noqa: F401  # deprecated
     from hybrid.simulation.lines_stiffness import offsets, stiffness
     from hybrid.simulation.listed_outputs import kinds_of_quantities, listed_outputs
     from hybrid.simulation.stepping import Simulation
@@ -58,11 +59,9 @@ _HOME = {
     "Outcome": ("hybrid.errors", "Outcome"),
     "Result": ("hybrid.store.reader", "Result"),
     "ResultError": ("hybrid.errors", "ResultError"),
-    "Scene": ("hybrid.scene.schema", "Scene"),
+    "Scene": ("hybrid.scene.root", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
     "Simulation": ("hybrid.simulation.stepping", "Simulation"),
-    "SystemSimulation": ("hybrid.simulation.stepping", "Simulation"),  # deprecated
-    "System": ("hybrid.scene.network_scene", "System"),
     "compare": ("hybrid.view.comparison", "write_comparison"),
     "design": ("hybrid.designs.design", "design"),
     "export_fmu": ("hybrid.couple.fmu_export", "export_fmu"),
@@ -70,7 +69,6 @@ _HOME = {
     "export_moordyn": ("hybrid.interop.moordyn", "export_moordyn"),
     "import_moordyn": ("hybrid.interop.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
-    "load_system": ("hybrid.scene.read", "load_system"),
     "modes": ("hybrid.modal.api", "modes"),
     "offsets": ("hybrid.simulation.lines_stiffness", "offsets"),
     "open": ("hybrid.store.reader", "open_result"),
@@ -114,7 +112,6 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulation",
-    "System",
     "compare",
     "design",
     "export",
@@ -124,7 +121,6 @@ __all__ = [
     "kinds_of_quantities",
     "listed_outputs",
     "load_scene",
-    "load_system",
     "modes",
     "offsets",
     "open",
@@ -156,7 +152,8 @@ __all__ = [
     "validate_scene",
 ]
 
-_FORMER = {"Look": "NodeState"}  # public names that have changed: the old one still works
+# public names that have changed: the old one still works
+_FORMER = {"Look": "NodeState", "System": "Scene", "SystemSimulation": "Simulation", "load_system": "load_scene"}
 
 
 def __getattr__(name: str) -> Any:

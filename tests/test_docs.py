@@ -18,7 +18,7 @@ import hybrid
 from hybrid.cli.commands import app, main
 from hybrid.designs.problem import scenes_of
 from hybrid.scene.design import DESIGN
-from hybrid.scene.read import as_scene_or_system, parse_either
+from hybrid.scene.read import as_scene, read_text
 from hybrid.scene.study import study_from
 from hybrid.studies.cases import cases_of
 
@@ -121,11 +121,11 @@ def test_scenes_on_pages_load(page: Path) -> None:
     for text in blocks(page, "yaml"):
         if re.search(r"^unknowns:", text, re.MULTILINE):
             task = DESIGN.of_data(YAML(typ="safe").load(text), ROOT / "examples" / "designs")
-            scenes_of(task, as_scene_or_system(task.asked.scene))
+            scenes_of(task, as_scene(task.asked.scene))
         elif "\nscene:" in text:
             cases_of(study_from(YAML(typ="safe").load(text), ROOT / "examples" / "studies"))
         else:
-            hybrid.plan(parse_either(text, str(page))[0])
+            hybrid.plan(read_text(text, str(page))[0])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)

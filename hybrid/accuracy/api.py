@@ -33,8 +33,8 @@ from hybrid.model.resolution import (
     wants_survey,
 )
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
-from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
+from hybrid.scene.read import SceneLike, as_scene, scene_text
+from hybrid.scene.schema import AdaptiveModel, LineScene, missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
@@ -53,14 +53,14 @@ from hybrid.store.lock import locked
 from hybrid.store.reader import Result, open_result, written_result
 
 if TYPE_CHECKING:
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
 
 # Why there is nothing that a criterion could ask for.
 NO_ZONES = "a criterion is for zones that move: the scene's model is not adaptive"
 
 
 def run(
-    scene: SceneLike | System,
+    scene: SceneLike,
     output: str | Path | None = None,
     *,
     progress: bool | Listener = False,
@@ -69,7 +69,7 @@ def run(
 ) -> Result:
     """Integrate a scene over its duration.
 
-    scene: a Scene, a System of lines, the path of a scene file, or a dict of its tables.  output: the HDF5 file to
+    scene: a Scene, the path of a scene file, or a dict of its tables.  output: the HDF5 file to
     write; None keeps the result in memory.  progress: True for a line on the error stream, or a function that gets a
     `hybrid.simulation.progress.Progress` about ten times a second.  overwrite: replace an existing result (never
     another program's file).  criterion: for zones that move, one more: it gets a `hybrid.NodeState` at every step and
@@ -78,10 +78,10 @@ def run(
     Raises SceneError when the scene is refused, ResultError when the output cannot be written, and ComputationError
     when the computation stops; what was computed until then is in the file, and the last good state beside it.
     """
-    scene = as_scene_or_system(scene)
+    scene = as_scene(scene)
     if scene.time is None:
         raise SceneError([missing_time()])
-    if not isinstance(scene, Scene):
+    if not isinstance(scene, LineScene):
         return _several_lines(scene, output, overwrite, progress, criterion)
     check_motions(scene)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
@@ -106,13 +106,13 @@ def run(
     return written_result(target, case.late_file)
 
 
-def static(scene: SceneLike | System, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
+def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
     """Find the equilibrium of a scene at t = 0 under its full loads; the result has one output.
 
     scene, output, overwrite and errors: as of `run`.
     """
-    scene = as_scene_or_system(scene)
-    if not isinstance(scene, Scene):
+    scene = as_scene(scene)
+    if not isinstance(scene, LineScene):
         return _several_lines(scene, output, overwrite, moves=False)
     check_motions(scene)
     compile_beside(scene, static=True)
@@ -179,7 +179,7 @@ def resume(
 
 
 def _several_lines(
-    system: System,
+    system: Network,
     output: str | Path | None,
     overwrite: bool,
     progress: bool | Listener = False,
@@ -208,8 +208,8 @@ def _several_lines(
 
 
 def _move_lines(
-    system: System, target: Target, progress: bool | Listener, source: Path | None = None,
-    criterion: UserCriterion | None = None, left: Remaining[System] | None = None,
+    system: Network, target: Target, progress: bool | Listener, source: Path | None = None,
+    criterion: UserCriterion | None = None, left: Remaining[Network] | None = None,
 ) -> None:  # fmt: skip
     """Compute the motion of several lines; source: the result to go on with; left: what is to be done with it."""
     changes = left.changes if left is not None else ()

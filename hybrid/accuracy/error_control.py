@@ -57,7 +57,7 @@ from hybrid.model.resolution import (
     RequestedAccuracy,
     Resolution,
 )
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.bounded_model_errors import doubtful
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import (
@@ -619,7 +619,9 @@ class ErrorController:
             "slow": list(self._slow_from or ()), "places": self.places if self.places is not None else ALL,
         }  # fmt: skip
 
-    def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints, source: Path | None = None) -> None:
+    def restore(
+        self, tree: Mapping[str, Any], scene: LineScene, points: OutputPoints, source: Path | None = None
+    ) -> None:
         """Continue as `checkpoint` has said; points: of the result.  source: its file; runs to compare with whose
         outputs are no longer beside it are computed again.
 

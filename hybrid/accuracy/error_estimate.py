@@ -44,7 +44,7 @@ from hybrid.accuracy.errors_by_cause import Block, Errors
 from hybrid.accuracy.snap_scatter import Between
 from hybrid.accuracy.step_ratios import usual_ratio
 from hybrid.model.bending_reference import NO_DOUBT
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.run_sample import (
     END_FORCES,
@@ -541,7 +541,7 @@ class Estimate:
         return found | {"doubt": self._model_doubt, "between": between}
 
     @classmethod
-    def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Self:
+    def restored(cls, tree: Any, scene: LineScene, shape: tuple[int, int, int]) -> Self:
         """An estimate from a checkpoint; shape, errors: as of `restored_sample`."""
         self = cls.__new__(cls)
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])

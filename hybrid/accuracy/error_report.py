@@ -17,7 +17,7 @@ from hybrid.accuracy.extreme_errors import figures as extreme_figures
 from hybrid.accuracy.refinement import END_FORCE, asked_quantities, asked_text, figures, not_asked_text, sizes_of
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.plan import output_times
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.bounded_model_errors import bounded
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
 from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, is_along
@@ -43,7 +43,7 @@ CAUSES = {
 
 
 def write_errors(
-    target: Path | io.BytesIO | LateFile, scene: Scene, control: ErrorController, result: RunSample,
+    target: Path | io.BytesIO | LateFile, scene: LineScene, control: ErrorController, result: RunSample,
     errors: Errors | None, cpu: float, before: Tree | None = NOTHING_MORE,
 ) -> None:  # fmt: skip
     """Add errors (None: they could not be estimated), attributes and events to a complete result.
@@ -79,7 +79,7 @@ def accuracy_figures(control: ErrorController, result: RunSample, errors: Errors
     return json.dumps(figures(control.asked, known, result, control.scattered, control.extremes))
 
 
-def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float) -> dict[str, str | float | int]:
+def effort(scene: LineScene, control: ErrorController, result: RunSample, cpu: float) -> dict[str, str | float | int]:
     """What was spent on a result, and what was asked, as its attributes; cpu: s, of all passes."""
     resolution = result.resolution
     attributes: dict[str, str | float | int] = {
@@ -97,7 +97,7 @@ def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float
 
 
 def known(
-    scene: Scene, control: ErrorController, result: RunSample, errors: Errors | None, happened: Happened,
+    scene: LineScene, control: ErrorController, result: RunSample, errors: Errors | None, happened: Happened,
     vibrations: Callable[[], LostBy],
 ) -> tuple[dict[str, float | str], list[tuple[str, str]]]:  # fmt: skip
     """The largest errors, as attributes, and events of a result; happened: its events until now; vibrations: finds what

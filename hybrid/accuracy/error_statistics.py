@@ -18,7 +18,7 @@ from hybrid.accuracy.error_order import MOST_ORDER, ORDER, Falls
 from hybrid.accuracy.errors_by_cause import Errors
 from hybrid.accuracy.snap_scatter import snap_times, steps_in_rise
 from hybrid.model.resolution import RequestedAccuracy
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.named_arrays import Tree, matched
@@ -67,7 +67,7 @@ class StatisticEstimate(Estimate):
         return super().checkpoint() | {"chance": self.chance}
 
     @classmethod
-    def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Self:
+    def restored(cls, tree: Any, scene: LineScene, shape: tuple[int, int, int]) -> Self:
         self = super().restored(tree, scene, shape)
         self.chance = matched({"chance": np.zeros(2)} | {k: x for k, x in tree.items() if k == "chance"},
                               {"chance": np.zeros(2)}, "statistics")["chance"]  # fmt: skip

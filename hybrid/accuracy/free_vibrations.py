@@ -30,8 +30,9 @@ from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_a
 from hybrid.linear.rest import Rest, line_at_rest, system_at_rest
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.motion_tables import Motion
-from hybrid.scene.network_scene import System
-from hybrid.scene.schema import Scene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import LINE
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.simulation.static_case import StaticCase
@@ -107,7 +108,7 @@ def uncertain_by_vibrations(
     return [("error uncertain", text)]
 
 
-def of_cable(scene: Scene, result: RunSample) -> LostBy:
+def of_cable(scene: LineScene, result: RunSample) -> LostBy:
     """By quantity, what steps of the result of one cable make of free vibrations; empty where none is left, or it is
 
     not known.
@@ -118,12 +119,12 @@ def of_cable(scene: Scene, result: RunSample) -> LostBy:
     return found.get(LINE, {})
 
 
-def of_system(system: System, resolution: NetworkResolution, times: Floats) -> Mapping[str, LostBy]:
+def of_system(system: Network, resolution: NetworkResolution, times: Floats) -> Mapping[str, LostBy]:
     """The same of several lines, by their names; times: (n,) s, ends of the steps of the result."""
     return lost_vibrations(system, lambda: system_at_rest(system, resolution), times)
 
 
-def lost_vibrations(asked: Scene | System, rest: Callable[[], Rest], times: Floats) -> Mapping[str, LostBy]:
+def lost_vibrations(asked: Scene, rest: Callable[[], Rest], times: Floats) -> Mapping[str, LostBy]:
     """By line and quantity, what steps that end at `times` (n,) s make of free vibrations about an equilibrium."""
     motions = asked.motions
     begins = [_quiet_from(x) for x in motions]
@@ -167,7 +168,7 @@ def _is_steady(rest: Rest) -> bool:
     return not any(x.loads or x.members is not None for x in rest.floats)
 
 
-def _radius(asked: Scene | System) -> float:
+def _radius(asked: Scene) -> float:
     return asked.time.rho_inf if asked.time is not None else 0.5
 
 

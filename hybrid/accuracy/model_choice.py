@@ -25,7 +25,7 @@ from hybrid.model.model_costs import (
 )
 from hybrid.model.resolution import Resolution, for_motion, model_is_free, wants_survey
 from hybrid.model.run_time import foretold_steps
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.initial_zones import HOLD
 from hybrid.simulation.layer_mesh import layered, survey_of
@@ -53,7 +53,7 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
 
 
 def choice_of(
-    scene: Scene, rods: Scene, survey: Survey, resolution: Resolution, near: str
+    scene: LineScene, rods: LineScene, survey: Survey, resolution: Resolution, near: str
 ) -> tuple[ModelChoice, Resolution]:
     """The model that costs least, and how finely it is computed first, by a pre-run of rods.
 
@@ -72,7 +72,7 @@ def choice_of(
     return ModelChoice(kind, reasons(each)), replace(resolution, grading=gradings[kind])
 
 
-def _steps_of_zones(scene: Scene, model: Model, resolution: Resolution) -> float:
+def _steps_of_zones(scene: LineScene, model: Model, resolution: Resolution) -> float:
     """Steps of zones that move for one of rods: those that follow the motion are no longer than zones let them be."""
     time, longest = scene.require_time(), LONGEST_IN_PACE * READY * HOLD * model.time_scale
     if resolution.local is None or isinf(longest):

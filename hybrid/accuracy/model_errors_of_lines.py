@@ -16,7 +16,7 @@ from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.scene.analysis import CatenaryZone, Mesh, RodModel, RodZone, ZonesModel
 from hybrid.scene.network import JoinedLine
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample
 from hybrid.store.reader import Result
 
@@ -34,8 +34,8 @@ def leaves_bending_out(line: JoinedLine) -> bool:
 
 
 def as_rods(
-    system: System, resolution: NetworkResolution, rods: Mapping[str, Stretches]
-) -> tuple[System, NetworkResolution, list[str]]:
+    system: Network, resolution: NetworkResolution, rods: Mapping[str, Stretches]
+) -> tuple[Network, NetworkResolution, list[str]]:
     """The same with rods in place of catenaries, how finely, and the names of the lines that this changes.
 
     resolution: of a run of the system; rods: stretches of its lines that were rod at some time in it.

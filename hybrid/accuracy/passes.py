@@ -37,7 +37,7 @@ from hybrid.model.resolution import (
     wants_survey,
     zones_are_free,
 )
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import survey_resolution
@@ -56,7 +56,7 @@ class Passes:
     """Computes a result and, where they are wanted, its errors."""
 
     def __init__(
-        self, case: Case, target: Target, source: Path | None = None, remaining: Remaining[Scene] | None = None
+        self, case: Case, target: Target, source: Path | None = None, remaining: Remaining[LineScene] | None = None
     ) -> None:
         """source, remaining: what to continue."""
         self.case, self.target, self.source, self.remaining = case, target, source, remaining
@@ -212,7 +212,7 @@ class Passes:
         return found
 
 
-def free_in(scene: Scene) -> Free:
+def free_in(scene: LineScene) -> Free:
     """What the scene leaves to the program."""
     time = scene.time
     steps = time is not None and time.controlled and time.tolerance is None
@@ -221,7 +221,7 @@ def free_in(scene: Scene) -> Free:
     return Free(mesh_is_free(scene), steps, zones_are_free(scene) and not follows, follows)
 
 
-def _has_joints(scene: Scene) -> bool:
+def _has_joints(scene: LineScene) -> bool:
     """Whether rods and catenaries may meet on the cells of a result, which then follows itself what that leaves out.
 
     What a joint does beside it is of the cells there: a coarser run, whose outputs are fewer too, does not show it.

@@ -52,9 +52,9 @@ from hybrid.model.resolution import (
     wants_survey,
 )
 from hybrid.model.self_reach import system_without_contact
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.layer_mesh import layered_lines, shown_lines
 from hybrid.simulation.load_change import with_loads_of
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points, survey_resolution, with_survey
@@ -79,7 +79,7 @@ if TYPE_CHECKING:
 Samples = dict[str, RunSample]  # of the lines, by name
 
 
-def is_refined(system: System) -> bool:
+def is_refined(system: Network) -> bool:
     """Whether errors of a line are estimated, for which it is computed several times."""
     return any(wants_errors(system.scene_of(name)) for name in system.lines)
 
@@ -110,9 +110,9 @@ class PassesOfLines:
     """All runs that the result of a system takes."""
 
     def __init__(
-        self, system: System, target: Path | io.BytesIO, moves: bool, reporter: ProgressReporter,
+        self, system: Network, target: Path | io.BytesIO, moves: bool, reporter: ProgressReporter,
         interrupted: Callable[[], bool], notes: Sequence[tuple[str, str]] = (),
-        criterion: UserCriterion | None = None, changes: Sequence[LoadChange[System]] = (),
+        criterion: UserCriterion | None = None, changes: Sequence[LoadChange[Network]] = (),
     ) -> None:  # fmt: skip
         """moves: whether its motion is computed, else its equilibrium; others as of `run_system`."""
         self._of_results, self._criterion = notes, criterion
@@ -122,7 +122,7 @@ class PassesOfLines:
         self.reporter, self.interrupted = reporter, interrupted
         time = system.time
         self._steps_free = moves and time is not None and time.controlled and time.tolerance is None
-        self.scenes, self.controls = dict[str, Scene](), dict[str, LineController]()
+        self.scenes, self.controls = dict[str, LineScene](), dict[str, LineController]()
         self._use_models({})
         # Of lines, stretches (m) that were rod at any output: of the last run to compare with, and of the result.
         self._compared_rods, self._result_rods = dict[str, Stretches](), dict[str, Stretches]()
@@ -249,7 +249,7 @@ class PassesOfLines:
 
     def _record(
         self, resolution: NetworkResolution | None, target: Path | io.BytesIO | None, name: str,
-        source: Path | None = None, found: Tree | None = None, system: System | None = None,
+        source: Path | None = None, found: Tree | None = None, system: Network | None = None,
     ) -> Samples:  # fmt: skip
         """Compute the system, or another; what is compared of its lines.  target: None: it is for that alone."""
         begin, asked = clock.process_time(), system or self.system
@@ -559,7 +559,7 @@ def _tree(resolution: NetworkResolution) -> Tree:
 
 
 def system_with_layers(
-    system: System, moves: bool, reporter: ProgressReporter, interrupted: Callable[[], bool],
+    system: Network, moves: bool, reporter: ProgressReporter, interrupted: Callable[[], bool],
     criterion: UserCriterion | None = None,
 ) -> NetworkResolution:  # fmt: skip
     """How finely a system is computed whose lines ask for no errors.

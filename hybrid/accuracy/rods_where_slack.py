@@ -16,10 +16,10 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.model.payout import payout_of
 from hybrid.scene.analysis import RodModel
 from hybrid.scene.cable import Section
-from hybrid.scene.schema import Environment, Scene
+from hybrid.scene.schema import Environment, LineScene
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
 
 CHOSEN = "slack line as rods"  # of the event that says so
 CELLS = 100  # of a mesh that is not given
@@ -31,18 +31,18 @@ GRAVITY = 9.81  # m/s2
 class Instead(NamedTuple):
     """What is computed in place of a scene, and the text of the event."""
 
-    scene: Scene
+    scene: LineScene
     text: str
 
 
 class LinesInstead(NamedTuple):
     """The same of several lines."""
 
-    system: System
+    system: Network
     text: str
 
 
-def rods_instead_of_slack(scene: Scene, error: ComputationError) -> Instead | None:
+def rods_instead_of_slack(scene: LineScene, error: ComputationError) -> Instead | None:
     """A scene with rods in place of catenaries that stood for no model; None: they did not, or did not go slack."""
     named = "model" in scene.model_fields_set or payout_of(scene) is not None
     if error.outcome != Outcome.SLACK or error.t is None or named or scene.model.kind != "catenary":
@@ -52,7 +52,7 @@ def rods_instead_of_slack(scene: Scene, error: ComputationError) -> Instead | No
     return Instead(scene.model_copy(update={"cable": cable, "model": RodModel()}), _text(error, given))
 
 
-def rods_of_system(system: System, error: ComputationError) -> LinesInstead | None:
+def rods_of_system(system: Network, error: ComputationError) -> LinesInstead | None:
     """The same of the line of a system that an error names."""
     line = system.lines.get(error.line_name)
     if error.outcome != Outcome.SLACK or error.t is None or line is None or line.model is not None:

@@ -27,8 +27,8 @@ from hybrid.model.model_costs import NAMED
 from hybrid.model.plan import NetworkPlan, Plan, count_steps
 from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
 from hybrid.model.run_time import COST_STEP
-from hybrid.scene.read import SceneLike, as_scene_or_system
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import kernels_of
 from hybrid.simulation.network_run import NetworkRun, Recording
@@ -36,7 +36,7 @@ from hybrid.solve.joined import LineFailed
 from hybrid.store.comparison_recorder import ComparisonRecorder
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
 
 # s of processor time that the pre-run and the first steps of the result may take, and a pre-run that chooses the model.
 PRE_RUN, FIRST_STEPS, CHOICE = 0.2, 0.1, 1.0
@@ -58,10 +58,12 @@ MOST_FINER = 9.0
 
 
 @overload
-def plan(scene: SceneLike, *, measure: bool = True) -> Plan: ...
+def plan(scene: LineScene, *, measure: bool = True) -> Plan: ...
 @overload
-def plan(scene: System, *, measure: bool = True) -> NetworkPlan: ...
-def plan(scene: SceneLike | System, *, measure: bool = True) -> Plan | NetworkPlan:
+def plan(scene: Network, *, measure: bool = True) -> NetworkPlan: ...
+@overload
+def plan(scene: SceneLike, *, measure: bool = True) -> Any: ...
+def plan(scene: SceneLike, *, measure: bool = True) -> Any:
     """What would be computed for a scene (a Scene, the path of a scene file, or a dict), and how long it would take.
 
     measure: the mesh pre-run and the first steps are computed (at most about 0.3 s of processor time, 1.1 s where they
@@ -69,8 +71,8 @@ def plan(scene: SceneLike | System, *, measure: bool = True) -> Plan | NetworkPl
     that of a run; False: nothing is computed, and they are estimated from tables, as where kernels are not compiled
     yet.  Of several lines it is a NetworkPlan.
     """
-    scene = as_scene_or_system(scene)
-    if not isinstance(scene, Scene):
+    scene = as_scene(scene)
+    if not isinstance(scene, LineScene):
         made = tables.plan_system(scene)
         return _measured_lines(scene, made) if measure and scene.time is not None else made
     found = tables.plan(scene)
@@ -107,7 +109,7 @@ def _steps_a_second(seen: Sequence[Seen]) -> float:
 class _Probe(Case):
     """A case whose passes end (KeyboardInterrupt) when their budget is used up."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: LineScene) -> None:
         super().__init__(scene, None)
         self.run: NetworkRun | None = None  # the last
         self.at_rest: tuple[Model, State] | None = None  # where it begins, if that is an equilibrium
@@ -162,7 +164,7 @@ class _Probe(Case):
             raise KeyboardInterrupt
 
 
-def _measured(scene: Scene, found: Plan) -> Plan:
+def _measured(scene: LineScene, found: Plan) -> Plan:
     """The same, with what the pre-run and the first steps show.
 
     As it is where kernels are to be compiled first, or the equilibrium would take longer to find than a plan may.
@@ -219,7 +221,7 @@ def _dearer(found: Plan) -> float:
 
 
 def _steps(
-    scene: Scene, resolution: Resolution, run: NetworkRun, coarse: NetworkRun | None, seen: Sequence[Seen]
+    scene: LineScene, resolution: Resolution, run: NetworkRun, coarse: NetworkRun | None, seen: Sequence[Seen]
 ) -> float:
     """Steps of the result, which has come as far as its run.
 
@@ -246,7 +248,7 @@ def _steps(
     return run.steps * times.size / passed * duration / max(coarse.t, 1e-9 * duration)
 
 
-def _of_passes(scene: Scene, setup: float, motion: float, outputs: float, found: Plan) -> tuple[float, float]:
+def _of_passes(scene: LineScene, setup: float, motion: float, outputs: float, found: Plan) -> tuple[float, float]:
     """Processor time, s, of all runs after the pre-run: expected, and at most.
 
     setup, motion: s, of a result before its first step, and of its steps; outputs: their number.
@@ -263,13 +265,13 @@ def _of_passes(scene: Scene, setup: float, motion: float, outputs: float, found:
     return expected, min(first + MOST_FINER * one, max(MOST_TIMES * expected, LEAST))
 
 
-def _grown(system: System) -> float:
+def _grown(system: Network) -> float:
     """When all loads and motions of a system that grow from nothing have grown, s."""
     moved = [getattr(x, "motion", None) for x in (*system.points.values(), *system.bodies.values())]
     return max((getattr(x, "ramp", None) or 0.0 for x in (system.environment.waves, *moved)), default=0.0)
 
 
-def _measured_lines(system: System, found: NetworkPlan) -> NetworkPlan:
+def _measured_lines(system: Network, found: NetworkPlan) -> NetworkPlan:
     """The same of several lines: their first steps, as often as all runs would take them."""
     if found.cells > MOST_CELLS or not is_warm(kernels_of(system)):
         return found

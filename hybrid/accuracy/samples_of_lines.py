@@ -9,7 +9,7 @@ import numpy as np
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution, follows_curvature, has_limits
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.network_run import NetworkRun
@@ -37,7 +37,7 @@ def compared(line: LineResult, run: NetworkRun, cpu: float) -> RunSample:
     )  # fmt: skip
 
 
-def touch_unasked(system: System, result: Result) -> bool:
+def touch_unasked(system: Network, result: Result) -> bool:
     """Whether a line of which contact is not asked for touches itself in a result."""
     return any(
         system.lines[name].contact.self is None and any(event.kind == "line touches itself" for event in line.events)
@@ -45,7 +45,7 @@ def touch_unasked(system: System, result: Result) -> bool:
     )
 
 
-def extremes_of(system: System, result: Result, name: str) -> dict[str, np.ndarray]:
+def extremes_of(system: Network, result: Result, name: str) -> dict[str, np.ndarray]:
     """What limits of a line, and of quantities that are asked of it, are held against."""
     line, asked = result.lines[name], (f"{EXTREMES}/{x}" for x, q in system.output.quantities.items() if q.line == name)
     held = {x: line[x] for x in line.names if x.startswith((ENVELOPE, EXTREMES))}

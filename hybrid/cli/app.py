@@ -21,8 +21,7 @@ from hybrid.cli.pipe import OUTPUT, raise_lost_output
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
-    from hybrid.scene.network_scene import System
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.root import Scene
     from hybrid.store.reader import Result
 
 REFUSED, FAILED, INTERRUPTED = 1, 2, 130
@@ -238,18 +237,11 @@ def tell(console: Console, error: BaseException) -> int:
 
 
 def load(console: Console, path: Path, settings: list[str] | None) -> Scene:
-    """The scene of a command, of one cable; keys with a former name are noted."""
-    from hybrid.scene.read import one_cable
-
-    return one_cable(load_either(console, path, settings), [], str(path))[0]
-
-
-def load_either(console: Console, path: Path, settings: list[str] | None) -> Scene | System:
-    """The scene of a command, of one cable or of several lines; keys with a former name are noted."""
-    from hybrid.scene.read import read_either
+    """The scene of a command; keys with a former name are noted."""
+    from hybrid.scene.read import read_scene
 
     console.source, console.settings = str(path), settings or []
-    scene, renamed = read_either(path, console.settings)
+    scene, renamed = read_scene(path, console.settings)
     for key in renamed:
         console.json("note", text=str(key), **vars(key))
         console.note(f"note: {key}")

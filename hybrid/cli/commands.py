@@ -41,7 +41,6 @@ from hybrid.cli.app import (
     app,
     flag,
     load,
-    load_either,
     output_option,
     picture_beside,
     session,
@@ -52,8 +51,7 @@ from hybrid.cli.pipe import guard_output, raise_lost_output
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
-    from hybrid.scene.network_scene import System
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.root import Scene
     from hybrid.store.reader import Result
 
 
@@ -64,7 +62,7 @@ def run(
 ) -> None:  # fmt: skip
     """Compute the motion of a cable and write it to a file."""
     with session(as_json, quiet) as console:
-        asked = load_either(console, scene, settings)
+        asked = load(console, scene, settings)
         duration = asked.require_time().duration
         target = console.will_write(output or Path(f"{scene.stem}.h5"))
         picture = picture_beside(target, plot)
@@ -119,7 +117,7 @@ def static(
 ) -> None:  # fmt: skip
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
-        asked = load_either(console, scene, settings)
+        asked = load(console, scene, settings)
         from hybrid.cli.progress_line import span
         from hybrid.cli.stiffness_tables import check_holding, show_holding
 
@@ -150,7 +148,7 @@ def plan(
     with session(as_json, False) as console:
         from hybrid.cli.plan_tables import contents_tables, outputs_table, plan_facts, plan_rows
 
-        asked = load_either(console, scene, settings)
+        asked = load(console, scene, settings)
         if outputs:
             found, more = hybrid.listed_outputs(asked), hybrid.kinds_of_quantities()
             console.json("outputs", recorded=[x._asdict() for x in found], on_request=[x._asdict() for x in more])
@@ -194,8 +192,9 @@ def trade(
         raise UsageError(f"--peers: {PEERS_ARE}")
     with session(as_json, quiet) as console:
         from hybrid.cli.tables import judged, trade_table
+        from hybrid.scene.read import one_line
 
-        asked = load(console, scene, settings)
+        asked = one_line(load(console, scene, settings), str(scene))
         folder = output or Path(scene.with_suffix(".trade").name)
         console.left = f"{folder} keeps the runs that are done; the same command makes the others"
         console.note(f"runs and tables go to the folder {folder}")
@@ -262,11 +261,13 @@ def import_(
 
 @app.command()
 def schema(
-    lines: Annotated[bool, flag("--lines", help="Of a scene of several lines, with points and lines.")] = False,
+    lines: Annotated[bool, flag("--lines", help="Of scenes with points and lines alone.")] = False,
 ) -> None:
     """Print the JSON schema of a scene, for editors."""
+    from hybrid.scene.root import Scene, form_of
+
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
-    print(json.dumps(dialect | (hybrid.System if lines else hybrid.Scene).model_json_schema(), indent=2))
+    print(json.dumps(dialect | (form_of({"lines": {}}) if lines else Scene).model_json_schema(), indent=2))
 
 
 def _count(n: int, what: str) -> str:
@@ -274,7 +275,7 @@ def _count(n: int, what: str) -> str:
 
 
 def _ended(
-    console: Console, asked: Scene | System, result: Result, target: Path, wall: float, computed: float, cold: bool,
+    console: Console, asked: Scene, result: Result, target: Path, wall: float, computed: float, cold: bool,
     picture: Path | None,
 ) -> None:  # fmt: skip
     """Print the summary of a run that has ended; computed: s of it, by this command."""

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from rich.console import Console as RichConsole
 
     from hybrid.errors import ComputationError, SceneError
-    from hybrid.scene.network_scene import System
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.root import Scene
     from hybrid.simulation.progress import Progress
     from hybrid.store.records import Event
     from hybrid.studies.dispatch import StudyRunning
@@ -85,7 +84,7 @@ class Console:
         if not (self.quiet or self.as_json):
             self._tell(text, "yellow", wrap=True)
 
-    def compiling(self, scene: Scene | System, static: bool = False) -> bool:
+    def compiling(self, scene: Scene, static: bool = False) -> bool:
         """Whether kernels of a scene have to be compiled first, which takes long; if so, say it beforehand.
 
         static: for its equilibrium alone, whose stability is judged.

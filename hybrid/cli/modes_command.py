@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_either, session
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load, session
 
 if TYPE_CHECKING:
     from hybrid.modal.api import Modes
@@ -32,7 +32,7 @@ def modes(
     with session(as_json, quiet) as console:
         from hybrid.view.save import PAGES, PICTURES, check_target
 
-        asked = load_either(console, scene, settings)
+        asked = load(console, scene, settings)
         picture = check_target(plot, (*PICTURES, *PAGES)) if plot is not None else None
         found = hybrid.modes(asked, count, near, friction=not smooth)
         if picture is not None and picture.suffix.lower() in PAGES:

@@ -20,8 +20,9 @@ from hybrid.store.hockling import kink_torque
 if TYPE_CHECKING:
     from hybrid.model.plan import NetworkPlan, Plan
     from hybrid.scene.analysis import Time
-    from hybrid.scene.network_scene import System
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.network_scene import Network
+    from hybrid.scene.root import Scene
+    from hybrid.scene.schema import LineScene
     from hybrid.simulation.listed_outputs import Listed
 
 NAME, COLUMNS = 13, 80  # columns of names, and of the short form
@@ -65,7 +66,7 @@ def contents_tables(plan: Any) -> list[Callable[[], Any]]:
     return [content for both in each for content in both]
 
 
-def _rows_of_cable(scene: Scene, plan: Plan) -> list[str]:
+def _rows_of_cable(scene: LineScene, plan: Plan) -> list[str]:
     """The plan of a cable."""
     on = {entry.what: entry.why for entry in plan.contents if entry.on}
     sections, attached = scene.cable.sections, len(scene.cable.attachments)
@@ -97,7 +98,7 @@ def _rows_of_cable(scene: Scene, plan: Plan) -> list[str]:
     ]
 
 
-def _rows_of_system(system: System, plan: NetworkPlan) -> list[str]:
+def _rows_of_system(system: Network, plan: NetworkPlan) -> list[str]:
     """The plan of several lines: each of them, what joins them, and what they have in common."""
     rows = _rows_of_lines(system, plan)
     every = list(plan.lines.values())
@@ -121,7 +122,7 @@ def _rows_of_system(system: System, plan: NetworkPlan) -> list[str]:
     ]
 
 
-def _rows_of_lines(system: System, plan: NetworkPlan) -> dict[str, str]:
+def _rows_of_lines(system: Network, plan: NetworkPlan) -> dict[str, str]:
     """A row for each line, with its ends; of many lines one for all that are alike, with their names."""
     rows: dict[str, str] = {}
     alike: dict[str, list[str]] = {}
@@ -174,7 +175,7 @@ def _contact(on: Mapping[str, str]) -> str:
     return f"of the line with itself, {why}" if why.startswith(WHERE_NEAR) else ""
 
 
-def _of_lines(system: System, on: Mapping[str, str]) -> str:
+def _of_lines(system: Network, on: Mapping[str, str]) -> str:
     """Which lines touch each other, and what else they touch."""
     pairs, found = [f"{a} with {b}" for a, b in system.touching_pairs], []
     if pairs:
@@ -195,7 +196,7 @@ def _of_lines(system: System, on: Mapping[str, str]) -> str:
     return "; ".join(found)
 
 
-def _outputs(scene: Scene | System) -> str:
+def _outputs(scene: Scene) -> str:
     """How often and how much, where the file is large or they do not show the shortest period of waves and motions."""
     if scene.time is None:
         return ""
@@ -212,7 +213,7 @@ def _accuracy(on: Mapping[str, str]) -> str:
     return on.get("accuracy", "not asked for") + ("" if _has(on, "error figure") else "; no error figure")
 
 
-def _clamps(system: System, name: str) -> list[str]:
+def _clamps(system: Network, name: str) -> list[str]:
     """How the ends of a line are clamped, those that are."""
     found = []
     for end in ("start", "end"):

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 import hybrid
-from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, flag, load_either, session
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, flag, load, session
 from hybrid.linear.response_results import ADDED, OF_LARGEST
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def response(
     if not 0.0 < hours < np.inf:
         raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
     with session(as_json, quiet) as console:
-        found = hybrid.response(load_either(console, scene, settings), friction=not smooth, check=check)
+        found = hybrid.response(load(console, scene, settings), friction=not smooth, check=check)
         rows = _rows(found, hours)
         console.show(lambda: _table(found, rows, hours))
         for text in _unresolved(found):

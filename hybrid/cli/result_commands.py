@@ -19,7 +19,7 @@ from hybrid.cli.app import (
     UsageError,
     app,
     flag,
-    load_either,
+    load,
     numbers,
     opened_line,
     output_option,
@@ -135,9 +135,9 @@ def report(
 
 def _modes_of(result: Result, count: int) -> Modes:
     """Natural modes of the scene of a result."""
-    from hybrid.scene.read import parse_either
+    from hybrid.scene.read import read_text
 
-    return hybrid.modes(parse_either(result.scene_text)[0], count)
+    return hybrid.modes(read_text(result.scene_text)[0], count)
 
 
 def _comparison(
@@ -185,7 +185,7 @@ def export(
         if unfit := [name for name, value in given.items() if value is not None]:
             raise UsageError(f"{', '.join(unfit)}: of a result, not of an FMU")
         with session(as_json, quiet) as console:
-            scene, unit = load_either(console, result, settings), output or result.with_suffix(".fmu")
+            scene, unit = load(console, result, settings), output or result.with_suffix(".fmu")
             console.done("co-simulation unit, FMI 3.0", hybrid.export_fmu(scene, unit, overwrite=not keep))
         return
     if settings:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, load_either, session, words
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, load, session, words
 
 if TYPE_CHECKING:
     from hybrid.designs.seek import Sought
@@ -38,7 +38,7 @@ def seek(
         if not equals:
             raise UsageError(f"--target: '{each}' is no RESULT=VALUE such as tension@250=25000")
     with session(as_json, quiet) as console:
-        found = hybrid.seek(load_either(console, scene, settings), targets, by)
+        found = hybrid.seek(load(console, scene, settings), targets, by)
         if output is not None:
             if output.exists():
                 raise hybrid.ResultError(f"{output} exists\n    try:      another name")

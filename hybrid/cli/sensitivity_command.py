@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_either, session, words
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load, session, words
 
 if TYPE_CHECKING:
     from hybrid.designs.sensitivity import Derivative
-    from hybrid.scene.network_scene import System
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.root import Scene
 
 
 @app.command()
@@ -35,7 +34,7 @@ def sensitivity(
 ) -> None:  # fmt: skip
     """Derivatives and elasticities (% by %) of an equilibrium, or a motion, by the numbers of its scene."""
     with session(as_json, quiet) as console:
-        asked = load_either(console, scene, settings)
+        asked = load(console, scene, settings)
         results, numbers = (list(chain.from_iterable(x or ())) for x in (of, by))
         found = hybrid.sensitivity(asked, results or _results(asked, motion), numbers or _numbers(asked), motion)
         console.show(lambda: _tables(found))
@@ -43,7 +42,7 @@ def sensitivity(
             console.json("derivative", **x._asdict())
 
 
-def _results(scene: Scene | System, motion: bool) -> list[str]:
+def _results(scene: Scene, motion: bool) -> list[str]:
     """What engineers ask first."""
     tensions = [f"{x}/tension@{end}".lstrip("/") for x in scene.lines for end in ("start", "end")]
     if motion:
@@ -52,7 +51,7 @@ def _results(scene: Scene | System, motion: bool) -> list[str]:
     return [*tensions, *["max curvature"] * bends]
 
 
-def _numbers(scene: Scene | System) -> list[str]:
+def _numbers(scene: Scene) -> list[str]:
     """All numbers of the sections that are not 0."""
     out = []
     for line, x in scene.lines.items():

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ResultError, optional_package
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import SceneLike, as_scene, scene_text
+from hybrid.scene.root import Scene
 from hybrid.scene.short_form import ENDS
 from hybrid.simulation.stepping import Simulation
 from hybrid.store.selection import check_target, write_atomically
@@ -32,7 +31,7 @@ ABILITIES = {
 }  # fmt: skip
 
 
-def export_fmu(scene: SceneLike | System, path: str | Path, *, name: str | None = None, overwrite: bool = True) -> Path:
+def export_fmu(scene: SceneLike, path: str | Path, *, name: str | None = None, overwrite: bool = True) -> Path:
     """Write a scene as a co-simulation unit (FMI 3.0) and return its path.
 
     scene: as of `hybrid.Simulation`; it is built once, so that a unit that cannot start is not written.  path: the
@@ -44,7 +43,7 @@ def export_fmu(scene: SceneLike | System, path: str | Path, *, name: str | None 
         raise ResultError(f"{target}: expected a name that ends in .fmu\n    try:      {target.with_suffix('.fmu')}")
     check_target(target, overwrite)
     builder = optional_package("pythonfmu3.builder", "an FMU", "fmu").FmuBuilder
-    found = as_scene_or_system(scene)
+    found = as_scene(scene)
     model = re.sub(r"\W", "_", name or target.stem)
     if not model[:1].isalpha():
         model = f"cable_{model}"
@@ -77,7 +76,7 @@ class {model}(SceneUnit, Fmi3Slave):
 '''
 
 
-def _write_scene(scene: Scene | System, folder: Path) -> list[Path]:
+def _write_scene(scene: Scene, folder: Path) -> list[Path]:
     """The scene in `folder`, and copies there of the files that it names."""
     data, copies = scene.model_dump(mode="json", exclude_none=True), dict[str, Path]()
 
@@ -103,7 +102,7 @@ def _yaml(data: Any) -> str:
     return json.dumps(data, indent=1)  # JSON is YAML 1.2
 
 
-def _interface(scene: Scene | System) -> dict[str, Any]:
+def _interface(scene: Scene) -> dict[str, Any]:
     """What may be set of the ends or points, and where they begin."""
     with Simulation(scene) as made:
         time, several = scene.require_time(), bool(scene.points)

@@ -23,7 +23,7 @@ from hybrid.interop.moordyn.rows import read_source
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.analysis import CatenaryModel
 from hybrid.scene.points import Fairlead
-from hybrid.scene.read import parse_either
+from hybrid.scene.read import read_text
 from hybrid.simulation.stepped_points import PointState
 from hybrid.simulation.stepping import Simulation
 
@@ -85,7 +85,7 @@ class MoorDyn:
             return
         made = scene_of_lines(self.deck)
         self.text, self.notes = made.text, made.notes
-        self.scene: Any = parse_either(self.text)[0]
+        self.scene: Any = read_text(self.text)[0]
         scene = self.scene
         names = {
             id: f"point{id}" if f"point{id}" in scene.points else f"body{p.on}" for id, p in self.deck.points.items()

@@ -24,7 +24,7 @@ from hybrid.kernels.state.state import Floats, Line
 from hybrid.linear.loaded_members import stiffness_by_water
 from hybrid.model.bodies import loads_of
 from hybrid.model.network import NetworkModel, bodies_of
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
@@ -118,7 +118,7 @@ def smooth(line: Line) -> Line:
     return line._replace(bits=line.bits & ~LEFT_OUT)
 
 
-def with_bodies(model: NetworkModel, system: System) -> NetworkModel:
+def with_bodies(model: NetworkModel, system: Network) -> NetworkModel:
     """The model with the bodies of a changed scene, and moments on its points; its lines stay as they are."""
     free = system.free_bodies
     held = [[system.points[x] for x in (line.start, line.end)] for line in system.lines.values()]

@@ -12,7 +12,6 @@ from hybrid.designs.edges import refuse_edges
 from hybrid.designs.problem import as_asked, problem_of, refused_result
 from hybrid.errors import SceneError, optional_package
 from hybrid.scene.design import Design
-from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def openmdao_component(
-    source: str | PathLike[str] | Mapping[str, Any] | SceneLike | System | Design,
+    source: str | PathLike[str] | Mapping[str, Any] | SceneLike | Design,
     *,
     unknowns: Mapping[str, Any] | None = None,
     driven: bool = False,

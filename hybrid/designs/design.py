@@ -23,7 +23,6 @@ from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.design import DESIGN, Design
-from hybrid.scene.network_scene import System
 from hybrid.scene.read import SceneLike
 from hybrid.scene.task_file import TaskFile
 
@@ -138,7 +137,7 @@ class Identified(Found):
 
 
 def design(
-    source: str | PathLike[str] | Mapping[str, Any] | SceneLike | System | Design,
+    source: str | PathLike[str] | Mapping[str, Any] | SceneLike | Design,
     *,
     unknowns: Mapping[str, Any] | None = None,
     **more: Any,

@@ -16,8 +16,7 @@ from hybrid.designs.numbers import changed_scene, number_of, size_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.touchdown import penetration
-from hybrid.scene.network_scene import System
-from hybrid.scene.schema import Scene
+from hybrid.scene.root import Scene
 
 WAY = "differences of equilibria, from cell to cell"
 NAMES = ("touchdown", "touchdown_position", "grounded_length")
@@ -30,7 +29,7 @@ TRIES = 8
 OF_CHANGE, UNSURE = 1.5, 0.02
 
 
-def is_edge(asked: Scene | System, text: str) -> bool:
+def is_edge(asked: Scene, text: str) -> bool:
     """Whether a result such as `max hose/touchdown`, or a quantity of the scene, goes by where contact begins."""
     name = text.split("@")[0].split("/")[-1].split(" ")[-1].split(".")[0]
     quantity = asked.output.quantities.get(name)
@@ -40,7 +39,7 @@ def is_edge(asked: Scene | System, text: str) -> bool:
     return "touchdown" in quantity.kind or (quantity.kind == "layback" and quantity.ends_at(seabed) == "touchdown")
 
 
-def refuse_edges(asked: Scene | System, of: Sequence[str]) -> None:
+def refuse_edges(asked: Scene, of: Sequence[str]) -> None:
     """SceneError: a result that goes by where contact begins, of what knows derivatives of the line of cells alone."""
     for text in of:
         if is_edge(asked, text):
@@ -50,7 +49,7 @@ def refuse_edges(asked: Scene | System, of: Sequence[str]) -> None:
 
 
 def by_cells(
-    asked: Scene | System, rest: NetworkAtRest, key: str, values_of: Callable[[Scene | System], Floats]
+    asked: Scene, rest: NetworkAtRest, key: str, values_of: Callable[[Scene], Floats]
 ) -> tuple[Floats, Floats]:
     """Derivatives (W,) of where contact begins by a number, and their errors: all of what goes over too few cells.
 

@@ -13,10 +13,9 @@ from hybrid.designs.numbers import scene_with
 from hybrid.designs.sensitivity import at_rest
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
-from hybrid.scene.network_scene import System
-from hybrid.scene.schema import Scene
+from hybrid.scene.root import Scene
 
-AnyScene = Scene | System
+AnyScene = Scene
 FINER = 0.5  # length of cells of the equilibria that check what was found, over that of others
 # Part by which unknowns that are alike are told apart: between sections that are alike there need be no node.
 APART = 1e-12

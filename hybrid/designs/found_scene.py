@@ -7,14 +7,13 @@ from pathlib import Path
 
 from hybrid.designs.numbers import PART
 from hybrid.errors import SceneError
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import parse_either, scene_text, text_of
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import read_text, scene_text, text_of
+from hybrid.scene.root import Scene
 from hybrid.scene.yaml_source import Node, Unreadable, from_text
 
 
 def text_of_found(
-    scene: Scene | System, file: str, keys: Mapping[str, Sequence[str]], numbers: Mapping[str, float],
+    scene: Scene, file: str, keys: Mapping[str, Sequence[str]], numbers: Mapping[str, float],
     folder: str | Path | None = None,
 ) -> str:  # fmt: skip
     """The scene as YAML.  file: what it was read from, "": nothing; folder: where the text is to go, None: anywhere.
@@ -34,7 +33,7 @@ def text_of_found(
             text = changed
     try:
         place = str(Path(folder).absolute() / "scene.yaml") if folder is not None else ""
-        return text if parse_either(text, place)[0] == scene else whole
+        return text if read_text(text, place)[0] == scene else whole
     except SceneError:
         return whole
 

@@ -27,8 +27,8 @@ from hybrid.designs.tangents import Seen, Unfollowed, has_two_sides, step_of
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
-from hybrid.scene.network_scene import System
-from hybrid.scene.schema import Scene, Spread
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import Spread
 
 NAME = re.compile(r"^(max|min|mean|std|last|t=\S+) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
 OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
@@ -73,7 +73,7 @@ class Slopes(NamedTuple):
     ways: tuple[str, ...]
 
 
-def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Slopes:
+def in_motion(asked: Scene, of: Sequence[str], by: Sequence[str]) -> Slopes:
     """Derivatives of results of a run: tangents along its steps or, where these are not known, four runs a number.
 
     of: `max tension@end`, `std position.z@100`, `max hose/curvature`: max, min, mean, std or last over the outputs, or
@@ -105,7 +105,7 @@ def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Sl
 
 
 def by_tangents(
-    asked: Scene | System, wanted: Sequence[Wanted], course: Course, numbers: Mapping[str, float],
+    asked: Scene, wanted: Sequence[Wanted], course: Course, numbers: Mapping[str, float],
     sizes: Mapping[str, float],
 ) -> Slopes:  # fmt: skip
     """Derivatives by tangents along the steps of one run; Unfollowed: they are not known of it.
@@ -115,7 +115,7 @@ def by_tangents(
     """
     steps = {key: step_of(key, sizes[key]) for key in numbers}
 
-    def other(key: str, d: float) -> Scene | System:
+    def other(key: str, d: float) -> Scene:
         return scene_with(asked, [(key,)], np.array([numbers[key] + d]))
 
     beside: list[tuple[float, tuple[Any, Any | None]]] = []  # steps of numbers; the scenes there and on the other side
@@ -141,7 +141,7 @@ def by_tangents(
 
 
 def followed(
-    asked: Scene | System, wanted: Sequence[Wanted], course: Course, pairs: Sequence[tuple[Any, Any | None]],
+    asked: Scene, wanted: Sequence[Wanted], course: Course, pairs: Sequence[tuple[Any, Any | None]],
     steps: Sequence[float], smooth: bool = False,
 ) -> tuple[Motion, Floats, Floats]:  # fmt: skip
     """A run, derivatives (P, W) of results by numbers, and parts of tangents (P,) by which these may be off.
@@ -166,7 +166,7 @@ def followed(
 
 
 def by_differences(
-    asked: Scene | System, wanted: Sequence[Wanted], course: Course, numbers: Mapping[str, float],
+    asked: Scene, wanted: Sequence[Wanted], course: Course, numbers: Mapping[str, float],
     sizes: Mapping[str, float],
 ) -> Slopes:  # fmt: skip
     """Derivatives by differences of runs in the steps of one: four for each number."""
@@ -188,7 +188,7 @@ def by_differences(
     return Slopes(base.values, slopes, errors, len(numbers) * (DIFFERENCES,))
 
 
-def parse_history(asked: Scene | System, text: str) -> Wanted:
+def parse_history(asked: Scene, text: str) -> Wanted:
     found = NAME.match(text)
     example = "max east/tension@end" if asked.line_names else "max tension@end"
     if found is None or bool(found[2]) != bool(asked.line_names):
@@ -220,7 +220,7 @@ def parse_history(asked: Scene | System, text: str) -> Wanted:
     return Wanted(over, line, name, axis or "", np.inf if s == length else s, of_section, time)
 
 
-def _time_of(asked: Scene | System, text: str, number: str) -> float:
+def _time_of(asked: Scene, text: str, number: str) -> float:
     """The time of a result, s; SceneError: it is none, or beyond the run."""
     duration = asked.require_time().duration
     try:
@@ -240,7 +240,7 @@ class Motion:
     """
 
     def __init__(
-        self, scene: Scene | System, wanted: Sequence[Wanted], course: Course, base: Motion | None = None,
+        self, scene: Scene, wanted: Sequence[Wanted], course: Course, base: Motion | None = None,
         finer: bool = False, smooth: bool = False, begun: Callable[..., None] | None = None,
     ) -> None:  # fmt: skip
         """course, finer, begun: as of `replay`; smooth: extremes are those of parabolas in time and along the line,

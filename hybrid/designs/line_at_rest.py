@@ -25,7 +25,7 @@ from hybrid.linear.memory import settle_layers
 from hybrid.model.build import Model
 from hybrid.model.output_points import jump_points, output_points
 from hybrid.outputs.probes import PROBES, Observer
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.line_result import WANTED, observer_of
 from hybrid.solve.joined import JoinedLine
 from hybrid.solve.stepper import POWERS
@@ -85,7 +85,7 @@ def parse_result(text: str, length: float) -> Wanted:
 class Beside(NamedTuple):
     """A line of a scene: its model, its ends, the sea around it."""
 
-    scene: Scene
+    scene: LineScene
     model: Model
     ends: Ends
     sea: Sea
@@ -127,7 +127,7 @@ class LineAtRest:
     """One line in the equilibrium of a scene, and lines beside it, of scenes with other numbers."""
 
     def __init__(
-        self, scene: Scene, model: Model, state: State, wanted: Sequence[Wanted], free: Sequence[int] = (),
+        self, scene: LineScene, model: Model, state: State, wanted: Sequence[Wanted], free: Sequence[int] = (),
         frames: Frames = NO_FRAMES,
     ) -> None:  # fmt: skip
         """wanted: results; free: ends (0, 1) that are joined to free points or bodies; frames: of those that turn with
@@ -180,7 +180,7 @@ class LineAtRest:
             right[-k, 1:4] = work.report[NET_A + 3 * k : NET_A + 3 * k + 3]
         return right.ravel(), work.report.copy()
 
-    def beside(self, scene: Scene, model: Model, frames: Frames = NO_FRAMES) -> Beside:
+    def beside(self, scene: LineScene, model: Model, frames: Frames = NO_FRAMES) -> Beside:
         """The line of another scene; what is around it is evaluated where it is not what is here.
 
         ValueError: it has layers that slip which this one does not have, or lacks some.

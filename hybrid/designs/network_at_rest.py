@@ -39,10 +39,11 @@ from hybrid.scene.analysis import Output
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import LINE, ShortForm, network_of, short_form
 from hybrid.simulation.layer_mesh import layered_lines
 from hybrid.simulation.network_run import static_system
@@ -67,7 +68,7 @@ Places = Mapping[str, tuple[float, ...]]
 NO_PLACES: Places = MappingProxyType({})
 
 
-def _network_of(scene: Any) -> tuple[Any, System, NetworkResolution, ShortForm | None]:
+def _network_of(scene: Any) -> tuple[Any, Network, NetworkResolution, ShortForm | None]:
     """The scene as it is computed, the network that does, how finely, and where keys of the scene are in that."""
     if scene.line_names:
         return scene, scene, layered_lines(scene, NetworkResolution.first(scene), False), None
@@ -76,7 +77,7 @@ def _network_of(scene: Any) -> tuple[Any, System, NetworkResolution, ShortForm |
     return case.scene, network_of(case.scene), resolution, short_form(case.scene)
 
 
-def parse_result_of(scene: Scene | System, text: str) -> tuple[str, Wanted]:
+def parse_result_of(scene: Scene, text: str) -> tuple[str, Wanted]:
     """The line and the parts of a result such as `east/tension@end`, `max hose/curvature`; SceneError: it is none.
 
     Of a line that has no name `tension@end`.
@@ -104,7 +105,7 @@ class _Changed(NamedTuple):
 class NetworkAtRest(OfScene):
     """The equilibrium on one mesh, its factors, and the values of results."""
 
-    def __init__(self, scene: Scene | System, cells: float, of: Sequence[str], places: Places = NO_PLACES) -> None:
+    def __init__(self, scene: Scene, cells: float, of: Sequence[str], places: Places = NO_PLACES) -> None:
         """cells: their lengths over the usual, 0.5 or more; of: results; places: of an equilibrium with these cells.
 
         SceneError, ComputationError: as of `hybrid.sensitivity`.
@@ -290,7 +291,7 @@ class NetworkAtRest(OfScene):
             out[..., k] = every[..., place]
         return out
 
-    def _scene_of(self, system: System, name: str) -> Scene:
+    def _scene_of(self, system: Network, name: str) -> LineScene:
         """A line with the free points that it carries, and others where they are first, and its named quantities."""
         scene = system.scene_of(name, system.carried(name), system.guesses)
         own = {key: q for key, q in system.output.quantities.items() if q.line in (name, None) and q.other is None}
@@ -332,7 +333,7 @@ class NetworkAtRest(OfScene):
             found.append(changed)
         return found[0], found[1]
 
-    def _hangs_on(self, system: System, name: str) -> bool:
+    def _hangs_on(self, system: Network, name: str) -> bool:
         """Whether a line hangs on what a changed scene has changed."""
         if any(getattr(system, x) is not getattr(self._system, x) for x in OF_ALL):
             return True
@@ -348,7 +349,7 @@ class NetworkAtRest(OfScene):
                 return True
         return False
 
-    def _changed(self, system: System, key: str) -> _Changed:
+    def _changed(self, system: Network, key: str) -> _Changed:
         """A changed scene.  How a clamped line is seated may hang on first shapes: then such lines are built anew."""
         anew = [self._hangs_on(system, name) for name in self._names]
         for new, name in zip(anew, self._names, strict=True):
@@ -389,7 +390,7 @@ class NetworkAtRest(OfScene):
         except ValueError:
             raise _other_cells(key) from None
 
-    def _on_surfaces(self, system: System, lines: Sequence[Beside], bodies: Sequence[BodyModel]) -> list[Beside]:
+    def _on_surfaces(self, system: Network, lines: Sequence[Beside], bodies: Sequence[BodyModel]) -> list[Beside]:
         """Lines of a changed scene on obstacles as hard as all of it asks for, with bodies that carry some at rest."""
         models = with_surfaces(system, [x.model for x in lines], bodies)
         out = [x._replace(model=model, sea=model.sea.at(np.inf)) for x, model in zip(lines, models, strict=True)]

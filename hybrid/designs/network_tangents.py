@@ -57,7 +57,7 @@ from hybrid.kernels.watch.tangent_job import TANGENT_SIZES, blank_other
 from hybrid.model.ends import table_of_loads
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.resolution import Resolution
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.simulation.line_result import observer_of
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.run_start import joined_lines
@@ -93,7 +93,7 @@ class NetworkOthers:
     """The systems of scenes with more of each number beside that of a run, and with less on its other side."""
 
     def __init__(
-        self, system: System, scenes: Sequence[tuple[System, System | None]], steps: Sequence[float],
+        self, system: Network, scenes: Sequence[tuple[Network, Network | None]], steps: Sequence[float],
         lines: Mapping[str, Resolution], more: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
         """system: of the run; scenes: with more of each number by a step, and with less (None: it is not looked at);
@@ -356,7 +356,7 @@ class NetworkOthers:
         return seen, self._looked_at(other, build_system(other, self._resolution), less, names)
 
     def _looked_at(
-        self, system: System, model: NetworkModel, batches: Mapping[int, Batch], names: Mapping[str, Sequence[str]]
+        self, system: Network, model: NetworkModel, batches: Mapping[int, Batch], names: Mapping[str, Sequence[str]]
     ) -> dict[str, Seen]:
         out = {}
         for l, batch in batches.items():

@@ -12,11 +12,11 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.base import Invalid, Table, unit_of
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import parse_either, scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import read_text, scene_text
+from hybrid.scene.root import Scene
 
-AnyScene = TypeVar("AnyScene", bound=Scene | System)
+AnyScene = TypeVar("AnyScene", bound=Scene)
 PART = re.compile(r"[^.\[\]]+")
 # Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.  Lengths are
 # changed by less: a place that is at a node would see the cell to one side of it as much as that to the other.  So are
@@ -37,7 +37,7 @@ COMPUTING = ("time", "output", "mesh", "accuracy", "model", "resolution")
 NAMED = ("lines", "points", "bodies", "obstacles")
 
 
-def number_of(scene: Scene | System, key: str) -> float:
+def number_of(scene: Scene, key: str) -> float:
     """The value of a key such as `cable.sections[0].length`; SceneError: it has no number."""
     value: Any = scene.model_dump(mode="python")
     for part in PART.findall(key):
@@ -79,7 +79,7 @@ def at_a_bound(key: str, number: float) -> SceneError:
     return SceneError([Complaint("by", key, "a number that may be a little more, and less", fix)])
 
 
-def size_of(asked: Scene | System, key: str, number: float) -> float:
+def size_of(asked: Scene, key: str, number: float) -> float:
     """What runs differ by parts of; SceneError: a number of how the scene is computed, which has no derivative."""
     refuse_computing(key)
     if PLACE.search(key):
@@ -89,7 +89,7 @@ def size_of(asked: Scene | System, key: str, number: float) -> float:
     return abs(number) or 1.0
 
 
-def unit_of_key(scene: Scene | System, key: str) -> str:
+def unit_of_key(scene: Scene, key: str) -> str:
     """The unit that the reference of scenes has for a key; "": none."""
     value, unit = cast(Any, scene), ""
     for part in PART.findall(key):
@@ -103,7 +103,7 @@ def unit_of_key(scene: Scene | System, key: str) -> str:
 class OfScene:
     """What is computed of a scene, and differentiated by its numbers."""
 
-    scene: Scene | System
+    scene: Scene
     lines: Sequence[Any]  # LineAtRest, by name as in the scene
 
     @property
@@ -128,7 +128,7 @@ class OfScene:
 
 def changed_scene(scene: AnyScene, key: str, value: float) -> AnyScene:
     """The scene with another number at a key, read and checked as a file is; SceneError: it may not be that."""
-    found, _ = parse_either(scene_text(scene), overrides=[f"{key}={float(value)!r}"])
+    found, _ = read_text(scene_text(scene), overrides=[f"{key}={float(value)!r}"])
     assert type(found) is type(scene)
     return found
 
@@ -139,7 +139,7 @@ def with_number(scene: AnyScene, key: str, value: float) -> AnyScene:
     return found
 
 
-def is_allowed(scene: Scene | System) -> bool:
+def is_allowed(scene: Scene) -> bool:
     """Whether a scene that was made by `with_number` is one that could be read."""
     try:
         type(scene).model_validate(scene.model_dump(mode="python"))
@@ -148,7 +148,7 @@ def is_allowed(scene: Scene | System) -> bool:
     return True
 
 
-def is_allowed_line(system: System, name: str) -> bool:
+def is_allowed_line(system: Network, name: str) -> bool:
     """The same of one line of several that was made by `with_number`."""
     try:
         system.checked_scene(name)

@@ -20,7 +20,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.design import Design, OfEquilibrium, Unknown
-from hybrid.scene.read import as_scene_or_system, parse_either, scene_text
+from hybrid.scene.read import as_scene, read_text, scene_text
 from hybrid.scene.task_file import TaskFile
 from hybrid.studies.expressions import evaluated
 
@@ -225,11 +225,11 @@ def scenes_of(task: TaskFile[Design], scene: AnyScene) -> dict[str, AnyScene]:
     """The scene of each case; "": there are none.  SceneError: one is refused."""
     if not task.asked.cases:
         return {"": scene}
-    text, scenes = scene_text(scene), {}
+    text, scenes = scene_text(scene), dict[str, AnyScene]()
     for name, changes in task.asked.cases.items():
         try:
             settings = [f"{key}={json.dumps(value)}" for key, value in changes.items()]
-            scenes[name] = parse_either(text, overrides=settings)[0]
+            scenes[name] = read_text(text, overrides=settings)[0]
         except SceneError as error:
             raise _moved(task, ("cases", name), error) from None
     return scenes
@@ -388,4 +388,4 @@ def refused_result(task: TaskFile[Design], error: SceneError) -> SceneError:
 
 def as_asked(scene: Any, task: TaskFile[Design]) -> AnyScene:
     """The scene of a design; None: that of the file that it names."""
-    return as_scene_or_system(task.asked.scene if scene is None else scene)
+    return as_scene(task.asked.scene if scene is None else scene)

@@ -19,9 +19,9 @@ from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.output_points import NEAR
 from hybrid.model.resolution import Resolution, accuracy_of, first_resolution
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import parse_either, scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import read_text, scene_text
+from hybrid.scene.root import Scene
 from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.simulation.network_run import Recording, run_system
 from hybrid.simulation.progress import ProgressReporter
@@ -45,7 +45,7 @@ class Course(NamedTuple):
         """How finely lines are computed; finer: on cells and in steps half as long."""
         return {k: _halved(x) for k, x in self.lines.items()} if finer else self.lines
 
-    def network(self, scene: Any, dimension: int | None = 3) -> System:
+    def network(self, scene: Any, dimension: int | None = 3) -> Network:
         """The network that computes a scene with other numbers in a replay; its errors are not estimated.
 
         dimension: tangents know no plane of a line.
@@ -55,7 +55,7 @@ class Course(NamedTuple):
             made = network_of(made.model_copy(update={"model": self.scene.model}))
         elif scene.output.errors:  # lines pass each other as where these are estimated
             made = made.model_copy(update={"contact": passing_each_other(self.scene).contact})
-        found: System = made.model_copy(update={"dimension": dimension})
+        found: Network = made.model_copy(update={"dimension": dimension})
         return found  # runs of several lines estimate no errors by themselves
 
 
@@ -77,7 +77,7 @@ def course_of(scene: Any) -> Course:
         run(scene, path).close()
         with open_result(path) as result:
             refuse_push(result)
-            computed: Any = parse_either(result.scene_text)[0]
+            computed: Any = read_text(result.scene_text)[0]
             part = next(x for _, x in result.each_line())
             ends = tuple(np.array(part["steps/t"], float).tolist())
         if scene.line_names:
@@ -101,7 +101,7 @@ def refuse_push(result: Result) -> None:
 
 
 def replay(
-    scene: Scene | System, course: Course, finer: bool = False, more: Sequence[float] | None = None,
+    scene: Scene, course: Course, finer: bool = False, more: Sequence[float] | None = None,
     each_step: bool = False, begun: Callable[..., None] | None = None,
 ) -> Result:  # fmt: skip
     """A run into memory, in the steps and on the nodes of a course; finer: on nodes as the scene has them, cells and
@@ -121,9 +121,9 @@ def replay(
 
 
 def with_outputs(
-    scene: Scene | System, course: Course, more: Sequence[float] | None = None, each_step: bool = False,
+    scene: Scene, course: Course, more: Sequence[float] | None = None, each_step: bool = False,
     finer: bool = False,
-) -> System:  # fmt: skip
+) -> Network:  # fmt: skip
     """The network that computes a scene in a replay.
 
     more: of one cable: outputs are at its nodes and these arc lengths, m; None: where the scene asks for them;
@@ -160,7 +160,7 @@ def _halved(resolution: Resolution) -> Resolution:
     return replace(resolution.halved(), step=0.5 * resolution.step, places=(), ends=tuple(both.tolist()))
 
 
-def _is_open(scene: Scene | System) -> bool:
+def _is_open(scene: Scene) -> bool:
     """Whether it leaves steps or cells to the program, which a run shows."""
     layers = any(x.resolution is not None for x in scene.lines.values())
     asked = (accuracy_of(scene.scene_of(name)) for name in scene.lines)

@@ -12,9 +12,8 @@ from hybrid.designs.nearest import MET, Rows, Space, nearest
 from hybrid.designs.numbers import number_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import SceneLike, as_scene_or_system
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.root import Scene
 
 
 @dataclass(frozen=True)
@@ -28,17 +27,17 @@ class Sought:
     results: Mapping[str, float]
     targets: Mapping[str, float]
     equilibria: int
-    scene: Scene | System
+    scene: Scene
 
 
-def seek(scene: SceneLike | System, targets: Mapping[str, float], by: Sequence[str]) -> Sought:
+def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> Sought:
     """Change as many numbers of a scene as there are targets until the results of its equilibrium are these.
 
     targets: results as of `hybrid.sensitivity`, such as `{"tension@250": 25e3}`; by: keys of numbers, each of which
     keeps its sign.  SceneError: what has no derivative, more or fewer numbers than targets; ComputationError: they are
     not reached, with how near it came.
     """
-    asked = as_scene_or_system(scene)
+    asked = as_scene(scene)
     if len(by) != len(targets) or not by:
         expected = f"as many keys as targets ({len(targets)})"
         raise SceneError([Complaint("by", f"{len(by)} keys", expected, "one number for each target")])

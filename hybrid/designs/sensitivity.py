@@ -15,9 +15,8 @@ from hybrid.designs.in_motion import in_motion
 from hybrid.designs.network_at_rest import NO_PLACES, NetworkAtRest, Places
 from hybrid.designs.numbers import number_of, refuse_computing
 from hybrid.errors import ComputationError, Outcome
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import SceneLike, as_scene_or_system
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.root import Scene
 from hybrid.studies.sensitivity import Influence
 from hybrid.studies.sensitivity import sensitivity as of_study
 
@@ -42,9 +41,7 @@ class Derivative(NamedTuple):
 
 
 @overload
-def sensitivity(
-    scene: SceneLike | System, of: Sequence[str], by: Sequence[str], motion: bool = False
-) -> list[Derivative]: ...
+def sensitivity(scene: SceneLike, of: Sequence[str], by: Sequence[str], motion: bool = False) -> list[Derivative]: ...
 
 
 @overload
@@ -64,7 +61,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     """
     if by is None:
         return of_study(scene, of)
-    asked = as_scene_or_system(scene)
+    asked = as_scene(scene)
     for key in by:
         refuse_computing(key)
     numbers = [number_of(asked, key) for key in by]
@@ -95,7 +92,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     return out
 
 
-def way_at_rest(asked: Scene | System, rest: NetworkAtRest) -> str:
+def way_at_rest(asked: Scene, rest: NetworkAtRest) -> str:
     """The way to derivatives at rest, with what is left out of them, and lines that have only begun to touch."""
     bed = asked.environment.seabed
     rubs = [bed and bed.friction, *(y.friction for y in asked.obstacles.values())]
@@ -106,7 +103,7 @@ def way_at_rest(asked: Scene | System, rest: NetworkAtRest) -> str:
     return ", ".join([AT_REST, *(["friction left out"] if any(rubs) else []), *begun])
 
 
-def at_rest(asked: Scene | System, of: Sequence[str], cells: float = 1.0, places: Places = NO_PLACES) -> NetworkAtRest:
+def at_rest(asked: Scene, of: Sequence[str], cells: float = 1.0, places: Places = NO_PLACES) -> NetworkAtRest:
     """The equilibrium of one cable or of several lines; of: results.
 
     cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.

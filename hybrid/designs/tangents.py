@@ -42,7 +42,7 @@ from hybrid.kernels.watch.tangent_job import (
 from hybrid.kernels.watch.wave_slopes import PHASES, SLOPES
 from hybrid.model.build import Model
 from hybrid.model.plane import planar
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 # Part of a number by which the scene of the other line differs; of coordinates, of lengths: what moves a line far moves
 # nodes into contact and out of it.
@@ -90,7 +90,7 @@ class Tangent(NamedTuple):
 class Seen(NamedTuple):
     """Results of a scene with another number: `values` (nt, ...) by name, at arc lengths s, m, and times t, s."""
 
-    scene: Scene
+    scene: LineScene
     values: Mapping[str, Floats]
     s: Floats
     t: Floats

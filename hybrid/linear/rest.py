@@ -15,7 +15,7 @@ from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching
 from hybrid.model.network import NetworkModel, NetworkResolution
 from hybrid.model.resolution import Resolution
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
 from hybrid.scene.short_form import LINE, network_of, short_form
@@ -50,7 +50,7 @@ def line_at_rest(case: StaticCase, resolution: Resolution) -> Rest:
         return replace(system_at_rest(network_of(case.scene), NetworkResolution({LINE: resolution})), tips={})
 
 
-def system_at_rest(system: System, resolution: NetworkResolution) -> Rest:
+def system_at_rest(system: Network, resolution: NetworkResolution) -> Rest:
     """Several lines; errors as of `line_at_rest`."""
     run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
     assert run.found is not None
@@ -68,7 +68,7 @@ def system_at_rest(system: System, resolution: NetworkResolution) -> Rest:
     )  # fmt: skip
 
 
-def _tips(system: System, model: NetworkModel) -> dict[tuple[str, int], str]:
+def _tips(system: Network, model: NetworkModel) -> dict[tuple[str, int], str]:
     """Free points that are the end (0, 1) of one line alone, by that."""
     ends = [
         ((name, k), getattr(system.lines[name], key)) for name in model.names for k, key in enumerate(("start", "end"))

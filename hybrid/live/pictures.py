@@ -13,7 +13,7 @@ from hybrid.model.model_costs import with_model
 from hybrid.model.plan import plan
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import located_in, parse_either, scene_text
+from hybrid.scene.read import located_in, read_text, scene_text
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.network_run import static_system
 from hybrid.simulation.static_case import StaticCase
@@ -21,8 +21,7 @@ from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.reader import Result, written_result
 
 if TYPE_CHECKING:
-    from hybrid.scene.network_scene import System
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.root import Scene
 
 # Points along a line in a picture: one for each cell, as far as a screen shows them apart.
 LEAST_POINTS, MOST_POINTS = 101, 401
@@ -36,7 +35,7 @@ def picture_of(text: str, file: str, compiling: Callable[[], None]) -> tuple[dic
     """
     out: dict[str, Any] = {"problems": [], "notes": []}
     try:
-        scene, renamed = parse_either(text, file)
+        scene, renamed = read_text(text, file)
         out["notes"] = [{"line": key.line, "title": "renamed", "text": str(key)} for key in renamed]
         out["title"], out["moves"] = scene.title or "", scene.time is not None
         made = plan(scene)
@@ -58,7 +57,7 @@ def picture_of(text: str, file: str, compiling: Callable[[], None]) -> tuple[dic
     return out | {"facts": drawing.facts(result)}, result
 
 
-def equilibrium(scene: Scene | System, made: Any) -> Result:
+def equilibrium(scene: Scene, made: Any) -> Result:
     """The equilibrium with the cells of a first run: no coarser ones to estimate its error, no pre-run for its mesh.
 
     It is looked for as `hybrid static` does, from the scene alone: from the last picture Newton's method might find
@@ -84,7 +83,7 @@ def _cable_at_rest(scene: Any, made: Any, target: MemoryTarget) -> None:
     StaticCase(scene).record(first_resolution(scene), target)
 
 
-def _begin_to_compile(scene: Scene | System, compiling: Callable[[], None]) -> None:
+def _begin_to_compile(scene: Scene, compiling: Callable[[], None]) -> None:
     """Begin to compile what an equilibrium calls, once on a machine; `compiling` hears of it beforehand."""
     if not is_warm(kernels_of(scene, True)):
         compiling()

@@ -91,11 +91,11 @@ class Worker:
     def _modes(self, text: str, file: str) -> dict[str, Any]:
         from hybrid.errors import HybridError
         from hybrid.modal.api import modes
-        from hybrid.scene.read import parse_either
+        from hybrid.scene.read import read_text
         from hybrid.view.modes_page import html
 
         try:
-            return {"html": html(modes(parse_either(text, file)[0]))}
+            return {"html": html(modes(read_text(text, file)[0]))}
         except HybridError as error:
             return {"refused": str(error)}
 

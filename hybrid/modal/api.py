@@ -23,9 +23,10 @@ from hybrid.model.network import NetworkResolution
 from hybrid.model.payout import payout_of
 from hybrid.scene.base import Table
 from hybrid.scene.motion_tables import Harmonic
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import SceneLike, as_scene_or_system
-from hybrid.scene.schema import Scene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.layer_mesh import layered_lines
 from hybrid.simulation.static_case import StaticCase
 
@@ -105,7 +106,7 @@ class _Found:
     tips: Mapping[tuple[str, int], str]  # as of `Rest`
 
 
-def modes(scene: SceneLike | System, count: int = 10, near: float | None = None, friction: bool = True) -> Modes:
+def modes(scene: SceneLike, count: int = 10, near: float | None = None, friction: bool = True) -> Modes:
     """Natural modes about the equilibrium under full loads: the longest periods, or those nearest to `near` (s).
 
     Drag and damping are left out; contact with the bed, obstacles, bodies and lines is as it is in the equilibrium.
@@ -114,7 +115,7 @@ def modes(scene: SceneLike | System, count: int = 10, near: float | None = None,
     the mesh, by one of half the cells.  SceneError: the scene is refused; ComputationError: it has no equilibrium, or
     nothing can move.
     """
-    asked = as_scene_or_system(scene)
+    asked = as_scene(scene)
     _check(count, near)
     count = int(count)
     fine, coarse = (_found(asked, cells, count, near, friction) for cells in (1.0, 2.0))
@@ -146,7 +147,7 @@ def _check(count: int, near: float | None) -> None:
         raise SceneError([Complaint("modes", f"{near:g}", "a period > 0, in s", "--near 8")])
 
 
-def _found(asked: Scene | System, cells: float, count: int, near: float | None, sticks: bool) -> _Found:
+def _found(asked: Scene, cells: float, count: int, near: float | None, sticks: bool) -> _Found:
     """Modes on the usual mesh (cells 1), or on one whose cells are so many times as long.
 
     They are more than `count`: what nothing holds is told apart from them, such as lines that turn about their axis.
@@ -166,7 +167,7 @@ def _found(asked: Scene | System, cells: float, count: int, near: float | None, 
     return _Found(network, eigen, rest.points, rest.bodies, axes, touched, together, sheaves, rest.tips)
 
 
-def equilibrium_of(asked: Scene | System, cells: float = 1.0, friction: bool = True) -> Rest:
+def equilibrium_of(asked: Scene, cells: float = 1.0, friction: bool = True) -> Rest:
     """The equilibrium on the usual mesh, or on one whose cells are so many times as long.
 
     friction: whether that settles where the scene says nothing of it.  SceneError: the scene is refused;
@@ -177,13 +178,13 @@ def equilibrium_of(asked: Scene | System, cells: float = 1.0, friction: bool = T
     return found
 
 
-def _cable_at_rest(asked: Scene, cells: float) -> Rest:
+def _cable_at_rest(asked: LineScene, cells: float) -> Rest:
     case = StaticCase(asked)
     resolution = resolution_at_rest(case)
     return line_at_rest(case, resolution.coarser(cells=cells) if cells > 1.0 else resolution)
 
 
-def _network_at_rest(asked: System, cells: float) -> Rest:
+def _network_at_rest(asked: Network, cells: float) -> Rest:
     system = layered_lines(asked, NetworkResolution.first(asked), False)
     if cells > 1.0:
         system = replace(system, lines={k: x.coarser(cells=cells) for k, x in system.lines.items()})
@@ -344,7 +345,7 @@ def _error(fine: _Found, coarse: _Found, k: int) -> float | None:
 # --- what is to be known ------------------------------------------------------------------------
 
 
-def of_first_length(asked: Scene | System) -> list[str]:
+def of_first_length(asked: Scene) -> list[str]:
     """What is to be known of a line that is paid out."""
     paid = [f"line {name} is" if name else "the line is" for name in asked.lines if payout_of(asked.scene_of(name))]
     return [f"{who} paid out: all of this is of its first length, to which it does not return" for who in paid]
@@ -379,7 +380,7 @@ def _doubts(found: _Found, unstable: int, free: list[str], chosen: np.ndarray) -
         yield f"contact of {name} stays as it is at rest: swings that part what touches have other periods"
 
 
-def _meetings(asked: Scene | System, found: list[Mode]) -> Iterator[str]:
+def _meetings(asked: Scene, found: list[Mode]) -> Iterator[str]:
     """Periods of the scene that meet those of modes."""
     for where, period in excitations(asked):
         near = [k for k, mode in enumerate(found, start=1) if abs(mode.period / period - 1.0) < MEETS]
@@ -388,7 +389,7 @@ def _meetings(asked: Scene | System, found: list[Mode]) -> Iterator[str]:
             yield f"{where} has a period of {period:.4g} s, near that of mode{'s' * (len(near) > 1)} {names}"
 
 
-def excitations(asked: Scene | System) -> list[tuple[str, float]]:
+def excitations(asked: Scene) -> list[tuple[str, float]]:
     """What moves in a scene with a period: key and period, s."""
     out = [(where, x.period) for where, x in _harmonics(asked, "")]
     fluid = asked.environment.fluid

@@ -9,9 +9,8 @@ import numpy as np
 
 from hybrid.accuracy.api import run
 from hybrid.errors import Complaint, SceneError
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import as_scene_or_system
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import as_scene
+from hybrid.scene.root import Scene
 
 if TYPE_CHECKING:
     from hybrid.linear.response_results import LineResponse
@@ -23,9 +22,7 @@ STEPS = 60
 CHECKED = ("tension", "curvature")
 
 
-def compared(
-    asked: Scene | System, lines: Mapping[str, LineResponse], duration: float
-) -> dict[str, tuple[float, float]]:
+def compared(asked: Scene, lines: Mapping[str, LineResponse], duration: float) -> dict[str, tuple[float, float]]:
     """Standard deviations where each quantity varies most, by frequency and in a run of `duration` (s)."""
     if not 0.0 < duration < np.inf:
         raise SceneError([Complaint("check", f"{duration:g}", "a time > 0, in s", "--check 600")])
@@ -37,7 +34,7 @@ def compared(
     data["time"] = {"duration": duration / (1.0 - BEGINS), "step": step}
     data["output"] = {"every": period / PER_PERIOD}
     data.pop("accuracy", None)
-    result: Any = run(as_scene_or_system(data))
+    result: Any = run(as_scene(data))
     found = {}
     for name, line in lines.items():
         one = result.lines[name] if result.lines else result

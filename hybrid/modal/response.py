@@ -33,8 +33,7 @@ from hybrid.modal.left_out import left_out
 from hybrid.modal.touching_validity import closing_doubts, name_of, touching_doubts
 from hybrid.modal.validity import doubts_of
 from hybrid.scene.combinations import refuse_use
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import SceneLike, as_scene_or_system
+from hybrid.scene.read import SceneLike, as_scene
 
 # Rounds of the linear drag, and the relative change of its largest part at which they end.
 ROUNDS, SETTLED, RELAXED = 30, 2e-3, 0.8
@@ -45,7 +44,7 @@ FEWER, LEAST_FREQUENCIES = 4, 12
 MOST_APART = 0.15
 
 
-def response(scene: SceneLike | System, friction: bool = True, check: float | None = None) -> Response:
+def response(scene: SceneLike, friction: bool = True, check: float | None = None) -> Response:
     """Response to the waves and harmonic motions of a scene, stationary, linear about its equilibrium.
 
     Drag is linear in the mean square, found by iteration; the mean drag of the waves is left out.  friction: as of
@@ -54,7 +53,7 @@ def response(scene: SceneLike | System, friction: bool = True, check: float | No
     SceneError: nothing excites it, or what does is no sum of harmonics; a load changes in time.  ComputationError: no
     equilibrium.
     """
-    asked = as_scene_or_system(scene)
+    asked = as_scene(scene)
     refuse_use(asked, "response")
     rest = equilibrium_of(asked, friction=friction)
     refuse_motions(rest.models, rest.names)

@@ -43,9 +43,9 @@ from hybrid.model.self_reach import contact_bits
 from hybrid.scene.motion_checks import prescribed_twist
 from hybrid.scene.schema import (
     AdaptiveModel,
+    LineScene,
     RodModel,
     RodZone,
-    Scene,
     ZonesModel,
 )
 
@@ -144,7 +144,7 @@ class Model:
         return 3 * (self.cells + 1) + self.cells + int(self.line.spin.sum())
 
 
-def zone_plans(scene: Scene) -> tuple[ZonePlan, ...]:
+def zone_plans(scene: LineScene) -> tuple[ZonePlan, ...]:
     """The zones a scene's model stands for, in order."""
     model = scene.model
     if isinstance(model, ZonesModel):
@@ -158,8 +158,8 @@ def zone_plans(scene: Scene) -> tuple[ZonePlan, ...]:
 
 
 def build(
-    scene: Scene, resolution: Resolution | None = None, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None = None,
-    like: Model | None = None, spare: bool = True,
+    scene: LineScene, resolution: Resolution | None = None,
+    mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None = None, like: Model | None = None, spare: bool = True,
 ) -> Model:  # fmt: skip
     """Make the model that a scene requires; resolution: how finely, None: as it asks for.
 
@@ -230,7 +230,7 @@ def build(
 
 
 def place_cells(
-    scene: Scene, cable: Material, resolution: Resolution, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None
+    scene: LineScene, cable: Material, resolution: Resolution, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None
 ) -> tuple[Layout | None, Floats, tuple[Zone, ...]]:
     """Layout of a line whose zones move (else None), nodes (N+1,) m and zones; mesh: as of `build`."""
     if isinstance(mesh, Layout):
@@ -244,7 +244,7 @@ def place_cells(
     return None, *_placed(scene, cable, zone_plans(scene), cuts, resolution, DEFAULT_CELLS)
 
 
-def _cuts(scene: Scene, cable: Material) -> list[float]:
+def _cuts(scene: LineScene, cable: Material) -> list[float]:
     """Arc lengths, m, at which a node must lie: of sections, loads, obstacles, and zones that the scene asks for."""
     cuts = {*cable.cuts, *corners(scene)}
     if isinstance(scene.model, AdaptiveModel):
@@ -253,13 +253,13 @@ def _cuts(scene: Scene, cable: Material) -> list[float]:
     return sorted(cuts)
 
 
-def _knots(scene: Scene, plans: Sequence[ZonePlan], cuts: Sequence[float]) -> list[float]:
+def _knots(scene: LineScene, plans: Sequence[ZonePlan], cuts: Sequence[float]) -> list[float]:
     """The same with both ends, and those of zones."""
     bounds = np.cumsum([plan.length for plan in plans])[:-1]
     return sorted({0.0, *cuts, *bounds.tolist(), scene.length})
 
 
-def places_of(model: Model, scene: Scene) -> tuple[float, ...]:
+def places_of(model: Model, scene: LineScene) -> tuple[float, ...]:
     """`Resolution.places` of the cells of a model; empty where what else makes them goes by no places."""
     if stiffeners_of(scene) or payout_of(scene) is not None or follows_curvature(scene):
         return ()
@@ -270,7 +270,7 @@ def places_of(model: Model, scene: Scene) -> tuple[float, ...]:
 
 
 def _at_places(
-    scene: Scene, plans: Sequence[ZonePlan], cuts: Sequence[float], resolution: Resolution
+    scene: LineScene, plans: Sequence[ZonePlan], cuts: Sequence[float], resolution: Resolution
 ) -> tuple[Floats, tuple[Zone, ...]] | None:
     """Nodes and zones by `Resolution.places`; None: there are others."""
     knots = _knots(scene, plans, cuts)
@@ -292,7 +292,7 @@ FEWEST_CELLS = 4  # of a zone, however little is asked
 FOLLOWING_BASE, FOLLOWING_CELLS, FOLLOWING_CELL, MOST_FOLLOWING = 24, 60, 0.125, 4096
 
 
-def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
+def given_zones(scene: LineScene, layout: Layout) -> np.ndarray:
     """(n,) of base cells: 1 where the scene wants rod whatever comes, -1 where catenary, else 0."""
     assert isinstance(scene.model, AdaptiveModel)
     middle = 0.5 * (layout.base[:-1] + layout.base[1:])
@@ -303,7 +303,7 @@ def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
     return given
 
 
-def twist_rate(scene: Scene, cable: Material, s: Floats) -> Floats:
+def twist_rate(scene: LineScene, cable: Material, s: Floats) -> Floats:
     """The most (K,) rad/m by which turns, motions and moments of the ends can twist a cable that is all rod, at s."""
     twisted, resists = prescribed_twist(scene.ends), _resists_spin(scene, cable)
     given = [[load.value for load in end.loads if load.what == "moment"] for end in scene.ends.both]
@@ -317,7 +317,7 @@ def twist_rate(scene: Scene, cable: Material, s: Floats) -> Floats:
     return np.asarray(np.minimum(torque * give + by_tension, MOST_FOR_TWIST * TWIST / scene.length)[cable.piece(s)])
 
 
-def _twist_of_tension(scene: Scene, cable: Material) -> Floats:
+def _twist_of_tension(scene: LineScene, cable: Material) -> Floats:
     """The most (K,) rad/m by which a tension of the weight and of the end forces twists the pieces of a cable."""
     if not cable.tension_torque.size:
         return np.zeros(cable.mass.size)
@@ -327,7 +327,7 @@ def _twist_of_tension(scene: Scene, cable: Material) -> Floats:
     return np.asarray(np.minimum(rate, MOST_FOR_TWIST * TWIST / scene.length))
 
 
-def _resists_spin(scene: Scene, cable: Material) -> bool:
+def _resists_spin(scene: LineScene, cable: Material) -> bool:
     """Whether a rod takes the torque of one end although the other turns freely: by inertia or by its sections.
 
     Along round, straight sections without inertia the torque is the same everywhere: an end that turns freely makes it
@@ -338,7 +338,7 @@ def _resists_spin(scene: Scene, cable: Material) -> bool:
 
 
 def _placed(
-    scene: Scene, cable: Material, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution,
+    scene: LineScene, cable: Material, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution,
     usual: int,
 ) -> tuple[Floats, tuple[Zone, ...]]:  # fmt: skip
     """Nodes and zones; usual: cells of a line whose scene does not say."""
@@ -350,7 +350,7 @@ def _placed(
     return _dense_in_stiffeners(scene, s, resolution.fineness), zones
 
 
-def _dense_in_stiffeners(scene: Scene, s: Floats, fineness: float) -> Floats:
+def _dense_in_stiffeners(scene: LineScene, s: Floats, fineness: float) -> Floats:
     """Nodes (N+1,) m with evenly split cells where stiffeners have fewer than they need."""
     stiffeners = stiffeners_of(scene)
     if not stiffeners:
@@ -366,7 +366,7 @@ def _dense_in_stiffeners(scene: Scene, s: Floats, fineness: float) -> Floats:
 
 
 def _placed_by_mesh(
-    scene: Scene, cable: Material, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution,
+    scene: LineScene, cable: Material, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution,
     usual: int,
 ) -> tuple[Floats, tuple[Zone, ...]]:  # fmt: skip
     """The same, where stiffeners are no more than changes of section."""
@@ -396,7 +396,7 @@ def _placed_by_mesh(
     return divided(s, resolution.parts), zones
 
 
-def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Resolution) -> Layout:
+def _layout(scene: LineScene, cable: Material, cuts: Sequence[float], resolution: Resolution) -> Layout:
     """The cells that rods everywhere would have; where cells follow the curvature, base cells, all rod."""
     model, whole = scene.model, (ZonePlan("rod", scene.length),)
     assert isinstance(model, AdaptiveModel)
@@ -417,7 +417,7 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Re
     return Layout(base, _following_parts(scene, cable, base, resolution), np.ones(base.size - 1, bool))
 
 
-def _following_parts(scene: Scene, cable: Material, base: Floats, resolution: Resolution) -> np.ndarray:
+def _following_parts(scene: LineScene, cable: Material, base: Floats, resolution: Resolution) -> np.ndarray:
     """Finest cells (n,) of base cells between nodes (n+1,) m, where they follow the curvature."""
     assert isinstance(scene.model, AdaptiveModel)
     middle = 0.5 * (base[:-1] + base[1:])

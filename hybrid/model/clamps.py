@@ -13,7 +13,7 @@ from hybrid.model.build import Model
 from hybrid.model.ends import first_director, transported
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.scene.ends import Triple
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 
 STRAIGHT = (1.0, 0.0, 0.0)  # direction of a line through a free point in axes of that, where none is given
 SECOND = 1e-3  # weight of the material axis of the first line at a free point against directions of lines
@@ -24,7 +24,7 @@ Ends = tuple[str, str]  # name of a line, and `start` or `end`
 Held = tuple[Triple, Triple | None]  # inertial tangent and material axis a1 of an end
 
 
-def directions_at_rigid(system: System, point: str) -> dict[Ends, tuple[Floats, Floats]]:
+def directions_at_rigid(system: Network, point: str) -> dict[Ends, tuple[Floats, Floats]]:
     """Tangent and material axis a1 (3,) of each line that is clamped to a free point, in axes of the point."""
     found: dict[Ends, tuple[Floats, Floats]] = {}
     here = system.clamped_at(point)

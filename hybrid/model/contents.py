@@ -39,7 +39,7 @@ from hybrid.model.self_reach import self_reach
 from hybrid.scene.accuracy import USUAL
 from hybrid.scene.body_shapes import Carried
 from hybrid.scene.ends import Clamped, End, Pinned
-from hybrid.scene.schema import AdaptiveModel, RecordedWaves, Scene, StreamFunctionWaves
+from hybrid.scene.schema import AdaptiveModel, LineScene, RecordedWaves, StreamFunctionWaves
 
 # Part of the variance of a record that is round-off.
 LOST = 1e-6
@@ -58,7 +58,7 @@ class Entry:
     s: tuple[float, float] | None = None  # the stretch of line (m) that it is about; None: all of it
 
 
-def _watched(scene: Scene) -> Iterator[Entry]:
+def _watched(scene: LineScene) -> Iterator[Entry]:
     """The criteria by which zones move, with their thresholds."""
     assert isinstance(scene.model, AdaptiveModel)
     why = "model.tolerance x length" if scene.model.tolerance else "1e-3 of the length, or a part of what accuracy asks"
@@ -90,7 +90,7 @@ def _moving(model: AdaptiveModel) -> Iterator[Entry]:
     yield Entry("joints that carry no moment", True, "where rod and catenary meet")
 
 
-def accuracy_entry(scene: Scene, reach: Reach | None = None) -> Entry:
+def accuracy_entry(scene: LineScene, reach: Reach | None = None) -> Entry:
     """What is asked of the result; reach: how far the line moves, where that is known."""
     want = requested_accuracy(scene)
     if want is None:
@@ -99,13 +99,13 @@ def accuracy_entry(scene: Scene, reach: Reach | None = None) -> Entry:
     return Entry(ACCURACY, True, f"{why}: {want.describe(reach, rests=scene.time is None)}")
 
 
-def with_accuracy(contents: Sequence[Entry], scene: Scene, reach: Reach | None = None) -> tuple[Entry, ...]:
+def with_accuracy(contents: Sequence[Entry], scene: LineScene, reach: Reach | None = None) -> tuple[Entry, ...]:
     """The same contents with what a scene itself asks, where they are those of a model that is chosen for it."""
     asked = accuracy_entry(scene, reach)
     return tuple(asked if x.what == asked.what else x for x in contents)
 
 
-def _accuracy(scene: Scene) -> Iterator[Entry]:
+def _accuracy(scene: LineScene) -> Iterator[Entry]:
     """What is asked of the result, and what it sets."""
     resolution, time = first_resolution(scene), scene.time
     yield accuracy_entry(scene)
@@ -127,7 +127,7 @@ def _accuracy(scene: Scene) -> Iterator[Entry]:
     yield Entry("error figure, by coarser runs", wants, why)
 
 
-def _parts(scene: Scene, line: Line, rods: bool, flat: Entry) -> Iterator[Entry]:
+def _parts(scene: LineScene, line: Line, rods: bool, flat: Entry) -> Iterator[Entry]:
     """Parts of the model of the cable itself: dimension, torsion, sections with axes of their own, attachments."""
     yield flat
     why = "rod cells" if rods else "no rod zone in model"
@@ -149,21 +149,21 @@ def _parts(scene: Scene, line: Line, rods: bool, flat: Entry) -> Iterator[Entry]
     yield Entry(f"attachments: {attached}", attached > 0, "cable.attachments, ends of kind body")
 
 
-def _swivel_holds(scene: Scene, end: End, cell: int) -> bool:
+def _swivel_holds(scene: LineScene, end: End, cell: int) -> bool:
     """Whether the section at a clamp with a swivel has a direction, which the element there then holds."""
     section = scene.cable.sections[cell]
     curved = section.intrinsic_curvature is not None and any(section.intrinsic_curvature)
     return end.kind == "clamped" and not end.holds_twist and (section.anisotropic or curved)
 
 
-def _by_first_harmonic(scene: Scene, end: End) -> bool:
+def _by_first_harmonic(scene: LineScene, end: End) -> bool:
     """Whether a vessel moves an end by an RAO in a wave of finite height."""
     fluid, vessel = scene.environment.fluid, getattr(end.prescribed_motion, "vessel", None)
     finite = fluid is not None and isinstance(fluid.waves, StreamFunctionWaves)
     return finite and vessel is not None and vessel.rao is not None
 
 
-def followed(scene: Scene, zones: Sequence[Zone]) -> Entry:
+def followed(scene: LineScene, zones: Sequence[Zone]) -> Entry:
     """Whether the error of leaving bending out is followed along the run."""
     what, sections = "model error (bending left out), along the run", scene.cable.sections
     if not wants_errors(scene):
@@ -183,7 +183,7 @@ def followed(scene: Scene, zones: Sequence[Zone]) -> Entry:
     return Entry(what, True, "error figure; in a coarser run")
 
 
-def _force(scene: Scene, line: Line, name: str, bit: int, needs: str) -> Entry:
+def _force(scene: LineScene, line: Line, name: str, bit: int, needs: str) -> Entry:
     """Whether a force acts, or may: contact of the line with itself begins where it comes near itself."""
     if bit == SELF_CONTACT:
         return Entry(name, bool(line.bits & (bit | MAY_TOUCH)), self_reach(scene).why)
@@ -192,7 +192,7 @@ def _force(scene: Scene, line: Line, name: str, bit: int, needs: str) -> Entry:
     return Entry(name, bool(line.bits & bit), needs)
 
 
-def _let_go(scene: Scene, name: str) -> str:
+def _let_go(scene: LineScene, name: str) -> str:
     """When an end is let go, by time; a run that ends before can be continued."""
     release = scene.ends.named()[name].release
     if release is None or release.time is None or scene.time is None:
@@ -204,7 +204,7 @@ def _let_go(scene: Scene, name: str) -> str:
 IDLE = "the current acts on nothing"
 
 
-def _idle(scene: Scene, line: Line) -> Iterator[Entry]:
+def _idle(scene: LineScene, line: Line) -> Iterator[Entry]:
     """That there is a current, but nothing of this line has drag."""
     fluid, carried = scene.environment.fluid, (*scene.cable.attachments, *scene.ends.bodies().values())
     flows = fluid is not None and fluid.flows()
@@ -213,7 +213,7 @@ def _idle(scene: Scene, line: Line) -> Iterator[Entry]:
         yield Entry(IDLE, False, f"{why} to what it carries", event="ignored")
 
 
-def _left_out(scene: Scene) -> Iterator[Entry]:
+def _left_out(scene: LineScene) -> Iterator[Entry]:
     """What of a measured elevation is in no wave."""
     waves = scene.environment.waves
     if isinstance(waves, RecordedWaves) and (waves.recorded.lost > LOST or waves.recorded.has_mean):
@@ -225,7 +225,7 @@ def _left_out(scene: Scene) -> Iterator[Entry]:
         yield Entry("a part of the record of the sea (environment.fluid.waves)", False, why, event="ignored")
 
 
-def obstacle_entries(scene: Scene, rows: Floats) -> Iterator[Entry]:
+def obstacle_entries(scene: LineScene, rows: Floats) -> Iterator[Entry]:
     """Each obstacle of a scene, with how stiff it is; rows: (M, OBSTACLE) of them."""
     for (name, x), row in zip(scene.obstacles.items(), rows, strict=True):
         why = "given" if x.stiffness else "so that it lies at most a twentieth of its diameter deep at rest"
@@ -235,7 +235,7 @@ def obstacle_entries(scene: Scene, rows: Floats) -> Iterator[Entry]:
         yield Entry(text, True, f"{key}; stiffness: {why}")
 
 
-def _torque_at_winch(scene: Scene, line: Line) -> Iterator[Entry]:
+def _torque_at_winch(scene: LineScene, line: Line) -> Iterator[Entry]:
     """A torque through a catenary whose length a winch changes: its compliance changes where nodes enter and leave."""
     if not line.torsion.size:
         return
@@ -252,7 +252,7 @@ def _torque_at_winch(scene: Scene, line: Line) -> Iterator[Entry]:
             yield Entry("torque through the catenary at the winch", False, why, event="torque neglected")
 
 
-def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) -> tuple[Entry, ...]:
+def contents_of(scene: LineScene, line: Line, zones: Sequence[Zone], flat: Entry) -> tuple[Entry, ...]:
     """What is on and by which key, what is off and what would switch it on; flat: whether it is in a plane."""
     kinds = {z.kind for z in zones}
     entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))

@@ -6,10 +6,10 @@ import math
 
 from hybrid.model.initial_shape import HARDLY
 from hybrid.model.scales import net_weight
-from hybrid.scene.schema import Body, Equilibrium, Free, Scene
+from hybrid.scene.schema import Body, Equilibrium, Free, LineScene
 
 
-def end_laid_anywhere(scene: Scene) -> str:
+def end_laid_anywhere(scene: LineScene) -> str:
     """The end that lies on a level bed in any direction as well, because nothing in the scene says which; "": none."""
     bed, fluid, initial, ends = scene.environment.seabed, scene.environment.fluid, scene.initial, scene.ends
     said = not isinstance(initial, Equilibrium) or initial.points is not None or initial.direction is not None
@@ -22,7 +22,7 @@ def end_laid_anywhere(scene: Scene) -> str:
     return "" if pulled or (tangent is not None and any(tangent[:2])) else other
 
 
-def reasons_against(scene: Scene, rod_ends: tuple[bool, bool], flexible: float = 0.0) -> list[str]:
+def reasons_against(scene: LineScene, rod_ends: tuple[bool, bool], flexible: float = 0.0) -> list[str]:
     """Reasons against an equilibrium of the scene, in sentences; empty when nothing is known.
 
     rod_ends: whether the line begins and ends with a rod.  flexible: its longest cell of a catenary, m.

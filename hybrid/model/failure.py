@@ -13,7 +13,7 @@ import numpy as np
 
 from hybrid.model.network import NetworkModel
 from hybrid.model.release import unclamped, without_hold
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Failure
 
 
@@ -27,7 +27,7 @@ class Weakness(NamedTuple):
     leaves: bool  # whether the ends leave their point; else the point comes with them
 
 
-def weaknesses(system: System) -> tuple[Weakness, ...]:
+def weaknesses(system: Network) -> tuple[Weakness, ...]:
     """All that may break, lines first."""
     names = list(system.lines)
     found: list[tuple[str, tuple[tuple[int, int], ...], Failure, bool]] = []

@@ -11,14 +11,14 @@ from hybrid.model.ends import EndConditions
 from hybrid.model.initial_shape import end_conditions, frames, initial_nodes, twist_by_tension
 from hybrid.model.material import Material
 from hybrid.model.sea import Surroundings
-from hybrid.scene.schema import Equilibrium, Points, Scene, Straight
+from hybrid.scene.schema import Equilibrium, LineScene, Points, Straight
 
 HUNG = "an elastic catenary under all loads"  # a first shape that has the tensions of an equilibrium, but for bending
 SHARPEST_START = np.radians(150.0)
 
 
 def first_state(
-    scene: Scene, line: Line, cable: Material, sea: Surroundings, scale: float, shape: Hanging | None
+    scene: LineScene, line: Line, cable: Material, sea: Surroundings, scale: float, shape: Hanging | None
 ) -> tuple[State, str, EndConditions]:
     """The state that a computation begins with, the name of its shape, and the ends; scale: N, its tensions where
 
@@ -45,7 +45,7 @@ def first_state(
     return start, shape_name, ends
 
 
-def other_state(scene: Scene, r: Floats, line: Line, cable: Material, scale: float) -> State:
+def other_state(scene: LineScene, r: Floats, line: Line, cable: Material, scale: float) -> State:
     """Another shape to find the equilibrium from: nodes r (N+1, 3) m, tensions of the scale (N)."""
     spare = state_for(line)
     spare.r[:], spare.T[:] = r, scale
@@ -56,14 +56,14 @@ def other_state(scene: Scene, r: Floats, line: Line, cable: Material, scale: flo
     return spare
 
 
-def _put_frames(scene: Scene, state: State, line: Line, cable: Material) -> tuple[Floats, Floats]:
+def _put_frames(scene: LineScene, state: State, line: Line, cable: Material) -> tuple[Floats, Floats]:
     """Give a state the directors and turns that its chords make; the directors at both ends."""
     directors, state.turn[:, 0] = frames(scene, state.e, line, cable)
     state.a1[:] = directors[1:-1]
     return directors[0], directors[-1]
 
 
-def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> None:
+def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: LineScene) -> None:
     """Give inextensible cells exactly their length: points carry round-off, which would be an impact at the first step.
 
     The gap this leaves at a held end is closed by small shifts of all chords, until both are met.

@@ -20,7 +20,7 @@ from hybrid.model.scales import net_weight
 from hybrid.model.sea import Surroundings
 from hybrid.model.sections import swivels
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.schema import Body, Equilibrium, Points, RodZone, Scene, Straight, ZonesModel
+from hybrid.scene.schema import Body, Equilibrium, LineScene, Points, RodZone, Straight, ZonesModel
 from hybrid.scene.sea import Seabed
 
 # A line that is longer than taut by less than this part of its length is not called slack.
@@ -31,7 +31,7 @@ GIVEN = "the polyline given"  # name of a first shape that the scene gives
 WAYS_OUT = 100  # places to which a node that is in an obstacle may be moved
 
 
-def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
+def initial_nodes(scene: LineScene, s: Floats) -> tuple[Floats, str]:
     """First positions of the nodes (N+1, 3), m, and the shape's name; what hangs is refined by `hung`."""
     start, end = (end.held_position for end in scene.ends.both)
     initial, length = scene.initial, scene.length
@@ -67,7 +67,7 @@ def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
     return first + s[:, None] * direction, "a straight line"
 
 
-def spare_shapes(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
+def spare_shapes(scene: LineScene, s: Floats) -> Iterator[tuple[str, Floats]]:
     """Shapes to start from where an elastic catenary leads nowhere: an arc and the straight span of two held ends."""
     start, end = (end.held_position for end in scene.ends.both)
     if start and end:
@@ -77,7 +77,7 @@ def spare_shapes(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
             yield "the straight span", first + (s / s[-1])[:, None] * span
 
 
-def from_joint(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
+def from_joint(scene: LineScene, s: Floats) -> Iterator[tuple[str, Floats]]:
     """A shape to start from where a line is clamped at one end alone: its first rod straight, the rest hanging."""
     start, end = (end.held_position for end in scene.ends.both)
     initial = scene.initial
@@ -96,7 +96,7 @@ def from_joint(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
     yield "a line that hangs from its first joint", r
 
 
-def _along_bed(scene: Scene, place: Sequence[float]) -> Floats:
+def _along_bed(scene: LineScene, place: Sequence[float]) -> Floats:
     """A direction along the seabed at a place, across its slope."""
     bed = scene.environment.seabed
     rise = bed.rise(place[0], place[1]) if bed is not None else (0.0, 0.0)
@@ -135,7 +135,7 @@ def _heights_of(bed: Seabed) -> Callable[[Floats, Floats], Floats]:
     return heights
 
 
-def hung(scene: Scene, line: Line, sea: Sea, clamp_leads: bool = True) -> Hanging | None:
+def hung(scene: LineScene, line: Line, sea: Sea, clamp_leads: bool = True) -> Hanging | None:
     """The elastic catenary that a search for equilibrium starts from; None where it does not apply or stays slack.
 
     clamp_leads: whether a line that is clamped at one end and free at the other has none.
@@ -213,7 +213,7 @@ def _has_directions(r: Floats) -> bool:
     return bool((np.linalg.norm(np.diff(r, axis=0), axis=1) > 0.0).all())  # False for what is not finite, too
 
 
-def _floating_end(scene: Scene, line: Line) -> int | None:
+def _floating_end(scene: LineScene, line: Line) -> int | None:
     """The node of a free end whose body may float at the surface."""
     if not (line.bits & SURFACE and line.bits & BODIES):
         return None
@@ -240,7 +240,7 @@ def current_drag(line: Line, sea: Sea, r: Floats) -> Floats:
     return f
 
 
-def slack_on_bed(scene: Scene, line: Line) -> Hanging | None:
+def slack_on_bed(scene: LineScene, line: Line) -> Hanging | None:
     """A catenary that is longer than along a level bed and straight up: it hangs straight down, the rest lies slack.
 
     What lies carries nothing, on an arc beside the span of the ends, in chords as long as its cells.  None: the line is
@@ -312,7 +312,7 @@ def _half_angle(part: float) -> float:
     return high
 
 
-def corners(scene: Scene) -> list[float]:
+def corners(scene: LineScene) -> list[float]:
     """Arc lengths at which the initial polyline turns."""
     if not isinstance(scene.initial, Points):
         return []
@@ -331,7 +331,7 @@ def softness(line: Line, cable: Material) -> Floats:
     return np.asarray(stiff.max() / stiff)
 
 
-def frames(scene: Scene, e: Floats, line: Line, cable: Material) -> tuple[Floats, Floats]:
+def frames(scene: LineScene, e: Floats, line: Line, cable: Material) -> tuple[Floats, Floats]:
     """First directors (N+2, 3) of the start, all cells and the end, carried without twist from the start, and the turns
 
     (K,) rad of catenary zones that a torque passes through.
@@ -399,7 +399,7 @@ def twist_by_tension(line: Line, cable: Material, state: State) -> None:
 
 
 def end_conditions(
-    scene: Scene, directors: tuple[Floats, Floats], chords: Floats, around: Surroundings
+    scene: LineScene, directors: tuple[Floats, Floats], chords: Floats, around: Surroundings
 ) -> EndConditions:
     """The ends of a line; directors, chords: first directors, and directions of the chords (2, 3), at start and end."""
     position, frame = np.zeros((2, 3)), np.zeros((2, 9))

@@ -16,10 +16,10 @@ from hybrid.model.self_reach import payouts, self_reach
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.lines_contact import LinesContact
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Touching:
         return line._replace(bits=(line.bits & ~(MAY_TOUCH | SELF_FRICTION)) | more)
 
 
-def touching_of(system: System, scenes: Mapping[str, Scene]) -> Touching | None:
+def touching_of(system: Network, scenes: Mapping[str, LineScene]) -> Touching | None:
     """Which lines of a system touch each other, as it asks; None: it does not.
 
     scenes: of the lines by name.  What is held, or moved, is one thing: ends there are beside each other.
@@ -58,7 +58,9 @@ def touching_of(system: System, scenes: Mapping[str, Scene]) -> Touching | None:
     return touching_among(system, scenes, [(names.index(a), names.index(b)) for a, b in system.touching_pairs])
 
 
-def touching_among(system: System, scenes: Mapping[str, Scene], pairs: Iterable[tuple[int, int]]) -> Touching | None:
+def touching_among(
+    system: Network, scenes: Mapping[str, LineScene], pairs: Iterable[tuple[int, int]]
+) -> Touching | None:
     """Lines of which these pairs, by number, touch each other; scenes: of the lines by name; None: there is no pair."""
     names, pairs = list(system.lines), [*pairs]
     lines = sorted({k for pair in pairs for k in pair})
@@ -87,7 +89,7 @@ def beside_others(line: Line) -> Line:
     return line._replace(bits=line.bits | MAY_MEET)
 
 
-def that_may_meet(system: System, scenes: Mapping[str, Scene]) -> tuple[int, ...]:
+def that_may_meet(system: Network, scenes: Mapping[str, LineScene]) -> tuple[int, ...]:
     """Numbers of the lines that touch each other from where they come near, because a scene says nothing of contact.
 
     scenes: of the lines by name.  They have diameters, steps are given, and no error is estimated (scene.combinations).
@@ -99,19 +101,19 @@ def that_may_meet(system: System, scenes: Mapping[str, Scene]) -> tuple[int, ...
     return found if len(found) > 1 else ()
 
 
-def passing_each_other(system: System) -> System:
+def passing_each_other(system: Network) -> Network:
     """The same, of which no line touches another one unless the scene asks for it."""
     if system.contact is not None or len(system.lines) == 1:
         return system
     return system.model_copy(update={"contact": LinesContact(between=())})
 
 
-def _may_meet(scene: Scene) -> bool:
+def _may_meet(scene: LineScene) -> bool:
     sections = [*scene.cable.sections, *(x for paid in payouts(scene) for x in paid.reel or ())]
     return scene.accuracy is None and not scene.output.errors and all(x.diameter is not None for x in sections)
 
 
-def joined_ends_of(system: System) -> NDArray[np.int64]:
+def joined_ends_of(system: Network) -> NDArray[np.int64]:
     """(L, 2) what the ends of lines are joined to, a free point or body by number; 0: what is held or moved."""
     free = {name: 1 + k for k, name in enumerate((*system.points, *system.bodies))}
     joined = np.zeros((len(system.lines), 2), np.int64)

@@ -40,7 +40,7 @@ from hybrid.model.sections import (
     swivels,
     torsional_stiffness,
 )
-from hybrid.scene.schema import BendRestrictor, BendStiffener, Scene, Section, Vortices
+from hybrid.scene.schema import BendRestrictor, BendStiffener, LineScene, Section, Vortices
 from hybrid.scene.stretch import Curve, Layer, slopes, stiffened
 
 # The tension below which bending counts as much as tension, in (EI w^2)^(1/3): there a cable bends under its weight as
@@ -236,7 +236,7 @@ def tension_floor(EI: Floats, w: Floats, scale: float) -> Floats:
     return np.asarray(np.maximum(TENSION_FLOOR * np.cbrt(EI * w**2), LEAST_TENSION * scale))
 
 
-def material(scene: Scene, nodes: Floats | None = None) -> Material:
+def material(scene: LineScene, nodes: Floats | None = None) -> Material:
     """The cable of a scene; nodes: (N+1,) m, of the mesh, whose cells are the pieces of stiffeners."""
     sections = merged_sections(scene.cable.sections)
     ends = np.concatenate([[0.0], np.cumsum([x.length for x in sections])])
@@ -281,7 +281,7 @@ def _pieces_of(stiffener: BendStiffener, nodes: Floats | None, length: float) ->
     return [float(s) for s in x[(x > a) & (x < b)]]
 
 
-def _stiffen(out: Material, scene: Scene, middle: Floats) -> None:
+def _stiffen(out: Material, scene: LineScene, middle: Floats) -> None:
     """Bending stiffness, mass and rotary inertia of stiffeners on pieces with their middles (K,) m."""
     for x in stiffeners_of(scene):
         for k in np.flatnonzero((middle > x.range[0]) & (middle < x.range[1])):
@@ -357,7 +357,7 @@ def stretch_law(section: Section) -> StretchLaw | None:
     return StretchLaw(section.curve, dynamic, working, creep) if section.curve else None
 
 
-def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
+def _bare(scene: LineScene, bounds: Floats, of: list[Section]) -> Material:
     """The cable without its water and its attachments."""
     k, gravity = len(of), scene.environment.gravity
     unasked: dict[str, Any] = {name: np.full(k, np.nan) for name in PER_LENGTH if name not in OF_SECTIONS}
@@ -395,7 +395,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
     return out
 
 
-def _wetted(out: Material, scene: Scene, of: list[Section], middle: Floats) -> None:
+def _wetted(out: Material, scene: LineScene, of: list[Section], middle: Floats) -> None:
     """Buoyancy, drag, added mass, pressure of waves, with what modules add."""
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     assert fluid is not None
@@ -443,7 +443,7 @@ def _lift(given: Vortices | None, density: float, diameter: float) -> tuple[floa
     return 0.5 * density * diameter * given.lift, diameter, given.center, given.low, given.high, given.ramp
 
 
-def _points(out: Material, scene: Scene) -> None:
+def _points(out: Material, scene: LineScene) -> None:
     """Floats, clumps and end bodies; bodies at one place are one."""
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     rho = fluid.density if fluid else 0.0

@@ -14,8 +14,8 @@ from hybrid.model.mesh_grading import Grading
 from hybrid.model.resolution import accuracy_of, holds_stress
 from hybrid.model.run_time import step_time
 from hybrid.scene.accuracy import of_unnamed_model
-from hybrid.scene.network_scene import System
-from hybrid.scene.schema import AdaptiveModel, CatenaryModel, RodModel, Scene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.schema import AdaptiveModel, CatenaryModel, LineScene, RodModel
 
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
 # Another model must cost less than this part of rods, which need no criterion and leave nothing out.
@@ -92,7 +92,7 @@ class Demand(NamedTuple):
     mean: Floats
 
 
-def with_model(scene: Scene, kind: str) -> Scene:
+def with_model(scene: LineScene, kind: str) -> LineScene:
     """The same scene with one of MODELS; a rod that is chosen, not named, asks for no curvature."""
     changed: dict[str, Any] = {"model": MODELS[kind]()}
     if (accuracy := accuracy_of(scene)) is not None:
@@ -100,7 +100,7 @@ def with_model(scene: Scene, kind: str) -> Scene:
     return scene.model_copy(update=changed)
 
 
-def with_models(system: System, kinds: Mapping[str, str]) -> System:
+def with_models(system: Network, kinds: Mapping[str, str]) -> Network:
     """The same with models of these kinds for lines by name, as of `with_model`."""
     scenes = {name: with_model(system.scene_of(name), kind) for name, kind in kinds.items()}
     changes = {name: {"model": x.model, "accuracy": x.accuracy} for name, x in scenes.items()}
@@ -108,7 +108,7 @@ def with_models(system: System, kinds: Mapping[str, str]) -> System:
     return system.model_copy(update={"lines": lines}) if kinds else system
 
 
-def structural(scene: Scene, cable: Material) -> str:
+def structural(scene: LineScene, cable: Material) -> str:
     """Why a cable cannot be catenary everywhere, whatever its tension is; empty: it can."""
     if any(cable.held_tangent) or any(cable.held_twist):
         return "an end is clamped"
@@ -123,7 +123,7 @@ def structural(scene: Scene, cable: Material) -> str:
     return "it is curved without load" if cable.kappa.any() else ""
 
 
-def ratios(scene: Scene, model: Model, demand: Demand, tolerance: float, along: Floats) -> tuple[Floats, ...]:
+def ratios(scene: LineScene, model: Model, demand: Demand, tolerance: float, along: Floats) -> tuple[Floats, ...]:
     """Criteria bend, slack and edge (K,) of docs/zone_rules.md, from extremes, and what is asked along the line.
 
     tolerance: m; along: (K,) what catenaries lack of that.
@@ -186,7 +186,7 @@ def no_catenary(found: Sequence[Floats], s: Floats) -> str:
 
 
 def costs(
-    scene: Scene, model: Model, rods: int, catenaries: int, of_zones: Rods, why_not: str, more_steps: float = 1.0
+    scene: LineScene, model: Model, rods: int, catenaries: int, of_zones: Rods, why_not: str, more_steps: float = 1.0
 ) -> tuple[Cost, Cost, Cost]:
     """Of rods, catenaries and zones that move, which have the cells of rods.
 

@@ -22,7 +22,7 @@ from hybrid.model.resolution import Resolution
 from hybrid.model.sea import Surroundings, surroundings
 from hybrid.model.sections import stiffeners_of
 from hybrid.scene.ends import Pinned
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 # Part of the length by which nodes may move: further than that, another one has been chosen for a place that needs one.
 SHIFT = 2e-4
@@ -31,7 +31,7 @@ WRITTEN = ("flow", "axis", "slip", "slid", "bed", "grip", "rolling", "now", "lan
 
 
 def nearby(
-    model: Model, of: Scene, scene: Scene, resolution: Resolution, without: int, clamped: bool = False
+    model: Model, of: LineScene, scene: LineScene, resolution: Resolution, without: int, clamped: bool = False
 ) -> Model | None:  # fmt: skip
     """The model of `scene`, in the cells and zones that `model` has of the scene `of`; None: its cells are others.
 
@@ -80,7 +80,7 @@ def nearby(
     )  # fmt: skip
 
 
-def _moves_ends_alone(of: Scene, scene: Scene) -> bool:
+def _moves_ends_alone(of: LineScene, scene: LineScene) -> bool:
     """Whether ends that are held are elsewhere, and nothing else is another one."""
     if scene.environment.seabed is not None or scene.obstacles:
         return False
@@ -96,7 +96,7 @@ def _moves_ends_alone(of: Scene, scene: Scene) -> bool:
     return True
 
 
-def _held_axes(model: Model, of: Scene, scene: Scene, line: Line, cable: Material) -> Floats:
+def _held_axes(model: Model, of: LineScene, scene: LineScene, line: Line, cable: Material) -> Floats:
     """(2, 3) first directors of ends that are held: those of the model, turned as directions of the scenes turn."""
     held = model.ends.values.frame.reshape(2, 3, 3)
     directions = [[(x.held_tangent, x.held_normal, x.held_turns) for x in each.ends.both] for each in (of, scene)]
@@ -121,7 +121,7 @@ def _turned_by_shape(model: Model) -> bool:
     return all(model.cable.held_twist) and bool(model.line.element.any()) and model.plane is None
 
 
-def _sea(model: Model, of: Scene, scene: Scene) -> Surroundings:
+def _sea(model: Model, of: LineScene, scene: LineScene) -> Surroundings:
     """The sea of a scene; that of the model where it is the same."""
     if scene.environment is of.environment and scene.environment.seabed is None and not scene.obstacles:
         return model.sea
@@ -137,7 +137,7 @@ def _same(x: Any, y: Any) -> bool:
     return bool(np.array_equal(x, y, equal_nan=True))
 
 
-def _built(model: Model, scene: Scene, resolution: Resolution) -> Model | None:
+def _built(model: Model, scene: LineScene, resolution: Resolution) -> Model | None:
     """The model as for a search, with the zones of `model`; None: its cells are others."""
     found, here = build(scene, resolution, spare=False), model.layout
     if found.layout is not None and here is not None:
@@ -150,7 +150,7 @@ def _built(model: Model, scene: Scene, resolution: Resolution) -> Model | None:
 
 
 def _cells(
-    model: Model, cable: Material, of: Scene, scene: Scene, resolution: Resolution
+    model: Model, cable: Material, of: LineScene, scene: LineScene, resolution: Resolution
 ) -> tuple[Layout | None, Floats, tuple[Zone, ...]] | None:
     """Layout, nodes (N+1,) m and zones; None: they are others than those of the model."""
     as_before = scene.model is of.model and scene.mesh is of.mesh and scene.initial is of.initial

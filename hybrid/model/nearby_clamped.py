@@ -19,13 +19,13 @@ from hybrid.model.clamps import seat_of, untwisted, with_clamps
 from hybrid.model.nearby import nearby
 from hybrid.model.network import NetworkResolution, build_system, first_lines
 from hybrid.scene.bodies import FixedBody
-from hybrid.scene.network_scene import System
-from hybrid.scene.schema import Scene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.schema import LineScene
 
 ENDS = ("start", "end")
 
 
-def seats_know_no_shape(system: System, name: str) -> bool:
+def seats_know_no_shape(system: Network, name: str) -> bool:
     """Whether how a line is seated follows from directions that are given, whatever the first shapes of lines are.
 
     A material axis that is not given is that of a line without twist between both tangents; at a free point these are
@@ -50,8 +50,8 @@ def seats_know_no_shape(system: System, name: str) -> bool:
 
 def nearby_clamped(
     model: Model,
-    of: Scene,
-    system: System,
+    of: LineScene,
+    system: Network,
     name: str,
     bodies: Sequence[BodyModel],
     resolution: NetworkResolution,
@@ -85,7 +85,7 @@ def nearby_clamped(
 
 
 def shaped_anew(
-    system: System, names: Iterable[str], bodies: Sequence[BodyModel], resolution: NetworkResolution
+    system: Network, names: Iterable[str], bodies: Sequence[BodyModel], resolution: NetworkResolution
 ) -> dict[str, tuple[Model, Floats]]:
     """Models of some lines with their seats (2, SEAT), as first shapes have them; bodies: the free ones.
 

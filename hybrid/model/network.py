@@ -38,10 +38,10 @@ from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.body_shapes import way_out
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import Connections, Fairlead
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 MOST_ROUNDS = 100  # of Newton's method for the first places of the points
 SAME_FORCE = 1e-5  # of the largest force at a point: what may be left there of what does not balance
@@ -56,7 +56,7 @@ class NetworkResolution:
     lines: Mapping[str, Resolution]  # by name
 
     @classmethod
-    def first(cls, system: System) -> NetworkResolution:
+    def first(cls, system: Network) -> NetworkResolution:
         """The resolution for the accuracy of each line, before anything is known of its errors."""
         found = {name: first_resolution(system.scene_of(name)) for name in system.lines}
         step, later = min(x.step for x in found.values()), min(x.later or x.step for x in found.values())
@@ -88,7 +88,7 @@ class NetworkModel:
     fairleads: Floats  # (L, 2, 3) m, of ends at free bodies, in axes of the body
     seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.junctions.carried_frames)
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
-    scenes: Mapping[str, Scene]  # of the lines by name, with their points where the system has them
+    scenes: Mapping[str, LineScene]  # of the lines by name, with their points where the system has them
     resolution: NetworkResolution
     moments: tuple[tuple[EndLoad, ...], ...]  # that are given to each of the points in `rigid`
     turns: tuple[tuple[float, float], ...]  # by which the start and the end of each line are twisted
@@ -177,7 +177,7 @@ class NetworkModel:
 
 
 def build_system(
-    system: System, resolution: NetworkResolution | None = None, like: NetworkModel | None = None
+    system: Network, resolution: NetworkResolution | None = None, like: NetworkModel | None = None
 ) -> NetworkModel:
     """Make the model that a system requires, with its points and bodies where the scene has them first.
 
@@ -221,7 +221,7 @@ def build_system(
     )  # fmt: skip
 
 
-def with_surfaces(system: System, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
+def with_surfaces(system: Network, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
     """Models of the lines of a system with what they may touch as `build_system` has it, in arrays of their own.
 
     Bodies that carry some are where they are first.
@@ -233,7 +233,7 @@ def with_surfaces(system: System, models: Sequence[Model], bodies: Sequence[Body
     return models
 
 
-def _in_space(system: System, name: str, model: Model, joints: tuple[int, int]) -> Model:
+def _in_space(system: Network, name: str, model: Model, joints: tuple[int, int]) -> Model:
     """The model of a line, without its plane where it is not computed in that; joints: of `NetworkModel`."""
     line = system.lines[name]
     carriers = [x for x in map(system.body_of, (line.start, line.end)) if isinstance(x, FixedBody)]
@@ -249,7 +249,7 @@ def _in_space(system: System, name: str, model: Model, joints: tuple[int, int]) 
     return replace(model, plane=None, contents=tuple(entries))
 
 
-def _kept_in_plane(system: System, models: Sequence[Model], joints: Sequence[tuple[int, int]]) -> list[Model]:
+def _kept_in_plane(system: Network, models: Sequence[Model], joints: Sequence[tuple[int, int]]) -> list[Model]:
     """The models, whose lines must not leave the plane in which all of them are."""
     scenes = [system.scene_of(name, system.carried(name)) for name in system.lines]
     tables = [(x.environment, x.ends, x.initial) for x in scenes]
@@ -266,7 +266,7 @@ def _kept_in_plane(system: System, models: Sequence[Model], joints: Sequence[tup
     return found
 
 
-def first_places(system: System, made: Sequence[BodyModel]) -> tuple[tuple[str, ...], Floats, Floats]:
+def first_places(system: Network, made: Sequence[BodyModel]) -> tuple[tuple[str, ...], Floats, Floats]:
     """Names of the free points at which lines turn freely, their places (P, 3) m, and (B, STATE) of bodies and of the
 
     points behind them, not turned yet, where the scene has them first.  made: the free bodies.
@@ -280,7 +280,7 @@ def first_places(system: System, made: Sequence[BodyModel]) -> tuple[tuple[str, 
     return free, np.array([system.first_place(x) for x in free], float).reshape(-1, 3), bodies
 
 
-def first_lines(system: System, made: Sequence[BodyModel], resolution: NetworkResolution) -> FirstLines:
+def first_lines(system: Network, made: Sequence[BodyModel], resolution: NetworkResolution) -> FirstLines:
     """What makes lines between first places of points and bodies, with free points that are not turned yet."""
     _, places, bodies = first_places(system, made)
     return FirstLines(system, _joined(system, places, bodies), bodies, resolution)
@@ -291,7 +291,7 @@ def _turns_of(held: Connections) -> tuple[float, float]:
     return a, b
 
 
-def bodies_of(system: System) -> tuple[BodyModel, ...]:
+def bodies_of(system: Network) -> tuple[BodyModel, ...]:
     """The free bodies of a system as numbers."""
     environment, around = system.environment, None
     density = environment.fluid.density if environment.fluid is not None else 0.0
@@ -302,7 +302,7 @@ def bodies_of(system: System) -> tuple[BodyModel, ...]:
     )
 
 
-def _leave_own_bodies(system: System, models: Sequence[Model]) -> NDArray[np.int64]:
+def _leave_own_bodies(system: Network, models: Sequence[Model]) -> NDArray[np.int64]:
     """Which free bodies carry obstacles (M,), none: empty; a line meets the shape of a body that it is fixed to only
 
     beyond its way out of that, straight towards its other end.
@@ -333,7 +333,7 @@ def _leave_own_bodies(system: System, models: Sequence[Model]) -> NDArray[np.int
     return np.array([numbers.index(x) if x in system.shaped else -1 for x in surfaces], np.int64)
 
 
-def _on_obstacles(system: System, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
+def _on_obstacles(system: Network, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
     """The models with obstacles as stiff as the pull of all lines, points and bodies asks for: a line that is cut lies
     on them as it does in one piece."""
     pulls = [pull_on_obstacles(system.scene_of(name, system.carried(name))) for name in system.lines]
@@ -351,7 +351,7 @@ def _on_obstacles(system: System, models: Sequence[Model], bodies: Sequence[Body
     return found
 
 
-def _with_contact(system: System, models: Sequence[Model], touching: Touching) -> list[Model]:
+def _with_contact(system: Network, models: Sequence[Model], touching: Touching) -> list[Model]:
     """The models of lines that touch each other from the start."""
     names, found = list(system.lines), list(models)
     assert system.contact is not None
@@ -368,7 +368,7 @@ def _beside_others(model: Model) -> Model:
     return replace(model, line=beside_others(model.line), contents=(*model.contents, MEETS))
 
 
-def _takes_current(system: System, models: Sequence[Model]) -> bool:
+def _takes_current(system: Network, models: Sequence[Model]) -> bool:
     """Whether anything of a system has drag."""
     members = [member for body in system.free_bodies.values() for member in body.members]
     return (
@@ -387,7 +387,7 @@ class _Joined(NamedTuple):
     rows: dict[str, int]  # of those the body
 
 
-def _joined(system: System, places: Floats, bodies: Floats) -> _Joined:
+def _joined(system: Network, places: Floats, bodies: Floats) -> _Joined:
     """places: (P, 3) m of the free points; bodies: (B, STATE) of the free bodies and the points behind them."""
     rigid = system.rigid
     free, free_bodies = tuple(x for x in system.free if x not in rigid), list(system.free_bodies)
@@ -405,7 +405,7 @@ def _joined(system: System, places: Floats, bodies: Floats) -> _Joined:
     return _Joined(at, joint, fairleads, {x: joint[x] - len(free) for x in fairleads})
 
 
-def starts_between(system: System, places: Floats, bodies: Floats, model: NetworkModel) -> tuple[list[State], Floats]:
+def starts_between(system: Network, places: Floats, bodies: Floats, model: NetworkModel) -> tuple[list[State], Floats]:
     """Shapes of the lines of a model to begin with, hung between other places of its points and bodies.
 
     places: (P, 3) m of the free points; bodies: (B, STATE), which are returned too, with the axes of points that lines
@@ -420,7 +420,7 @@ class FirstLines:
     """Makes the models of lines, with their clamps."""
 
     def __init__(
-        self, system: System, joined: _Joined, bodies: Floats, resolution: NetworkResolution,
+        self, system: Network, joined: _Joined, bodies: Floats, resolution: NetworkResolution,
         before: NetworkModel | None = None,
     ) -> None:  # fmt: skip
         """before: a model that was made before, whose seats and scenes hold; None: as the first shapes lie."""
@@ -473,7 +473,7 @@ class FirstLines:
         with said_of_line(name):
             return build(scene, self._resolution[name], mesh, spare=alone or bool(scene.obstacles))
 
-    def scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
+    def scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> LineScene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""
         if name not in self.scenes:
             self.scenes[name] = self._system.scene_of(name)
@@ -529,7 +529,7 @@ class FirstLines:
         return model
 
 
-def balanced_places(system: System, model: NetworkModel) -> tuple[Floats, Floats] | None:
+def balanced_places(system: Network, model: NetworkModel) -> tuple[Floats, Floats] | None:
     """Places (P, 3) m of the free points and (B, STATE) of the bodies at which elastic catenaries balance there; None:
     they are not found.
 

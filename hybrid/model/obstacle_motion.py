@@ -31,7 +31,7 @@ from hybrid.model.driven_end import PATH, DrivenEnd
 from hybrid.model.ends import Motion, table_of_motions
 from hybrid.scene.body_shapes import Carried, CarriedBox, CarriedCylinder
 from hybrid.scene.motion import Elevation, EndMotion
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 
 class Courses(NamedTuple):
@@ -42,7 +42,7 @@ class Courses(NamedTuple):
     driven: dict[str, DrivenEnd]
 
 
-def courses_of(scene: Scene, rows: Floats, waves: Floats, ramp: float, elevation: Elevation) -> Courses:
+def courses_of(scene: LineScene, rows: Floats, waves: Floats, ramp: float, elevation: Elevation) -> Courses:
     """How the obstacles of a scene move; rows: (M, OBSTACLE) of them at t = 0.
 
     waves: as of `Surroundings.waves_of_vessels`, ramp: s, over which they grow; elevation: of the surface, as of

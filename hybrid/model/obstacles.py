@@ -53,7 +53,7 @@ from hybrid.scene.obstacles import (
     SphereObstacle,
     TorusObstacle,
 )
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 # As parts of the diameter of a line: how deep it lies in an obstacle under what the scene asks for, where it follows
 # its radius and where it touches it at a point; how deep it goes where it hits one; the onset of contact; the elastic
@@ -63,7 +63,7 @@ DEPTH, DEPTH_AT_POINT, DEPTH_AT_IMPACT, ONSET, TRAVEL = 0.02, 0.05, 0.125, 0.01,
 CELLS_PER_RADIUS, MOST_CELLS = 4.0, 2000
 
 
-def obstacle_bits(scene: Scene) -> int:
+def obstacle_bits(scene: LineScene) -> int:
     """Bits of kernels.state.forces that the obstacles of a scene ask for."""
     if not scene.obstacles:
         return 0
@@ -77,12 +77,12 @@ def kind_of(obstacle: Obstacle) -> int:
     return MOVES if obstacle.moves else FIXED
 
 
-def strand_radius(scene: Scene) -> float:
+def strand_radius(scene: LineScene) -> float:
     """Radius of the line that touches obstacles, where it is thickest, on the reel from which it is paid out too, m."""
     return 0.5 * max(x.diameter or 0.0 for x in whole_scene(scene)[0].cable.sections)
 
 
-def _pieces(scene: Scene) -> Floats:
+def _pieces(scene: LineScene) -> Floats:
     """Of a line of several diameters, what rows have behind their OBSTACLE columns; of others nothing."""
     whole, begin = whole_scene(scene)
     sections = whole.cable.sections
@@ -93,7 +93,7 @@ def _pieces(scene: Scene) -> Floats:
     return np.column_stack([ends, radii.max() - radii]).ravel()
 
 
-def pull_on_obstacles(scene: Scene) -> float:
+def pull_on_obstacles(scene: LineScene) -> float:
     """The tension, N, with which a line of a scene lies on obstacles; of one that is paid out, when it is longest."""
     pull = tension_scale(scene, merged_sections(scene.cable.sections), False)
     longer = longest_out(scene)
@@ -117,7 +117,7 @@ def stiffness_at_impact(mass: float, speed: float, diameter: float) -> float:
     return mass * (speed / (DEPTH_AT_IMPACT * diameter)) ** 2
 
 
-def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
+def obstacle_rows(scene: LineScene, pull: float | None = None) -> Floats:
     """(M, OBSTACLE) of the obstacles of a scene, in its order, as kernels.laws.obstacles has them.
 
     pull: N, tension with which the line lies on them; None: what the scene asks for.
@@ -188,7 +188,7 @@ def _put_shape(row: Floats, x: Obstacle, strand: float) -> None:
         row[KIND], row[RING], row[GROOVE], row[RIM] = SHEAVE, x.radius + x.groove, x.groove - strand, x.rim + strand
 
 
-def least_cells(scene: Scene) -> float:
+def least_cells(scene: LineScene) -> float:
     """Cells that a line has at least whose cells follow the radii of obstacles."""
     round_ = [x for x in scene.obstacles.values() if not isinstance(x, PlaneObstacle)]
     radii = [bend_radius(x) + strand_radius(scene) for x in round_]

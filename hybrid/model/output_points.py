@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid.kernels.state.state import Floats
 from hybrid.model.sections import section_changes
-from hybrid.scene.schema import RodZone, Scene, Spread, ZonesModel
+from hybrid.scene.schema import LineScene, RodZone, Spread, ZonesModel
 
 # Part of the length below which two places are one.
 NEAR = 1e-9
@@ -23,7 +23,7 @@ class OutputPoints(NamedTuple):
     jumps: Floats
 
 
-def output_points(scene: Scene, longest: float | None = None, at_start: bool = False) -> OutputPoints:
+def output_points(scene: LineScene, longest: float | None = None, at_start: bool = False) -> OutputPoints:
     """The points that `output.points` asks for, those of the history, and all jumps.
 
     longest: m, of a line that is paid out, how much may be out, and at_start: whether at its start, where s is then
@@ -41,7 +41,7 @@ def output_points(scene: Scene, longest: float | None = None, at_start: bool = F
     return OutputPoints(usual, np.array(jumps, float))
 
 
-def jump_points(scene: Scene) -> tuple[float, ...]:
+def jump_points(scene: LineScene) -> tuple[float, ...]:
     """Arc lengths (m) inside the cable where quantities may have two values, one on each side.
 
     Point loads, changes of section, ends of modules and stiffeners, joints of rod and catenary in zones that stay where

@@ -21,7 +21,7 @@ from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.payout_law import extremes, law_of, least_length, lengths_at, refuse
 from hybrid.model.sections import bending_stiffness, restrictors_of, stiffeners_of
 from hybrid.scene.payout import Payout
-from hybrid.scene.schema import AdaptiveModel, Scene, Section, Spread
+from hybrid.scene.schema import AdaptiveModel, LineScene, Section, Spread
 
 # The fewest cells that may be left.
 FEWEST_CELLS = 4
@@ -33,18 +33,18 @@ RIDE_BEHIND_CLAMP, RIDE = 8, 4
 BENDING_LENGTHS = 10.0
 
 
-def payout_of(scene: Scene) -> Payout | None:
+def payout_of(scene: LineScene) -> Payout | None:
     """How a line is paid out at one of its ends, if it is."""
     found: list[Payout | None] = [getattr(end, "payout", None) for end in scene.ends.both]
     return found[0] or found[1]
 
 
-def winch_side(scene: Scene) -> int:
+def winch_side(scene: LineScene) -> int:
     """Which end of a line that is paid out is at the winch: 0, the start, or 1."""
     return int(getattr(scene.ends.start, "payout", None) is None)
 
 
-def winch_at(scene: Scene) -> str:
+def winch_at(scene: LineScene) -> str:
     """Where a scene says how its line is paid out."""
     return f"ends.{('start', 'end')[winch_side(scene)]}.payout"
 
@@ -236,8 +236,8 @@ class PayoutPlan:
 
 
 def payout_plan(
-    scene: Scene, line: Line, zones: tuple[Zone, ...], parts: Callable[[Material, Floats], np.ndarray] | None = None,
-    to_compare: bool = False,
+    scene: LineScene, line: Line, zones: tuple[Zone, ...],
+    parts: Callable[[Material, Floats], np.ndarray] | None = None, to_compare: bool = False,
 ) -> PayoutPlan | None:  # fmt: skip
     """What a scene's line consists of that is paid out; None: its length stays.  SceneError: it cannot be done.
 
@@ -305,14 +305,14 @@ def payout_plan(
     )  # fmt: skip
 
 
-def _catenary_up_to(scene: Scene) -> float:
+def _catenary_up_to(scene: LineScene) -> float:
     """Up to where, m from the far end, a scene whose zones move forces catenaries."""
     wanted = scene.model.force_catenary if isinstance(scene.model, AdaptiveModel) else None
     length = scene.length
     return max([b if winch_side(scene) else length - a for a, b in wanted or ()], default=0.0)
 
 
-def riding_nodes(scene: Scene, line: Line, s: Floats, room: float) -> int:
+def riding_nodes(scene: LineScene, line: Line, s: Floats, room: float) -> int:
     """Nodes that ride with the fairlead: behind a clamp, and where rods do not stretch.
 
     s: (N+1,) m, places of the nodes from the far end on; room: m, before the winch, that is free at any length.
@@ -328,7 +328,7 @@ def riding_nodes(scene: Scene, line: Line, s: Floats, room: float) -> int:
     return 0 if stretches or not line.spin[-side] or (payout is not None and payout.winch is not None) else RIDE
 
 
-def shorter_behind_clamp(scene: Scene, cable: Material, base: Floats, share: float, fineness: float) -> Floats:
+def shorter_behind_clamp(scene: LineScene, cable: Material, base: Floats, share: float, fineness: float) -> Floats:
     """Base nodes (n+1,) m that follow the curvature, with shorter cells behind a clamp from which line is paid out.
 
     Cells that ride with the winch stay whole.  Behind the clamp the curvature falls by exp(-x/lam) in x,
@@ -357,7 +357,7 @@ def winch_of(payout: Payout, length: float) -> w.Winch:
     return out
 
 
-def _from_far_end(scene: Scene, longest: float) -> list[Section]:
+def _from_far_end(scene: LineScene, longest: float) -> list[Section]:
     """The sections that are out and those on the reel, from the far end on."""
     payout, out, more = payout_of(scene), list(scene.cable.sections), longest - scene.length
     assert payout is not None
@@ -372,7 +372,7 @@ def _from_far_end(scene: Scene, longest: float) -> list[Section]:
     return [*out, out[-1].model_copy(update={"length": more + scene.length})]
 
 
-def longest_out(scene: Scene) -> float:
+def longest_out(scene: LineScene) -> float:
     """Longest length, m, that may be out in a scene's motion; of a line that is not paid out its length."""
     payout = payout_of(scene)
     if payout is None or scene.time is None:
@@ -382,7 +382,7 @@ def longest_out(scene: Scene) -> float:
     return max(high, payout.longest or 0.0)
 
 
-def whole_scene(scene: Scene) -> tuple[Scene, float]:
+def whole_scene(scene: LineScene) -> tuple[LineScene, float]:
     """A scene whose cable has also what is on the reel, and the arc length, m, of its start in the scene as it is."""
     if payout_of(scene) is None:
         return scene, 0.0
@@ -398,7 +398,7 @@ def whole_scene(scene: Scene) -> tuple[Scene, float]:
     return scene.model_copy(update={"cable": scene.cable.model_copy(update=changed)}), -more
 
 
-def cable_of(scene: Scene, cells: Floats | None = None) -> Material:
+def cable_of(scene: LineScene, cells: Floats | None = None) -> Material:
     """The cable of a scene; cells: as of `material`.
 
     Where sections differ in bending stiffness, that at the winch is another one as line is paid out: results do not
@@ -411,7 +411,7 @@ def cable_of(scene: Scene, cells: Floats | None = None) -> Material:
     return cable
 
 
-def _whole_material(scene: Scene, nodes: Floats) -> Material:
+def _whole_material(scene: LineScene, nodes: Floats) -> Material:
     """The cable with what is on the reel, by the arc lengths of the scene; nodes: m, that there may be."""
     whole, begin = whole_scene(scene)
     cable = material(whole, nodes - begin)
@@ -420,7 +420,7 @@ def _whole_material(scene: Scene, nodes: Floats) -> Material:
     return cable
 
 
-def _pieces(scene: Scene, cable: Material, side: int, far: float) -> Floats:
+def _pieces(scene: LineScene, cable: Material, side: int, far: float) -> Floats:
     """Where every piece of the material begins, and its row, as of Reel.pieces: with the inertia that cells have."""
     begins = cable.bounds[:-1] if side else far - cable.bounds[1:]
     inertia = inertia_of_zones(cable) if isinstance(scene.model, AdaptiveModel) else WITH_SECTIONS

@@ -26,11 +26,12 @@ from hybrid.model.payout_law import said_of_line
 from hybrid.model.resolution import first_resolution, model_is_free, predicted_runs
 from hybrid.model.run_time import foretold_steps, processor_time
 from hybrid.model.sections import limits_along, outer_diameter
-from hybrid.scene.read import SceneLike, as_scene_or_system
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import LineScene
 
 if TYPE_CHECKING:
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
 
 
 class CriticalTorque(NamedTuple):
@@ -108,12 +109,12 @@ def equal_steps(
     return first, done, count, length
 
 
-def size_of_result(scene: Scene | System) -> float:
+def size_of_result(scene: Scene) -> float:
     """Bytes of the file of a run, roughly."""
     return (scene.require_time().duration / scene.output_interval + 1.0) * scene.size_of_output
 
 
-def refuse_too_much(scene: Scene) -> None:
+def refuse_too_much(scene: LineScene) -> None:
     """SceneError for more outputs, points or steps than a disk and a life have room for, before any is made."""
     time, every = scene.require_time(), scene.output_interval
     count = time.duration / every
@@ -132,14 +133,14 @@ def refuse_too_much(scene: Scene) -> None:
         raise SceneError([Complaint("time.step", f"{time.step:g} s, {steps:.3g} steps", expected, "make it larger")])
 
 
-def output_times(scene: Scene) -> list[float]:
+def output_times(scene: LineScene) -> list[float]:
     """Times (s) of the outputs after the first."""
     refuse_too_much(scene)
     time, every = scene.require_time(), scene.output_interval
     return [k * every for k in range(1, parts(time.duration, every))] + [time.duration]
 
 
-def count_steps(scene: Scene) -> int:
+def count_steps(scene: LineScene) -> int:
     """Steps of a run (a load that stops, or `output.exact`, may add some); where they follow the motion: the least."""
     return parts(scene.require_time().duration, first_resolution(scene).step)
 
@@ -159,7 +160,7 @@ class NetworkPlan:
     measured: bool = False
 
 
-def plan_system(system: System) -> NetworkPlan:
+def plan_system(system: Network) -> NetworkPlan:
     """What would be computed for several lines; nothing is computed."""
     plans, scenes, guesses = {}, {}, system.guesses
     for name in system.lines:
@@ -179,16 +180,18 @@ def plan_system(system: System) -> NetworkPlan:
 
 
 @overload
-def plan(scene: SceneLike) -> Plan: ...
+def plan(scene: LineScene) -> Plan: ...
 @overload
-def plan(scene: System) -> NetworkPlan: ...
-def plan(scene: SceneLike | System) -> Plan | NetworkPlan:
+def plan(scene: Network) -> NetworkPlan: ...
+@overload
+def plan(scene: SceneLike) -> Any: ...
+def plan(scene: SceneLike) -> Any:
     """What would be computed for a scene (a Scene, the path of a scene file, or a dict); nothing is computed.
 
     Of several lines it is a NetworkPlan.
     """
-    scene = as_scene_or_system(scene)
-    if not isinstance(scene, Scene):
+    scene = as_scene(scene)
+    if not isinstance(scene, LineScene):
         return plan_system(scene)
     if scene.time:
         refuse_too_much(scene)
@@ -202,7 +205,7 @@ def plan(scene: SceneLike | System) -> Plan | NetworkPlan:
     return replace(rods, contents=contents, choice=(("rod", rods.seconds), *others), no_choice=why_not)
 
 
-def _plan(scene: Scene) -> Plan:
+def _plan(scene: LineScene) -> Plan:
     """The same of a scene that names its model."""
     model = build(scene)
     mesh = mesh_of(model)
@@ -234,7 +237,7 @@ def mesh_of(model: Model) -> dict[str, Any]:
     return {"zones": model.zones, "cells": cells, "base_cells": base, "unknowns": model.unknowns}
 
 
-def _of_hanging(scene: Scene, model: Model) -> CriticalTorque | None:
+def _of_hanging(scene: LineScene, model: Model) -> CriticalTorque | None:
     """Of the elastic catenary that a search of equilibrium starts from, or would without a clamp at one end."""
     if not model.cable.passes_torque:
         return None
@@ -245,7 +248,7 @@ def _of_hanging(scene: Scene, model: Model) -> CriticalTorque | None:
     return None if found is None else found._replace(rough=True)
 
 
-def critical_torque(scene: Scene, model: Model, T: Floats) -> CriticalTorque | None:
+def critical_torque(scene: LineScene, model: Model, T: Floats) -> CriticalTorque | None:
     """The smallest torque with which a line under the tensions T (N,) N could throw a loop; 0 where it is slack.
 
     None: no torque passes through it, or nothing resists bending.

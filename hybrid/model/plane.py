@@ -11,14 +11,16 @@ from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Ends, Floats, Line, State
 from hybrid.model.contents import Entry
 from hybrid.scene.plane import EXACT, TYPED, plane_of
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 # Of the length: how far an equilibrium may be out of the plane and count as in it (Newton's tolerance).
 IN_PLANE = 1e-8
 WHAT = "computed in a plane (3 unknowns a node)"
 
 
-def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: Ends) -> tuple[Floats | None, Entry]:
+def in_plane(
+    scene: LineScene, start: State, others: list[tuple[str, State]], ends: Ends
+) -> tuple[Floats | None, Entry]:
     """The plane (3, 3) of a scene, rows p, q and normal, or None; and its entry in the contents of the model.
 
     What a scene does not write down is looked at as well: the shape that it starts from.  Starts in `others` that

@@ -16,7 +16,7 @@ from hybrid.model.sections import bending_stiffness, rotary_inertia, weight
 from hybrid.scene.attachments import BendRestrictor, BendStiffener, Float
 from hybrid.scene.cable import DENSITIES
 from hybrid.scene.motion_tables import SHIFTS
-from hybrid.scene.schema import Scene, Section
+from hybrid.scene.schema import LineScene, Section
 from hybrid.scene.start_checks import apart_in_motion
 from hybrid.scene.waves import GivenWaves
 
@@ -87,7 +87,7 @@ class Note(NamedTuple):
     s: tuple[float, float]
 
 
-def implausible(scene: Scene) -> Iterator[Note]:
+def implausible(scene: LineScene) -> Iterator[Note]:
     """Numbers that are more likely in another unit."""
     whole = (0.0, scene.length)
     for what, why in (*_water(scene), *_bed(scene), *_motions(scene), *_loads(scene)):
@@ -110,7 +110,7 @@ def implausible(scene: Scene) -> Iterator[Note]:
             yield Note(what, f"cable.sections[{i}].{key}: {why}", (begin, begin + section.length))
 
 
-def _water(scene: Scene) -> Iterator[tuple[str, str]]:
+def _water(scene: LineScene) -> Iterator[tuple[str, str]]:
     """The fluid, its current and its waves; gravity and depth."""
     gravity, fluid = scene.environment.gravity, scene.environment.fluid
     if gravity > HEAVIEST:
@@ -139,7 +139,7 @@ def _water(scene: Scene) -> Iterator[tuple[str, str]]:
         yield f"a depth of {depth:g} m", f"environment.seabed: {why}"
 
 
-def _bed(scene: Scene) -> Iterator[tuple[str, str]]:
+def _bed(scene: LineScene) -> Iterator[tuple[str, str]]:
     """The seabed: friction, and how deep the line sinks into it."""
     bed = scene.environment.seabed
     if bed is None:
@@ -164,7 +164,7 @@ def _bed(scene: Scene) -> Iterator[tuple[str, str]]:
         yield what, f"environment.seabed.stiffness, {bed.spring:g} N/m per m: {why}"
 
 
-def _motions(scene: Scene) -> Iterator[tuple[str, str]]:
+def _motions(scene: LineScene) -> Iterator[tuple[str, str]]:
     """Ends that move faster than ships do."""
     fluid = scene.environment.fluid
     if fluid is None or fluid.density < LIQUIDS[0]:
@@ -178,7 +178,7 @@ def _motions(scene: Scene) -> Iterator[tuple[str, str]]:
                 yield f"an end that moves at {speed:.3g} m/s", f"ends.{name}.motion.{key}: {why}"
 
 
-def _loads(scene: Scene) -> Iterator[tuple[str, str]]:
+def _loads(scene: LineScene) -> Iterator[tuple[str, str]]:
     """Forces at ends that no line holds."""
     for name, end in scene.ends.named().items():
         for load in end.loads:
@@ -304,7 +304,7 @@ def _checked(section: Section) -> Iterator[Wrong]:
         yield f"a yield strength of {code.yield_strength:g} Pa", "code.yield_strength", why
 
 
-def _sleeves(scene: Scene) -> Iterator[tuple[BendStiffener | BendRestrictor, str, str]]:
+def _sleeves(scene: LineScene) -> Iterator[tuple[BendStiffener | BendRestrictor, str, str]]:
     """Sleeves into which their cable does not fit, or that add nothing: which, what, and why."""
     ends = [*accumulate(x.length for x in scene.cable.sections)]
     for i, x in enumerate(scene.cable.attachments):
@@ -330,7 +330,7 @@ def _sleeves(scene: Scene) -> Iterator[tuple[BendStiffener | BendRestrictor, str
             yield x, f"a bend stiffener of {x.modulus:g} Pa", f"{at}.modulus: {why}"
 
 
-def _too_short(scene: Scene) -> Iterator[tuple[int, str, str]]:
+def _too_short(scene: LineScene) -> Iterator[tuple[int, str, str]]:
     """Sections that break because the line is shorter than the way between its ends: number, what, and why."""
     held, length, sections = scene.ends.held(), scene.length, scene.cable.sections
     paid = any(getattr(end, "payout", None) is not None or not end.is_placed for end in scene.ends.both)
@@ -361,7 +361,7 @@ def _too_short(scene: Scene) -> Iterator[tuple[int, str, str]]:
             yield i, f"{what} stretch this section by {strain:.2%}", why
 
 
-def _floats(scene: Scene) -> Iterator[tuple[float, str, str]]:
+def _floats(scene: LineScene) -> Iterator[tuple[float, str, str]]:
     """Floats that weigh far more than they lift, or than their line does: where, what, and why."""
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     line = sum(x.mass * x.length for x in scene.cable.sections)
@@ -378,7 +378,7 @@ def _floats(scene: Scene) -> Iterator[tuple[float, str, str]]:
             yield x.at, f"a float of {x.mass:g} kg", f"cable.attachments[{i}].mass: {why}{fix}"
 
 
-def _use(section: Section, scene: Scene) -> Iterator[Wrong]:
+def _use(section: Section, scene: LineScene) -> Iterator[Wrong]:
     """A section that its own weight, hung straight down, stretches by more than it bears."""
     if not section.stiffness:
         return

@@ -20,7 +20,7 @@ from hybrid.model.sections import limits_along, weakest_bending
 from hybrid.model.start_vibration import start_vibrations
 from hybrid.scene.accuracy import NOT_ASKED, ROUGHEST, USUAL, Accuracy, amount
 from hybrid.scene.motion_checks import shortest_period
-from hybrid.scene.schema import AdaptiveModel, CatenaryZone, RodModel, Scene, Section, ZonesModel
+from hybrid.scene.schema import AdaptiveModel, CatenaryZone, LineScene, RodModel, Section, ZonesModel
 from hybrid.scene.waves import PeriodicWaves
 
 # Part of the requested error that neglecting bending in catenary zones may use; mesh and time step share the rest.
@@ -254,14 +254,14 @@ class Resolution:
         return SHORTEST * self.step
 
 
-def accuracy_of(scene: Scene) -> Accuracy | None:
+def accuracy_of(scene: LineScene) -> Accuracy | None:
     """The accuracy a scene requests; USUAL where it leaves its steps open."""
     if scene.accuracy is None and scene.time is not None and scene.time.controlled and scene.time.tolerance is None:
         return Accuracy(all=USUAL)
     return scene.accuracy
 
 
-def requested_accuracy(scene: Scene) -> RequestedAccuracy | None:
+def requested_accuracy(scene: LineScene) -> RequestedAccuracy | None:
     """The same in numbers; None if nothing is requested."""
     accuracy = accuracy_of(scene)
     if accuracy is None:
@@ -299,7 +299,7 @@ def _part(text: str | None) -> float | None:
     return None if text in (None, NOT_ASKED) else amount(text)[1]
 
 
-def _why_curvature(scene: Scene, accuracy: Accuracy) -> str:
+def _why_curvature(scene: LineScene, accuracy: Accuracy) -> str:
     """Why an accuracy that names no quantity asks for curvature: something rests on it; empty: nothing does."""
     bends = all(x.weakest_bending for x in scene.cable.sections)
     if not bends or not shows_bends(scene):
@@ -314,14 +314,14 @@ def holds_stress(sections: Sequence[Section]) -> bool:
     return any(x.pipe is not None and x.pipe.max_stress is not None for x in sections)
 
 
-def shows_bends(scene: Scene) -> bool:
+def shows_bends(scene: LineScene) -> bool:
     """Whether a line is, or may become, rod somewhere: what a catenary lacks at clamps never converges."""
     if isinstance(scene.model, ZonesModel):
         return not all(isinstance(zone, CatenaryZone) for zone in scene.model.zones)
     return isinstance(scene.model, RodModel | AdaptiveModel)
 
 
-def judges_bends(scene: Scene) -> bool:
+def judges_bends(scene: LineScene) -> bool:
     """Whether errors of its bend count: they are asked for, or nothing is and all are estimated."""
     if not any(x.weakest_bending for x in scene.cable.sections) or not shows_bends(scene):
         return False
@@ -332,7 +332,7 @@ def judges_bends(scene: Scene) -> bool:
     return named or any(x.quantity == "curvature" for x in asked.limits)
 
 
-def _limits(scene: Scene, finest: float) -> tuple[Limited, ...]:
+def _limits(scene: LineScene, finest: float) -> tuple[Limited, ...]:
     """The limits of sections that ask for an accuracy; finest: the finest part that the scene asks for."""
     given = {name for name in ("min_bend_radius", "max_tension") for x in scene.cable.sections if getattr(x, name)}
     if not given:
@@ -351,7 +351,7 @@ def _limits(scene: Scene, finest: float) -> tuple[Limited, ...]:
     return tuple(found)
 
 
-def has_limits(scene: Scene) -> bool:
+def has_limits(scene: LineScene) -> bool:
     """Whether anything of a scene is held against a limit: of a section, a code, a pipe, a named quantity."""
     names = ("min_bend_radius", "max_tension", "min_tension", "max_contact_force", "capacity", "code")
     sections = scene.cable.sections
@@ -363,7 +363,7 @@ def has_limits(scene: Scene) -> bool:
     )
 
 
-def is_irregular(scene: Scene) -> bool:
+def is_irregular(scene: LineScene) -> bool:
     """Whether a scene moves irregularly: its extremes and standard deviations matter, not what is at an instant.
 
     It is not, where `accuracy: {instant: ...}` asks for that.
@@ -372,29 +372,29 @@ def is_irregular(scene: Scene) -> bool:
     return _waves_are_irregular(scene) and not (asked is not None and asked.instant)
 
 
-def _waves_are_irregular(scene: Scene) -> bool:
+def _waves_are_irregular(scene: LineScene) -> bool:
     return scene.time is not None and not isinstance(scene.environment.waves, PeriodicWaves | None)
 
 
-def rubs_on_obstacles(scene: Scene) -> bool:
+def rubs_on_obstacles(scene: LineScene) -> bool:
     """Whether a line may rub on obstacles: its tension then jumps where contact begins."""
     return any(x.friction for x in scene.obstacles.values())
 
 
-def may_be_held(scene: Scene) -> bool:
+def may_be_held(scene: LineScene) -> bool:
     """Whether friction of a bed or an obstacle may hold a line here or there."""
     bed = scene.environment.seabed
     return rubs_on_obstacles(scene) or (bed is not None and bool(bed.friction or bed.soil))
 
 
-def wants_errors(scene: Scene) -> bool:
+def wants_errors(scene: LineScene) -> bool:
     """Whether the error of the result is estimated."""
     if scene.output.errors is not None:
         return scene.output.errors
     return accuracy_of(scene) is not None
 
 
-def predicted_runs(scene: Scene) -> tuple[int, int]:
+def predicted_runs(scene: LineScene) -> tuple[int, int]:
     """Runs that a scene in motion takes before it has a first result with its errors, and at most, with refinements."""
     if not wants_errors(scene):
         return 1 + wants_survey(scene), 1 + wants_survey(scene)
@@ -406,13 +406,13 @@ def predicted_runs(scene: Scene) -> tuple[int, int]:
     return first, first + free * (IRREGULAR_REFINEMENTS if is_irregular(scene) else MOST_REFINEMENTS)
 
 
-def mesh_is_free(scene: Scene) -> bool:
+def mesh_is_free(scene: LineScene) -> bool:
     """Whether the program places the cells."""
     zones = scene.model.zones if isinstance(scene.model, ZonesModel) else ()
     return scene.mesh is None and not any(zone.cells or zone.ratio for zone in zones)
 
 
-def wants_survey(scene: Scene) -> bool:
+def wants_survey(scene: LineScene) -> bool:
     """Whether a coarse run comes first that shows where cells should be short.
 
     Where cells follow the curvature it is for their base, and comes if the scene gives a number of cells to a layer.
@@ -421,18 +421,18 @@ def wants_survey(scene: Scene) -> bool:
     return mesh_is_free(scene) and (wanted or scene.resolution is not None)
 
 
-def follows_curvature(scene: Scene) -> bool:
+def follows_curvature(scene: LineScene) -> bool:
     """Whether the cells of rods follow the curvature in a run."""
     wanted = scene.model.curvature_error if isinstance(scene.model, AdaptiveModel) else None
     return wanted is not None and scene.time is not None
 
 
-def zones_are_free(scene: Scene) -> bool:
+def zones_are_free(scene: LineScene) -> bool:
     """Whether the program chooses the tolerance of zones."""
     return isinstance(scene.model, AdaptiveModel) and scene.model.tolerance is None
 
 
-def model_is_free(scene: Scene, moves: bool = True) -> bool:
+def model_is_free(scene: LineScene, moves: bool = True) -> bool:
     """Whether the program chooses the model of a cable that bends, whose scene names none, or `adaptive` alone.
 
     moves: in motion, by a pre-run; else an equilibrium.
@@ -445,7 +445,7 @@ def model_is_free(scene: Scene, moves: bool = True) -> bool:
     return wants and not (named or scene.output.criteria or scene.contact.self or scene.obstacles)
 
 
-def first_resolution(scene: Scene) -> Resolution:
+def first_resolution(scene: LineScene) -> Resolution:
     """The resolution for a scene's accuracy, before anything is known of its errors."""
     want = requested_accuracy(scene)
     zones = scene.model.tolerance if isinstance(scene.model, AdaptiveModel) else None
@@ -475,7 +475,7 @@ def first_resolution(scene: Scene) -> Resolution:
     return replace(found, step=shown, later=step, still=still) if shown < step else found
 
 
-def for_motion(resolution: Resolution, scene: Scene, reach: Reach) -> Resolution:
+def for_motion(resolution: Resolution, scene: LineScene, reach: Reach) -> Resolution:
     """As fine as a part of what moves asks for at first, where a pre-run has shown how far the line does."""
     want = requested_accuracy(scene)
     if want is None or want.of_motion is None or reach.size(want.least)[0] < want.least:
@@ -489,7 +489,7 @@ def for_motion(resolution: Resolution, scene: Scene, reach: Reach) -> Resolution
     return replace(resolution, fineness=fineness, local=local)
 
 
-def vibration_step(scene: Scene, want: RequestedAccuracy | None) -> tuple[float, float]:
+def vibration_step(scene: LineScene, want: RequestedAccuracy | None) -> tuple[float, float]:
     """The longest step, s, that shows what ramps set off along the line, and its force, N, from which on it counts.
 
     Infinity for the step where nothing asks for it.

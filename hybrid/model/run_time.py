@@ -16,7 +16,7 @@ from hybrid.kernels.step.generalized_alpha import weights
 from hybrid.kernels.step.step_law import SAFETY
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution, requested_accuracy, wants_errors
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 # s per cell and Newton iteration, in space and in a plane.
 COST = {"rod": (0.4e-6, 0.16e-6), "catenary": (0.095e-6, 0.09e-6)}
@@ -47,7 +47,7 @@ COST_ERRORS, COST_ACCURACY = 2.1, 2.6
 COST_SURVEY = 0.1  # s, of the mesh pre-run and of judging errors, whatever the scene
 
 
-def foretold_steps(scene: Scene, model: Model, resolution: Resolution, least: int) -> int:
+def foretold_steps(scene: LineScene, model: Model, resolution: Resolution, least: int) -> int:
     """Steps of a run: `least` where they are of fixed length, else as many as the motion is likely to ask for.
 
     The error of a step grows with the rate at which the acceleration changes (docs/theory.md, (T3c)), of which that of
@@ -70,7 +70,7 @@ def foretold_steps(scene: Scene, model: Model, resolution: Resolution, least: in
 
 
 def step_time(
-    scene: Scene, model: Model, rods: float, catenaries: float, moves: bool = False, followed: float = 0.0
+    scene: LineScene, model: Model, rods: float, catenaries: float, moves: bool = False, followed: float = 0.0
 ) -> float:
     """Processor time, s, of a step of a line of so many cells of either kind.
 
@@ -94,7 +94,7 @@ def _stirred(model: Model) -> float:
     return float(np.mean(model.start.r[:, 2] > calm_below.py_func(model.sea.values)))
 
 
-def processor_time(scene: Scene, model: Model, cells: Sequence[int], steps: int, outputs: float) -> float:
+def processor_time(scene: LineScene, model: Model, cells: Sequence[int], steps: int, outputs: float) -> float:
     """Processor time, s, of a run with so many steps; cells: of each zone of the model, if all is rod."""
     if scene.time is None:
         return 0.0

@@ -9,22 +9,22 @@ import numpy as np
 from hybrid.kernels.state.state import Line
 from hybrid.model.sections import attached_weights, attachments_at, bending_stiffness, weight
 from hybrid.scene.motion_tables import SHIFTS
-from hybrid.scene.schema import Scene, Section, Straight
+from hybrid.scene.schema import LineScene, Section, Straight
 
 
-def pressing(scene: Scene) -> float:
+def pressing(scene: LineScene) -> float:
     """The least weight per length (N/m) that a cable of the scene puts on its bed; its dry weight if it would float."""
     heavy = [w for w in (weight(x, scene) for x in scene.cable.sections) if w > 0.0]
     dry = [x.mass * (scene.environment.gravity or 1.0) for x in scene.cable.sections]
     return min(heavy or dry)
 
 
-def net_weight(scene: Scene) -> float:
+def net_weight(scene: LineScene) -> float:
     """Weight of the whole line with its attachments in its surroundings, N, positive downwards."""
     return sum(weight(x, scene) * x.length for x in scene.cable.sections) + sum(attached_weights(scene))
 
 
-def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool, fastest: float = 0.0) -> float:
+def tension_scale(scene: LineScene, sections: Sequence[Section], bending: bool, fastest: float = 0.0) -> float:
     """A tension typical of the scene, N: the largest that weight, loads, bending, drag, motion or speed can ask for.
 
     bending: whether bending counts, as it does where there is a rod; fastest: the current's highest speed, m/s.

@@ -21,7 +21,7 @@ from hybrid.model.obstacles import obstacle_rows
 from hybrid.model.scales import pressing
 from hybrid.model.spectra import waves_of
 from hybrid.scene.dispersion import wavenumber
-from hybrid.scene.schema import CurrentProfile, PowerLawCurrent, Scene, Seabed, UniformCurrent
+from hybrid.scene.schema import CurrentProfile, LineScene, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.spectra import SumOfWaves
 from hybrid.scene.waves import GivenWaves, MeasuredWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
 
@@ -90,7 +90,7 @@ class Surroundings:
         return part * eta, part * float(w @ down) + rate * eta, -part * float(kx @ down), -part * float(ky @ down)
 
 
-def surroundings(scene: Scene, cells: int) -> Surroundings:
+def surroundings(scene: LineScene, cells: int) -> Surroundings:
     """Everything around a line of `cells` cells that a scene names."""
     fluid, bed = scene.environment.fluid, scene.environment.seabed
     sea = no_sea(cells)
@@ -133,7 +133,7 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
     return _moved(scene, cells, around)
 
 
-def _moved(scene: Scene, cells: int, around: Surroundings) -> Surroundings:
+def _moved(scene: LineScene, cells: int, around: Surroundings) -> Surroundings:
     """The same with the motions of obstacles."""
     sea = around.values
     courses = courses_of(scene, sea.obstacles, around.waves_of_vessels, float(sea.ramps[1]), around.elevation)
@@ -183,7 +183,7 @@ def soil_numbers(bed: Seabed) -> Floats:
     return out
 
 
-def slip_length(scene: Scene, bed: Seabed) -> float:
+def slip_length(scene: LineScene, bed: Seabed) -> float:
     """Elastic travel (m) before a touching cable slides."""
     if bed.friction is not None and bed.friction.travel is not None:
         return bed.friction.travel
@@ -191,7 +191,7 @@ def slip_length(scene: Scene, bed: Seabed) -> float:
     return SLIP_LENGTH * min(widths) if widths else 0.1 * pressing(scene) / bed.spring
 
 
-def current_table(scene: Scene) -> tuple[Floats, Floats]:
+def current_table(scene: LineScene) -> tuple[Floats, Floats]:
     """Heights (K,) m, increasing, and the current there (K, 3) m/s; linear between them, constant beyond."""
     fluid = scene.environment.fluid
     current = fluid.current if fluid else None

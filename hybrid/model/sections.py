@@ -14,8 +14,8 @@ from hybrid.scene.schema import (
     Clump,
     Damping,
     Float,
+    LineScene,
     Modules,
-    Scene,
     Section,
     Spread,
     Swivel,
@@ -62,7 +62,7 @@ def bending_stiffness(section: Section) -> tuple[float, float]:
     return section.initial_bending or (0.0, 0.0)
 
 
-def limits_along(scene: Scene, s: np.ndarray) -> dict[str, np.ndarray]:
+def limits_along(scene: LineScene, s: np.ndarray) -> dict[str, np.ndarray]:
     """Limits (ns,) of the sections at arc lengths s (m), by name: those that the scene gives at all.
 
     NaN where none is given; the stricter one at a seam.
@@ -75,7 +75,7 @@ def limits_along(scene: Scene, s: np.ndarray) -> dict[str, np.ndarray]:
     return found
 
 
-def weakest_bending(scene: Scene, s: np.ndarray) -> np.ndarray:
+def weakest_bending(scene: LineScene, s: np.ndarray) -> np.ndarray:
     """The smaller bending stiffness (ns,) N m^2 at arc lengths s (m), with stiffeners; at a seam the weaker one."""
     found = _along(scene, s, [min(bending_stiffness(x)) for x in scene.cable.sections], np.fmin)
     near, length = 1e-9 * scene.length, scene.length
@@ -86,17 +86,17 @@ def weakest_bending(scene: Scene, s: np.ndarray) -> np.ndarray:
     return found
 
 
-def outer_diameter(scene: Scene, s: np.ndarray) -> np.ndarray:
+def outer_diameter(scene: LineScene, s: np.ndarray) -> np.ndarray:
     """Outer diameter (ns,) m at arc lengths s (m); at a seam the larger one, NaN where none is given."""
     return _along(scene, s, [np.nan if x.diameter is None else x.diameter for x in scene.cable.sections], np.fmax)
 
 
-def borne_tension(scene: Scene, s: np.ndarray) -> np.ndarray:
+def borne_tension(scene: LineScene, s: np.ndarray) -> np.ndarray:
     """Tension (ns,) N at which a section reaches its max_strain, at arc lengths s (m); the smaller one at a seam."""
     return _along(scene, s, [x.borne for x in scene.cable.sections], np.fmin)
 
 
-def _along(scene: Scene, s: np.ndarray, of_section: Sequence[float], choose: np.ufunc) -> np.ndarray:
+def _along(scene: LineScene, s: np.ndarray, of_section: Sequence[float], choose: np.ufunc) -> np.ndarray:
     """A number per section at arc lengths s (ns,); where two sections meet, what `choose` makes of both."""
     ends = np.cumsum([x.length for x in scene.cable.sections])[:-1]
     near = 1e-9 * scene.length  # a seam that adding up lengths has shifted is still a seam
@@ -124,14 +124,14 @@ def damping(section: Section) -> Damping:
     return d if isinstance(d, Damping) else Damping(mass=d)
 
 
-def weight(section: Section, scene: Scene) -> float:
+def weight(section: Section, scene: LineScene) -> float:
     """Weight in water (air, vacuum) per unstretched length, N/m, positive downwards."""
     fluid = scene.environment.fluid
     displaced = fluid.density * np.pi / 4 * section.diameter**2 if fluid and section.diameter else 0.0
     return float((section.mass - displaced) * scene.environment.gravity)
 
 
-def attachments_at(scene: Scene) -> Iterator[tuple[float, Float | Clump | Swivel | Body]]:
+def attachments_at(scene: LineScene) -> Iterator[tuple[float, Float | Clump | Swivel | Body]]:
     """Everything that sits at a point of the line, with its arc length, m: floats, clumps, bodies at the ends."""
     for x in scene.cable.attachments:
         if not isinstance(x, Spread):
@@ -141,29 +141,29 @@ def attachments_at(scene: Scene) -> Iterator[tuple[float, Float | Clump | Swivel
             yield at, end
 
 
-def swivels(scene: Scene) -> list[float]:
+def swivels(scene: LineScene) -> list[float]:
     """Arc lengths, m, at which the cable turns freely about itself."""
     return sorted(x.at for x in scene.cable.attachments if isinstance(x, Swivel))
 
 
-def modules_of(scene: Scene) -> Iterator[Modules]:
+def modules_of(scene: LineScene) -> Iterator[Modules]:
     """What is spread over stretches of the line."""
     for x in scene.cable.attachments:
         if isinstance(x, Modules):
             yield x
 
 
-def stiffeners_of(scene: Scene) -> list[BendStiffener]:
+def stiffeners_of(scene: LineScene) -> list[BendStiffener]:
     """Bend stiffeners on the line."""
     return [x for x in scene.cable.attachments if isinstance(x, BendStiffener)]
 
 
-def restrictors_of(scene: Scene) -> list[BendRestrictor]:
+def restrictors_of(scene: LineScene) -> list[BendRestrictor]:
     """Bend restrictors on the line."""
     return [x for x in scene.cable.attachments if isinstance(x, BendRestrictor)]
 
 
-def attached_weights(scene: Scene) -> list[float]:
+def attached_weights(scene: LineScene) -> list[float]:
     """Weight in water of every attachment and end body, N, positive downwards."""
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     density = fluid.density if fluid else 0.0
@@ -176,7 +176,7 @@ def attached_weights(scene: Scene) -> list[float]:
     return points + [sinks(x) * (x.range[1] - x.range[0]) for x in spread]
 
 
-def section_changes(scene: Scene) -> tuple[float, ...]:
+def section_changes(scene: LineScene) -> tuple[float, ...]:
     """Arc lengths (m) inside the cable where bending stiffness jumps: between sections, at the ends of stiffeners."""
     found = [*accumulate(x.length for x in merged_sections(scene.cable.sections)[:-1])]
     near = 1e-9 * scene.length

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line
 from hybrid.scene.payout import Payout
-from hybrid.scene.schema import CatenaryModel, Scene
+from hybrid.scene.schema import CatenaryModel, LineScene
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
 
 # Diameters of slack of the smallest loop: WINDOW of contact.self_contact_pairs less OUTER of contact.self_contact_law,
 # which a plan does not import.
@@ -32,7 +32,7 @@ class Reach(NamedTuple):
     why: str
 
 
-def self_reach(scene: Scene) -> Reach:
+def self_reach(scene: LineScene) -> Reach:
     """Whether contact of the line with itself is computed, by the scene alone."""
     asked = scene.contact.self
     if asked is not None:
@@ -54,19 +54,19 @@ def self_reach(scene: Scene) -> Reach:
     return Reach(False, True, f"{WHERE_NEAR}: {much}; {COST}")
 
 
-def no_contact(scene: Scene) -> str:
+def no_contact(scene: LineScene) -> str:
     """Why a line may be within itself in a run of a scene."""
     reach = self_reach(scene)
     return "parts are in each other, and contact begins where they are apart" if reach.may else reach.why
 
 
-def payouts(scene: Scene) -> list[Payout]:
+def payouts(scene: LineScene) -> list[Payout]:
     """How line is paid out, at the ends at which it is."""
     found = [getattr(end, "payout", None) for end in scene.ends.both]
     return [x for x in found if x is not None]
 
 
-def slack_of(scene: Scene) -> float:
+def slack_of(scene: LineScene) -> float:
     """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may, is set from
 
     outside, breaks or is let go, or it is paid out.
@@ -79,12 +79,12 @@ def slack_of(scene: Scene) -> float:
     return scene.length - math.dist(a, b)
 
 
-def least_slack(scene: Scene) -> float:
+def least_slack(scene: LineScene) -> float:
     """The slack, m, that two points take to meet which are no neighbours along the line: that of the smallest loop."""
     return LOOP * min(x.diameter or math.inf for x in scene.cable.sections)
 
 
-def contact_bits(scene: Scene) -> int:
+def contact_bits(scene: LineScene) -> int:
     """Bits of kernels.state.forces for the start of a run."""
     reach = self_reach(scene)
     if reach.asked:
@@ -92,14 +92,14 @@ def contact_bits(scene: Scene) -> int:
     return MAY_TOUCH if reach.may else 0
 
 
-def without_contact(scene: Scene) -> Scene:
+def without_contact(scene: LineScene) -> LineScene:
     """The scene with no contact that it does not ask for."""
     if scene.contact.self is not None:
         return scene
     return scene.model_copy(update={"contact": scene.contact.model_copy(update={"self": False})})
 
 
-def system_without_contact(system: System) -> System:
+def system_without_contact(system: Network) -> Network:
     """The same of all lines of a system."""
     lines = {
         name: line.model_copy(update={"contact": line.contact.model_copy(update={"self": False, "friction": 0.0})})

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from hybrid.scene.cable import Cable
 from hybrid.scene.motion_tables import SHIFTS, Motion
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 # Derivatives of the ramp by x where it begins and where it ends, by their order, and the highest that counts.  Of a
 # ramp that is shorter than the period the sum may be too large, which makes steps shorter than they need to be.
@@ -55,7 +55,7 @@ def longest_period(cable: Cable) -> float | None:
     return 2.0 * pi * travel / high
 
 
-def start_vibrations(scene: Scene) -> list[Vibration]:
+def start_vibrations(scene: LineScene) -> list[Vibration]:
     """What harmonic motions with a ramp, and moves to another place, set off; none in a line that does not stretch."""
     period = longest_period(scene.cable)
     if period is None:

@@ -18,7 +18,7 @@ from hybrid.outputs.section_use import Capacities, Codes, Pipes
 
 if TYPE_CHECKING:
     from hybrid.scene.quantities import Quantity
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.schema import LineScene
 
 END = {"start": 0, "end": 1}
 # Where a clearance is least: name of that field, after the name of the clearance.
@@ -27,7 +27,7 @@ WHERE = "_at"
 FEW = 4096
 
 
-def quantities_of(scene: Scene) -> Quantities | None:
+def quantities_of(scene: LineScene) -> Quantities | None:
     """What a scene asks for beside the usual outputs; None: nothing."""
     along = any(x.pipe is not None or x.capacity is not None or x.code is not None for x in scene.cable.sections)
     return Quantities(scene, scene.output.quantities) if along or scene.output.quantities else None
@@ -36,7 +36,7 @@ def quantities_of(scene: Scene) -> Quantities | None:
 class Quantities:
     """The quantities of one line as probes, and the places from which excursions count."""
 
-    def __init__(self, scene: Scene, wanted: Mapping[str, Quantity]) -> None:
+    def __init__(self, scene: LineScene, wanted: Mapping[str, Quantity]) -> None:
         self.wanted = dict(wanted)
         self.pipes = Pipes(scene) if any(x.pipe is not None for x in scene.cable.sections) else None
         self.capacities = Capacities(scene) if any(x.capacity for x in scene.cable.sections) else None

@@ -20,7 +20,7 @@ from hybrid.store.code_checks import use as code_used
 
 if TYPE_CHECKING:
     from hybrid.scene.cable import Section
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.schema import LineScene
 
 CURVED_NOWHERE: Floats = np.zeros(1)
 
@@ -40,7 +40,7 @@ class Walls(NamedTuple):
 class Pipes:
     """The pipes of one line.  Only for a scene that has some."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: LineScene) -> None:
         fluid = scene.environment.fluid
         self._gravity = scene.environment.gravity
         self._density = fluid.density if fluid is not None else 0.0
@@ -157,7 +157,7 @@ def largest_stress(
 class Capacities:
     """The capacity polygons of one line.  Only for a scene that has some."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: LineScene) -> None:
         whole, begin = whole_scene(scene)
         sections = whole.cable.sections
         ends = begin + np.cumsum([x.length for x in sections])
@@ -194,7 +194,7 @@ class Capacities:
 class Codes:
     """The codes of one line.  Only for a scene that has some."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: LineScene) -> None:
         fluid, gravity = scene.environment.fluid, scene.environment.gravity
         self._water = fluid.density * gravity if fluid is not None else 0.0
         self._surface = 0.0 if fluid is None or fluid.surface is None else fluid.surface

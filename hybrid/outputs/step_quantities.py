@@ -22,7 +22,7 @@ from hybrid.store.limits import EXTREMES
 if TYPE_CHECKING:
     from hybrid.outputs.section_use import Pipes
     from hybrid.scene.quantities import Quantity
-    from hybrid.scene.schema import Scene
+    from hybrid.scene.schema import LineScene
 
 
 NONE: Mapping[str, Quantity] = MappingProxyType({})
@@ -33,7 +33,7 @@ class StepQuantities:
     """Ranges of the quantities of one line."""
 
     def __init__(
-        self, scene: Scene, wanted: Mapping[str, Quantity], pipes: Pipes | None = None, line: str = "",
+        self, scene: LineScene, wanted: Mapping[str, Quantity], pipes: Pipes | None = None, line: str = "",
         shown: Mapping[str, Quantity] = NONE, rows_of: Mapping[str, tuple[int, int]] = NO_ROWS,
     ) -> None:  # fmt: skip
         """wanted: by name; pipes: of which wall tension and stress are kept at every node, in the extremes of the line.

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
 
-from hybrid.errors import Complaint, SceneError
+from hybrid.errors import Complaint
 from hybrid.scene.base import (
     Before,
     Direction,
@@ -439,41 +439,6 @@ def missing_time() -> Complaint:
         fix="add `time: {duration: ..., step: ...}`; for the equilibrium alone: hybrid static FILE, or "
         "hybrid.static(scene) in Python",
     )
-
-
-class Timed:
-    """What follows from the tables `time`, `accuracy` and `output` of a scene, of one line or of several."""
-
-    if TYPE_CHECKING:
-        time: Any
-        accuracy: Any
-        output: Any
-        points_kept: Any
-        lasting_period: Any
-
-    def require_time(self) -> Time:
-        """The `time` table; SceneError if there is none."""
-        if self.time is None:
-            raise SceneError([missing_time()])
-        found: Time = self.time
-        return found
-
-    @property
-    def size_of_output(self) -> int:
-        """Bytes of an output in the file, roughly."""
-        asked = self.output.errors
-        wanted = self.accuracy is not None or (self.time is not None and self.time.controlled)
-        return int(8 * VALUES * self.points_kept * (1 + (wanted if asked is None else asked)))
-
-    @property
-    def output_interval(self) -> float:
-        """Time between two outputs [s]."""
-        if self.output.every is not None:
-            return float(self.output.every)
-        time = self.require_time()
-        wanted = max(OUTPUTS, math.ceil(min(PER_PERIOD * time.duration / self.lasting_period, 1e9)))
-        most = max(OUTPUTS, int(UNASKED_BYTES / self.size_of_output))
-        return max(time.duration / min(wanted, most), time.step or 0.0)
 
 
 class Output(Table):

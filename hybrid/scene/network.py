@@ -29,7 +29,6 @@ from hybrid.scene.analysis import (
     RodModel,
     Straight,
     Time,
-    Timed,
     without_friction,
 )
 from hybrid.scene.attachments import Attachment
@@ -39,7 +38,6 @@ from hybrid.scene.base import (
     Pair,
     Positive,
     Table,
-    Text,
     Truth,
     Whole,
     refuse,
@@ -47,7 +45,7 @@ from hybrid.scene.base import (
     value_or_table,
 )
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
-from hybrid.scene.cable import Cable, Contact, Environment, Section
+from hybrid.scene.cable import Cable, Contact, Section
 from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Guided, Pinned, Triple
 from hybrid.scene.lines_contact import LinesContact
@@ -67,7 +65,8 @@ from hybrid.scene.points import (
     Point,
 )
 from hybrid.scene.quantities import Quantities
-from hybrid.scene.schema import Scene
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import LineScene
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
@@ -243,7 +242,7 @@ class NetworkOutput(Table):
         return self.points.get(line, DEFAULT_POINTS) if isinstance(self.points, dict) else self.points
 
 
-class Network(Table, Timed):
+class NetworkTables(Scene):
     """Several lines, the points where they meet, what acts on them, and what is asked; not checked."""
 
     instead: ClassVar[Mapping[str, str]] = {
@@ -255,8 +254,6 @@ class Network(Table, Timed):
         "solver": "leave it out: every scene is solved by elimination",
     }
 
-    title: Text = Field(default="", description="a line for people; it heads plots and reports")
-    environment: Environment = Field(default=Environment(), description="what acts on the lines from outside")
     points: dict[Name, Point] = Field(min_length=1, description="points by name: where lines end, are held, and meet")
     bodies: dict[Name, RigidBody] = Field(
         default={}, description="rigid bodies by name, with fairleads among the points"
@@ -475,8 +472,8 @@ class Network(Table, Timed):
 
     def scene_of(
         self, name: str, carrying: Sequence[str] = (), places: Mapping[str, Triple] | None = None,
-        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: Scene | None = None,
-    ) -> Scene:  # fmt: skip
+        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: LineScene | None = None,
+    ) -> LineScene:  # fmt: skip
         """A line between the places where its points are, or are first looked for, as a scene of its own.
 
         carrying: ends at which the free point is a body of the line, not a place that is held.  places: of the points
@@ -492,7 +489,7 @@ class Network(Table, Timed):
         return known[key]
 
     @property
-    def _known_scenes(self) -> dict[tuple[str, tuple[str, ...]], Scene]:
+    def _known_scenes(self) -> dict[tuple[str, tuple[str, ...]], LineScene]:
         """Scenes of lines that have been made, by line and ends that carry: to validate one takes 2 ms."""
         tables, known = self._made_scenes
         if any(getattr(self, name) is not table for name, table in tables.items()):  # of what this was copied from
@@ -501,15 +498,15 @@ class Network(Table, Timed):
         return known
 
     @cached_property
-    def _made_scenes(self) -> tuple[dict[str, Any], dict[tuple[str, tuple[str, ...]], Scene]]:
+    def _made_scenes(self) -> tuple[dict[str, Any], dict[tuple[str, tuple[str, ...]], LineScene]]:
         """The tables of this system, and `_known_scenes`."""
         return {name: getattr(self, name) for name in type(self).model_fields}, {}
 
     def _scene_of(
         self, name: str, carrying: Sequence[str], places: Mapping[str, Triple] | None = None,
-        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: Scene | None = None,
+        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: LineScene | None = None,
         strict: bool = False,
-    ) -> Scene:  # fmt: skip
+    ) -> LineScene:  # fmt: skip
         """As `scene_of`, made anew; strict: an accuracy that is asked for without errors is refused."""
         line = self.lines[name]
         first = self._places(line)
@@ -567,7 +564,7 @@ class Network(Table, Timed):
         late = {}
         if self.output.errors is False and not (strict and (line.accuracy or self.accuracy)):
             late["accuracy"] = tables.pop("accuracy")  # that nobody has asked for, or a chosen model has brought along
-        return Scene.model_validate(tables).model_copy(update=late)
+        return LineScene.model_validate(tables).model_copy(update=late)
 
     def _free_end(self, name: str, key: Literal["start", "end"], near: Triple | None) -> End:
         """The end of a line at a point that is no more than that; near: as of `FreePoint.only_end`."""
@@ -591,11 +588,11 @@ class Network(Table, Timed):
         touches = self.contact is not None and any(name in pair for pair in self.touching_pairs)
         return own.beside_others(self.contact.friction) if self.contact is not None and touches else own
 
-    def checked_scene(self, name: str) -> Scene:
+    def checked_scene(self, name: str) -> LineScene:
         """The scene of a line as `scene_of`, checked anew; ValidationError of pydantic: what is wrong with it."""
         return self._scene_of(name, (), strict=True)
 
-    def know_scene(self, name: str, scene: Scene) -> None:
+    def know_scene(self, name: str, scene: LineScene) -> None:
         """Make the scene of a line from that of a system that differs in numbers alone, without checking it again."""
         self._known_scenes[name, ()] = self._scene_of(name, (), scene=scene)
 

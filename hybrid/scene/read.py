@@ -21,9 +21,13 @@ from hybrid.scene.analysis import usual_model
 from hybrid.scene.base import Finding, Place, Renamed, Table, as_written, dotted
 from hybrid.scene.checks import contradictions
 from hybrid.scene.motion_checks import motion_findings
-from hybrid.scene.schema import Scene
+from hybrid.scene.root import Scene, form_of
+from hybrid.scene.schema import LineScene
 from hybrid.scene.schema_messages import explain
 from hybrid.scene.yaml_source import Node, Spot, Unreadable, from_data, from_text, override
+
+if TYPE_CHECKING:
+    from hybrid.scene.network_scene import Network
 
 # Bytes: a scene is a page or two, which is read in milliseconds, and this in some seconds.
 LARGEST_SCENE = 4_000_000
@@ -40,50 +44,22 @@ class RenamedKey(FutureWarning):
         super().__init__(f"{place}: {where}: {old} is now called {new}; please rename it")
 
 
-if TYPE_CHECKING:
-    from hybrid.scene.network_scene import System
-
 SceneLike = Scene | str | PathLike[str] | Mapping[str, Any]
 
 
-def as_scene_or_system(scene: SceneLike | System) -> Scene | System:
-    """As `as_scene`, of one cable or of several lines."""
-    if not isinstance(scene, Scene | str | PathLike | Mapping):
-        return scene if isinstance(scene, _system()) else as_scene(scene)  # type: ignore[arg-type]
-    if isinstance(scene, str | PathLike) and "\n" not in str(scene):
-        return _warn_renamed(*read_either(scene))
-    if isinstance(scene, Mapping) and names_lines(scene):
-        return _warn_renamed(*_from_data(dict(scene)))
-    return as_scene(scene)
-
-
-def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
-    """Read a scene file of several lines; overrides and errors as of `load_scene`."""
-    scene = _warn_renamed(*read_either(path, overrides))
-    if isinstance(scene, Scene):
-        fix = "hybrid.load_scene reads a scene of one cable"
-        raise SceneError([Complaint("cable", "one cable", "several lines, with `points` and `lines`", fix)], str(path))
-    return scene
-
-
-def read_either(path: str | PathLike[str], overrides: Sequence[str] = ()) -> tuple[Scene | System, list[RenamedKey]]:
-    """Read a scene file of one cable or of several lines; with the notes on renamed keys."""
-    return parse_either(text_of(Path(path)), str(path), overrides)
-
-
-def as_scene(scene: SceneLike) -> Scene:
+def as_scene(scene: SceneLike) -> LineScene | Network:
     """The scene given as a `Scene`, as the path of a scene file, or as a dict of its tables.
 
     SceneError if it is refused; TypeError if it is none of these.
     """
     if isinstance(scene, Scene):
-        return scene
+        return scene  # type: ignore[return-value]  # of one of the two forms
     if isinstance(scene, str) and "\n" in scene:
         raise TypeError("a scene is expected, or the path of a scene file; for YAML text: hybrid.parse_scene(text)")
     if isinstance(scene, str | PathLike):
-        return load_scene(Path(scene))
+        return _warn_renamed(*read_scene(scene))
     if isinstance(scene, Mapping):
-        return validate_scene(dict(scene))
+        return _warn_renamed(*_from_data(dict(scene)))
     raise TypeError(
         f"a scene is expected: a hybrid.Scene, the path of a scene file, or a dict; given: {type(scene).__name__}"
     )
@@ -99,9 +75,11 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     return _warn_renamed(*read_scene(path, overrides))
 
 
-def read_scene(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Scene, list[RenamedKey]]:
+def read_scene(
+    path: str | PathLike[str], overrides: Sequence[str] = ()
+) -> tuple[LineScene | Network, list[RenamedKey]]:
     """Read a scene file as `load_scene` does; with the notes on renamed keys, instead of warnings."""
-    return _parsed(text_of(path), str(path), overrides)
+    return read_text(text_of(Path(path)), str(path), overrides)
 
 
 HDF5 = b"\x89HDF\r\n\x1a\n"  # how files of that format begin
@@ -138,7 +116,7 @@ def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Sce
     """Read a scene from YAML text; `file` is its name in complaints and the folder of motion files."""
     if not isinstance(text, str):
         raise TypeError(f"the text of a scene is a str, not {type(text).__name__}; validate_scene takes Python data")
-    return _warn_renamed(*_parsed(text, file, overrides))
+    return _warn_renamed(*read_text(text, file, overrides))
 
 
 @contextmanager
@@ -153,29 +131,25 @@ def _without_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _parsed(text: str, file: str, overrides: Sequence[str]) -> tuple[Scene, list[RenamedKey]]:
-    return one_cable(*parse_either(text, file, overrides), file)
-
-
-def one_cable(scene: Scene | System, renamed: list[RenamedKey], file: str = "") -> tuple[Scene, list[RenamedKey]]:
-    """The same; SceneError if it is of several lines, which is not what is asked for."""
-    if not isinstance(scene, Scene):
-        fix = "hybrid.run, static, plan and Simulation take several lines; hybrid.load_system reads them"
+def one_line(scene: Scene, file: str = "") -> LineScene:
+    """A scene of one cable; SceneError if it is of several lines, which is not what is asked for."""
+    if not isinstance(scene, LineScene):
+        fix = "hybrid.run, static, plan and Simulation take several lines"
         raise SceneError(
             [Complaint("lines", f"{len(scene.lines)} lines", "one cable, with `cable` and `ends`", fix)], file
         )
-    return scene, renamed
+    return scene
 
 
 @_without_collection()
-def parse_either(text: str, file: str = "", overrides: Sequence[str] = ()) -> tuple[Scene | System, list[RenamedKey]]:
-    """Read a scene of one cable or of several lines from YAML text; with the notes on renamed keys."""
+def read_text(text: str, file: str = "", overrides: Sequence[str] = ()) -> tuple[LineScene | Network, list[RenamedKey]]:
+    """Read a scene as `parse_scene` does; with the notes on renamed keys, instead of warnings."""
     try:
         root, complaints = from_text(text)
     except Unreadable as error:
         raise SceneError([error.complaint], file) from None
     data = root.plain()
-    schema: type[Table] = _system() if names_lines(data) else Scene
+    schema = form_of(data)
     if isinstance(root.value, dict):
         complaints += [c for c in (override(root, each, schema) for each in overrides) if c is not None]
         data = root.plain()
@@ -199,8 +173,8 @@ def located_in(error: SceneError, text: str, file: str = "", overrides: Sequence
         return error
     if isinstance(root.value, dict):
         for each in overrides:
-            override(root, each, _system() if names_lines(root.plain()) else Scene)
-    complaints, keys = [], {*Scene.model_fields, *_system().model_fields}
+            override(root, each, form_of(root.plain()))
+    complaints, keys = [], {*LineScene.model_fields, *form_of({"lines": {}}).model_fields}
     for complaint in error.complaints:
         at = tuple(int(x) if x.isdigit() else x for x in re.findall(r"\w+", complaint.where))
         place = _find(root, at, False)[2] if at and at[0] in keys else None  # an option has no place in the file
@@ -212,10 +186,10 @@ def located_in(error: SceneError, text: str, file: str = "", overrides: Sequence
 
 def validate_scene(data: Any) -> Scene:
     """A scene from Python data (nested dicts, lists, numbers); SceneError with every complaint."""
-    return _warn_renamed(*one_cable(*_from_data(data)))
+    return _warn_renamed(*_from_data(data))
 
 
-def _from_data(data: Any) -> tuple[Scene | System, list[RenamedKey]]:
+def _from_data(data: Any) -> tuple[LineScene | Network, list[RenamedKey]]:
     try:
         return _validated(data, from_data(data), [], "")
     except RecursionError:  # a table that is deep, or holds itself
@@ -223,7 +197,7 @@ def _from_data(data: Any) -> tuple[Scene | System, list[RenamedKey]]:
         raise SceneError([Complaint("scene", "nested too deeply", "a scene", fix)]) from None
 
 
-def scene_text(scene: Scene | System) -> str:
+def scene_text(scene: Scene) -> str:
     """The scene as YAML; `parse_scene` reads it back to an equal scene."""
     import yaml
 
@@ -242,19 +216,7 @@ def _text_in_yaml(dumper: Any, text: str) -> Any:
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="'" if quoted else None)
 
 
-def names_lines(data: Any) -> bool:
-    """Whether the tables of a scene are those of several lines."""
-    return isinstance(data, Mapping) and ("lines" in data or "points" in data) and "cable" not in data
-
-
 # --- helpers -----------------------------------------------------------------------------------
-
-
-def _system() -> type[System]:
-    """The schema of several lines, which takes some time to make."""
-    from hybrid.scene.network_scene import System
-
-    return System
 
 
 def _resolve_motion_files(data: Any, folder: Path) -> None:
@@ -325,7 +287,7 @@ def _renamed(data: Any, scene: Any, path: Place = ()) -> Iterator[tuple[Place, s
             yield from _renamed(entry, made, (*path, i))
 
 
-def _notes(data: Any, scene: Scene | System, root: Node, file: str) -> list[RenamedKey]:
+def _notes(data: Any, scene: Scene, root: Node, file: str) -> list[RenamedKey]:
     """A note for each renamed key or word, where it stands first."""
     notes: dict[tuple[str, str], RenamedKey] = {}
     for path, old, now in _renamed(data, scene):
@@ -336,43 +298,45 @@ def _notes(data: Any, scene: Scene | System, root: Node, file: str) -> list[Rena
 
 def _validated(
     data: Any, root: Node, complaints: list[Complaint], file: str
-) -> tuple[Scene | System, list[RenamedKey]]:
-    scene: Scene | System | None = None
+) -> tuple[LineScene | Network, list[RenamedKey]]:
+    scene: Any = None
     found: list[tuple[Finding, bool]] = []
-    if names_lines(data):
+    if isinstance(data, dict | Scene):
+        schema = form_of(data)
         try:
-            scene = _system().model_validate(data)
+            scene = schema.model_validate(data)
         except ValidationError as error:
-            found = [each for one in error.errors(include_url=False) for each in explain(_system(), one)]
-    elif not isinstance(data, dict | Scene):
+            found = [each for one in error.errors(include_url=False) for each in explain(schema, one)]
+        if schema is LineScene:
+            found += [(finding, False) for finding in _of_short_form(data, scene)]
+    else:
         fix = "begin with tables such as `cable:` and `ends:`"
         found = [(Finding((), "a table with cable, ends, initial and model", fix), False)]
-    else:
-        try:
-            scene = Scene.model_validate(data)
-            tables: dict[str, Any] = {name: getattr(scene, name) for name in Scene.model_fields}
-        except ValidationError as error:
-            for each in error.errors(include_url=False):
-                found += explain(Scene, each)
-            # The tables that can be read are held against each other all the same.
-            tables = _readable_tables(data) if isinstance(data, dict) else {}
-            found += [(finding, False) for finding in contradictions(tables)]
-        found += [(finding, False) for finding in motion_findings(tables)]
     complaints = complaints + [complaint_of(root, finding, at_key) for finding, at_key in found]
     if complaints or scene is None:
         raise SceneError(in_order(complaints), file)
     return scene, _notes(data, scene, root, file)
 
 
+def _of_short_form(data: Any, scene: LineScene | None) -> Iterator[Finding]:
+    """What is wrong with motions of a cable; where it cannot be read, with those of its tables that can be."""
+    if scene is not None:
+        tables = {name: getattr(scene, name) for name in LineScene.model_fields}
+    else:
+        tables = _readable_tables(data)
+        yield from contradictions(tables)
+    yield from motion_findings(tables)
+
+
 @cache
 def _adapters() -> dict[str, TypeAdapter[Any]]:
-    hints = get_type_hints(Scene, include_extras=True)
-    return {name: TypeAdapter(hints[name]) for name in Scene.model_fields}
+    hints = get_type_hints(LineScene, include_extras=True)
+    return {name: TypeAdapter(hints[name]) for name in LineScene.model_fields}
 
 
 def _readable_tables(data: dict[str, Any]) -> dict[str, Any]:
     tables: dict[str, Any] = {}
-    for name, field in Scene.model_fields.items():
+    for name, field in LineScene.model_fields.items():
         if name in data:
             try:
                 tables[name] = _adapters()[name].validate_python(data[name])

@@ -9,7 +9,7 @@ The tables live in five files (`cable`, `attachments`, `sea`, `ends`, `task`); i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -29,14 +29,13 @@ from hybrid.scene.analysis import (
     RodZone,
     Straight,
     Time,
-    Timed,
     ZonesModel,
     missing_time,
     usual_model,
     without_friction,
 )
 from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
-from hybrid.scene.base import Table, Text, Vector, refuse
+from hybrid.scene.base import Table, Vector, refuse
 from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section, Vortices
 from hybrid.scene.checks import contradictions
 from hybrid.scene.end_loads import Load
@@ -53,6 +52,7 @@ from hybrid.scene.obstacles import (
     SphereObstacle,
     TorusObstacle,
 )
+from hybrid.scene.root import Scene
 from hybrid.scene.sea import (
     Current,
     CurrentPoint,
@@ -106,6 +106,7 @@ __all__ = [
     "Harmonic",
     "Initial",
     "JonswapWaves",
+    "LineScene",
     "Load",
     "MeasuredWaves",
     "Mesh",
@@ -150,14 +151,12 @@ __all__ = [
 ]  # fmt: skip
 
 
-class Scene(Table, Timed):
+class LineScene(Scene):
     """A cable, what holds it, what acts on it, and what is asked."""
 
     instead: ClassVar[Mapping[str, str]] = {"solver": "leave it out: every scene is solved by elimination"}
     asked_nothing: ClassVar[Mapping[str, Any]] = {"solver": "elimination"}
 
-    title: Text = Field(default="", description="a line for people; it heads plots and reports")
-    environment: Environment = Field(default=Environment(), description="what acts on the cable from outside")
     cable: Cable = Field(description="what the cable is made of")
     contact: Contact = Field(default=Contact(), description="what the cable touches beside the seabed")
     obstacles: Obstacles = Field(
@@ -191,13 +190,13 @@ class Scene(Table, Timed):
         "computed in a plane where the whole scene lies in one, for as long as nothing could push it out of it [-]",
     )
 
-    # What a scene of several lines has as well, so that nobody has to ask which of the two it is.
+    # What the long form has as well, so that nobody has to ask which of the two it is.
     points: ClassVar[Mapping[str, Any]] = {}
     bodies: ClassVar[Mapping[str, Any]] = {}
     line_names: ClassVar[tuple[str, ...]] = ()
 
     @property
-    def lines(self) -> dict[str, Scene]:
+    def lines(self) -> dict[str, LineScene]:
         """The lines by name: this one, whose name is empty."""
         return {"": self}
 
@@ -216,7 +215,7 @@ class Scene(Table, Timed):
         """How ends are moved."""
         return [end.prescribed_motion for end in self.ends.both if end.prescribed_motion is not None]
 
-    def scene_of(self, name: str) -> Scene:
+    def scene_of(self, name: str) -> LineScene:
         """A line as a scene of its own: there is one."""
         return self.lines[name]
 
@@ -229,11 +228,6 @@ class Scene(Table, Timed):
         """Unstretched length of the longest line [m]."""
         return self.cable.length
 
-    @classmethod
-    def model_json_schema(cls, *args: Any, **kwargs: Any) -> dict[str, Any]:
-        """JSON Schema of a scene file; bounds in the words that editors know."""
-        return dict(_standard(super().model_json_schema(*args, **kwargs)))
-
     @property
     def points_kept(self) -> int:
         """How many places along the line are kept at every output, but for those that are added."""
@@ -244,7 +238,7 @@ class Scene(Table, Timed):
         """The shortest period of waves and motions [s]; infinity: there is none."""
         return lasting_period(moved_in(self.ends, self.obstacles), self.environment)
 
-    def without_friction(self) -> Scene:
+    def without_friction(self) -> Self:
         """The same whose equilibrium neglects friction, unless the scene says how it settles."""
         return self.model_copy(update={"initial": without_friction(self.initial)})
 
@@ -254,16 +248,6 @@ class Scene(Table, Timed):
         return cls.without_former(value)
 
     @model_validator(mode="after")
-    def _no_contradiction(self) -> Scene:
+    def _no_contradiction(self) -> LineScene:
         refuse(contradictions({name: getattr(self, name) for name in type(self).model_fields}))
         return self
-
-
-# pydantic leaves a bound under its own name where a validator of ours stands before the number
-_STANDARD = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
-
-
-def _standard(schema: Any) -> Any:
-    if isinstance(schema, dict):
-        return {_STANDARD.get(k, k) if not isinstance(v, dict) else k: _standard(v) for k, v in schema.items()}
-    return [_standard(x) for x in schema] if isinstance(schema, list) else schema

@@ -28,9 +28,9 @@ from hybrid.scene.analysis import CatenaryModel, Output
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.combinations import value_at
 from hybrid.scene.ends import End, Release
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Failure
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 
 LINE = "cable"
 ENDS = ("start", "end")
@@ -122,7 +122,7 @@ class ShortForm:
 class _This:
     """A scene as a key: itself, and none that is equal."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: LineScene) -> None:
         self.scene = scene
 
     def __hash__(self) -> int:
@@ -132,13 +132,13 @@ class _This:
         return isinstance(other, _This) and other.scene is self.scene
 
 
-def network_of(scene: Scene) -> System:
+def network_of(scene: LineScene) -> Network:
     """The network of one line that computes what a scene of a cable does.  NotInNetwork: there is none yet."""
     return _made_of(_This(scene))
 
 
 @lru_cache(maxsize=MOST_KEPT)
-def _made_of(key: _This) -> System:
+def _made_of(key: _This) -> Network:
     """The network of a scene, kept for whoever asks for it next."""
     scene = key.scene
     made = {name: _end(getattr(scene.ends, name)) for name in ENDS}
@@ -157,17 +157,17 @@ def _made_of(key: _This) -> System:
     if scene.output.errors is False and "accuracy" in tables:
         kept["accuracy"] = tables.pop("accuracy")
     try:
-        return System.model_validate(tables).model_copy(update=kept)
+        return Network.model_validate(tables).model_copy(update=kept)
     except ValidationError as error:
         raise NotInNetwork(list(_complaints(scene, error))) from None
 
 
-def as_network(scene: Scene | System) -> tuple[System, ShortForm]:
+def as_network(scene: LineScene | Network) -> tuple[Network, ShortForm]:
     """The network that computes what a scene asks for, and where the keys of that are in the scene."""
-    return (network_of(scene), short_form(scene)) if isinstance(scene, Scene) else (scene, ShortForm(()))
+    return (network_of(scene), short_form(scene)) if isinstance(scene, LineScene) else (scene, ShortForm(()))
 
 
-def short_form(scene: Scene) -> ShortForm:
+def short_form(scene: LineScene) -> ShortForm:
     """Where the keys of the network of a scene are in that."""
     pairs: list[tuple[Place, Place]] = [(("lines", LINE), ("cable",))]
     pairs += [(("lines", LINE, name), (name,)) for name in ("model", *OF_LINE)]
@@ -204,7 +204,7 @@ def _output(output: Output) -> dict[str, Any]:
     return found
 
 
-def _complaints(scene: Scene, error: ValidationError) -> Iterator[Complaint]:
+def _complaints(scene: LineScene, error: ValidationError) -> Iterator[Complaint]:
     """What a network refuses, where the scene has it."""
     form = short_form(scene)
     for each in error.errors(include_url=False):

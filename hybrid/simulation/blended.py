@@ -14,7 +14,7 @@ from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.scene.end_loads import Triple
 from hybrid.scene.motion_tables import Motion
-from hybrid.scene.schema import Points, Scene
+from hybrid.scene.schema import LineScene, Points
 from hybrid.scene.vessel_record import motion_record
 from hybrid.simulation.events import EventLog
 
@@ -23,7 +23,7 @@ AT_REST = 1e-9  # m, deg, m/s or deg/s, below which a record starts at rest
 DRAWN = 0.02
 
 
-def note_blended(scene: Scene, events: EventLog) -> None:
+def note_blended(scene: LineScene, events: EventLog) -> None:
     """An event for every motion file with a ramp: where it starts, how fast, and until when it is blended in."""
     for k, (name, end) in enumerate(scene.ends.named().items()):
         held = end.held_tangent is not None
@@ -55,7 +55,7 @@ def blended_text(where: str, motion: Motion | None, position: Triple | None, tur
     )
 
 
-def note_drawn(scene: Scene, events: EventLog) -> None:
+def note_drawn(scene: LineScene, events: EventLog) -> None:
     """An event for a line that starts stretched, or compressed, as its points are drawn and its ends do not ask for."""
     initial, cable, held = scene.initial, scene.cable, scene.ends.held()
     if not isinstance(initial, Points) or initial.arc_lengths is not None or cable.inextensible:
@@ -74,7 +74,7 @@ def note_drawn(scene: Scene, events: EventLog) -> None:
 
 
 def rotate_ends_in(
-    scene: Scene, model: Model, state: State, events: EventLog, held: tuple[bool, bool] = (True, True)
+    scene: LineScene, model: Model, state: State, events: EventLog, held: tuple[bool, bool] = (True, True)
 ) -> None:
     """Tangents that the initial shape does not have are reached smoothly, and an event says so.
 

@@ -34,7 +34,7 @@ from hybrid.model.resolution import (
 from hybrid.model.self_reach import self_reach, without_contact
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.interrupts import at_once
@@ -109,7 +109,7 @@ class Case:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: LineScene,
         criterion: UserCriterion | None,
         changes: Sequence[LoadChange] = (),
         points: OutputPoints | None = None,
@@ -128,7 +128,7 @@ class Case:
         self.late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
         self.late_finer: LateFile | None = None  # of a finer one, which may take its place
         self._results = 0  # that were begun
-        self._told: tuple[Scene, str] | None = None  # a scene, and what it is as a text
+        self._told: tuple[LineScene, str] | None = None  # a scene, and what it is as a text
         self._owner = threading.get_ident()  # the thread that puts files in their places
         self._start_of_lines: tuple[Resolution, Start] | None = None
         self.reach: Reach | None = None  # how far the line moves, by a pre-run

@@ -30,7 +30,7 @@ from hybrid.model.self_reach import no_contact
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.section_use import Pipes
 from hybrid.outputs.step_quantities import StepQuantities
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.self_watch import SelfWatch
 from hybrid.solve.run import CompiledRun, no_extremes
 from hybrid.solve.statics import Equilibrium
@@ -61,7 +61,7 @@ _S_TEXT = (
 NEVER_NEAR = blank_itself(np.ones(1)).found
 
 
-def marked_places(scene: Scene, model: Model) -> tuple[tuple[float, int], ...]:
+def marked_places(scene: LineScene, model: Model) -> tuple[tuple[float, int], ...]:
     """Arc lengths, m, of point loads, ends of modules and changes of section, with their bits of state.books."""
     edges = [x for modules in modules_of(scene) for x in modules.range]
     loads = tuple((float(x), b.LOADED) for x in (*model.attached, *edges))
@@ -77,7 +77,7 @@ def marks_on(s: Floats, places: Sequence[tuple[float, int]]) -> np.ndarray:
     return marks
 
 
-def marks_of(scene: Scene, model: Model) -> np.ndarray:
+def marks_of(scene: LineScene, model: Model) -> np.ndarray:
     """The same for the nodes of a model."""
     return marks_on(model.line.s, marked_places(scene, model))
 
@@ -100,7 +100,7 @@ class Envelope:
     Places are nodes; those where a quantity may have two values come twice, the left value first.
     """
 
-    def __init__(self, scene: Scene, model: Model, moves: bool, touches: bool = False) -> None:
+    def __init__(self, scene: LineScene, model: Model, moves: bool, touches: bool = False) -> None:
         """moves: whether there are steps; of an equilibrium the nodes are those of its line.
 
         touches: whether it is one in which lines touch each other.
@@ -288,7 +288,7 @@ def with_all_rows(x: Any) -> Any:
 
 
 def of_equilibrium(
-    envelope: Envelope, scene: Scene, model: Model, found: Equilibrium, event: Callable[..., None]
+    envelope: Envelope, scene: LineScene, model: Model, found: Equilibrium, event: Callable[..., None]
 ) -> dict[str, np.ndarray]:
     """Values of the envelope of an equilibrium under full loads: those of its one state.
 

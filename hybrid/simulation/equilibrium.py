@@ -21,7 +21,7 @@ from hybrid.model.initial_shape import GIVEN
 from hybrid.model.plane import leaves_plane, planar, untwist
 from hybrid.model.self_reach import touching
 from hybrid.scene.analysis import Equilibrium as StaticStart
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.contact_equilibrium import settled_from, with_contact
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.slack_bends import slack_remedy
@@ -36,7 +36,7 @@ CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
 MANY = 1000
 
 
-def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
+def equilibrium_of(scene: LineScene, model: Model, t: float) -> Equilibrium:
     """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size.
 
     Of a line that touches itself, where contact is asked for, that to which a damped motion with contact leads; so too
@@ -61,7 +61,7 @@ def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
     return with_contact(model, t, found) or found
 
 
-def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
+def _without_contact(scene: LineScene, model: Model, t: float) -> Equilibrium:
     """Equilibrium of a line that nothing keeps from passing through itself."""
     try:
         found = _as_laid(scene, model, t)
@@ -81,7 +81,7 @@ def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
 
 
 def count_turns(
-    scene: Scene, model: Model, t: float, state: State, given: tuple[float, float] | None = None,
+    scene: LineScene, model: Model, t: float, state: State, given: tuple[float, float] | None = None,
     keeps_link: bool = False,
 ) -> None:  # fmt: skip
     """ComputationError where a rod between two ends that hold it is not twisted by the turns of the scene.
@@ -168,7 +168,7 @@ def _untwisted(model: Model, line: Line, start: State) -> State:
     return out
 
 
-def _as_laid(scene: Scene, model: Model, t: float) -> Equilibrium:
+def _as_laid(scene: LineScene, model: Model, t: float) -> Equilibrium:
     """Equilibrium with friction that has settled as the scene says; as it says nothing, that is where it can."""
     way = settling(scene, model)
     try:
@@ -196,7 +196,7 @@ def pulled_from(found: Equilibrium, pull: Callable[[], Equilibrium]) -> Equilibr
 
 
 def _statics(
-    scene: Scene, model: Model, t: float, settle: str = "", quick: bool = False, start: State | None = None
+    scene: LineScene, model: Model, t: float, settle: str = "", quick: bool = False, start: State | None = None
 ) -> Equilibrium:
     """The equilibrium by the ways of `Search`, from the start of the model or another."""
     lies = bool(model.line.bits & OBSTACLES)
@@ -235,12 +235,12 @@ def _statics(
     return solve(search._replace(refused=refused if counts else None))
 
 
-def _settles(scene: Scene, model: Model, t: float) -> bool:
+def _settles(scene: LineScene, model: Model, t: float) -> bool:
     """Whether friction holds the cable where it starts, so that no other start will do."""
     return bool(model.line.bits & FRICTION) and (settling(scene, model) == "start" or not model.ends.at(t).held.any())
 
 
-def settling(scene: Scene, model: Model, touches: bool = False) -> str:
+def settling(scene: LineScene, model: Model, touches: bool = False) -> str:
     """How friction is to settle, as of `Search`: a shape that the scene gives is where the line was laid.
 
     "usual": as "pull" on a bed alone, where that leads anywhere, else not, which a scene has that says nothing of it.
@@ -257,7 +257,7 @@ def settling(scene: Scene, model: Model, touches: bool = False) -> str:
     return "usual" if hangs and not meets and model.payout is None else ""
 
 
-def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:
+def _by_coarser(scene: LineScene, model: Model, t: float) -> Equilibrium | None:
     """The equilibrium of a line of many cells: by Newton at once, or from that of a coarser mesh, easier to find.
 
     Of very many the coarser one comes first: where Newton fails at once, that costs more than all the rest.
@@ -275,7 +275,7 @@ def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:
     return None
 
 
-def _from_coarser(scene: Scene, model: Model, fewer: Model, t: float) -> Equilibrium:
+def _from_coarser(scene: LineScene, model: Model, fewer: Model, t: float) -> Equilibrium:
     """From the equilibrium of the model with fewer cells; ComputationError: there is none, or it leads to none."""
     coarse = _by_coarser(scene, fewer, t) or _statics(scene, fewer, t)
     start = refined(coarse.state, fewer.line, model.line)

@@ -18,12 +18,12 @@ from hybrid.model.payout import payout_of
 from hybrid.model.resolution import first_resolution, wants_errors
 from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
-from hybrid.scene.read import validate_scene
-from hybrid.scene.schema import Equilibrium, Scene
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import Equilibrium, LineScene
 from hybrid.simulation.switch import at_rest_as_network
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.run.in_plane", "run.run.in_space")
@@ -50,7 +50,7 @@ SAMPLE = {
 }  # fmt: skip
 
 
-def kernels_of(scene: Scene | System, static: bool = False) -> list[str]:
+def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     """The kernels that a run of a scene calls, as room.file.function, by the last of each family; the solver's first.
 
     static: those of its equilibrium, whose stability is judged where there are rods and no end moments.
@@ -80,7 +80,7 @@ def _kernels_of_network(scene: Any, static: bool) -> list[str]:
     return found
 
 
-def _kernels_of_cable(scene: Scene, static: bool) -> list[str]:
+def _kernels_of_cable(scene: LineScene, static: bool) -> list[str]:
     """Of a cable.
 
     Whether it is computed in a plane follows from the scene; rarely its first shape leaves the plane.
@@ -95,20 +95,20 @@ def _kernels_of_cable(scene: Scene, static: bool) -> list[str]:
     return [*solvers, *beside, *more]
 
 
-def _is_in_space(scene: Scene, dimension: int | None) -> bool:
+def _is_in_space(scene: LineScene, dimension: int | None) -> bool:
     """Whether a line is not computed in a plane, whatever it does."""
     tables = scene.environment, scene.cable, scene.ends, scene.initial
     leaves = plane_of(*tables, TYPED if dimension == 2 else EXACT)[1]
     return dimension == 3 or bool(scene.contact.self or scene.obstacles or leaves)
 
 
-def _is_judged(scene: Scene, static: bool) -> bool:
+def _is_judged(scene: LineScene, static: bool) -> bool:
     """Whether the stability of an equilibrium is."""
     turned = any(load.what == "moment" for end in scene.ends.both for load in end.loads)
     return (static or isinstance(scene.initial, Equilibrium)) and _has_rods(scene) and not turned
 
 
-def _kernels_of_lines(system: System, static: bool) -> list[str]:
+def _kernels_of_lines(system: Network, static: bool) -> list[str]:
     """Of lines with names."""
     found = [*OF_LINES, START_OF_LINES, *((REST_OF_LINES,) if static else (BOOKS_OF_LINES, STEPS_OF_LINES))]
     joined = {name for name, x in system.lines.items() if system.is_joined(x.start) or system.is_joined(x.end)}
@@ -127,7 +127,7 @@ def _kernels_of_lines(system: System, static: bool) -> list[str]:
     return found
 
 
-def _has_rods(scene: Scene) -> bool:
+def _has_rods(scene: LineScene) -> bool:
     """Whether part of the cable is a rod from the beginning; zones that move (adaptive) may have none."""
     zones = scene.model.zones if isinstance(scene.model, ZonesModel) else ()
     return isinstance(scene.model, RodModel) or any(isinstance(zone, RodZone) for zone in zones)
@@ -150,7 +150,7 @@ def is_ready(name: str) -> bool:
     return bool(entry(name).signatures) or is_warm([name])
 
 
-def compile_beside(scene: Scene | System, static: bool = False) -> None:
+def compile_beside(scene: Scene, static: bool = False) -> None:
     """Let a second process compile what a scene calls besides the solver, which this one compiles meanwhile.
 
     Each waits for what the other is compiling (machine.compile).  Does nothing where all is compiled, or where there is
@@ -197,7 +197,7 @@ def compile_all(names: Sequence[str]) -> None:
     if PAYOUT in names:
         for kernel in payout_kernels():
             kernel.compile_unless_busy(table)
-    scene = validate_scene(SAMPLE)
+    scene = LineScene.model_validate(SAMPLE)
     model = build(scene)
     if OUTPUTS in names:
         _compile_outputs(model)
@@ -239,7 +239,7 @@ def _compile_outputs(model: Model) -> None:
     stored_energy(model.line, model.sea.values, model.start.r)
 
 
-def _compile_zones(scene: Scene, model: Model, moves: bool) -> None:
+def _compile_zones(scene: LineScene, model: Model, moves: bool) -> None:
     from hybrid.kernels.mesh.zone_step import follow_zones
     from hybrid.simulation.initial_zones import manager_for
 

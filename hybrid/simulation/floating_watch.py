@@ -12,7 +12,7 @@ from hybrid.kernels.run.network_sampling import SAMPLE_AXES, SAMPLE_PLACE
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.network import NetworkModel, build_system
 from hybrid.scene.attachments import sphere_diameter
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FixedPoint, FreePoint
 from hybrid.simulation.run_points import Sampled, times
 from hybrid.simulation.run_start import equilibrium_of_system
@@ -24,7 +24,7 @@ UNDER = 1e-3
 DEEPER = 3.0
 
 
-def note_dry_bodies(system: System, model: NetworkModel, seen: Sampled, dry: set[str], tell: Tell) -> None:
+def note_dry_bodies(system: Network, model: NetworkModel, seen: Sampled, dry: set[str], tell: Tell) -> None:
     """An event where a body that counts as submerged has risen out of the water; dry: names of those told already."""
     fluid = system.environment.fluid
     if fluid is None or fluid.surface is None:
@@ -45,7 +45,7 @@ def note_dry_bodies(system: System, model: NetworkModel, seen: Sampled, dry: set
 
 
 def note_pulled_under(
-    system: System, model: NetworkModel, seen: Sampled, depths: dict[str, float], tell: Tell, *, moves: bool
+    system: Network, model: NetworkModel, seen: Sampled, depths: dict[str, float], tell: Tell, *, moves: bool
 ) -> None:
     """An event where a point that floats by itself is wholly below the surface, and where it is much deeper.
 
@@ -76,7 +76,7 @@ def note_pulled_under(
             depths[name] = float(depth[k])
 
 
-def _floating(system: System, level: float) -> list[str]:
+def _floating(system: Network, level: float) -> list[str]:
     """Names of the points that are more buoyant than heavy, and are to float at a level (m).
 
     They have a height, which nothing but the surface asks for, or are first put at the surface; a buoy that is moored
@@ -97,14 +97,14 @@ def _height(point: FreePoint) -> float:
     return point.height or sphere_diameter(point.volume)
 
 
-def _net(system: System, point: FreePoint) -> float:
+def _net(system: Network, point: FreePoint) -> float:
     """Buoyancy of its whole volume less its weight, N."""
     fluid = system.environment.fluid
     assert fluid is not None
     return system.environment.gravity * (fluid.density * point.volume - point.mass)
 
 
-def _held(system: System, model: NetworkModel, seen: Sampled, name: str) -> tuple[Floats, Floats]:
+def _held(system: Network, model: NetworkModel, seen: Sampled, name: str) -> tuple[Floats, Floats]:
     """Places (nb, 3) m of a point, and by how much its lines pull it down (nb,) N."""
     pull, place = np.zeros(len(seen.t)), np.zeros((len(seen.t), 3))
     for line, end in system.lines_at(name):
@@ -125,7 +125,7 @@ def _elevations(sea: Sea, r: Floats, now: Floats) -> Floats:
     return np.asarray(now[:, 2] * (np.cos(angle) @ A))
 
 
-def _at_surface(system: System, point: FreePoint, name: str, place: Floats, z: float) -> str:
+def _at_surface(system: Network, point: FreePoint, name: str, place: Floats, z: float) -> str:
     """What the lines would pull of a point at rest that just floats, at a height z (m), and what would bear them."""
     fluid = system.environment.fluid
     assert fluid is not None

@@ -25,7 +25,7 @@ from hybrid.model.payout_law import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.accuracy import ROUGHEST
 from hybrid.scene.motion_checks import longest_period
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.contact_equilibrium import nearness
 from hybrid.simulation.equilibrium import MANY, equilibrium_of, solve_like
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
@@ -49,7 +49,12 @@ OF_ALONG = 0.25
 
 
 def zones_at_start(
-    scene: Scene, model: Model, resolution: Resolution, t: float, criterion: UserCriterion | None, at_rest: bool = False
+    scene: LineScene,
+    model: Model,
+    resolution: Resolution,
+    t: float,
+    criterion: UserCriterion | None,
+    at_rest: bool = False,
 ) -> tuple[Model, Equilibrium | None, ZoneSwitching]:
     """Zones, equilibrium if one is asked for, and what will move the zones."""
     assert isinstance(scene.model, AdaptiveModel)
@@ -81,7 +86,7 @@ def reasons_at_start(manager: DomainManager | None) -> str:
     return json.dumps(found)
 
 
-def _with_followed_cells(scene: Scene, model: Model, manager: DomainManager, t: float) -> tuple[Model, Equilibrium]:
+def _with_followed_cells(scene: LineScene, model: Model, manager: DomainManager, t: float) -> tuple[Model, Equilibrium]:
     """Equilibrium of a line whose cells follow the curvature, on the cells that it asks for; rod wherever it may be.
 
     A line that touches itself, is turned, or has no equilibrium on these cells, begins on the shortest ones.
@@ -146,7 +151,9 @@ def planned_cells(model: Model, manager: DomainManager, state: State, t: float) 
     return here
 
 
-def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: UserCriterion | None) -> DomainManager:
+def manager_for(
+    scene: LineScene, model: Model, resolution: Resolution, criterion: UserCriterion | None
+) -> DomainManager:
     """The domain manager of a model that is rod wherever it may be."""
     wanted = scene.model
     assert isinstance(wanted, AdaptiveModel) and model.layout is not None
@@ -175,7 +182,7 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     return manager
 
 
-def _given(scene: Scene, model: Model, pace: float) -> np.ndarray:
+def _given(scene: LineScene, model: Model, pace: float) -> np.ndarray:
     """(n,) of base cells: 1 rod, -1 catenary, 0 adaptive; pace: s, ramp time of bending stiffness."""
     assert model.layout is not None
     if model.payout is None:
@@ -186,7 +193,7 @@ def _given(scene: Scene, model: Model, pace: float) -> np.ndarray:
     return rods_at_winch(scene, paid, model, paid.count(paid.first), pace, fastest(paid.law))
 
 
-def shares_asked(scene: Scene, curvature_error: float | None, bends: float = math.inf) -> dict[int, float]:
+def shares_asked(scene: LineScene, curvature_error: float | None, bends: float = math.inf) -> dict[int, float]:
     """Parts of the largest tension, curvature and moment along the line that leaving bending out may make.
 
     bends: of `Resolution`: what limits of bending ask for as well.

@@ -25,14 +25,14 @@ from hybrid.model.mesh_grading import GROWTH, SAMPLES, Grading, layers
 from hybrid.model.model_costs import with_model
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free, shows_bends, wants_survey
-from hybrid.scene.schema import AdaptiveModel, Equilibrium, Scene
+from hybrid.scene.schema import AdaptiveModel, Equilibrium, LineScene
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.mesh_survey import Survey, survey_resolution
 from hybrid.simulation.section_layers import MORE
 
 if TYPE_CHECKING:  # of several lines, which most scenes do not have
     from hybrid.model.network import NetworkResolution
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
     from hybrid.simulation.case import Case
     from hybrid.simulation.static_case import StaticCase
 
@@ -73,7 +73,7 @@ def layered(case: Case | StaticCase, resolution: Resolution) -> Resolution:
     return resolution if grading is None else replace(resolution, grading=grading)
 
 
-def layered_lines(system: System, resolution: NetworkResolution, moves: bool) -> NetworkResolution:
+def layered_lines(system: Network, resolution: NetworkResolution, moves: bool) -> NetworkResolution:
     """The same of several lines, of those that leave their mesh open and ask for no pre-run.
 
     moves: the equilibrium is that with which a motion begins, else that under full loads.
@@ -93,7 +93,7 @@ def layered_lines(system: System, resolution: NetworkResolution, moves: bool) ->
     return replace(resolution, lines=lines)
 
 
-def _rest_of(system: System, resolution: NetworkResolution, moves: bool) -> dict[str, tuple[Model, State]]:
+def _rest_of(system: Network, resolution: NetworkResolution, moves: bool) -> dict[str, tuple[Model, State]]:
     """Models of several lines with their first states, by name; moves: as of `layered_lines`.  ComputationError."""
     from hybrid.model.network import build_system
     from hybrid.simulation.run_start import equilibrium_of_system
@@ -106,7 +106,7 @@ def _rest_of(system: System, resolution: NetworkResolution, moves: bool) -> dict
     return dict(zip(model.names, zip(model.models, states, strict=True), strict=True))
 
 
-def shown_lines(system: System, resolution: NetworkResolution, moves: bool) -> NetworkResolution:
+def shown_lines(system: Network, resolution: NetworkResolution, moves: bool) -> NetworkResolution:
     """As `shown`, of several lines that have a pre-run; moves: as of `layered_lines`."""
     if moves and system.starts_as_placed:
         return resolution
@@ -158,18 +158,18 @@ def shown(case: Case | StaticCase, resolution: Resolution) -> Resolution:
     return found
 
 
-def _unfolded(scene: Scene, model: Model, state: State) -> Grading | None:
+def _unfolded(scene: LineScene, model: Model, state: State) -> Grading | None:
     """The cells that show the bends of a state, where a rod folds from one cell to the next; None: none does."""
     return grading_of(scene, model, state) if float(_turns(model, state).max()) > MOST_FOLD else None
 
 
-def _is_open(scene: Scene, resolution: Resolution) -> bool:
+def _is_open(scene: LineScene, resolution: Resolution) -> bool:
     """Whether the cells of a line are for the program to place, and not yet placed."""
     placed = follows_curvature(scene) or resolution.grading is not None or payout_of(scene) is not None
     return mesh_is_free(scene) and not placed
 
 
-def grading_of(scene: Scene, model: Model, state: State) -> Grading | None:
+def grading_of(scene: LineScene, model: Model, state: State) -> Grading | None:
     """The cells that show all bends of a state; None: its own do."""
     line, length = model.line, model.length
     if not line.spin.any():

@@ -47,7 +47,7 @@ from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
@@ -115,7 +115,7 @@ WANTED = Wanted()
 
 
 def observer_of(
-    scene: Scene, model: Model, moves: bool, only: Sequence[str] | None = None, wanted: Wanted = WANTED
+    scene: LineScene, model: Model, moves: bool, only: Sequence[str] | None = None, wanted: Wanted = WANTED
 ) -> Observer:
     """What records the outputs of a line; moves: whether it does, or is in equilibrium; only: quantities, None: all."""
     points = wanted.points or output_points(scene)
@@ -170,7 +170,7 @@ class LineResult:
     _sampled: Sequence[Output] = ()  # of several meshes, of which `output` is still to be told
 
     def __init__(
-        self, number: int, name: str, scene: Scene, model: Model, found: LinesAtRest | None, state: State,
+        self, number: int, name: str, scene: LineScene, model: Model, found: LinesAtRest | None, state: State,
         outputs: int, wanted: Wanted = WANTED, paying: PayingOut | None = None,
     ) -> None:  # fmt: skip
         """number: of the line in its system; found: the equilibrium that it starts from, None: it has none; state: from

@@ -28,7 +28,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching, joined_ends_of
 from hybrid.model.network import NetworkModel
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.simulation.contact_equilibrium import JUMP, jumps
 from hybrid.simulation.self_watch import diameters, least_bending
 from hybrid.solve.joined import NetworkState
@@ -85,14 +85,14 @@ def pair_text(shared: SharedContact, model: NetworkModel) -> str:
 # --- lines between which no contact is computed -------------------------------------------------------
 
 
-def watched_pairs(system: System, model: NetworkModel) -> list[tuple[int, int]]:
+def watched_pairs(system: Network, model: NetworkModel) -> list[tuple[int, int]]:
     """Numbers of lines, two each, that have diameters, and between which no contact is computed."""
     thick = [k for k, x in enumerate(model.models) if (diameters(x) > 0.0).all()]
     touching = model.touching
     return [(a, b) for a, b in combinations(thick, 2) if touching is None or b not in touching.partners(a)]
 
 
-def _joined_by_place(system: System, width: float) -> NDArray[np.int64]:
+def _joined_by_place(system: Network, width: float) -> NDArray[np.int64]:
     """As joined_ends_of, but what is held or moved is one thing only where it is one place at first.
 
     width: m, the largest diameter.
@@ -112,7 +112,7 @@ class LinesWatch:
     """What looks after every step whether two of such lines have met, or are near."""
 
     def __init__(
-        self, system: System, model: NetworkModel, met: set[tuple[int, int]], clock: Clock,
+        self, system: Network, model: NetworkModel, met: set[tuple[int, int]], clock: Clock,
         alone: Collection[tuple[int, int]] = (),
     ) -> None:  # fmt: skip
         """met: lines of which it is known; clock: of the run; alone: lines that may meet, but are let pass."""
@@ -142,7 +142,7 @@ class LinesWatch:
         even, odd = self._jobs
         return even.numbers, odd.numbers, watch_lines.address(even.numbers)
 
-    def begin(self, system: System) -> set[tuple[int, int]]:
+    def begin(self, system: Network) -> set[tuple[int, int]]:
         """Look at the start, to which the jobs of even parity lead; lines that meet at a point or body and lie in each
 
         other there, by a narrow angle, are returned: of these nothing is said.

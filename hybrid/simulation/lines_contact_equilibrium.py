@@ -19,7 +19,7 @@ from hybrid.model.first_state import HUNG, first_state
 from hybrid.model.initial_shape import GIVEN, hung
 from hybrid.model.lines_contact import touching_among
 from hybrid.model.network import NetworkModel
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.simulation.contact_equilibrium import KEPT, contact_of, nearness, passes_itself
 from hybrid.simulation.lines_contact import crossed, shared_of, watched_pairs
 from hybrid.solve.contact_statics import contact_energy
@@ -91,7 +91,7 @@ def _passes_another(
     return any(True for a, b in pairwise((first, *way[::-1])) for _ in crossed(model.touching, a, b))
 
 
-def crossings(system: System, model: NetworkModel, rest: NetworkState) -> list[tuple[int, int]]:
+def crossings(system: Network, model: NetworkModel, rest: NetworkState) -> list[tuple[int, int]]:
     """Numbers of lines, two each, without contact, that cross on the straight way from first shapes to an equilibrium.
 
     A first shape says on which side of another line one lies where the scene gives it, or it hangs between held places.

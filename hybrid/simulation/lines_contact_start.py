@@ -13,7 +13,7 @@ from hybrid.kernels.state.state import Line
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import touching_among
 from hybrid.model.self_reach import contact_bits
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.lines_contact import PASSED, pair_text
 from hybrid.simulation.lines_contact_equilibrium import crossings, energy_between
 from hybrid.simulation.run_of_lines import RunOfLines
@@ -83,7 +83,7 @@ def touch_each_other(run: RunOfLines, pairs: Iterable[Pair]) -> None:
     for k in {*now, *(before.lines if before is not None else ())}:
         scene = run.model.scenes[run.model.names[k]]
 
-        def change(line: Line, scene: Scene = scene, touches: bool = k in now) -> Line:
+        def change(line: Line, scene: LineScene = scene, touches: bool = k in now) -> Line:
             if touches and touching is not None:
                 return touching.bits(line)
             return line._replace(bits=(line.bits & ~(SELF_CONTACT | SELF_FRICTION)) | contact_bits(scene))

@@ -24,9 +24,9 @@ from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.bodies import FixedBody, FreeBody, HeldBody
 from hybrid.scene.body_shapes import BodyShape
 from hybrid.scene.network import JoinedLine
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead, FixedPoint
-from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
+from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
 from hybrid.scene.suggestions import nearest
 from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.lines_contact_equilibrium import contacts_of
@@ -82,7 +82,7 @@ class Offsets:
     tension: dict[str, Floats]
 
 
-def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
+def stiffness(scene: SceneLike, at: str) -> Stiffness:
     """Stiffness of a system of lines at `point:NAME` or `body:NAME`, free or held; from the factors of the equilibrium.
 
     SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
@@ -118,7 +118,7 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     return Stiffness(at, matrix, np.asarray(matrix - own, float), position, rotation)
 
 
-def _equilibrium(system: System, model: NetworkModel) -> LinesAtRest:
+def _equilibrium(system: Network, model: NetworkModel) -> LinesAtRest:
     """Under full loads, without friction.  SceneError: a line that contact is asked for is within itself in it."""
     found = equilibrium_of_system(system, model, np.inf, friction=False)
     if not found.settled:
@@ -224,7 +224,7 @@ def _place_of(solver: NetworkSolver, state: NetworkState, before: NetworkState, 
     return np.concatenate([row[PLACE:FRAME] - old[PLACE:FRAME], turn])
 
 
-def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], heading: float = 0.0) -> Offsets:
+def offsets(scene: SceneLike, at: str, distances: Sequence[float], heading: float = 0.0) -> Offsets:
     """Forces of the lines on `point:NAME` or `body:NAME` held at distances (m) from its equilibrium along a heading
     (deg, counter-clockwise from the x axis), at the height and rotation that it has there; a point to which lines are
     clamped keeps their directions.
@@ -297,7 +297,7 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     )  # fmt: skip
 
 
-def _largest_tension(found: LinesAtRest, model: NetworkModel, system: System, l: int) -> float:
+def _largest_tension(found: LinesAtRest, model: NetworkModel, system: Network, l: int) -> float:
     """Of the cells of line l, and of its ends, where the force of what holds it is known, N."""
     state, report, line = found.state.lines[l], found.solver.work[l].report, model.models[l]
     marks = marks_of(system.scene_of(model.names[l]), line)
@@ -311,9 +311,9 @@ def _largest_tension(found: LinesAtRest, model: NetworkModel, system: System, l:
     return largest
 
 
-def _system(scene: SceneLike | System) -> System:
-    found = as_scene_or_system(scene)
-    if not isinstance(found, System):
+def _system(scene: SceneLike) -> Network:
+    found = as_scene(scene)
+    if not isinstance(found, Network):
         expected = "a scene of several lines, with points and lines"
         raise SceneError(
             [Complaint("cable", "a scene of one cable", expected, "write it as one line between two points")]
@@ -321,7 +321,7 @@ def _system(scene: SceneLike | System) -> System:
     return found
 
 
-def target_of(system: System, at: str) -> tuple[str, str]:
+def target_of(system: Network, at: str) -> tuple[str, str]:
     """Kind and name of what is asked for, `point:NAME` or `body:NAME`; SceneError where the scene has no such one."""
     kind, _, name = at.partition(":")
     if name not in (system.points if kind == "point" else system.bodies if kind == "body" else ()):
@@ -336,23 +336,23 @@ def target_of(system: System, at: str) -> tuple[str, str]:
     return kind, name
 
 
-def _ends(system: System) -> list[tuple[str, str]]:
+def _ends(system: Network) -> list[tuple[str, str]]:
     return [(x.start, x.end) for x in system.lines.values()]
 
 
-def _points_of(system: System, kind: str, name: str) -> list[str]:
+def _points_of(system: Network, kind: str, name: str) -> list[str]:
     if kind == "point":
         return [name]
     return [p for p, point in system.points.items() if isinstance(point, Fairlead) and point.body == name]
 
 
-def _place(system: System, model: NetworkModel, found: LinesAtRest, point: str) -> Floats:
+def _place(system: Network, model: NetworkModel, found: LinesAtRest, point: str) -> Floats:
     """Where a point is in an equilibrium."""
     line, end = system.lines_at(point)[0]
     return np.asarray(found.state.lines[model.names.index(line)].r[-(end == "end")]).copy()
 
 
-def _clamped_as_they_lie(system: System, model: NetworkModel, found: LinesAtRest, point: str) -> dict[str, JoinedLine]:
+def _clamped_as_they_lie(system: Network, model: NetworkModel, found: LinesAtRest, point: str) -> dict[str, JoinedLine]:
     """The lines, with inertial directions of an equilibrium for those that are clamped to a free point."""
     axes = found.state.bodies[len(model.bodies) + model.rigid.index(point), FRAME:V].reshape(3, 3)
     lines = dict(system.lines)
@@ -365,7 +365,7 @@ def _clamped_as_they_lie(system: System, model: NetworkModel, found: LinesAtRest
     return lines
 
 
-def _from_where_they_lie(system: System, found: LinesAtRest) -> dict[str, JoinedLine]:
+def _from_where_they_lie(system: Network, found: LinesAtRest) -> dict[str, JoinedLine]:
     """The lines, whose equilibria are searched for from that."""
     shapes = (tuple(map(tuple, x.r.tolist())) for x in found.state.lines)
     return {
@@ -374,7 +374,7 @@ def _from_where_they_lie(system: System, found: LinesAtRest) -> dict[str, Joined
     }
 
 
-def _held(system: System, kind: str, name: str, pose: tuple[Floats, Floats], shape: BodyShape | None) -> System:
+def _held(system: Network, kind: str, name: str, pose: tuple[Floats, Floats], shape: BodyShape | None) -> Network:
     """The system with a point or body held somewhere; pose: place, m, and rotation, deg; shape: of the body."""
     at, turned = (tuple(x.tolist()) for x in pose)
     changed: dict[str, dict[str, Any]] = {"points": {**system.points, name: FixedPoint(position=at)}}
@@ -382,15 +382,15 @@ def _held(system: System, kind: str, name: str, pose: tuple[Floats, Floats], sha
         changed = {"bodies": {**system.bodies, name: FixedBody(position=at, rotation=turned)}}
         if not _points_of(system, kind, name):  # which no scene holds
             del changed["bodies"][name]
-    moved, _ = parse_either(scene_text(system.model_copy(update=changed)))  # so that lines too short are refused
-    assert isinstance(moved, System)
+    moved, _ = read_text(scene_text(system.model_copy(update=changed)))  # so that lines too short are refused
+    assert isinstance(moved, Network)
     if shape is None:
         return moved
     held = HeldBody(position=at, rotation=turned, shape=shape)
     return moved.model_copy(update={"bodies": {**moved.bodies, name: held}})
 
 
-def _make_as_hard(moved: System, there: NetworkModel, system: System, model: NetworkModel) -> None:
+def _make_as_hard(moved: Network, there: NetworkModel, system: Network, model: NetworkModel) -> None:
     """Let obstacles be as hard as they were with a body or point that presses lines on them, and is held now."""
     before = list(system.surfaces)
     same = [before.index(x) for x in moved.surfaces]
@@ -398,7 +398,7 @@ def _make_as_hard(moved: System, there: NetworkModel, system: System, model: Net
         new.sea.values.obstacles[:, STIFFNESS_OF] = old.sea.values.obstacles[same, STIFFNESS_OF]
 
 
-def _contact_on(found: LinesAtRest, system: System, body: str, origin: Floats) -> tuple[Floats, Floats]:
+def _contact_on(found: LinesAtRest, system: Network, body: str, origin: Floats) -> tuple[Floats, Floats]:
     """Force (3,) N of lines that touch a body, and moment (3,) N m about its origin."""
     force, moment, surfaces = np.zeros(3), np.zeros(3), list(system.surfaces)
     if body not in surfaces or body in system.obstacles:
@@ -414,7 +414,7 @@ def _contact_on(found: LinesAtRest, system: System, body: str, origin: Floats) -
 
 
 def _let_go(
-    system: System, model: NetworkModel, found: LinesAtRest, kind: str, name: str
+    system: Network, model: NetworkModel, found: LinesAtRest, kind: str, name: str
 ) -> tuple[NetworkSolver, NetworkState]:
     """The lines of an equilibrium as they are, with what is held at a point or body free to move."""
     points, bodies = len(model.free), found.solver.bodies

@@ -8,9 +8,8 @@ from typing import NamedTuple
 from hybrid.model.model_costs import with_models
 from hybrid.model.network import build_system
 from hybrid.model.resolution import model_is_free, wants_errors
-from hybrid.scene.network_scene import System
 from hybrid.scene.quantities import KINDS, Quantity
-from hybrid.scene.read import SceneLike, as_scene_or_system
+from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.short_form import as_network
 from hybrid.simulation.line_result import Wanted, observer_of
 from hybrid.simulation.pair_forces import fields_of_pairs
@@ -30,12 +29,12 @@ class Listed(NamedTuple):
     description: str
 
 
-def listed_outputs(scene: SceneLike | System) -> list[Listed]:
+def listed_outputs(scene: SceneLike) -> list[Listed]:
     """What `hybrid run` (or `hybrid static` of a scene without time) will record over time; nothing is computed.
 
     Of several lines: what is recorded of points and bodies, and of every line under `lines/<name>/`.
     """
-    asked = as_scene_or_system(scene)
+    asked = as_scene(scene)
     moves, named, (system, _) = asked.time is not None, bool(asked.line_names), as_network(asked)
     free = [name for name in system.lines if model_is_free(system.scene_of(name))]
     system = with_models(system, dict.fromkeys(free, "adaptive"))

@@ -11,7 +11,7 @@ from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel, build_system
 from hybrid.model.release import unclamped, without_hold
 from hybrid.model.self_reach import touching
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.zone_switching import on_layout
 
@@ -19,13 +19,13 @@ from hybrid.simulation.zone_switching import on_layout
 LOADED = ("environment", "points", "bodies")
 
 
-def with_loads_of(system: System, other: System) -> System:
+def with_loads_of(system: Network, other: Network) -> Network:
     """A system with the loads and motions of another one, which has the same lines."""
     return system.model_copy(update={name: getattr(other, name) for name in LOADED})
 
 
 def loaded_as(
-    model: NetworkModel, system: System, t: float, fit: Callable[[NetworkModel], NetworkModel] | None = None
+    model: NetworkModel, system: Network, t: float, fit: Callable[[NetworkModel], NetworkModel] | None = None
 ) -> NetworkModel:
     """The same network from t (s) on with the loads and motions of a system; what is joined or loose stays so.
 
@@ -46,7 +46,7 @@ def loaded_as(
     )  # fmt: skip
 
 
-def _line_as(name: str, now: Model, later: Model, system: System, t: float) -> Model:
+def _line_as(name: str, now: Model, later: Model, system: Network, t: float) -> Model:
     """The model of a line with other loads, on its cells of now, with what has come off it."""
     for k in (0, 1):
         if now.ends.released[k]:
@@ -66,7 +66,7 @@ def _line_as(name: str, now: Model, later: Model, system: System, t: float) -> M
     return replace(later, line=line)
 
 
-def change_loads_of_lines(run: RunOfLines, system: System) -> None:
+def change_loads_of_lines(run: RunOfLines, system: Network) -> None:
     """Other loads, and other motions of points and bodies, from now on; lines stay what they are and where they are."""
     run.ends_of_now()
     for line in run.lines:

@@ -23,7 +23,7 @@ from hybrid.model.resolution import (
 from hybrid.model.sections import limits_along
 from hybrid.scene.accuracy import ROUGHEST
 from hybrid.scene.motion_checks import stationary_from
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_sample import Outputs, reach_of
 
 # Cells and steps so many times as long as those of the first result; places at which it is looked at.
@@ -49,14 +49,14 @@ def survey_points(model: Model, coarse: Resolution) -> Floats:
     return s if coarse.grading is None else np.union1d(s, model.line.s)
 
 
-def survey_duration(scene: Scene) -> float:
+def survey_duration(scene: LineScene) -> float:
     """How long the pre-run is, s: of an irregular motion that is stationary, PERIODS of it, else all of the run."""
     duration = scene.require_time().duration
     found = stationary_from(scene) if is_irregular(scene) else None
     return duration if found is None else min(duration, found[0] + PERIODS * found[1])
 
 
-def with_survey(resolution: Resolution, scene: Scene, survey: Survey | None) -> Resolution:
+def with_survey(resolution: Resolution, scene: LineScene, survey: Survey | None) -> Resolution:
     """With cells where a pre-run shows that they should be, and the share of curvature that limits ask for."""
     if survey is None:
         return resolution
@@ -73,19 +73,19 @@ def stretches_above_one(s: Floats, x: Floats) -> tuple[tuple[float, float, float
     return tuple((float(bounds[a]), float(bounds[b]), float(x[a:b].max())) for a, b in changes.reshape(-1, 2))
 
 
-def lack_along(scene: Scene, survey: Survey) -> Floats:
+def lack_along(scene: LineScene, survey: Survey) -> Floats:
     """`Survey.lack_along` of what a scene asks; none (K,) where it asks for nothing."""
     asked = requested_accuracy(scene)
     return survey.lack_along(asked) if asked is not None else np.zeros(survey.demand.s.size)
 
 
-def asks_along(scene: Scene) -> bool:
+def asks_along(scene: LineScene) -> bool:
     """Whether curvature, moment or tension along the line is asked."""
     asked = requested_accuracy(scene)
     return asked is not None and asked.along
 
 
-def bending_asked(scene: Scene, s: Floats, curvature: Floats) -> float:
+def bending_asked(scene: LineScene, s: Floats, curvature: Floats) -> float:
     """Error of curvature that is asked, as a part of the largest; infinite where none is.
 
     curvature: (K,) 1/m, the largest at s (K,) m, which shows how much of min_bend_radius is used.
@@ -114,7 +114,9 @@ class Survey:
     bends: float = np.inf  # error of curvature that is asked, as a part of the largest
 
     @classmethod
-    def of(cls, scene: Scene, resolution: Resolution, model: Model, s: Floats, run: Mapping[str, Outputs]) -> Survey:
+    def of(
+        cls, scene: LineScene, resolution: Resolution, model: Model, s: Floats, run: Mapping[str, Outputs]
+    ) -> Survey:
         """From positions, curvature and tension (nt, K) of a run at s (K,) m; resolution: of the first result."""
         curvature, tension = np.asarray(run["curvature"]), np.asarray(run["tension"])
         low = np.maximum(tension, 1e-9 * model.tension_scale)

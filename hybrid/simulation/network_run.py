@@ -29,9 +29,9 @@ from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on, output_times
 from hybrid.scene.motion_checks import ramp_ends
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.plane import OUT
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.body_overlap import note_overlaps
 from hybrid.simulation.collapse import COLLAPSE, GIVE_UP, TOUCH_EACH_OTHER, TOUCHES_ITSELF, collapse_text
 from hybrid.simulation.events import Sink, energy_gains_text
@@ -128,9 +128,9 @@ class NetworkRun:
     """One system, computed into a file or into memory."""
 
     def __init__(
-        self, system: System, target: Target | None, text: Text, moves: bool,
+        self, system: Network, target: Target | None, text: Text, moves: bool,
         resolution: NetworkResolution | None = None, recording: Recording = ALONE,
-        criterion: UserCriterion | None = None, changes: Sequence[LoadChange[System]] = (),
+        criterion: UserCriterion | None = None, changes: Sequence[LoadChange[Network]] = (),
     ) -> None:  # fmt: skip
         """target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether
 
@@ -141,7 +141,7 @@ class NetworkRun:
         source, planes = recording.source, recording.planes
         self._notes, self._begun = recording.notes, recording.begun
         self.end = (recording.until or system.require_time().duration) if moves else 0.0
-        self.changes: Sequence[LoadChange[System]] = [
+        self.changes: Sequence[LoadChange[Network]] = [
             replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < self.end
         ]
         self.lets_touch, self.came_near_itself = recording.touches, False
@@ -1024,13 +1024,13 @@ class NetworkRun:
             raise LineFailed(line.number, Outcome.COLLAPSED, self.t, s, text)
 
 
-def line_scenes(system: System, model: NetworkModel) -> dict[str, Scene]:
+def line_scenes(system: Network, model: NetworkModel) -> dict[str, LineScene]:
     """Scenes of the lines of a system by name, between points as they are first looked for."""
     guesses, known = system.guesses, model.scenes
     return {name: system.scene_of(name, system.carried(name), guesses, scene=known[name]) for name in model.names}
 
 
-def start_of(system: System, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:
+def start_of(system: Network, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:
     """The first state of a system, with its zones; moves: whether a motion begins there, else it is at rest."""
     scenes = line_scenes(system, model)
     if moves and system.starts_as_placed:
@@ -1046,10 +1046,10 @@ def _torque_of(manager: DomainManager | None) -> Callable[[], float] | None:
 
 
 def run_system(
-    system: System, target: Target | None, text: str, reporter: ProgressReporter,
+    system: Network, target: Target | None, text: str, reporter: ProgressReporter,
     interrupted: Callable[[], bool], name: str = RESULT, resolution: NetworkResolution | None = None,
     recording: Recording = ALONE, criterion: UserCriterion | None = None,
-    changes: Sequence[LoadChange[System]] = (),
+    changes: Sequence[LoadChange[Network]] = (),
 ) -> NetworkRun:  # fmt: skip
     """Compute the motion of a system into a file with checkpoints, into memory, or (target None) to be compared with.
 
@@ -1064,7 +1064,7 @@ def run_system(
 
 
 def static_system(
-    system: System, target: Target | None, text: Text, resolution: NetworkResolution | None = None, pending: str = ""
+    system: Network, target: Target | None, text: Text, resolution: NetworkResolution | None = None, pending: str = ""
 ) -> NetworkRun:
     """Compute the equilibrium of a system under full loads; target, resolution, pending: as of `run_system`."""
     run = NetworkRun(system, target, text, False, resolution, Recording(pending=pending))

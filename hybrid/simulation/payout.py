@@ -40,7 +40,7 @@ from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.payout import SOURCES
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.store.named_arrays import matched
 
 ROUND_OFF = 1e-9  # of a length
@@ -518,7 +518,7 @@ class PayingOut:
 
 
 def length_asked(
-    scene: Scene, paying: PayingOut | None, length: Any, rate: Any, where: str = ""
+    scene: LineScene, paying: PayingOut | None, length: Any, rate: Any, where: str = ""
 ) -> tuple[float | None, float]:
     """Length (m; None: what the rate leads to) and rate (m/s) that are asked of a line; ValueError: they cannot be.
 

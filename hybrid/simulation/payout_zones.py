@@ -14,7 +14,7 @@ from hybrid.kernels.state.state import State
 from hybrid.model.build import Model, given_zones
 from hybrid.model.layout import Layout
 from hybrid.model.payout import FEWEST_CELLS, PayoutPlan
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.zone_switching import ZoneSwitching
 
@@ -25,7 +25,7 @@ AHEAD = 2.0
 MERGED_AHEAD = 2
 
 
-def rods_at_winch(scene: Scene, plan: PayoutPlan, model: Model, count: int, pace: float, rate: float) -> np.ndarray:
+def rods_at_winch(scene: LineScene, plan: PayoutPlan, model: Model, count: int, pace: float, rate: float) -> np.ndarray:
     """(N,) of base cells: 1 rod, -1 catenary, 0 adaptive, where the winch may reach them soon.
 
     count: material nodes that are out; pace: s; rate: m/s.
@@ -41,7 +41,7 @@ class PaidZones:
     """The zones of one line that is paid out."""
 
     def __init__(
-        self, scene: Scene, paying: PayingOut, switching: ZoneSwitching, turning: Sequence[bool] = (False, False)
+        self, scene: LineScene, paying: PayingOut, switching: ZoneSwitching, turning: Sequence[bool] = (False, False)
     ) -> None:
         """turning: whether the ends are clamped to what turns, beside which a line stays rod."""
         self.scene, self.paying, self.switching, self._turning = scene, paying, switching, turning

@@ -20,7 +20,7 @@ from hybrid.model.output_points import OutputPoints
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.base import dotted
-from hybrid.scene.read import as_scene_or_system, parse_either, scene_text
+from hybrid.scene.read import as_scene, read_text, scene_text
 from hybrid.scene.short_form import as_network
 from hybrid.simulation.restore import kept_resolution, refused, restored_points
 from hybrid.store.checkpoint import read_before, read_checkpoint
@@ -30,7 +30,7 @@ from hybrid.store.reader import Result, open_result
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.model.network import NetworkResolution
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
 MAY_CHANGE = (
@@ -95,7 +95,7 @@ def remaining(
         return left
     begin = left.reached if start is None else start
     last = left.changes[-1] if left.changes else LoadChange(0.0, left.scene)
-    changed, _ = parse_either(scene_text(last.scene), overrides=settings)
+    changed, _ = read_text(scene_text(last.scene), overrides=settings)
     end = changed.require_time().duration
     if until is not None and end != until:
         raise _refused("time.duration", f"{end:g} s", f"{until:g} s, as until says, or nothing", "say it once")
@@ -117,7 +117,7 @@ def _found(path: Path) -> tuple[Remaining[Any], bool]:
             flat, points = not result.lines, None
 
             def read(text: str) -> Any:
-                scene: Any = parse_either(text)[0]
+                scene: Any = read_text(text)[0]
                 return scene if flat else as_begun(scene, result, meets)
 
             scene = _as_often(read(result.scene_text), result)
@@ -148,7 +148,7 @@ def _scene_until(scene: Any, until: float, every: float) -> Any:
     data = scene.model_dump(mode="json", exclude_none=True)
     data["time"]["duration"] = until
     data.setdefault("output", {})["every"] = every
-    return parse_either(scene_text(as_scene_or_system(data)))[0]
+    return read_text(scene_text(as_scene(data)))[0]
 
 
 def _refuse_more_out(before: Any, after: Any, until: float) -> None:
@@ -183,7 +183,7 @@ def _check(last: LoadChange[Any], changed: Any, resolution: NetworkResolution, b
                 _refuse_jump(one, other, k, begin, dotted(form.place((*place, "motion"))))
 
 
-def as_begun(system: System, result: Result, meets: bool) -> System:
+def as_begun(system: Network, result: Result, meets: bool) -> Network:
     """The same, without contact that nobody asks for, of a result of a version that computed none then.
 
     meets: whether it computed that between lines.

@@ -26,7 +26,7 @@ from hybrid.model.mesh import MOST_CELLS
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.resolution import Resolution, first_resolution
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.old_checkpoints import is_of_cable
 from hybrid.store.checkpoint import Checkpoint, read_checkpoint
 from hybrid.store.hdf5_file import is_result, opened
@@ -35,7 +35,7 @@ from hybrid.store.reader import Result, open_result
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.model.network import NetworkResolution
-    from hybrid.scene.network_scene import System
+    from hybrid.scene.network_scene import Network
 
 # Rooms that have a part in the numbers of a file.
 COMPUTES = ("accuracy", "adapt", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store")
@@ -102,7 +102,7 @@ def resolution_tree(resolution: Resolution) -> Tree:
     return tree | {"grading": resolution.grading and vars(resolution.grading)} | rows
 
 
-def resolution_from(tree: Any, scene: Scene) -> Resolution:
+def resolution_from(tree: Any, scene: LineScene) -> Resolution:
     """The resolution again.  ValueError: it is none for this scene."""
     first = first_resolution(scene)
     if not is_of_cable(tree) and len(tree) == 1:
@@ -147,7 +147,7 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     return Resolution(**saved | {"grading": grading} | rows)
 
 
-def kept_resolution(system: System, source: Path) -> NetworkResolution:
+def kept_resolution(system: Network, source: Path) -> NetworkResolution:
     """How finely a result was computed that has a checkpoint.  ResultError: it is none of this system."""
     from hybrid.model.network import NetworkResolution
 

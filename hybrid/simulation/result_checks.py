@@ -9,7 +9,7 @@ import numpy as np
 from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import OF_VIBRATION
 from hybrid.model.start_vibration import Vibration, start_vibrations, strain_travel
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.reader import Result
 
@@ -94,7 +94,7 @@ def cubic_spline(x: Floats, y: Floats, at: Floats) -> Floats:
     )
 
 
-def jolts(scene: Scene) -> list[Vibration]:
+def jolts(scene: LineScene) -> list[Vibration]:
     """Where the slope of a load's history jumps, and the vibration along the line that starts there.
 
     A jump a (N/s) at one end of a bar that is held at the other makes a triangle of a L/c about the slow answer, of
@@ -120,7 +120,7 @@ def jolts(scene: Scene) -> list[Vibration]:
     return found
 
 
-def damped_jolts(scene: Scene, result: RunSample, error: float, allowed: float | None) -> list[tuple[str, str]]:
+def damped_jolts(scene: LineScene, result: RunSample, error: float, allowed: float | None) -> list[tuple[str, str]]:
     """The events that say so where steps damp a vibration that a jump in the slope of a load, or a ramp, starts.
 
     error: N, figure of the forces at the ends, which does not see it, as all runs damp it; allowed: N, None: not asked.

@@ -37,7 +37,7 @@ from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene
 from hybrid.model.sections import SECTION_LIMITS, limits_along, outer_diameter, weakest_bending
 from hybrid.outputs.probes import Observer
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.envelope import Envelope
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
@@ -69,7 +69,7 @@ STEP_FIELDS = (
 
 
 def result_recorder(
-    scene: Scene,
+    scene: LineScene,
     model: Model,
     observer: Observer,
     target: Target,
@@ -122,7 +122,7 @@ def places_of_elevation(gauges: Floats) -> list[tuple[Field, Floats]]:
     return [(Field("elevation_at", "m", text, gauges.shape, ("gauge", "xy")), gauges)] if len(gauges) else []
 
 
-def _note_neglected_bending(scene: Scene, model: Model, recorder: BaseRecorder) -> None:
+def _note_neglected_bending(scene: LineScene, model: Model, recorder: BaseRecorder) -> None:
     """Clamps and point loads in catenary zones: who wants their moment has to ask for it."""
     for s, text in _neglected_clamps(scene, model):
         recorder.event(0.0, s, s, "bending at clamp neglected", text)
@@ -142,7 +142,7 @@ def _bends(model: Model, s: float) -> bool:
     return bool(model.line.element[node]) or not 0 < node < model.line.h.size
 
 
-def _neglected_clamps(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
+def _neglected_clamps(scene: LineScene, model: Model) -> Iterator[tuple[float, str]]:
     """Clamps that lie in a catenary zone because they hardly shift the cable; who wants their moment has to ask."""
     line = model.line
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
@@ -159,7 +159,7 @@ def _neglected_clamps(scene: Scene, model: Model) -> Iterator[tuple[float, str]]
         yield s, text
 
 
-def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
+def _limits(scene: LineScene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
     """What reports hold a result against: limits of the sections, and of rods the bending stiffness.
 
     At jumps that of the section on the left, and in right/* of the one on the right, as of what they are held against.

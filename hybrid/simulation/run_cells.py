@@ -12,7 +12,7 @@ from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import refined
 from hybrid.model.network import NetworkModel
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.simulation.initial_zones import MOST_ROUNDS, on_fewer, planned_cells, with_fewer_cells
 from hybrid.simulation.run_start import equilibrium_of_system, solve_from
 from hybrid.simulation.zone_switching import on_layout
@@ -28,7 +28,7 @@ def following(model: NetworkModel, managers: Mapping[int, DomainManager]) -> dic
     return {k: x for k, x in managers.items() if share[k] > 0.0 and model.models[k].payout is None}
 
 
-def equilibrium_on_cells(system: System, model: NetworkModel, managers: Mapping[int, DomainManager], t: float) -> Rest:
+def equilibrium_on_cells(system: Network, model: NetworkModel, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """Equilibrium of a system, rod wherever it may be; of lines with managers on the cells that it asks for.
 
     managers: by number of the line, of cells that follow.  Lines that touch themselves, are turned or are catenary

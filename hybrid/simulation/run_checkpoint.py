@@ -14,7 +14,7 @@ from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE
 from hybrid.scene.bodies import FixedBody, FreeBody
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.obstacles import files_of as obstacle_files
 from hybrid.simulation.lines_contact_start import touch_each_other
 from hybrid.simulation.lone_planes import LonePlanes
@@ -277,7 +277,7 @@ def kept_changes(source: Path, most: int) -> int:
         return made
 
 
-def files_of(system: System) -> dict[str, str]:
+def files_of(system: Network) -> dict[str, str]:
     """Digests of the files that a scene of several lines reads, by path."""
     guesses = system.guesses
     scenes = [system.scene_of(name, system.carried(name), guesses) for name in system.lines]

@@ -21,7 +21,7 @@ from hybrid.errors import ComputationError
 from hybrid.kernels.machine.cache import cache_folder
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import short_form
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
@@ -49,8 +49,8 @@ AnyRecorder = Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
 class Cable(NamedTuple):
     """The scene of a cable that a network was made of, and what changes in it later."""
 
-    scene: Scene
-    changes: Sequence[LoadChange[Scene]] = ()
+    scene: LineScene
+    changes: Sequence[LoadChange[LineScene]] = ()
 
 
 class Filing(Protocol):
@@ -103,11 +103,11 @@ class LinesFile:
 
     # --- how lines are recorded -----------------------------------------------------------------
 
-    def scene_of(self, scene: Scene) -> Scene:
+    def scene_of(self, scene: LineScene) -> LineScene:
         """The scene by which a line is recorded."""
         return scene
 
-    def of_quantities(self, scenes: Mapping[str, Scene]) -> Mapping[str, Scene]:
+    def of_quantities(self, scenes: Mapping[str, LineScene]) -> Mapping[str, LineScene]:
         """Of these scenes of lines, those whose quantities by name are recorded beside the lines."""
         return scenes
 
@@ -248,10 +248,10 @@ class CableFile(LinesFile):
         s = self._line.model.length if point == "end" else 0.0
         return s, s
 
-    def scene_of(self, scene: Scene) -> Scene:
+    def scene_of(self, scene: LineScene) -> LineScene:
         return self._cable.scene
 
-    def of_quantities(self, scenes: Mapping[str, Scene]) -> Mapping[str, Scene]:
+    def of_quantities(self, scenes: Mapping[str, LineScene]) -> Mapping[str, LineScene]:
         return {}
 
     @property

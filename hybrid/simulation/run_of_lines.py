@@ -15,8 +15,8 @@ from hybrid.adapt.manager import Change
 from hybrid.kernels.state.state import Floats, Line, Work
 from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel, NetworkResolution
-from hybrid.scene.network_scene import System
-from hybrid.scene.schema import Scene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
 from hybrid.simulation.line_of_run import HasPlanes
@@ -57,14 +57,14 @@ class PaidLines(Protocol):
 class RunOfLines(Protocol):
     """A run between two steps; what is writable here, parts change, and the solver follows (`make_solver`)."""
 
-    system: System
+    system: Network
     model: NetworkModel
     state: NetworkState
     other: NetworkState  # after the next step
     solver: NetworkSolver
     loop: NetworkSteps
     lines: list[LineResult]
-    scenes: list[Scene]
+    scenes: list[LineScene]
     resolution: NetworkResolution
     loaded: float  # s, loads that have stopped by then act no more
     rest: Floats  # bodies when the motion began

@@ -22,14 +22,14 @@ from hybrid.model.bodies import angles_of
 from hybrid.model.network import NetworkModel
 from hybrid.outputs.probes import elevation, elevation_field
 from hybrid.scene.bodies import FreeBody
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, Point
 from hybrid.store.format import Field
 
 WORKS = ("lines", "damping", "loads")
 
 
-def fields_of(system: System) -> list[Field]:
+def fields_of(system: Network) -> list[Field]:
     """Place and velocity of all points and bodies, forces on them, energies of free bodies, and the sea at gauges."""
 
     def vector(name: str, unit: str, what: str) -> Field:
@@ -73,7 +73,7 @@ def fields_of(system: System) -> list[Field]:
     return fields
 
 
-def gauges_of(system: System) -> Floats:
+def gauges_of(system: Network) -> Floats:
     """Places (n, 2) m at which the elevation of the sea is recorded."""
     return np.array(system.output.elevation or (), float).reshape(-1, 2)
 
@@ -103,7 +103,7 @@ def times(frames: Floats, x: Floats) -> Floats:
     return np.asarray(frames[..., 0] * x[..., :1] + frames[..., 1] * x[..., 1:2] + frames[..., 2] * x[..., 2:])
 
 
-def values_of(system: System, model: NetworkModel, seen: Sampled) -> dict[str, Floats]:
+def values_of(system: Network, model: NetworkModel, seen: Sampled) -> dict[str, Floats]:
     """The values (nb, ...) of all fields for outputs."""
     values: dict[str, Floats] = {}
     t, count = seen.t, len(seen.bodies)
@@ -150,7 +150,7 @@ def values_of(system: System, model: NetworkModel, seen: Sampled) -> dict[str, F
 class Rotations:
     """Roll, pitch and yaw of bodies and points that go on from output to output, beyond half a turn."""
 
-    def __init__(self, system: System, model: NetworkModel) -> None:
+    def __init__(self, system: Network, model: NetworkModel) -> None:
         """They begin within half a turn of what the scene gives for bodies, and of 0 for points."""
         begin = {f"points/{name}/rotation": np.zeros(3) for name in model.rigid}
         for name, body in system.bodies.items():
@@ -176,7 +176,7 @@ def nearest_angles(angles: Floats, before: Floats) -> Floats:
     return min(both, key=lambda x: float(((x - before) ** 2).sum()))
 
 
-def _clamp_moment(system: System, model: NetworkModel, seen: Sampled, point: str) -> Floats | None:
+def _clamp_moment(system: Network, model: NetworkModel, seen: Sampled, point: str) -> Floats | None:
     """Moment (nb, 3) N m of the lines that are clamped at a point, about it; None: there are none."""
     here = system.clamped_at(point)
     if not here:

@@ -12,9 +12,9 @@ from hybrid.model.network import NetworkModel
 from hybrid.outputs.observation import Probe
 from hybrid.outputs.quantities import Quantities
 from hybrid.outputs.step_quantities import StepQuantities
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FreePoint
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.result_file import limits_of
 from hybrid.store.format import Field
@@ -22,7 +22,7 @@ from hybrid.store.format import Field
 MORE_CELLS = 4  # times as many as at first may a line have whose chords are looked at; with more nothing is known
 
 
-def idle_ends(system: System, model: NetworkModel) -> list[tuple[int, int]]:
+def idle_ends(system: Network, model: NetworkModel) -> list[tuple[int, int]]:
     """Ends (line, 0 or 1) that are alone at a free point on which nothing acts, or have come loose."""
     found = []
     for number, (name, x, joints) in enumerate(zip(model.names, model.models, model.joints, strict=True)):
@@ -37,7 +37,7 @@ def idle_ends(system: System, model: NetworkModel) -> list[tuple[int, int]]:
 class RunQuantities:
     """The quantities of all lines, each computed from a state of its line."""
 
-    def __init__(self, system: System, scenes: Mapping[str, Scene]) -> None:
+    def __init__(self, system: Network, scenes: Mapping[str, LineScene]) -> None:
         """scenes: of the lines whose quantities are kept here, by name; others keep them themselves."""
         self._wanted, self._scenes, self._system = system.output.quantities, scenes, system
         self._idle: frozenset[tuple[str, int]] = frozenset()

@@ -17,7 +17,7 @@ from hybrid.model.mesh import Zone
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.resolution import Reach, Resolution, first_resolution
 from hybrid.outputs.probes import SIDED_ERRORS
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched, pack
 from hybrid.store.records import Zone as ZoneRow
@@ -196,7 +196,7 @@ def rows_key(resolution: Resolution) -> str:
     return hashlib.blake2b(pack(resolution_tree(resolution)), digest_size=4).hexdigest()
 
 
-def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result: Path | None = None) -> RunSample:
+def restored_sample(tree: Any, scene: LineScene, shape: tuple[int, int, int], result: Path | None = None) -> RunSample:
     """A sample from a checkpoint; shape: number of outputs of the result, of its output points, and of its jumps.
 
     result: the file that the checkpoint is in.  ResultError or ValueError: it is none of this scene; MissingRows: its

@@ -19,9 +19,9 @@ from hybrid.model.network import NetworkModel, balanced_places, starts_between
 from hybrid.model.plane import as_kept
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FixedBody
-from hybrid.scene.network_scene import System, floating_groups
+from hybrid.scene.network_scene import Network, floating_groups
 from hybrid.scene.points import Fairlead, FixedPoint
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.blended import blended_text, note_drawn, rotate_ends_in
 from hybrid.simulation.contact_start import refuse_start_in_obstacles
 from hybrid.simulation.diagnostics import borne_strain
@@ -45,7 +45,7 @@ MOST_ROUNDS, SAME_WATER = 40, 1e-8
 FAR = 3.0
 
 
-def equilibrium_of_system(system: System, model: NetworkModel, t: float, friction: bool = True) -> LinesAtRest:
+def equilibrium_of_system(system: Network, model: NetworkModel, t: float, friction: bool = True) -> LinesAtRest:
     """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found.
 
     friction: whether it settles on the bed, of lines that ask for that.
@@ -82,7 +82,7 @@ def equilibrium_of_system(system: System, model: NetworkModel, t: float, frictio
         raise named(failed, model, _nearer(system)) from None
 
 
-def _nearer(system: System) -> str:
+def _nearer(system: Network) -> str:
     """What to try first where a point is looked for farther away than a line to a held point reaches; else empty."""
     worst, text = FAR, ""
     for name, place in system.guesses.items():
@@ -135,7 +135,7 @@ def _are_alone(model: NetworkModel, friction: bool) -> bool:
     return not (joined or touches or (not friction and _ways(model)))
 
 
-def _each_alone(system: System, model: NetworkModel, t: float) -> LinesAtRest:
+def _each_alone(system: Network, model: NetworkModel, t: float) -> LinesAtRest:
     """The equilibria of lines that are joined to nothing that moves, found one by one, as of one cable."""
     found = []
     for k, (name, x) in enumerate(zip(model.names, model.models, strict=True)):
@@ -223,7 +223,7 @@ def _same_water(there: Floats, taken: Floats) -> bool:
     )
 
 
-def _starts(system: System, model: NetworkModel) -> Iterator[Start]:
+def _starts(system: Network, model: NetworkModel) -> Iterator[Start]:
     """Shapes from which the equilibrium is looked for."""
     several = len(model.models) > 1
     shape = "lines hung between the first places" if several else model.models[0].start_shape
@@ -251,7 +251,7 @@ def joined_lines(model: NetworkModel, t: float) -> list[JoinedLine]:
 
 
 def begin_as_placed(
-    model: NetworkModel, scenes: Sequence[Scene], state: NetworkState, events: Sequence[EventLog]
+    model: NetworkModel, scenes: Sequence[LineScene], state: NetworkState, events: Sequence[EventLog]
 ) -> None:
     """Make a start that is no equilibrium ready, of each line as of one cable: clamps that its shape does not fit are
 
@@ -266,7 +266,7 @@ def begin_as_placed(
         stepper.static_friction(x.sea.at(0.0), joined_ends(x.ends.at(0.0), joints), one)
 
 
-def blended_of_lines(system: System) -> Iterator[tuple[str, str]]:
+def blended_of_lines(system: Network) -> Iterator[tuple[str, str]]:
     """Points and bodies of lines, and texts of simulation.blended.note_blended; empty ones of what has no file."""
     for name, point in system.points.items():
         if isinstance(point, FixedPoint):

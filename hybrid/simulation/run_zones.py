@@ -25,8 +25,8 @@ from hybrid.kernels.state.state import Ends, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
 from hybrid.model.network import NetworkModel
-from hybrid.scene.network_scene import System
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.initial_zones import (
     MOST_ROUNDS,
     STRICTER,
@@ -71,7 +71,7 @@ class Start(NamedTuple):
 
 
 def managers_for(
-    scenes: Mapping[str, Scene], model: NetworkModel, criterion: UserCriterion | None
+    scenes: Mapping[str, LineScene], model: NetworkModel, criterion: UserCriterion | None
 ) -> dict[int, DomainManager]:
     """The domain managers of lines that are rod wherever they may be; at a clamp to what is free they stay rod."""
     managers = {
@@ -85,7 +85,7 @@ def managers_for(
 
 
 def start_at_rest(
-    system: System, scenes: Mapping[str, Scene], model: NetworkModel, moves: bool, criterion: UserCriterion | None
+    system: Network, scenes: Mapping[str, LineScene], model: NetworkModel, moves: bool, criterion: UserCriterion | None
 ) -> Start:
     """Equilibrium with its zones and cells; moves: whether a motion begins there, else it has loads of full size."""
     t, managers = (0.0 if moves else np.inf), managers_for(scenes, model, criterion)
@@ -149,7 +149,7 @@ def _with_rods(
 
 
 def zones_as_placed(
-    scenes: Mapping[str, Scene], model: NetworkModel, criterion: UserCriterion | None
+    scenes: Mapping[str, LineScene], model: NetworkModel, criterion: UserCriterion | None
 ) -> tuple[NetworkModel, dict[int, DomainManager]]:
     """Zones of a start that is no equilibrium, as of one cable: rod, but for what a line wants to be catenary."""
     managers, models = managers_for(scenes, model, criterion), [*model.models]

@@ -22,7 +22,7 @@ from hybrid.model.equilibrium_hints import end_laid_anywhere
 from hybrid.model.initial_shape import dead_loads
 from hybrid.model.material import Material
 from hybrid.outputs.observation import Observation
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import EventLog
 from hybrid.solve.flaws import lies_slack
 
@@ -77,7 +77,7 @@ def slack_text_of(model: Model, state: State) -> tuple[float, float, str] | None
     return float(line.s[cells[0]]), float(line.s[cells[-1] + 1]), text
 
 
-def note_laid(scene: Scene, model: Model, state: State, events: EventLog) -> None:
+def note_laid(scene: LineScene, model: Model, state: State, events: EventLog) -> None:
     """Say which way a free end lies on the bed where nothing in the scene does."""
     end = end_laid_anywhere(scene)
     free, held = (-1, 0) if end == "end" else (0, -1)

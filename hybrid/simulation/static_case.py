@@ -18,7 +18,7 @@ from hybrid.model.resolution import Resolution, wants_errors
 from hybrid.outputs.edge_errors import edge_errors
 from hybrid.outputs.layer_errors import layer_errors
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.simulation.mesh_survey import Survey, survey_points
 from hybrid.simulation.network_run import ALONE, NetworkRun, Recording, start_of
@@ -35,7 +35,7 @@ from hybrid.store.writer import Recorder
 class StaticCase(StaticCaseOfCable):
     """The equilibrium of one scene at t = 0, under loads that have grown to their full size."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: LineScene) -> None:
         super().__init__(scene)
         self._first: tuple[Resolution, Start] | None = None
         self._by_network = at_rest_as_network(scene)

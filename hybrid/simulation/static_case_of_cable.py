@@ -22,7 +22,7 @@ from hybrid.outputs.layer_errors import layer_errors
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.contact_equilibrium import why_not, within_itself
 from hybrid.simulation.diagnostics import Diagnostics, stretch_text
@@ -44,7 +44,7 @@ from hybrid.store.records import ERROR_ESTIMATE, PENDING, RODS_AT_START
 class StaticCaseOfCable:
     """The equilibrium of one scene at t = 0, under loads that have grown to their full size."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: LineScene) -> None:
         self.scene = scene
         self._begun: tuple[Resolution, tuple[Model, Equilibrium, ZoneSwitching | None]] | None = None
 

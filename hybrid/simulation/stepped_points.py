@@ -21,7 +21,7 @@ from hybrid.model.ends import EndConditions
 from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.model.sea import Surroundings
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead
 from hybrid.scene.short_form import ENDS, LINE, ShortForm
 from hybrid.simulation.interface_stiffness import interface_stiffness, step_taken
@@ -60,7 +60,7 @@ def of_line(method: Callable[Concatenate[Any, str, P], R]) -> Callable[..., R]:
 class SteppedPoints(SettableObstacles):
     """The points and lines of a scene that is stepped from outside."""
 
-    _system: System  # what is computed
+    _system: Network  # what is computed
     _form: ShortForm | None  # of a scene in the short form
     _run: NetworkRun
     _driven: dict[str, list[DrivenEnd]]  # of points that are set, for each end there

@@ -20,8 +20,8 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.driven_end import DrivenEnd, contradictions
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.first_use import compile_beside
@@ -46,7 +46,7 @@ READ_OUTSIDE = 1.0
 NUMBER = (int, float, np.integer, np.floating)
 
 
-def layers_at_rest(system: System) -> NetworkResolution:
+def layers_at_rest(system: Network) -> NetworkResolution:
     """Cells by the equilibrium of the start; where a line says how many cells a layer has, by that of full loads."""
     asked = [name for name, line in system.lines.items() if line.resolution is not None]
     first = layered_lines(system, NetworkResolution.first(system), True)
@@ -84,11 +84,11 @@ class Simulation(SteppedPoints):
     """
 
     def __init__(
-        self, scene: SceneLike | System, output: str | Path | None = None, *, overwrite: bool = True,
+        self, scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True,
         criterion: UserCriterion | None = None, most_iterations: int | None = None,
     ) -> None:  # fmt: skip
         most = iterations_allowed(most_iterations)
-        self._read_scene(as_scene_or_system(scene))
+        self._read_scene(as_scene(scene))
         self.lock, self._stack, self._owner = threading.RLock(), ExitStack(), object()
         self._target: Path | io.BytesIO = io.BytesIO()
         if output is not None:

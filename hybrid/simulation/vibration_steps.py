@@ -15,7 +15,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import Resolution
 from hybrid.model.start_vibration import start_vibrations
 from hybrid.scene.motion_checks import stationary_from
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.store.named_arrays import matched
 
 # Periods of the vibration over which its amplitude is found, which are those from one look at it to the next; what
@@ -28,7 +28,7 @@ GONE = 0.5
 class VibrationSteps:
     """Of one run whose steps follow the motion: when a vibration begins steps are short, until it has died out."""
 
-    def __init__(self, scene: Scene, resolution: Resolution) -> None:
+    def __init__(self, scene: LineScene, resolution: Resolution) -> None:
         regular = stationary_from(scene) if resolution.later > resolution.step else None
         shown = [x for x in start_vibrations(scene) if x.force > resolution.still] if regular is not None else []
         self.begins = sorted({x.t for x in shown})  # s

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import as_scene_or_system, parse_either, text_of
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import as_scene, read_text, text_of
+from hybrid.scene.root import Scene
 from hybrid.scene.study import MOST_CASES, TAKEN, Study
 from hybrid.studies.csv_table import read_table
 from hybrid.studies.expressions import evaluated
@@ -51,7 +50,7 @@ class Cases:
     static: bool
     bounds: dict[str, tuple[float, float]]
 
-    def scene(self, case: int) -> Scene | System:
+    def scene(self, case: int) -> Scene:
         """The scene of a case; SceneError if it is refused."""
         return scene_of(self.base, self.keys, self.rows[case])
 
@@ -79,7 +78,7 @@ class Cases:
 def cases_of(study: Study) -> Cases:
     """The cases of a study; SceneError if its scene, its keys or its table of cases is refused, or none is left."""
     text = text_of(study.scene)
-    scene, _ = parse_either(text, study.scene)
+    scene, _ = read_text(text, study.scene)
     if not study.static:
         scene.require_time()
     keys = {name: each.keys or (each.key or name,) for name, each in study.vary.items()}
@@ -122,13 +121,13 @@ def _with_absolute_files(row: Row, keys: Mapping[str, Sequence[str]], folder: Pa
     return {k: str((folder / v).absolute()) if k in named and isinstance(v, str) else v for k, v in row.items()}
 
 
-def scene_of(base: Mapping[str, Any], keys: Mapping[str, Sequence[str]], row: Row) -> Scene | System:
+def scene_of(base: Mapping[str, Any], keys: Mapping[str, Sequence[str]], row: Row) -> Scene:
     """The scene, of one line or several, with the values of a row; SceneError if it is refused."""
     data = deepcopy(dict(base))
     for name, paths in keys.items():
         for path in paths:
             _set(data, path, row[name])
-    return as_scene_or_system(data)
+    return as_scene(data)
 
 
 def short_names(names: Iterable[str]) -> dict[str, str]:
@@ -220,7 +219,7 @@ def _derived(study: Study, rows: list[Row]) -> dict[str, np.ndarray]:
 def _check_keys(text: str, file: str, keys: Mapping[str, Sequence[str]], row: Row) -> None:
     """SceneError if a key is none of the scene, or the first case is refused; with the names of the keys."""
     settings = [f"{path}={json.dumps(row[name])}" for name, paths in keys.items() for path in paths]
-    parse_either(text, file, settings)
+    read_text(text, file, settings)
 
 
 def _set(data: Any, path: str, value: Any) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.read import SceneLike, as_scene, one_line
 from hybrid.simulation.interrupts import interrupts
 from hybrid.store.tradeoff_table import Row
 from hybrid.studies.runs import RunStore, StudyProgress, level_spec
@@ -153,7 +153,7 @@ def trade_levels(
     refuse_peers(former)
     for name in former:
         raise TypeError(f"trade_levels() got an unexpected keyword argument {name!r}")
-    scene = as_scene(scene)
+    scene = one_line(as_scene(scene))
     scene.require_time()
     specs = []
     for level, asked in LEVELS.items():

@@ -21,8 +21,8 @@ from hybrid.scene.accuracy import of_length
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.base import Kinds
 from hybrid.scene.obstacles import files_of
-from hybrid.scene.read import scene_text, validate_scene
-from hybrid.scene.schema import Model, Scene
+from hybrid.scene.read import as_scene, one_line, scene_text
+from hybrid.scene.schema import LineScene, Model
 from hybrid.simulation.progress import Progress
 from hybrid.store.reader import Result
 from hybrid.store.tradeoff_table import DONE, FAILED, MISSED, OURS, Row
@@ -56,7 +56,7 @@ class RunSpec:
 
     model: str
     accuracy: str
-    scene: Scene | None  # None: refused
+    scene: LineScene | None  # None: refused
     refused: str = ""
     times: int = 1  # repetitions; the median of their CPU times counts
     kept: tuple[str, ...] = COMPARED  # outputs that are compared
@@ -71,7 +71,7 @@ def model_kinds() -> tuple[str, ...]:
     return next(part.names for part in get_args(Model) if isinstance(part, Kinds))
 
 
-def scene_data(scene: Scene, kind: str, accuracy: str | Mapping[str, str]) -> dict[str, Any]:
+def scene_data(scene: LineScene, kind: str, accuracy: str | Mapping[str, str]) -> dict[str, Any]:
     """The scene with this model at this accuracy, and without keys that set the resolution; as data.
 
     A part is one of the length and of the end forces, by which runs are compared.
@@ -95,22 +95,22 @@ def scene_data(scene: Scene, kind: str, accuracy: str | Mapping[str, str]) -> di
     return data | {"model": {"kind": kind} | kept, "accuracy": asked}
 
 
-def run_spec(scene: Scene, kind: str, accuracy: str) -> RunSpec:
+def run_spec(scene: LineScene, kind: str, accuracy: str) -> RunSpec:
     try:
-        return RunSpec(kind, accuracy, validate_scene(scene_data(scene, kind, accuracy)))
+        return RunSpec(kind, accuracy, one_line(as_scene(scene_data(scene, kind, accuracy))))
     except SceneError as error:
         return RunSpec(kind, accuracy, None, _in_short(error))
 
 
 def level_spec(
-    scene: Scene, kind: str, name: str, accuracy: Mapping[str, str], model: Mapping[str, float] | None = None
+    scene: LineScene, kind: str, name: str, accuracy: Mapping[str, str], model: Mapping[str, float] | None = None
 ) -> RunSpec:
     """A run for an accuracy with several parts, which has a name; model: more keys of the model."""
     data = scene_data(scene, kind, accuracy)
     data["model"] |= model or {}
     kept = (*COMPARED, *ALONG)
     try:
-        return RunSpec(kind, name, validate_scene(data), kept=kept)
+        return RunSpec(kind, name, one_line(as_scene(data)), kept=kept)
     except SceneError as error:
         return RunSpec(kind, name, None, _in_short(error), kept=kept)
 
@@ -184,7 +184,7 @@ class RunStore:
         draft.replace(runs / f"{row.key}.json")
         return row, half
 
-    def _compute(self, row: Row, spec: RunSpec, scene: Scene, required: bool) -> tuple[Row, dict[str, np.ndarray]]:
+    def _compute(self, row: Row, spec: RunSpec, scene: LineScene, required: bool) -> tuple[Row, dict[str, np.ndarray]]:
         spent, result = [], None
         try:
             self._warm_up(spec, scene)
@@ -215,7 +215,7 @@ class RunStore:
 
         return follow
 
-    def _warm_up(self, spec: RunSpec, scene: Scene) -> None:
+    def _warm_up(self, spec: RunSpec, scene: LineScene) -> None:
         """Compile and load the kernels of a model; the result of this run is not used."""
         if spec.model in self._warm:
             return
@@ -225,10 +225,10 @@ class RunStore:
         data["time"]["duration"] *= WARM_PART
         data["output"].pop("every", None)
         with suppress(ComputationError, SceneError, ArithmeticError, ValueError, LookupError):
-            run(validate_scene(data))
+            run(data)
 
 
-def key_of(scene: Scene, repeat: int, also: str = "") -> str:
+def key_of(scene: LineScene, repeat: int, also: str = "") -> str:
     """Hash of all that decides the result of a run: scene, files it reads, package, repetitions."""
     digest = hashlib.sha256(f"{version('hybrid-cable')} {repeat}{also}\n{scene_text(scene)}".encode())
     for path in (*scene.ends.files(), *scene.environment.files(), *scene.cable.files(), *files_of(scene.obstacles)):

@@ -18,8 +18,8 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.model.resolution import RequestedAccuracy, requested_accuracy
 from hybrid.scene.accuracy import amount
 from hybrid.scene.analysis import LEAST_DAMPED
-from hybrid.scene.read import SceneLike, as_scene, validate_scene
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import SceneLike, as_scene, one_line
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.interrupts import interrupts
 from hybrid.store.tradeoff_table import CHECK, FAILED, REFERENCE, Row, TradeTable, judged
 from hybrid.studies.runs import (
@@ -70,7 +70,7 @@ def trade(
     KeyboardInterrupt leaves a table of the finished runs.
     """
     target, progress = _renamed(former, target, progress)
-    scene = as_scene(scene)
+    scene = one_line(as_scene(scene))
     scene.require_time()
     names = _models(scene, models)
     goal = reference or _finer(scene, accuracies)
@@ -136,11 +136,11 @@ def _order(row: Row, kinds: Sequence[str]) -> int:
 # --- what is asked ------------------------------------------------------------------------------
 
 
-def _refusal(scene: Scene, kind: str, accuracy: str) -> str:
+def _refusal(scene: LineScene, kind: str, accuracy: str) -> str:
     return run_spec(scene, kind, accuracy).refused
 
 
-def _models(scene: Scene, wanted: Sequence[str] | None) -> dict[str, str]:
+def _models(scene: LineScene, wanted: Sequence[str] | None) -> dict[str, str]:
     """Kinds of models, and why the scene does not admit them, "" if it does."""
     known = model_kinds()
     for name in wanted or ():
@@ -149,7 +149,7 @@ def _models(scene: Scene, wanted: Sequence[str] | None) -> dict[str, str]:
     return {kind: _refusal(scene, kind, ACCURACIES[0]) for kind in wanted or known}
 
 
-def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
+def _notes(scene: LineScene, models: Mapping[str, str], chosen: bool) -> list[str]:
     """Keys of the scene that the study ignores, and models that the scene does not admit."""
     time = scene.require_time()
     dropped = [f"time.{x}" for x in ("step", "tolerance") if getattr(time, x) is not None]
@@ -167,10 +167,10 @@ def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
     return notes if dropped else notes[1:]
 
 
-def _asked(scene: Scene, accuracy: str, where: str) -> RequestedAccuracy:
+def _asked(scene: LineScene, accuracy: str, where: str) -> RequestedAccuracy:
     """An accuracy in numbers; SceneError if it is none."""
     try:
-        found = requested_accuracy(validate_scene(scene_data(scene, scene.model.kind, accuracy)))
+        found = requested_accuracy(one_line(as_scene(scene_data(scene, scene.model.kind, accuracy))))
     except SceneError as error:
         bad = [c for c in error.complaints if c.where.startswith("accuracy")] or error.complaints
         raise SceneError([replace(c, where=where, line=None, column=None) for c in bad[:1]]) from None
@@ -178,7 +178,7 @@ def _asked(scene: Scene, accuracy: str, where: str) -> RequestedAccuracy:
     return found
 
 
-def _finer(scene: Scene, accuracies: Sequence[str]) -> str:
+def _finer(scene: LineScene, accuracies: Sequence[str]) -> str:
     """An accuracy for the reference: the usual one, or a third of the finest accuracy."""
     parts = [amount(x)[1] for x in accuracies if _asked(scene, x, "accuracies") and amount(x)[0] == "part"]
     return f"{100 * min([amount(REFERENCE_ACCURACY)[1], *(x / CHECK_COARSER for x in parts)]):.3g}%"

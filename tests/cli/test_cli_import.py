@@ -68,7 +68,7 @@ def test_several_cables_are_one_scene(call: Call) -> None:
     said = call("three_lines.txt")
     assert said.code == 0 and said.out == "1 scene, 0 left out -> three_lines.yaml\n"
     assert "give points.point4.motion" in said.err
-    assert list(hybrid.load_system("three_lines.yaml").lines) == ["line1", "line2", "line3"]
+    assert list(hybrid.load_scene("three_lines.yaml").lines) == ["line1", "line2", "line3"]
     said = call("rods_and_bodies.txt")
     assert said.code == 1 and "rods_and_bodies.txt:43: left out" in said.err and "--separate" in said.err
 

@@ -96,8 +96,9 @@ def test_a_picture_of_a_command_is_that_of_python(tmp_path: Path, monkeypatch: p
 def test_schema_is_valid_json_schema(several: bool) -> None:
     schema = json.loads(call("schema", *["--lines"] * several)[0])
     assert schema["$schema"].startswith("https://json-schema.org/")
-    assert ({"points", "lines"} if several else {"cable", "ends", "initial"}) <= set(schema["required"])
-    assert schema["additionalProperties"] is False
+    form = schema if several else schema["$defs"][schema["else"]["$ref"].rpartition("/")[2]]
+    assert ({"points", "lines"} if several else {"cable", "ends", "initial"}) <= set(form["required"])
+    assert form["additionalProperties"] is False
 
     def check(part: object) -> None:
         if isinstance(part, dict):

@@ -17,8 +17,8 @@ import hybrid
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.scene.combinations import REFUSALS
-from hybrid.scene.read import _readable_tables, as_scene_or_system
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import _readable_tables, as_scene
+from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import LINE, NotInNetwork, network_of
 from tests.combinations.pairs import (
     FEATURES,
@@ -41,7 +41,7 @@ ASKED = ("this end of the line is a catenary, which has no moment",)
 def refusal(tables: Tables) -> str:
     """Why a scene is refused; empty: it is not.  Fails where that is in no table."""
     try:
-        as_scene_or_system(tables)
+        as_scene(tables)
     except SceneError as error:
         for told in error.complaints:
             known = any(re.search(f"because {x}$", told.expected) for x in REASONS)
@@ -72,14 +72,14 @@ def test_every_pair_is_read_or_refused_by_the_table() -> None:
     assert read > 0.9 * len(NAMES)
 
 
-def unchecked(tables: Tables) -> Scene:
+def unchecked(tables: Tables) -> LineScene:
     """The tables of a scene, each of which can be read, without what contradicts between them."""
-    return Scene.model_construct(None, **_readable_tables(tables))
+    return LineScene.model_construct(None, **_readable_tables(tables))
 
 
 def refused_as_cable(tables: Tables) -> bool:
     """Whether its tables can be read one by one: what they refuse together is asked of a network, too."""
-    return {*_readable_tables(tables)} == {*Scene.model_fields}
+    return {*_readable_tables(tables)} == {*LineScene.model_fields}
 
 
 # --- computed ------------------------------------------------------------------------------------

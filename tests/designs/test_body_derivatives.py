@@ -11,7 +11,7 @@ from hybrid.designs.numbers import changed_scene, with_number
 from hybrid.designs.sensitivity import at_rest
 from hybrid.model.nearby_clamped import seats_know_no_shape, shaped_anew
 from hybrid.model.network import NetworkResolution, bodies_of, build_system
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from tests.designs.test_system_derivatives import ANCHORS, BUOY, CHAIN, HOSE, SEA, moored
 
 HULL = {
@@ -141,7 +141,7 @@ SCENES = {
 def test_differences_of_equilibria(what):
     """Bodies shift and turn with what holds them."""
     tables, of, keys = SCENES[what]
-    made = as_scene_or_system(tables)
+    made = as_scene(tables)
     rest = at_rest(made, of)
     for key, ours in zip(keys, rest.by(keys), strict=True):
         number = rest.number(key)
@@ -156,7 +156,7 @@ def test_differences_of_equilibria(what):
 def test_arrays_of_clamped_lines_are_those_of_lines_that_are_built_anew(what, monkeypatch):
     """No line is built for a number where directions say how it is seated; all are where first shapes do."""
     tables, of, keys = SCENES[what]
-    made, built = as_scene_or_system(tables), []
+    made, built = as_scene(tables), []
     rest = at_rest(made, of)
     monkeypatch.setattr(network_at_rest, "shaped_anew", lambda *x: built.append(1) or shaped_anew(*x))
     ours = rest.by(keys)
@@ -170,7 +170,7 @@ def test_arrays_of_clamped_lines_are_those_of_lines_that_are_built_anew(what, mo
 @pytest.mark.parametrize("what", ["two bodies", "without normals", "twist that hangs on first shapes"])
 def test_lines_that_are_built_alone_are_those_of_the_whole(what):
     tables, _, _ = SCENES[what]
-    system = as_scene_or_system(tables)
+    system = as_scene(tables)
     resolution = NetworkResolution.first(system)
     whole = build_system(system, resolution)
     model, seats = shaped_anew(system, ["hose"], bodies_of(system), resolution)["hose"]
@@ -189,7 +189,7 @@ def test_numbers_that_others_have_to_match_are_refused(clamped):
     hose = tables["lines"]["hose"]
     del hose["mesh"]
     hose["model"] = {"kind": "zones", "zones": [{"rod": 40.0, "cells": 15}, {"catenary": 60.0, "cells": 15}]}
-    rest = at_rest(as_scene_or_system(tables), ["hose/tension@start"])
+    rest = at_rest(as_scene(tables), ["hose/tension@start"])
     for key in ("lines.hose.sections[0].length", "lines.hose.model.zones[0].rod"):
         with pytest.raises(hybrid.SceneError, match="a number that may change by itself"):
             rest.by([key])
@@ -198,7 +198,7 @@ def test_numbers_that_others_have_to_match_are_refused(clamped):
 
 def test_what_hangs_on_first_shapes():
     def known(tables, name="hose"):
-        return seats_know_no_shape(as_scene_or_system(tables), name)
+        return seats_know_no_shape(as_scene(tables), name)
 
     assert known(two_bodies()) and known(without_normals()) and known(clamped_to_a_point())
     assert not known(clamped_to_a_point(tangent=[1, 0, 1])) and known(

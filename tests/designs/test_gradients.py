@@ -11,7 +11,7 @@ import pytest
 from hybrid.designs.gradients import Gradients
 from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.sensitivity import at_rest
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from tests.designs.test_body_derivatives import SCENES
 from tests.designs.test_derivatives import LINE, SEA, pinned, scene
 from tests.designs.test_system_derivatives import BUOY, moored
@@ -69,7 +69,7 @@ def _of_all_lines(rest: NetworkAtRest, found: list[np.ndarray]) -> list[np.ndarr
 def test_the_transposed_solve_is_the_forward_one(case: str) -> None:
     """Of the same gradients, to rounding of the solves; what answers less than a thousandth is compared with that."""
     tables, of, keys = CASES[case]
-    rest = at_rest(as_scene_or_system(tables), of)
+    rest = at_rest(as_scene(tables), of)
     right, shifts, _ = sides(rest, keys)
     forward, sizes = by_gradients(rest, right, shifts)
     forward, sizes = ([rest._in_order(_of_all_lines(rest, x))] for x in (forward, sizes))
@@ -83,7 +83,7 @@ def test_the_transposed_solve_is_the_forward_one(case: str) -> None:
 def test_many_numbers_are_the_same_as_few(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Results are differenced along their movement, or by unknowns: the same to what differences leave."""
     tables, of, keys = CASES[case]
-    rest = at_rest(as_scene_or_system(tables), of)
+    rest = at_rest(as_scene(tables), of)
     few = rest.by(keys)
     monkeypatch.setattr(Gradients, "pay_for", lambda *_: True)
     monkeypatch.setattr(rest, "forward", None)
@@ -93,7 +93,7 @@ def test_many_numbers_are_the_same_as_few(case: str, monkeypatch: pytest.MonkeyP
 
 def test_the_way_is_chosen_by_the_count(monkeypatch: pytest.MonkeyPatch) -> None:
     """One result at the end of a line depends on the four last nodes, of five unknowns each, but for the last spin."""
-    rest = at_rest(as_scene_or_system(ON_A_BED), ["tension@end"])
+    rest = at_rest(as_scene(ON_A_BED), ["tension@end"])
     assert [rest.gradients[0].pay_for(x) for x in (19, 20)] == [False, True]
     keys = 20 * SECTION[1:2]
     few = rest.by(keys[:1])
@@ -102,7 +102,7 @@ def test_the_way_is_chosen_by_the_count(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_a_result_of_the_whole_line_depends_on_all_its_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
-    rest = at_rest(as_scene_or_system(ON_A_BED), ["contact_force"])
+    rest = at_rest(as_scene(ON_A_BED), ["contact_force"])
     assert not rest.gradients[0].pay_for(400)
     few = rest.by(SECTION)
     monkeypatch.setattr(rest, "forward", None)

@@ -16,7 +16,7 @@ from hybrid.designs.in_motion import in_motion
 from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.designs.replay import course_of, replay
 from hybrid.designs.tangents import Unfollowed
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 
 G, A, PERIOD = 9.81, 1.0, 8.0
 W = 2.0 * np.pi / PERIOD
@@ -65,7 +65,7 @@ def test_the_same_in_steps_and_cells_that_a_run_has_chosen(more, several):
     if several:
         tables = as_lines(tables)
         key, of, amplitude = "lines.a.sections[0].mass", "a/tension@start", "points.top.motion.heave.amplitude"
-    found = in_motion(as_scene_or_system(tables), [f"max {of}", f"t=33.0 {of}"], [key, amplitude])
+    found = in_motion(as_scene(tables), [f"max {of}", f"t=33.0 {of}"], [key, amplitude])
     mass, pull = 5.0 * 40.0 + 60.0, G + A * W**2
     assert found.values[0] == pytest.approx(mass * pull, rel=2e-3)
     assert found.derivatives[0, 0] == pytest.approx(40.0 * pull, rel=5e-3)

@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.designs import line_at_rest
 from hybrid.designs.sensitivity import at_rest
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from tests.designs.test_derivatives import LINE, SEA, pinned, scene
 from tests.designs.test_gradients import CLAMP, OF, SECTION
 from tests.designs.test_system_derivatives import BUOY, moored
@@ -34,7 +34,7 @@ def test_far_nodes_do_not_count(case: str, monkeypatch: pytest.MonkeyPatch) -> N
     tables, of, keys = CASES[case]
     if case == "a buoy":
         tables = tables | {"lines": {name: x | {"mesh": {"cells": 200}} for name, x in tables["lines"].items()}}
-    rest = at_rest(as_scene_or_system(tables), of)
+    rest = at_rest(as_scene(tables), of)
     found, lines = rest.by(keys), rest.lines
     assert all(x._near is not None for x in lines if x.wanted)
     monkeypatch.setattr(line_at_rest, "MANY", 10**9)

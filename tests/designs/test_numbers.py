@@ -9,7 +9,7 @@ import pytest
 
 from hybrid.designs.numbers import changed_scene, is_allowed, number_of, with_number
 from hybrid.errors import SceneError
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -27,7 +27,7 @@ def keys(tables: object, path: str = "") -> Iterator[str]:
 
 @pytest.mark.parametrize("name", ["touchdown", "laying", "s_tether", "irregular_sea", "rov_descent"])
 def test_a_number_put_in_place_is_as_read(name):
-    scene, same = as_scene_or_system(EXAMPLES / f"{name}.yaml"), 0
+    scene, same = as_scene(EXAMPLES / f"{name}.yaml"), 0
     for key in keys(scene.model_dump(mode="python")):
         number = number_of(scene, key) * (1.0 + 1e-5)
         changed = with_number(scene, key, number)
@@ -43,21 +43,21 @@ def test_a_number_put_in_place_is_as_read(name):
 
 
 def test_what_does_not_match_is_not_allowed():
-    scene = as_scene_or_system(EXAMPLES / "03_suspension_rod.yaml")
+    scene = as_scene(EXAMPLES / "03_suspension_rod.yaml")
     assert not is_allowed(with_number(scene, "cable.sections[0].mass", -1.0))
 
 
 @pytest.mark.parametrize("place", ["-1", "00", "1"])
 def test_an_item_is_counted_from_the_start(place):
     """An item of a list written in another way would be none of the scene, and nothing would depend on it."""
-    scene = as_scene_or_system(EXAMPLES / "03_suspension_rod.yaml")
+    scene = as_scene(EXAMPLES / "03_suspension_rod.yaml")
     with pytest.raises(SceneError, match="a key of the scene that has a number"):
         number_of(scene, f"cable.sections[{place}].mass")
 
 
 def test_a_number_of_things_is_none_to_differentiate_by():
     """Whole numbers, such as the seed of a sea, have no neighbours; numbers that are written without a point have."""
-    scene = as_scene_or_system(EXAMPLES / "irregular_sea.yaml")
+    scene = as_scene(EXAMPLES / "irregular_sea.yaml")
     for key in ("environment.fluid.waves.seed", "environment.fluid.waves.components"):
         with pytest.raises(SceneError, match="may change by a little"):
             number_of(scene, key)

@@ -13,7 +13,7 @@ import hybrid
 from hybrid.cli.commands import app
 from hybrid.designs.numbers import with_number
 from hybrid.designs.sensitivity import at_rest
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 
 CHAIN = {"length": 185.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
 HOSE = {"length": 100.0, "mass": 10.0, "diameter": 0.08, "axial_stiffness": 1e7, "bending_stiffness": 400.0}
@@ -46,7 +46,7 @@ def moored(top, hose=False):
 )  # fmt: skip
 def test_lines_that_pull_at_a_buoy(hose, keys):
     """All forces and places answer to a number of any line, or of any point."""
-    made = as_scene_or_system(moored(BUOY, hose))
+    made = as_scene(moored(BUOY, hose))
     of = ["east/tension@end", "north/reaction_start.x", "south/position.z@end", "max east/tension"]
     of += ["max hose/curvature", "hose/tension@start"] if hose else []
     rest = at_rest(made, of)
@@ -62,7 +62,7 @@ def test_lines_that_pull_at_a_buoy(hose, keys):
 
 
 def test_results_are_those_of_the_equilibrium():
-    made = as_scene_or_system(moored(BUOY, True))
+    made = as_scene(moored(BUOY, True))
     rest = at_rest(made, ["east/tension@end", "hose/position.z@start", "max hose/curvature", "north/reaction_start.z"])
     with hybrid.static(made) as found:
         hose = found.lines["hose"]
@@ -129,7 +129,7 @@ def test_the_command(tmp_path, monkeypatch):
     seek = ["seek", "mooring.yaml", "--target", "east/tension@end=22000", "--by", "lines.east.sections[0].length"]
     told = CliRunner().invoke(app, [*seek, "-o", "new.yaml"])
     assert told.exit_code == 0, told.output
-    assert as_scene_or_system(tmp_path / "new.yaml").lines["east"].cable.length < 185.0
+    assert as_scene(tmp_path / "new.yaml").lines["east"].cable.length < 185.0
 
 
 def test_a_named_quantity_of_a_line_is_a_result():

@@ -11,7 +11,7 @@ from hybrid.designs import in_motion as way
 from hybrid.designs.in_motion import DIFFERENCES, TANGENTS, by_differences, by_tangents, in_motion, parse_history
 from hybrid.designs.numbers import number_of, size_of
 from hybrid.designs.replay import course_of
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 
 SECTION = {
     "mass": 20.0, "diameter": 0.05, "axial_stiffness": 2e7, "bending_stiffness": 2e3, "torsional_stiffness": 2e3,
@@ -67,7 +67,7 @@ def at_a_body(model: str = "catenary", waves: bool = False) -> dict[str, Any]:
 
 
 def asked_of(tables: dict[str, Any], of: list[str], keys: list[str]) -> tuple[Any, ...]:
-    scene = as_scene_or_system(tables)
+    scene = as_scene(tables)
     numbers = {key: number_of(scene, key) for key in keys}
     sizes = {key: size_of(scene, key, x) for key, x in numbers.items()}
     return scene, [parse_history(scene, x) for x in of], course_of(scene), numbers, sizes
@@ -148,6 +148,6 @@ def test_lines_at_a_body(model: str, waves: bool, monkeypatch: pytest.MonkeyPatc
 def test_what_is_not_followed_is_left_to_differences_and_said() -> None:
     tables, key, of = at_a_point(), "points.mid.mass", ["last a/tension@30"]
     tables["time"]["duration"] = 0.5
-    assert in_motion(as_scene_or_system(tables), of, [key]).ways == (TANGENTS,)
+    assert in_motion(as_scene(tables), of, [key]).ways == (TANGENTS,)
     tables["environment"]["seabed"] = {"z": -60.0, "stiffness": 5e3, "friction": 0.5}
-    assert in_motion(as_scene_or_system(tables), of, [key]).ways == (f"{DIFFERENCES}: friction of the bed",)
+    assert in_motion(as_scene(tables), of, [key]).ways == (f"{DIFFERENCES}: friction of the bed",)

@@ -9,7 +9,7 @@ import pytest
 
 from hybrid.designs.numbers import changed_scene
 from hybrid.designs.sensitivity import at_rest
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from tests.modal.test_touching import drum, over_sheave
 
 Tables = dict[str, Any]
@@ -43,7 +43,7 @@ SCENES: dict[str, tuple[Tables, list[str], list[str]]] = {
 @pytest.mark.parametrize("what", SCENES)
 def test_differences_of_equilibria(what: str) -> None:
     tables, of, keys = SCENES[what]
-    made = as_scene_or_system(tables)
+    made = as_scene(tables)
     rest = at_rest(made, of)
     for key, ours in zip(keys, rest.by(keys), strict=True):
         number = rest.number(key)

@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.designs.numbers import changed_scene
 from hybrid.designs.sensitivity import at_rest
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from tests.validation.test_validation_lines_contact import crossing
 
 Tables = dict[str, Any]
@@ -86,7 +86,7 @@ SCENES: dict[str, tuple[Tables, list[str], list[str]]] = {
 def test_differences_of_equilibria(what: str) -> None:
     """Of what differs too much the one equilibrium lies between other sample points: then less counts."""
     tables, of, keys = SCENES[what]
-    made = as_scene_or_system(tables)
+    made = as_scene(tables)
     rest = at_rest(made, of)
     assert rest.contact is not None and rest.contact.stiffness.nnz
     for key, ours in zip(keys, rest.by(keys), strict=True):
@@ -106,7 +106,7 @@ def test_differences_of_equilibria(what: str) -> None:
 def test_what_the_spacing_of_sample_points_does_is_in_the_error() -> None:
     """The hose slides along the wire as its buoy is drawn down: over hollows, by 3 %, and not within the one it lies in."""
     tables, key, of = held_by_a_buoy(), "lines.one.sections[0].length", [*LOADS, "one/tension@start"]
-    made = as_scene_or_system(tables)
+    made = as_scene(tables)
     more, less = (at_rest(changed_scene(made, key, 16.5 * x), of).values for x in (1.03, 0.97))
     for x, theirs in zip(hybrid.sensitivity(tables, of, [key]), (more - less) / (0.06 * 16.5), strict=True):
         assert abs(x.derivative - theirs) < x.error, x.of
@@ -129,10 +129,10 @@ def test_what_a_rope_weighs_more_is_borne_by_both() -> None:
         "lines.upper.sections[0].mass",
         [f"{x}/reaction_{y}.z" for x in ("upper", "lower") for y in ("start", "end")],
     )
-    found = at_rest(as_scene_or_system(crossing_ropes()), of).by([key])[0]
+    found = at_rest(as_scene(crossing_ropes()), of).by([key])[0]
     assert found.sum() == pytest.approx(9.81, rel=1e-6) and 2.0 < found[2:].sum() < 4.0
 
 
 def test_what_is_refused() -> None:
     with pytest.raises(hybrid.SceneError, match="do not touch each other"):
-        at_rest(as_scene_or_system(crossing_ropes()), ["max upper/self_contact"])
+        at_rest(as_scene(crossing_ropes()), ["max upper/self_contact"])

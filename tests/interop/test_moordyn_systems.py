@@ -16,9 +16,9 @@ from hybrid.interop.moordyn import import_moordyn
 from hybrid.interop.moordyn.bodies import angles_of, rotation_of
 from hybrid.interop.moordyn.cables import _rotated
 from hybrid.scene.bodies import turned
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FixedPoint, FreePoint
-from hybrid.scene.read import parse_either
+from hybrid.scene.read import read_text
 
 # A riser over a buoyant section, held by a tether: rods without length join its sections, a body the tether.
 RISER = """\
@@ -62,9 +62,9 @@ ID LineType AttachA AttachB UnstrLen NumSegs Outputs
 def test_every_deck_is_one_scene_that_is_planned(name: str) -> None:
     deck = import_moordyn(FOLDER / f"{name}.txt")
     (made,) = deck.scenes.values()
-    assert parse_either(made.text)[0] == made.scene and hybrid.plan(made.scene).cells
+    assert read_text(made.text)[0] == made.scene and hybrid.plan(made.scene).cells
     assert made.lines == tuple(range(1, 1 + len(made.lines)))
-    assert isinstance(made.scene, System) == (name in ("three_lines", "free_fall", "generator_spread"))
+    assert isinstance(made.scene, Network) == (name in ("three_lines", "free_fall", "generator_spread"))
 
 
 def test_lines_that_meet_nowhere_are_one_scene_as_well() -> None:

@@ -13,8 +13,8 @@ from test_moordyn_systems import RISER
 import hybrid
 from hybrid.interop.moordyn import export_moordyn, import_moordyn
 from hybrid.interop.moordyn.writer import deck_of
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import parse_either, scene_text
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import read_text, scene_text
 
 
 class Straight:
@@ -23,7 +23,7 @@ class Straight:
     def __init__(self, scene: Any) -> None:
         self.scene_text = scene_text(scene)
         self.lines: dict[str, Any] = {}
-        if isinstance(scene, System):
+        if isinstance(scene, Network):
             self.lines = {name: Straight(scene.scene_of(name)) for name in scene.lines}
             self._arrays = {}
             for name, body in scene.bodies.items():
@@ -97,7 +97,7 @@ def test_bodies_come_back(tmp_path: Path) -> None:
     given = scene.model_dump(mode="json", exclude_none=True)
     given["bodies"]["body1"]["hydrostatics"] = {"heave": 10}
     del given["bodies"]["body1"]["volume"], given["bodies"]["body1"]["centre_of_buoyancy"]
-    other, _ = parse_either(scene_text(System.model_validate(given)))
+    other, _ = read_text(scene_text(Network.model_validate(given)))
     with pytest.raises(hybrid.SceneError, match=r"bodies.body1.hydrostatics"):
         deck_of(Straight(other))
 
@@ -202,7 +202,7 @@ def test_clamps_of_several_lines_are_rods_and_come_back(tmp_path: Path) -> None:
             "leg": {"start": "low", "end": "far", "sections": [pipe], "model": "catenary", "mesh": {"cells": 10}},
         },
     }  # fmt: skip
-    scene = System.model_validate(tables)
+    scene = Network.model_validate(tables)
     made = back(scene, tmp_path)
     ours, theirs = scene.lines["pipe"], made.lines["line1"]
     for end in ("start", "end"):
@@ -213,4 +213,4 @@ def test_clamps_of_several_lines_are_rods_and_come_back(tmp_path: Path) -> None:
     assert np.abs(shapes[0]["position"][-1] - shapes[1]["position"][-1] - [0.0, 0.0, 5.0]).max() < 1e-6
     held["end"]["bend_stiffness"] = 1e3
     with pytest.raises(hybrid.SceneError, match=r"lines\.pipe\.connections\.end"):
-        back(System.model_validate(tables), tmp_path)
+        back(Network.model_validate(tables), tmp_path)

@@ -27,7 +27,7 @@ from hybrid.live.pictures import picture_of
 from hybrid.live.server import LARGEST_MESSAGE, Guard, listen, make_app
 from hybrid.live.session import Session
 from hybrid.model.plan import plan
-from hybrid.scene.read import parse_either
+from hybrid.scene.read import read_text
 
 
 @pytest.fixture(scope="module")
@@ -264,7 +264,7 @@ time: {duration: 4}
 def test_a_scene_that_names_no_model_is_shown_as_the_plan_has_it(model: str, kind: str) -> None:
     picture, result = picture_of(TWO_SECTIONS + model, "", lambda: None)
     assert result is not None and {zone[0] for zone in picture["frame"]["lines"][0]["zones"]} == {kind}
-    assert {zone.kind for zone in plan(parse_either(TWO_SECTIONS + model)[0]).zones} == {kind}
+    assert {zone.kind for zone in plan(read_text(TWO_SECTIONS + model)[0]).zones} == {kind}
 
 
 def test_several_lines_are_drawn(page: Page) -> None:

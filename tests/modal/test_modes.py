@@ -14,7 +14,7 @@ from hybrid.cli.commands import app
 from hybrid.linear.eigen import _every, _nearest
 from hybrid.linear.matrices import linear_network
 from hybrid.modal.api import _found, equilibrium_of
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 
 G = 9.81
 
@@ -295,7 +295,7 @@ def test_moored_body():
 
 def test_joints_give_way_as_the_solver_says():
     """(K + ca M)^-1 at points and bodies is the compliance that the junctions of the solver have from its factors."""
-    system = as_scene_or_system(PIPE)
+    system = as_scene(PIPE)
     rest = equilibrium_of(system)
     solver, states = rest.solver, rest.states
     network = linear_network(solver, states, rest.names, False)

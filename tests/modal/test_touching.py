@@ -11,7 +11,7 @@ import hybrid
 from hybrid.linear.eigen import lowest_modes
 from hybrid.linear.matrices import linear_network
 from hybrid.modal.api import equilibrium_of
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from tests.designs.test_touching_lines import beside
 
 Tables = dict[str, Any]
@@ -103,7 +103,7 @@ def test_the_response_is_the_motion_of_a_run(what: str) -> None:
 
 def squares(tables: Tables, sticks: bool = True) -> Any:
     """w^2 (1/s^2) of the lowest modes on the usual mesh."""
-    rest = equilibrium_of(as_scene_or_system(tables))
+    rest = equilibrium_of(as_scene(tables))
     network = linear_network(rest.solver, rest.states, rest.names, sticks, touching=rest.touching)
     return np.array([x for x in lowest_modes(network, 7).squares if x > 1.0])[:5]
 

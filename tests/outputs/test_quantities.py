@@ -15,7 +15,7 @@ from hybrid.outputs.probes import PROBES
 from hybrid.outputs.quantities import FEW, between, nearest
 from hybrid.outputs.section_use import Walls, largest_stress
 from hybrid.scene.quantities import TAKEN
-from hybrid.scene.read import parse_either
+from hybrid.scene.read import read_text
 from hybrid.store.limits import held_of
 from hybrid.view.summary import facts_of
 
@@ -311,9 +311,9 @@ def test_clearance_of_two_lines(tmp_path: Path) -> None:
     assert {x.name for x in hybrid.listed_outputs(moving)} >= {"gap", "gap_at", "pull", "lines/one/tension"}
 
 
-def _system(text: str) -> hybrid.System:
-    found, _ = parse_either(text)
-    assert isinstance(found, hybrid.System)
+def _system(text: str) -> hybrid.Scene:
+    found, _ = read_text(text)
+    assert isinstance(found, hybrid.Scene)
     return found
 
 

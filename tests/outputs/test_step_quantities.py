@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.kernels.watch import named_quantities
 from hybrid.scene.quantities import KINDS
-from hybrid.scene.read import parse_either
+from hybrid.scene.read import read_text
 from hybrid.scene.study import Kept
 from hybrid.store.limits import held_of
 from hybrid.store.statistics_table import rows_of
@@ -166,8 +166,8 @@ output:
 @pytest.mark.long
 def test_ranges_of_several_lines(tmp_path: Path) -> None:
     def run(text: str, name: str) -> hybrid.Result:
-        system = parse_either(text)[0]
-        assert isinstance(system, hybrid.System)
+        system = read_text(text)[0]
+        assert isinstance(system, hybrid.Scene)
         return hybrid.run(system, tmp_path / name)
 
     dense = run(SYSTEM, "dense.h5")

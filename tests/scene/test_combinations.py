@@ -13,8 +13,8 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene import combinations as c
 from hybrid.scene.combinations import REFUSALS, Use, refuse_use
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import parse_either
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import read_text
 from hybrid.scene.schema import Scene
 from tests.problems import tables_with
 
@@ -91,8 +91,8 @@ OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
 )
 
 
-def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
-    return parse_either(yaml.safe_dump(tables_with(LINES if several else CABLE, changes), sort_keys=False))[0]
+def _scene(changes: dict[str, Any], several: bool) -> Scene | Network:
+    return read_text(yaml.safe_dump(tables_with(LINES if several else CABLE, changes), sort_keys=False))[0]
 
 
 def _of_several(changes: dict[str, Any]) -> bool:

@@ -17,8 +17,8 @@ from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, MEASURED, OCEAN, P
 
 from hybrid.errors import SceneError
 from hybrid.scene.base import dotted
-from hybrid.scene.read import as_scene_or_system, parse_scene, validate_scene
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import as_scene, parse_scene, validate_scene
+from hybrid.scene.schema import LineScene
 
 ADAPTIVE = (
     OCEAN.replace(
@@ -399,7 +399,7 @@ def test_nonsense_for_a_list(name: str) -> None:
 
 
 def test_the_texts_of_this_file_have_every_key() -> None:
-    schema = Scene.model_json_schema()
+    schema = LineScene.model_json_schema()
     known = {key for table in (schema, *schema["$defs"].values()) for key in table["properties"]}
     written = {part for text in TEXTS.values() for path, _ in _places(text) for part in path}
     elsewhere = {
@@ -491,7 +491,7 @@ def test_a_scene_nested_deep_is_refused(key: str, depth: int) -> None:
     with pytest.raises(SceneError):
         validate_scene(deep)
     with pytest.raises(SceneError):
-        as_scene_or_system({"lines": deep, "points": {}})
+        as_scene({"lines": deep, "points": {}})
     while deep:  # Python's own deletion of a chain of dicts is safe, and slow
         (deep,) = deep.values()
 

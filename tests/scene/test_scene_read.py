@@ -13,8 +13,8 @@ from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS, SUSPE
 
 from hybrid.errors import SceneError
 from hybrid.scene import yaml_nodes, yaml_source
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import as_scene, load_scene, parse_either, parse_scene, scene_text, validate_scene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import as_scene, load_scene, parse_scene, read_text, scene_text, validate_scene
 from hybrid.scene.schema import (
     Cable,
     CatenaryModel,
@@ -96,7 +96,7 @@ def test_python_and_yaml_make_the_same_scene() -> None:
     )
     assert parse_scene(AT_REST) == built
     assert validate_scene(built) == built
-    assert validate_scene({name: getattr(built, name) for name in Scene.model_fields}) == built
+    assert validate_scene({name: getattr(built, name) for name in type(built).model_fields}) == built
 
 
 def test_numpy_values_are_welcome() -> None:
@@ -321,16 +321,16 @@ def test_points_and_lines_are_added_whole() -> None:
     section = "sections: [{length: 300, mass: 5, axial_stiffness: 1.0e+7}]"
     text = f"points: {{a: {{position: [0, 0, 0]}}, b: {{position: [9, 0, 0]}}}}\nlines: {{x: {{start: a, end: b, {section}}}}}"
     more = ["points.c={position: [1, 9, 0]}", f"lines.y={{start: b, end: c, {section}}}"]
-    system, _ = parse_either(text, overrides=more)
-    assert isinstance(system, System) and (list(system.points), list(system.lines)) == (["a", "b", "c"], ["x", "y"])
-    system, _ = parse_either(text, overrides=[*more, "lines.y=null", "points.c=null"])
-    assert isinstance(system, System) and (list(system.points), list(system.lines)) == (["a", "b"], ["x"])
+    system, _ = read_text(text, overrides=more)
+    assert isinstance(system, Network) and (list(system.points), list(system.lines)) == (["a", "b", "c"], ["x", "y"])
+    system, _ = read_text(text, overrides=[*more, "lines.y=null", "points.c=null"])
+    assert isinstance(system, Network) and (list(system.points), list(system.lines)) == (["a", "b"], ["x"])
     for override, told in (
         ("points.bb.position=[1, 9, 0]", "did you mean b?; points.bb={...} adds it, with all of its keys"),
         ("points.bb=null", "did you mean b?"), ("obstacles.o.kind=plane", "obstacles.o={...} adds it"),
     ):  # fmt: skip
         with pytest.raises(SceneError) as refused:
-            parse_either(text, overrides=[override])
+            read_text(text, overrides=[override])
         assert told in refused.value.complaints[0].fix
 
 
@@ -442,8 +442,8 @@ time: {duration: 20, step: 0.05}
 
 def test_a_copy_of_several_lines_keeps_nothing_of_the_lines_it_was_copied_from() -> None:
     """Also with the lowest pydantic, in which nothing can be deleted of a frozen model."""
-    system, _ = parse_either(TWO_LINES, "lines.yaml")
-    assert isinstance(system, System)
+    system, _ = read_text(TWO_LINES, "lines.yaml")
+    assert isinstance(system, Network)
     assert system.lines_at("buoy") == [("west", "end"), ("east", "start")]
     assert system.scene_of("east").length == 185.0
     longer = {"length": 190.0}

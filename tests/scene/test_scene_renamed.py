@@ -13,7 +13,7 @@ from hybrid.errors import SceneError
 from hybrid.scene.base import FORMER_NAMES, Table
 from hybrid.scene.checks import CHECKS
 from hybrid.scene.read import RenamedKey, load_scene, parse_scene, read_scene, validate_scene
-from hybrid.scene.schema import AdaptiveModel, Body, JonswapWaves, Modules, PowerLawCurrent, Scene
+from hybrid.scene.schema import AdaptiveModel, Body, JonswapWaves, LineScene, Modules, PowerLawCurrent, Scene
 
 MODEL = "{kind: adaptive, hold_time: 2.0, force_rod: [[0, 10]], force_catenary: [[200, 250]]}"
 ADAPTIVE = change(OCEAN, "{kind: catenary}", MODEL)
@@ -144,7 +144,7 @@ def _bending() -> dict[str, object]:
 def test_names_of_a_scene_are_those_of_a_scene() -> None:
     """What pydantic has deprecated does not stand among them."""
     names = {name for name in dir(parse_scene(OCEAN)) if not name.startswith("_")}
-    assert set(Scene.model_fields) | {"length", "require_time", "model_dump"} <= names
+    assert set(LineScene.model_fields) | {"length", "require_time", "model_dump"} <= names
     assert not names & {"copy", "dict", "json", "parse_obj", "parse_raw", "construct", "schema", "validate", "from_orm"}
 
 
@@ -184,7 +184,7 @@ def test_a_key_that_is_no_more(key: str, tmp_path: Path) -> None:
 def test_every_check_asks_for_tables_that_a_scene_has() -> None:
     """A check is skipped where a table of its arguments is missing: one that is misnamed would never run."""
     for check in CHECKS:
-        assert set(signature(check).parameters) <= set(Scene.model_fields), check.__name__
+        assert set(signature(check).parameters) <= set(LineScene.model_fields), check.__name__
 
 
 def test_there_is_one_solver() -> None:

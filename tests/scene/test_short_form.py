@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
 
+import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene.base import Finding
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FixedPoint, FreePoint, GuidedPoint
-from hybrid.scene.read import as_scene, as_scene_or_system, parse_either, scene_text
-from hybrid.scene.schema import Ends, Scene
+from hybrid.scene.read import as_scene, read_text, scene_text
+from hybrid.scene.schema import Ends, LineScene
 from hybrid.scene.short_form import LINE, POINTS, network_of, short_form
 from tests.combinations.pairs import CLAMP, END, FEATURES, START, scene_of
 from tests.problems import tables_with
@@ -19,22 +21,42 @@ from tests.problems import tables_with
 FORCE, MOMENT = [40.0, 3.0, 30.0], [0.0, 5.0, 0.0]
 
 
-def scene(*names: str, **changes: Any) -> Scene:
+def scene(*names: str, **changes: Any) -> LineScene:
     return as_scene(tables_with(scene_of(*names), {key.replace("__", "."): x for key, x in changes.items()}))
 
 
 @pytest.mark.parametrize("name", FEATURES)
 def test_a_cable_with_any_feature_is_a_network_that_is_read_back(name: str) -> None:
     made = network_of(scene(name))
-    again, _ = parse_either(scene_text(made))
-    assert isinstance(again, System) and again == made
+    again, _ = read_text(scene_text(made))
+    assert isinstance(again, Network) and again == made
+
+
+@pytest.mark.parametrize("network", [False, True])
+def test_both_forms_are_a_scene_however_it_is_made(network: bool) -> None:
+    made = network_of(scene()) if network else scene()
+    tables = made.model_dump(mode="json", exclude_none=True)
+    again = [hybrid.Scene(**tables), hybrid.Scene.model_validate(made), hybrid.parse_scene(scene_text(made))]
+    again += [hybrid.Scene.model_validate_json(json.dumps(tables)), hybrid.validate_scene(tables)]
+    assert isinstance(made, hybrid.Scene) and all(x == made and type(x) is type(made) for x in again)
+    schema = hybrid.Scene.model_json_schema()
+    form = schema["then" if network else "else"]["$ref"].rpartition("/")[2]
+    assert schema["$defs"][form]["properties"].keys() == type(made).model_fields.keys()
+
+
+@pytest.mark.parametrize(("name", "now"), [
+    ("System", "Scene"), ("load_system", "load_scene"), ("SystemSimulation", "Simulation"),
+])  # fmt: skip
+def test_names_of_systems_are_deprecated_names_of_scenes(name: str, now: str) -> None:
+    with pytest.warns(DeprecationWarning, match=f"hybrid.{name} is now hybrid.{now}"):
+        assert getattr(hybrid, name) is getattr(hybrid, now)
 
 
 def test_every_key_of_a_cable_has_its_place() -> None:
     """All tables of a scene and all kinds of ends: a new one has to be given a place here."""
     taken = {"cable", "ends", "output", "model", "mesh", "resolution", "contact", "initial"}
     taken |= {"title", "environment", "obstacles", "time", "accuracy", "dimension"}
-    assert taken == {*Scene.model_fields}
+    assert taken == {*LineScene.model_fields}
     kinds = {get.__name__.lower() for get in (type(x) for x in _one_of_each_end())}
     assert kinds == {*POINTS}
 
@@ -89,7 +111,7 @@ def test_places_and_messages_of_a_network_are_said_in_words_of_the_scene() -> No
 def test_a_moment_at_the_end_of_a_line_is_for_a_rod_without_a_body() -> None:
     tables = network_of(scene("body")).model_dump(mode="json", exclude_none=True)
     with pytest.raises(SceneError, match="nothing there takes a moment"):
-        as_scene_or_system(tables_with(tables, {"points.end.moment": MOMENT}))
+        as_scene(tables_with(tables, {"points.end.moment": MOMENT}))
 
 
 @pytest.mark.parametrize("wrong", [
@@ -101,7 +123,7 @@ def test_a_moment_at_the_end_of_a_line_is_for_a_rod_without_a_body() -> None:
 def test_a_guided_point_that_is_none_is_refused(wrong: tuple[dict[str, Any], str]) -> None:
     tables = network_of(scene()).model_dump(mode="json", exclude_none=True)
     with pytest.raises(SceneError, match=wrong[1]):
-        as_scene_or_system(tables_with(tables, wrong[0]))
+        as_scene(tables_with(tables, wrong[0]))
 
 
 def test_a_free_point_where_lines_meet_says_where_it_is_first() -> None:
@@ -109,4 +131,4 @@ def test_a_free_point_where_lines_meet_says_where_it_is_first() -> None:
     second = tables["lines"]["cable"] | {"start": "end", "end": "far"}
     more = {"lines.second": second, "points.far": {"position": [20.0, 0.0, 0.0]}}
     with pytest.raises(SceneError, match="the lines that meet here"):
-        as_scene_or_system(tables_with(tables, more))
+        as_scene(tables_with(tables, more))

@@ -9,7 +9,7 @@ import pytest
 
 from hybrid.kernels.junctions.bodies import FORCE, MOMENT, NUMBERS
 from hybrid.model.bodies import body_model
-from hybrid.scene.read import load_system
+from hybrid.scene.read import load_scene
 
 SCENE = """
 points:
@@ -49,7 +49,7 @@ def test_files_of_points_and_bodies_are_looked_for_beside_the_scene(
 ) -> None:
     path = written(tmp_path)
     monkeypatch.chdir(Path(__file__).parent)
-    scene = load_system(path)
+    scene = load_scene(path)
     ship, buoy, pulled = scene.bodies["ship"], scene.bodies["buoy"], scene.points["pulled"]
     assert ship.motion is not None and ship.motion.file == str(tmp_path / "loads" / "ship.csv")  # type: ignore[union-attr]
     for x in (buoy, pulled):
@@ -58,7 +58,7 @@ def test_files_of_points_and_bodies_are_looked_for_beside_the_scene(
 
 def test_a_body_bears_what_its_histories_say(tmp_path: Path) -> None:
     """Linear between rows, the last value after them, nothing once a load is let go."""
-    scene = load_system(written(tmp_path))
+    scene = load_scene(written(tmp_path))
     model = body_model("buoy", scene.bodies["buoy"], 0.0, 9.81)  # type: ignore[union-attr,arg-type]
     row = np.zeros(NUMBERS)
     for t, force, moment in ((1.0, (0, 0, 300), 40.0), (3.0, (50, 0, 300), 40.0), (9.0, (100, 0, 0), 0.0)):

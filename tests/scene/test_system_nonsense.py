@@ -10,7 +10,7 @@ import pytest
 
 from hybrid.errors import SceneError
 from hybrid.scene.base import dotted
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 
 SECTION = {"length": 185.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 40.0}
 MOTION = {"heave": {"amplitude": 1.0, "period": 9.0}, "roll": {"amplitude": 2.0, "period": 9.0}, "ramp": 9.0}
@@ -90,7 +90,7 @@ def changed(path: tuple[str | int, ...], value: Any) -> dict[str, Any]:
 
 
 def test_the_scene_itself_is_read() -> None:
-    assert as_scene_or_system(SCENE)
+    assert as_scene(SCENE)
 
 
 @pytest.mark.parametrize("path", list(places(SCENE)), ids=dotted)
@@ -98,7 +98,7 @@ def test_nonsense_is_refused_in_words_or_read(path: tuple[str | int, ...]) -> No
     refused = 0
     for nonsense in NONSENSE:
         try:
-            as_scene_or_system(changed(path, nonsense))
+            as_scene(changed(path, nonsense))
         except SceneError as error:
             refused += 1
             assert all(x.expected and x.where for x in error.complaints), str(error)
@@ -113,6 +113,6 @@ def test_a_key_that_is_left_out_is_refused_or_not_needed(path: tuple[str | int, 
         node = node[key]
     del node[path[-1]]
     try:
-        as_scene_or_system(scene)
+        as_scene(scene)
     except SceneError as error:
         assert all(x.expected and x.where for x in error.complaints), str(error)

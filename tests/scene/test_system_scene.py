@@ -10,9 +10,9 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene.bodies import FixedBody, FreeBody, Hydrostatics
 from hybrid.scene.network import JoinedLine, NetworkOutput
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
-from hybrid.scene.read import parse_either, scene_text
+from hybrid.scene.read import read_text, scene_text
 
 PAGE = Path(__file__).parents[2] / "docs" / "scene.md"
 TEXT = """\
@@ -29,9 +29,9 @@ time: {duration: 20, step: 0.05}
 """
 
 
-def system(text: str, *settings: str) -> System:
-    found, _ = parse_either(text, "lines.yaml", settings)
-    assert isinstance(found, System)
+def system(text: str, *settings: str) -> Network:
+    found, _ = read_text(text, "lines.yaml", settings)
+    assert isinstance(found, Network)
     return found
 
 
@@ -67,7 +67,7 @@ def test_a_system_is_read_changed_and_written() -> None:
 def test_refused_with_place_and_remedy(old: str, new: str, line: int, where: str, says: str) -> None:
     assert old in TEXT
     with pytest.raises(SceneError) as refused:
-        parse_either(TEXT.replace(old, new, 1), "lines.yaml")
+        read_text(TEXT.replace(old, new, 1), "lines.yaml")
     found = {complaint.where: complaint for complaint in refused.value.complaints}
     assert where in found, str(refused.value)
     assert found[where].line == line and says in found[where].text(), found[where].text()
@@ -77,7 +77,7 @@ def test_points_that_nothing_holds_are_refused() -> None:
     text = TEXT.replace("  buoy: {", "  a: {initial_guess: [0, 0, 9]}\n  b: {initial_guess: [5, 0, 9]}\n  buoy: {")
     text = text.replace("lines:\n", "lines:\n  loose: {start: a, end: b, sections: [{length: 9, mass: 1}]}\n")
     with pytest.raises(SceneError, match=r"nothing holds this cable, which weighs 88\.29 N"):
-        parse_either(text)
+        read_text(text)
 
 
 def test_a_guess_out_of_reach_is_only_a_guess() -> None:
@@ -127,9 +127,9 @@ def test_every_key_is_on_the_page(table: type) -> None:
 
 
 def test_keys_of_one_cable_say_what_several_lines_have_instead() -> None:
-    for key, fix in System.instead.items():
+    for key, fix in Network.instead.items():
         with pytest.raises(SceneError) as refused:
-            parse_either(f"{TEXT}{key}: 1\n")
+            read_text(f"{TEXT}{key}: 1\n")
         assert [x.fix for x in refused.value.complaints if x.where == key] == [fix]
 
 
@@ -138,7 +138,7 @@ def test_a_name_that_the_result_file_does_not_take(name: str, better: str) -> No
     """It was called `lines.a/b.[key]`, of which "something else" was expected."""
     before, _, after = TEXT.partition("lines:\n  west:")
     with pytest.raises(SceneError) as refused:
-        parse_either(f"{before}lines:\n  {name}:{after}")
+        read_text(f"{before}lines:\n  {name}:{after}")
     (found,) = [x for x in refused.value.complaints if x.value.startswith(f"{name}: ")]
     assert (found.line, found.fix) == (before.count("\n") + 2, f"call it {better}")
     assert "without / and ." in found.expected

@@ -13,7 +13,7 @@ from hybrid.accuracy.refinement import asked_text, bounds_of, judge, not_asked_t
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.model_costs import with_model
 from hybrid.model.resolution import Reach, Resolution, first_resolution, for_motion, requested_accuracy
-from hybrid.scene.read import as_scene_or_system, parse_scene, scene_text
+from hybrid.scene.read import as_scene, parse_scene, scene_text
 from hybrid.simulation.run_sample import RunSample
 
 LENGTH, DIAMETER = 100.0, 0.04
@@ -208,7 +208,7 @@ def test_a_limit_that_is_nearly_reached_is_settled_at_a_loose_accuracy() -> None
 def test_lines_of_a_system_ask_the_same(accuracy: str | None) -> None:
     """Each of what it moves by itself; a line that names no model, a rod as well, asks for no curvature."""
     line = {"sections": [{"length": LENGTH, "mass": 3.0, "bending_stiffness": 50.0, "diameter": DIAMETER}]}
-    system = as_scene_or_system({
+    system = as_scene({
         "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [80, 0, 0]}, "c": {"position": [0, 80, 0]}},
         "lines": {
             "plain": {"start": "a", "end": "b", **line}, "named": {"start": "a", "end": "c", "model": "rod", **line}

@@ -14,7 +14,7 @@ import hybrid
 from hybrid.kernels.machine.kept_code import KeptCode
 from hybrid.kernels.reel import payout, payout_nodes
 from hybrid.kernels.run import payout_run
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from hybrid.simulation import first_use
 
 
@@ -109,7 +109,7 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
     called: set[str] = set()
     taking = KeptCode.taking
     monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
-    scene = as_scene_or_system(KINDS[kind])
+    scene = as_scene(KINDS[kind])
     known = first_use.kernels_of(scene, static)
     hybrid.static(scene) if static else hybrid.run(scene)
     texts = [x for value in vars(first_use).values() for x in (value if isinstance(value, tuple) else (value,))]

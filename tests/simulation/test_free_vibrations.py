@@ -12,7 +12,7 @@ from hybrid.accuracy import free_vibrations as f
 from hybrid.linear.rest import line_at_rest, system_at_rest
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import first_resolution
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from hybrid.simulation.static_case import StaticCase
 
 
@@ -99,7 +99,7 @@ def apart(tables, line=None):
     runs = [hybrid.run(tables | {"time": {"duration": 10.0, "step": h}, "output": {"every": 0.1}}) for h in (0.1, 0.01)]
     late = runs[0].times > 1.7
     rough, fine = (run.lines[line].position if line else run.position for run in runs)
-    asked, times = as_scene_or_system(tables), np.arange(1, 101) * 0.1
+    asked, times = as_scene(tables), np.arange(1, 101) * 0.1
     rest = partial(system_at_rest, asked, NetworkResolution.first(asked)) if line else partial(at_rest, asked)
     found = f.lost_vibrations(asked, rest, times)[line or "cable"]["position"]
     return float(np.linalg.norm(rough - fine, axis=2)[late].max()), found

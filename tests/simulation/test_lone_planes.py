@@ -35,7 +35,7 @@ def flat(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
     return found
 
 
-def as_network(tables: Any) -> hybrid.System:
+def as_network(tables: Any) -> hybrid.Scene:
     return network_of(hybrid.validate_scene(tables))
 
 
@@ -187,7 +187,7 @@ def test_stepped_from_outside_it_is_computed_in_the_plane_that_a_scene_asks_for(
     for dimension in (2, None):
         tables = swinging(0.0, 0.0, dimension)
         del tables["ends"]["end"]["motion"]
-        cable, network = hybrid.Simulation(tables), hybrid.SystemSimulation(as_network(tables))
+        cable, network = hybrid.Simulation(tables), hybrid.Simulation(as_network(tables))
         saved = network.save()
         for again in (True, False):
             for k in range(1, 9):

@@ -12,8 +12,8 @@ import hybrid
 from hybrid.accuracy.run_forecast import _grown
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import ComputationError, Outcome
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import as_scene
 
 SECTION = {"length": 10.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5}
 HEAVE = {"position": [9, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period": 0.8}, "ramp": 1.6}}
@@ -72,8 +72,8 @@ def test_a_catenary_that_is_asked_for_stops(scene: dict[str, Any]) -> None:
 
 def test_the_plan_says_what_a_slack_line_may_cost() -> None:
     """And counts steps whose loads still grow as those of grown loads: the motion of the end has a ramp of 1.6 s."""
-    open_, named = as_scene_or_system(system()), as_scene_or_system(system(model="catenary"))
-    assert isinstance(open_, System) and isinstance(named, System)
+    open_, named = as_scene(system()), as_scene(system(model="catenary"))
+    assert isinstance(open_, Network) and isinstance(named, Network)
     assert open_.slack_becomes_rod and not named.slack_becomes_rod and _grown(open_) == 1.6
     plan = replace(hybrid.plan(open_, measure=False), seconds=8.0, most_seconds=19.0)
     said = " ".join(" ".join(plan_rows(open_, plan)).split())

@@ -20,7 +20,7 @@ from hybrid.accuracy.refinement import Verdict
 from hybrid.errors import ComputationError
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.analysis import RodModel
-from hybrid.scene.network_scene import System
+from hybrid.scene.network_scene import Network
 from hybrid.simulation import progress as reports
 from hybrid.simulation.run_sample import COMPARED, END_FORCES, RIGHT
 
@@ -169,7 +169,7 @@ def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> 
     scene["lines"]["tow"] |= {"model": "catenary", "accuracy": "2%"}
     computed = passes_of_lines.run_system
 
-    def without_rods(system: System, *x: Any, **more: Any) -> Any:
+    def without_rods(system: Network, *x: Any, **more: Any) -> Any:
         if isinstance(system.lines["tow"].model, RodModel):
             fails()
         return computed(system, *x, **more)
@@ -245,7 +245,7 @@ def test_cells_that_find_no_equilibrium_are_halved(
     with hybrid.static(scene) as plain:
         fineness = float(plain.lines["tow"].attributes["effort_fineness"])
 
-    def finds_rest(system: System, target: Any, text: Any, resolution: Any, *more: Any) -> Any:
+    def finds_rest(system: Network, target: Any, text: Any, resolution: Any, *more: Any) -> Any:
         if resolution.one.fineness < part * fineness:
             raise ComputationError(hybrid.errors.Outcome.UNSTABLE, None, 0.0)
         return computed(system, target, text, resolution, *more)

@@ -211,7 +211,7 @@ def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path, mon
     """Some ms after a step that is drawn, so that it is not always between two steps."""
     monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 3000)
     scene, whole = tmp_path / "float.yaml", tmp_path / "whole.h5"
-    scene.write_text(hybrid.scene_text(hybrid.System.model_validate(mooring(time=LONG))))
+    scene.write_text(hybrid.scene_text(hybrid.Scene.model_validate(mooring(time=LONG))))
     hybrid.run(scene, whole).close()
     draw, steps = random.Random(7), LONG["duration"] / LONG["step"]
     for share in (0.3, 0.8):

@@ -182,7 +182,7 @@ def test_a_file_is_what_memory_is(tmp_path: Path, moved: hybrid.Result) -> None:
             assert np.array_equal(line.tension, moved.lines[name].tension)
             assert line.dims("tension") == ("t", "s") and line.units["tension"] == "N"
     (tmp_path / "again.yaml").write_text(written.scene_text)
-    assert hybrid.load_system(tmp_path / "again.yaml") == hybrid.System.model_validate(mooring())
+    assert hybrid.load_scene(tmp_path / "again.yaml") == hybrid.Scene.model_validate(mooring())
     hybrid.export(written.lines["hose"], tmp_path / "hose.csv")
     assert (tmp_path / "hose.csv").stat().st_size > 5_000
     with pytest.raises(ResultError, match="nothing left to do"):

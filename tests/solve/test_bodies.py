@@ -117,7 +117,7 @@ def test_damping_takes_the_energy_that_it_says() -> None:
 
 def spun(rho: float, steps: int) -> tuple[NetworkSolver, NetworkState, list[np.ndarray]]:
     """A torque-free body that tumbles about its middle axis, beside a line that it does not touch."""
-    run = NetworkRun(hybrid.System.model_validate(moored()), io.BytesIO(), "", moves=False)
+    run = NetworkRun(hybrid.Scene.model_validate(moored()), io.BytesIO(), "", moves=False)
     x = run.found.solver.lines[0]
     ends = x.ends._replace(held=np.ones(2, np.int8), position=run.found.state.lines[0].r[[0, -1]])
     held = x._replace(joints=(-1, -1), ends=ends)

@@ -66,7 +66,7 @@ def in_pieces(
 
 
 def equilibrium(tables: dict[str, Any]) -> NetworkRun:
-    return NetworkRun(hybrid.System.model_validate(tables), io.BytesIO(), "", moves=False)
+    return NetworkRun(hybrid.Scene.model_validate(tables), io.BytesIO(), "", moves=False)
 
 
 def test_offsets_of_a_point_to_which_lines_are_clamped() -> None:
@@ -285,7 +285,7 @@ def test_stiffness_of_a_body_on_a_clamped_rod_is_that_of_differences() -> None:
     tables = hung()
     tables["lines"]["line"]["connections"]["start"]["normal"] = [1, 0, 0]
     tables["lines"]["line"]["connections"]["end"]["normal"] = [1, 0, 0]
-    C = np.linalg.inv(hybrid.stiffness(hybrid.System.model_validate(tables), "body:body").matrix)
+    C = np.linalg.inv(hybrid.stiffness(hybrid.Scene.model_validate(tables), "body:body").matrix)
     for k, (key, size) in enumerate((("force", 0.05),) * 3 + (("moment", 0.05),) * 3):
         rows = []
         for sign in (1, -1):
@@ -389,7 +389,7 @@ def test_three_rods_that_meet_rigidly_balance_their_moments() -> None:
     assert np.abs(sum(moments)).max() < 1e-6 * np.abs(moments[0]).max()
     place, turned = result["points/knot/position"][-1], result["points/knot/rotation"][-1]
     assert np.abs(place[:2]).max() < 1e-6 and np.abs(turned[:2]).max() < 1e-4  # symmetric
-    point = hybrid.stiffness(hybrid.System.model_validate(tables), "point:knot").matrix
+    point = hybrid.stiffness(hybrid.Scene.model_validate(tables), "point:knot").matrix
     tables["points"]["knot"]["force"] = [0.1, 0, 0]
     moved = hybrid.static(tables)["points/knot/position"][-1] - place
     assert moved[0] == pytest.approx(0.1 * np.linalg.inv(point)[0, 0], rel=1e-3)

@@ -6,7 +6,7 @@ import yaml
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.scene.read import parse_either, scene_text
+from hybrid.scene.read import read_text, scene_text
 from hybrid.solve.stepper import Stepper
 from tests.said import ONE, both_ways, line_of, said
 
@@ -51,7 +51,7 @@ def test_a_slack_catenary_stops_the_run(tmp_path, network):
         assert float(snapshot["t"]) == error.t
         assert snapshot[f"{ONE}/r" if network else "r"].shape == (41, 3)
         read, expected = (
-            parse_either(x, "")[0]
+            read_text(x, "")[0]
             for x in (str(snapshot["scene"]), yaml.safe_dump(said(scene(), network), sort_keys=False))
         )
         assert scene_text(read) == scene_text(expected)

@@ -134,7 +134,7 @@ def equilibrium(tables: dict[str, Any]) -> NetworkRun:
     """The equilibrium of a system, not yet written."""
     import io
 
-    return NetworkRun(hybrid.System.model_validate(tables), io.BytesIO(), "", moves=False)
+    return NetworkRun(hybrid.Scene.model_validate(tables), io.BytesIO(), "", moves=False)
 
 
 def test_a_bridle_without_weight_against_its_force_polygon() -> None:

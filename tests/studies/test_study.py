@@ -464,7 +464,7 @@ def test_several_lines(folder: Path, tmp_path: Path, scheduler: str) -> None:
     assert (found.status.values == DONE).all() and found.sizes["case"] == 4
     text = LINES.replace("mass: 3", "mass: 4").replace("position: [0, 0, 0]", "position: [-1, 0, 0]")
     (tmp_path / "one.yaml").write_text(text)
-    result = hybrid.run(hybrid.load_system(tmp_path / "one.yaml"))
+    result = hybrid.run(hybrid.load_scene(tmp_path / "one.yaml"))
     last = found.isel(case=int(np.flatnonzero((found.m.values == 4) & (found.x.values == -1.0))[0]))
     port, other = result.lines["port"], result.lines["star-board"]
     assert float(last.port_max) == np.nanmax(port["envelope/tension_max"])

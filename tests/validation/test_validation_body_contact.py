@@ -20,8 +20,8 @@ from hybrid.model.bodies import body_model
 from hybrid.model.build import build
 from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody, turned
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import as_scene
 from hybrid.simulation.run_start import joined_lines
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.network_solver import NetworkSolver
@@ -89,8 +89,8 @@ def test_what_rests_stays_and_an_obstacle_there_holds_the_lines_the_same(rest: A
 
 
 def _rows(tables: Tables) -> Any:
-    system = as_scene_or_system(tables)
-    assert isinstance(system, System)
+    system = as_scene(tables)
+    assert isinstance(system, Network)
     return build_system(system).models[0].sea.values.obstacles
 
 
@@ -475,8 +475,8 @@ def test_a_thrown_line_gives_a_ball_what_it_loses(friction: float) -> None:
 
 def test_newtons_method_converges_quadratically() -> None:
     """A step of a spinning ball pressed on lines, with friction: what is left falls by squares once contact is found."""
-    system = as_scene_or_system(pushed())
-    assert isinstance(system, System)
+    system = as_scene(pushed())
+    assert isinstance(system, Network)
     model = build_system(system)
     solver = NetworkSolver(joined_lines(model, 0.0), 0, model.body_numbers(0.0))
     start = NetworkState([x.start for x in model.models], model.body_places).copy()

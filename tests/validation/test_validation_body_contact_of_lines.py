@@ -20,8 +20,8 @@ from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import as_scene
 from hybrid.simulation.lines_contact import shared_of
 from hybrid.simulation.run_start import joined_lines
 from hybrid.solve.joined import NetworkState
@@ -203,8 +203,8 @@ def test_a_ball_rests_on_lines_that_lie_on_others() -> None:
 
 
 def build_of(tables: Tables) -> Any:
-    system = as_scene_or_system(tables)
-    assert isinstance(system, System)
+    system = as_scene(tables)
+    assert isinstance(system, Network)
     return build_system(system)
 
 

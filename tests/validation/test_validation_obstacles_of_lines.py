@@ -12,17 +12,17 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.model.network import build_system
-from hybrid.scene.network_scene import System
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.network_scene import Network
+from hybrid.scene.read import as_scene
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, Tables, drum, half_turn, over_pipe
 
 MU, WEIGHT = 0.3, 100.0
 CELLS = 64
 
 
-def system_of(tables: Tables) -> System:
-    found = as_scene_or_system(tables)
-    assert isinstance(found, System)
+def system_of(tables: Tables) -> Network:
+    found = as_scene(tables)
+    assert isinstance(found, Network)
     return found
 
 

@@ -20,7 +20,7 @@ from hybrid.cli.console import Console
 from hybrid.cli.lines_tables import show_lines
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import ResultError
-from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.read import as_scene
 from hybrid.store.records import Zone
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks, Text
@@ -381,7 +381,7 @@ def test_a_plan_of_many_lines_has_a_row_for_those_that_are_alike() -> None:
     scene = fan()
     for line in scene["lines"].values():
         line["sections"] = [SECTION]
-    system = as_scene_or_system(scene)
+    system = as_scene(scene)
     rows = plan_rows(system, hybrid.plan(system, measure=False))  # type: ignore[arg-type]
     assert any(x.startswith("14 lines ") and "120 m" in x for x in rows) and not any(
         x.startswith("line ") for x in rows

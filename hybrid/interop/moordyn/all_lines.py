@@ -30,7 +30,7 @@ from hybrid.interop.moordyn.scenes import ImportedScene
 from hybrid.interop.moordyn.tables import NEAR, Tables, flow, lines_of
 from hybrid.interop.moordyn.types import LineType
 from hybrid.scene.ends import Triple
-from hybrid.scene.read import parse_either
+from hybrid.scene.read import read_text
 
 # Two lines are one only where a rod without length joins them: points are points.
 JOINTS = ("rod",)
@@ -44,7 +44,7 @@ def scene_of_lines(deck: Deck) -> ImportedScene:
     if made.complaints:
         raise SceneError(sorted(dict.fromkeys(made.complaints), key=lambda c: c.line or 0), deck.file)
     try:
-        scene, _ = parse_either(text)
+        scene, _ = read_text(text)
     except SceneError as error:
         raise SceneError([made.of_deck(c) for c in error.complaints], deck.file) from None
     return ImportedScene("system", tuple(sorted(deck.lines)), scene, text, in_order(made.notes))

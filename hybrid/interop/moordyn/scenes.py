@@ -26,7 +26,7 @@ class ImportedScene:
 
     name: str
     lines: tuple[int, ...]
-    scene: Any  # Scene, or System of several lines
+    scene: Any  # of a cable, or of several lines
     text: str
     notes: tuple[Note, ...]
 

@@ -24,7 +24,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.bodies import body_row
 from hybrid.interop.moordyn.tables import NEAR
 from hybrid.scene.cable import Section
-from hybrid.scene.read import parse_either
+from hybrid.scene.read import read_text
 
 Triple = tuple[float, float, float]
 NO_BED = 1e4  # m under the surface, where a scene has none
@@ -98,7 +98,7 @@ def deck_of(result: Computed) -> WrittenDeck:
 
     SceneError, with every complaint, if the scene has what MoorDyn has not.
     """
-    scene, _ = parse_either(result.scene_text)
+    scene, _ = read_text(result.scene_text)
     shapes = {name: _shape(line) for name, line in result.lines.items()} or {"": _shape(result)}
     writer = _Writer(scene, shapes)
     for name in scene.bodies:
