@@ -26,7 +26,9 @@ HEAD = """\
 
 Use this page to look up every key of a scene: meaning, unit, bounds and default.
 A scene is a YAML file, or the same tables in Python: `hybrid.validate_scene({...})`.
-SI units; the inertial frame has z up; arc length s is unstretched and runs from `ends.start` to `ends.end`.
+It names [points and lines](#points-and-lines), or is the [short form](#short-form-of-one-line) of one line, `cable`
+with `ends` ([points.md](points.md)).
+SI units; the inertial frame has z up; arc length s is unstretched and runs from the start of a line to its end.
 Angles are in degrees, as people write them.
 A table that is left out is not there, and a key that does not exist is refused.
 `hybrid schema` prints the JSON schema, with which editors complete and check a scene as
@@ -521,10 +523,9 @@ def combinations() -> Iterator[str]:
     yield "## What does not combine"
     yield ""
     yield (
-        "Pairs that are refused, each with what to do instead.  *Physics* cannot be otherwise; *several lines* is what "
-        "one cable can and several cannot yet; the rest is not worked out.  All other pairs of some thirty features "
-        "are computed as they stand, turned and mirrored, and as a system of one line "
-        "(`pytest tests/combinations -m slow`)."
+        "Pairs that are refused, each with what to do instead.  *Physics* cannot be otherwise; the rest is not worked "
+        "out.  All other pairs of some thirty features are computed in the short form and with names, turned and "
+        "mirrored (`pytest tests/combinations -m slow`)."
     )
     yield ""
     yield "| this | beside this | because |  |"
@@ -539,7 +540,8 @@ def page() -> str:
     """The whole page."""
     order: list[str] = []
     lines = [HEAD]
-    for title, schema in (("Scene", LineScene.model_json_schema()), ("Several lines", Network.model_json_schema())):
+    forms = {"Short form of one line": LineScene, "Points and lines": Network}
+    for title, schema in ((title, form.model_json_schema()) for title, form in forms.items()):
         tables = schema.pop("$defs")
         known = len(order)
 

@@ -67,7 +67,7 @@ class OfEquilibrium(Table):
     quantity: Text = Field(
         description="what: all that `hybrid static` records, such as tension, curvature, position.z, reaction_end.x"
     )
-    line: Text | None = Field(default=None, description="which line, in a scene of several lines")
+    line: Text | None = Field(default=None, description="which line, by its name")
     at: Where | None = Field(default=None, description="arc length, start or end; absent: the most along the line [m]")
     section: Annotated[Whole, Field(ge=0)] | None = Field(
         default=None, description="only along this section, counted from 0"
@@ -137,7 +137,7 @@ class Measured(Table):
 
     file: Text = Field(
         description="CSV file, relative to the design file: a column s (m), columns of quantities such as tension, or "
-        "x, y, z of the position; of a motion a column t (s); in a scene of several lines a column line, with several "
+        "x, y, z of the position; of a motion a column t (s); where lines have names a column line, with several "
         "cases a column case"
     )  # fmt: skip
     at: Where | None = Field(

@@ -136,14 +136,14 @@ class JoinedLine(Table):
         default=None, description="how fine the cells are that the program places; absent: as the accuracy asks"
     )
     contact: Contact = Field(
-        default=Contact(), description="whether the line touches itself in a run, as of one cable, and its friction"
+        default=Contact(), description="whether the line touches itself in a run, and its friction"
     )
     accuracy: AskedAccuracy | None = Field(
-        default=None, description="how wrong the result of this line may be; absent: as `accuracy` of the system"
+        default=None, description="how wrong the result of this line may be; absent: as `accuracy` of the scene"
     )
     initial: LineInitial = Field(
         default=Equilibrium(),
-        description="straight or along a polyline, as of one cable, where all lines start so, or the shape that the "
+        description="straight or along a polyline, where all lines start so, or the shape that the "
         "search of the equilibrium starts from: guess, or points, a polyline that is shifted to the first places of "
         "its ends; absent: hung between these",
     )
@@ -243,10 +243,10 @@ class NetworkOutput(Table):
 
 
 class NetworkTables(Scene):
-    """Several lines, the points where they meet, what acts on them, and what is asked; not checked."""
+    """Lines, the points where they end and meet, what acts on them, and what is asked; not checked."""
 
     instead: ClassVar[Mapping[str, str]] = {
-        "ends": "a scene of several lines has points, at which its lines end",
+        "ends": "a scene with lines has points, at which they end",
         "model": "each line has its own: lines.NAME.model",
         "mesh": "each line has its own: lines.NAME.mesh",
         "initial": "each line has its own: lines.NAME.initial",

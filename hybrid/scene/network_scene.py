@@ -30,7 +30,7 @@ from hybrid.scene.ways import farthest, moving_key, shift, smaller
 
 
 class Network(NetworkTables):
-    """Several lines, the points where they meet, what acts on them, and what is asked."""
+    """Lines, the points where they end and meet, what acts on them, and what is asked."""
 
     @model_validator(mode="after")
     def _lines_join_points(self) -> Network:

@@ -71,7 +71,7 @@ class Quantity(Table):
 
     kind: Literal[tuple(KINDS)] = Field(description="what is recorded: " + ", ".join(KINDS))  # type: ignore[valid-type]
     line: Text | None = Field(
-        default=None, min_length=1, description="which line, in a scene of several lines; absent: the only one"
+        default=None, min_length=1, description="which line, by its name; absent: the only one"
     )
     end: Literal["start", "end"] | None = Field(
         default=None, description="at which end, of all kinds but clearance: s = 0 or s = length"
@@ -97,7 +97,7 @@ class Quantity(Table):
         default=None, description="of clearance: points of another line that does not move, such as a pipeline [m]"
     )
     other: Text | None = Field(
-        default=None, min_length=1, description="of clearance: another line of a scene of several lines"
+        default=None, min_length=1, description="of clearance: another line"
     )
     diameter: NonNegative = Field(
         default=0.0, description="of clearance: diameter of what is around the point or along the path [m]"

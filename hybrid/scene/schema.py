@@ -152,7 +152,7 @@ __all__ = [
 
 
 class LineScene(Scene):
-    """A cable, what holds it, what acts on it, and what is asked."""
+    """A cable, what holds it, what acts on it, and what is asked: one line without names."""
 
     instead: ClassVar[Mapping[str, str]] = {"solver": "leave it out: every scene is solved by elimination"}
     asked_nothing: ClassVar[Mapping[str, Any]] = {"solver": "elimination"}

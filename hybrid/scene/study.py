@@ -131,7 +131,7 @@ class Kept(Table):
 
     quantity: Text = Field(description="a quantity of the result, such as tension or end_force_end")
     line: Text | None = Field(
-        default=None, description="of which line, in a scene of several lines; absent: of what stands beside its lines"
+        default=None, description="of which line, by its name; absent: of what stands beside the lines"
     )
     at: (
         Annotated[
