@@ -73,7 +73,7 @@ def plan(scene: SceneLike, *, measure: bool = True) -> Any:
     """
     scene = as_scene(scene)
     if not isinstance(scene, LineScene):
-        made = tables.plan_system(scene)
+        made = tables.plan(scene)
         return _measured_lines(scene, made) if measure and scene.time is not None else made
     found = tables.plan(scene)
     return _measured(scene, found) if measure and scene.time is not None else found

@@ -149,7 +149,7 @@ def _with_nodes(course: Course) -> Course:
     """With the places of the nodes of every line."""
     network = course.network(course.scene)
     model = build_system(network, NetworkResolution(course.lines))
-    scenes = {name: network.scene_of(name, network.carried(name), network.guesses) for name in model.names}
+    scenes = network.scenes_of_lines
     places = {name: places_of(x, scenes[name]) for name, x in zip(model.names, model.models, strict=True)}
     return course._replace(lines={k: replace(x, places=places[k]) for k, x in course.lines.items()})
 

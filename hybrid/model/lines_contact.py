@@ -16,6 +16,7 @@ from hybrid.model.self_reach import payouts, self_reach
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.lines_contact import LinesContact
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 
 if TYPE_CHECKING:  # its tables take long to make
@@ -89,7 +90,7 @@ def beside_others(line: Line) -> Line:
     return line._replace(bits=line.bits | MAY_MEET)
 
 
-def that_may_meet(system: Network, scenes: Mapping[str, LineScene]) -> tuple[int, ...]:
+def that_may_meet(system: Scene, scenes: Mapping[str, LineScene]) -> tuple[int, ...]:
     """Numbers of the lines that touch each other from where they come near, because a scene says nothing of contact.
 
     scenes: of the lines by name.  They have diameters, steps are given, and no error is estimated (scene.combinations).

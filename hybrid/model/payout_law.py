@@ -21,11 +21,11 @@ SAME_LENGTH = 1e-9
 
 @contextmanager
 def said_of_line(name: str) -> Iterator[None]:
-    """What is refused within of how a line of several is paid out is said of its connection."""
+    """What is refused within of how a line is paid out is said of its connection, if it has a name."""
     try:
         yield
     except SceneError as error:
-        at = f"lines.{name}.connections."
+        at = f"lines.{name}.connections." if name else "ends."
         raise SceneError([replace(x, where=re.sub(r"^ends\.", at, x.where)) for x in error.complaints]) from None
 
 

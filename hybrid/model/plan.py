@@ -147,7 +147,7 @@ def count_steps(scene: LineScene) -> int:
 
 @dataclass(frozen=True)
 class NetworkPlan:
-    """What a system of lines requires: the plan of each line by name, and what they come to together."""
+    """What lines with names require: the plan of each line by name, and what they come to together."""
 
     lines: dict[str, Plan]
     free: tuple[str, ...]  # names of the points that are free
@@ -160,25 +160,6 @@ class NetworkPlan:
     measured: bool = False
 
 
-def plan_system(system: Network) -> NetworkPlan:
-    """What would be computed for several lines; nothing is computed."""
-    plans, scenes, guesses = {}, {}, system.guesses
-    for name in system.lines:
-        scenes[name] = scene = system.scene_of(name, system.carried(name), guesses)
-        if scene.time:
-            refuse_too_much(scene)
-        with said_of_line(name):
-            plans[name] = _plan(scene)
-    for name in (tuple(system.lines)[k] for k in that_may_meet(system, scenes)):
-        plans[name] = replace(plans[name], contents=(*plans[name].contents, MEETS))
-    every = list(plans.values())
-    shortest = min(every, key=lambda x: x.step)  # all have the steps in common
-    return NetworkPlan(
-        plans, system.free, sum(sum(x.cells) for x in every), sum(x.unknowns for x in every), shortest.steps,
-        shortest.step, sum(x.seconds for x in every),
-    )  # fmt: skip
-
-
 @overload
 def plan(scene: LineScene) -> Plan: ...
 @overload
@@ -188,13 +169,29 @@ def plan(scene: SceneLike) -> Any: ...
 def plan(scene: SceneLike) -> Any:
     """What would be computed for a scene (a Scene, the path of a scene file, or a dict); nothing is computed.
 
-    Of several lines it is a NetworkPlan.
+    Of lines with names it is a NetworkPlan.
     """
-    scene = as_scene(scene)
-    if not isinstance(scene, LineScene):
-        return plan_system(scene)
-    if scene.time:
-        refuse_too_much(scene)
+    scene, plans = as_scene(scene), dict[str, Plan]()
+    scenes = scene.scenes_of_lines
+    for name, line in scenes.items():
+        if scene.time:
+            refuse_too_much(line)
+        with said_of_line(name):
+            plans[name] = _plan_of_line(line)
+    if not scene.line_names:
+        return plans[""]
+    for name in (tuple(scenes)[k] for k in that_may_meet(scene, scenes)):
+        plans[name] = replace(plans[name], contents=(*plans[name].contents, MEETS))
+    every = list(plans.values())
+    shortest = min(every, key=lambda x: x.step)  # all have the steps in common
+    return NetworkPlan(
+        plans, scene.free, sum(sum(x.cells) for x in every), sum(x.unknowns for x in every), shortest.steps,
+        shortest.step, sum(x.seconds for x in every),
+    )  # fmt: skip
+
+
+def _plan_of_line(scene: LineScene) -> Plan:
+    """What would be computed for a line; where its model is open, for a rod, with what others would cost."""
     if not model_is_free(scene):
         return _plan(scene)
     rods = _plan(with_model(scene, "rod"))

@@ -489,6 +489,12 @@ class NetworkTables(Scene):
         return known[key]
 
     @property
+    def scenes_of_lines(self) -> dict[str, LineScene]:
+        """Each line with the points that it carries, by name, as a scene of its own."""
+        guesses = self.guesses
+        return {name: self.scene_of(name, self.carried(name), guesses) for name in self.lines}
+
+    @property
     def _known_scenes(self) -> dict[tuple[str, tuple[str, ...]], LineScene]:
         """Scenes of lines that have been made, by line and ends that carry: to validate one takes 2 ms."""
         tables, known = self._made_scenes

@@ -194,6 +194,7 @@ class LineScene(Scene):
     points: ClassVar[Mapping[str, Any]] = {}
     bodies: ClassVar[Mapping[str, Any]] = {}
     line_names: ClassVar[tuple[str, ...]] = ()
+    free: ClassVar[tuple[str, ...]] = ()
 
     @property
     def lines(self) -> dict[str, LineScene]:
@@ -214,6 +215,11 @@ class LineScene(Scene):
     def motions(self) -> list[Motion]:
         """How ends are moved."""
         return [end.prescribed_motion for end in self.ends.both if end.prescribed_motion is not None]
+
+    @property
+    def scenes_of_lines(self) -> dict[str, LineScene]:
+        """Each line with the points that it carries, by name: this one."""
+        return self.lines
 
     def scene_of(self, name: str) -> LineScene:
         """A line as a scene of its own: there is one."""

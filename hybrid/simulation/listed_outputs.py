@@ -38,8 +38,7 @@ def listed_outputs(scene: SceneLike) -> list[Listed]:
     moves, named, (system, _) = asked.time is not None, bool(asked.line_names), as_network(asked)
     free = [name for name in system.lines if model_is_free(system.scene_of(name))]
     system = with_models(system, dict.fromkeys(free, "adaptive"))
-    model, guesses, found = build_system(system), system.guesses, list[Listed]()
-    scenes = {name: system.scene_of(name, system.carried(name), guesses) for name in model.names}
+    model, found, scenes = build_system(system), list[Listed](), system.scenes_of_lines
     if named:
         found = _over_time([*fields_of(system), *fields_of_pairs(model), *RunQuantities(system, scenes).fields])
     else:  # a cable is recorded by its own scene, which has its quantities

@@ -279,8 +279,7 @@ def kept_changes(source: Path, most: int) -> int:
 
 def files_of(system: Network) -> dict[str, str]:
     """Digests of the files that a scene of several lines reads, by path."""
-    guesses = system.guesses
-    scenes = [system.scene_of(name, system.carried(name), guesses) for name in system.lines]
+    scenes = system.scenes_of_lines.values()
     found = {path for scene in scenes for path in scene.ends.files()}
     found |= {path for scene in scenes for path in scene.cable.files()} | set(system.environment.files())
     found |= set(obstacle_files(system.obstacles))

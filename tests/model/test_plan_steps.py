@@ -9,6 +9,7 @@ import pytest
 import hybrid
 from hybrid.accuracy import run_forecast
 from hybrid.accuracy.run_forecast import Seen, _cost_of_a_step, _steps_a_second, _still_to_come
+from hybrid.scene.short_form import LINE, network_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -31,6 +32,13 @@ def test_a_finer_result_costs_more() -> None:
     coarse, fine = (hybrid.plan(scene(x), measure=False) for x in ("1%", "0.01%"))
     assert fine.steps == pytest.approx(10.0 * coarse.steps, rel=0.15)
     assert fine.seconds > 10.0 * coarse.seconds
+
+
+def test_a_network_of_one_line_has_the_plan_of_its_cable() -> None:
+    """With what each model would cost, where the program chooses one."""
+    asked = scene("1%", "model=adaptive")
+    of_cable = hybrid.plan(asked, measure=False)
+    assert of_cable.choice and hybrid.plan(network_of(asked), measure=False).lines[LINE] == of_cable
 
 
 def test_what_the_first_steps_show_is_in_the_plan() -> None:
