@@ -32,9 +32,7 @@ from hybrid.outputs.section_use import Pipes
 from hybrid.outputs.step_quantities import StepQuantities
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.self_watch import SelfWatch
-from hybrid.solve.run import CompiledRun, no_extremes
-from hybrid.solve.statics import Equilibrium
-from hybrid.solve.stepper import Stepper
+from hybrid.solve.run import no_extremes
 from hybrid.store.envelope import BEGIN, END, GROUP, SCALE, Recorded, limits_of
 from hybrid.store.format import Field
 from hybrid.store.named_arrays import matched
@@ -285,28 +283,3 @@ def with_all_rows(x: Any) -> Any:
         return x
     more = np.full((len(x), b.EXTREMES - x.shape[1], x.shape[2]), np.nan)
     return np.concatenate([x, more], axis=1)
-
-
-def of_equilibrium(
-    envelope: Envelope, scene: LineScene, model: Model, found: Equilibrium, event: Callable[..., None]
-) -> dict[str, np.ndarray]:
-    """Values of the envelope of an equilibrium under full loads: those of its one state.
-
-    event: as Recorder.event, for a line that meets itself.
-    """
-    run, line = CompiledRun(1.0, np.zeros(0), extremes=True), model.line
-    ends, sea = model.ends.at(np.inf), model.sea.at(np.inf)
-    stepper = Stepper(line, model.length, model.tension_scale)
-    run.books.loaded[:] = model.loaded_ends
-    run.books = run.books._replace(hinges=model.hinges)
-    run.attach(
-        stepper, sea, ends, model.ends.moves(), found.state, np.full(model.cells, np.inf), np.zeros(0, int),
-        marks_of(scene, model),
-    )  # fmt: skip
-    run.books.report[0] = found.report
-    if found.touch.size:
-        run.books.touch[0] = found.touch
-    run.note_state()
-    envelope.itself.attach(model, run)
-    envelope.itself.look_at_start(run, event)
-    return envelope.values(line.s, run.books.extremes, 0.0)

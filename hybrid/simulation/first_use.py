@@ -20,7 +20,6 @@ from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import Equilibrium, LineScene
-from hybrid.simulation.switch import at_rest_as_network
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.network_scene import Network
@@ -32,7 +31,6 @@ ZONES = "mesh.zone_step.follow_zones"
 CRITERIA = "mesh.zone_step.evaluate_criteria"
 MODEL_ERROR = "watch.bending_error.advance_error"
 PAYOUT = "run.payout_run.go_on"
-STEPS = "run.run.run"  # around the solver of either kind
 STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
 # Of several lines: what all of them call, steps, equilibria, those that touch, those that are paid out.
 OF_LINES = ("run.network.solve_system", SOLVER[1], OUTPUTS)
@@ -56,14 +54,14 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     static: those of its equilibrium, whose stability is judged where there are rods and no end moments.
     """
     one: Any = scene
-    if scene.line_names:
-        return _kernels_of_lines(one, static)
-    own = static and not at_rest_as_network(one)
-    return _kernels_of_cable(one, static) if own else _kernels_of_network(one, static)
+    return _kernels_of_lines(one, static) if scene.line_names else _kernels_of_cable(one, static)
 
 
-def _kernels_of_network(scene: Any, static: bool) -> list[str]:
-    """Of a cable that is computed as a network of one line."""
+def _kernels_of_cable(scene: Any, static: bool) -> list[str]:
+    """Of a cable, which is computed as a network of one line.
+
+    Whether it is in a plane follows from the scene; rarely its first shape leaves the plane.
+    """
     in_space = _is_in_space(scene, scene.dimension)
     steps = [REST_OF_LINES] if static else [STEPS_OF_LINES, BOOKS_OF_LINES]
     found = [SOLVER[in_space], START_OF_LINES, *steps, OUTPUTS]
@@ -77,22 +75,9 @@ def _kernels_of_network(scene: Any, static: bool) -> list[str]:
         found += [TOUCHING, *_OF_TOUCHING]
     if wants_errors(scene) and scene.model.kind != "rod":
         found.append(MODEL_ERROR)
+        if static and scene.dimension is None and not in_space:
+            found.append(SOLVER[1])  # what leaving bending out does is followed in space
     return found
-
-
-def _kernels_of_cable(scene: LineScene, static: bool) -> list[str]:
-    """Of a cable.
-
-    Whether it is computed in a plane follows from the scene; rarely its first shape leaves the plane.
-    """
-    beside, in_space = _beside_solver(scene, static), _is_in_space(scene, scene.dimension)
-    solvers = [SOLVER[in_space]]
-    if scene.dimension is None and not in_space and MODEL_ERROR in beside:
-        solvers.insert(0, SOLVER[1])  # what leaving bending out does is followed in space
-    more = [STABILITY] if not in_space and _is_judged(scene, static) else []
-    if scene.contact.self:
-        more += [TOUCHING, *((*_OF_TOUCHING, START_OF_LINES, REST_OF_LINES) if static else ())]
-    return [*solvers, *beside, *more]
 
 
 def _is_in_space(scene: LineScene, dimension: int | None) -> bool:
@@ -133,18 +118,6 @@ def _has_rods(scene: LineScene) -> bool:
     return isinstance(scene.model, RodModel) or any(isinstance(zone, RodZone) for zone in zones)
 
 
-def _beside_solver(scene: Any, static: bool) -> list[str]:
-    """In the order in which they are best compiled beside the solver."""
-    needed = [STEPS, OUTPUTS]  # steps: their kernel notes the extremes of an equilibrium, too
-    if scene.time is not None and not static and payout_of(scene) is not None:
-        needed.insert(1, PAYOUT)  # asked for before the first step
-    if scene.time is not None and scene.model.kind == "adaptive":
-        needed.append(CRITERIA if static else ZONES)
-    if wants_errors(scene) and scene.model.kind != "rod":
-        needed.append(MODEL_ERROR)
-    return needed
-
-
 def is_ready(name: str) -> bool:
     """Whether a kernel is compiled, in this process or on disk, where a look takes 0.2 ms."""
     return bool(entry(name).signatures) or is_warm([name])
@@ -159,9 +132,7 @@ def compile_beside(scene: Scene, static: bool = False) -> None:
     if scene.line_names:
         return
     one: Any = scene
-    own = static and not at_rest_as_network(one)
-    of_network = [*_kernels_of_network(one, static)[1:], *([] if static else [REST_OF_LINES])]  # beside the solver
-    needed = _beside_solver(one, static) if own else of_network
+    needed = [*_kernels_of_cable(one, static)[1:], *([] if static else [REST_OF_LINES])]  # beside the solver
     if MODEL_ERROR in needed and SOLVER[1] not in needed:  # a line in a plane needs both solvers
         needed.insert(needed.index(OUTPUTS) + 1, SOLVER[1])
     missing = [name for name in needed if not is_ready(name)]
@@ -186,14 +157,12 @@ def command_to_compile(names: Sequence[str]) -> list[str]:
 
 def compile_all(names: Sequence[str]) -> None:
     """Compile kernels in this process, but for what another one is compiling."""
-    from hybrid.kernels.run.run import in_space, run
+    from hybrid.kernels.run.run import in_space
 
     table = np.zeros(0, np.int64)  # of which only the type counts
     for name in (*OF_LINES[:1], START_OF_LINES, REST_OF_LINES, BOOKS_OF_LINES, STEPS_OF_LINES, *PAYOUT_OF_LINES):
         if name in names:
             entry(name).compile_unless_busy(table)
-    if STEPS in names:
-        run.compile_unless_busy(table)
     if PAYOUT in names:
         for kernel in payout_kernels():
             kernel.compile_unless_busy(table)

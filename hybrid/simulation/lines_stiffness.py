@@ -20,6 +20,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
 from hybrid.model.clamps import seat_of, seated
 from hybrid.model.network import NetworkModel, build_system
+from hybrid.model.plane import in_space
 from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.bodies import FixedBody, FreeBody, HeldBody
 from hybrid.scene.body_shapes import BodyShape
@@ -441,6 +442,7 @@ def _let_go(
                     if x.line.element[-k]:
                         seats[k] = seat_of(x.ends.frame[k], rows[-1, FRAME:V].reshape(3, 3))
         ends_now = x.ends._replace(held=held, position=x.ends.position.copy())
+        x = x._replace(line=in_space(x.line))
         lines.append(x._replace(joints=(joints[0], joints[1]), ends=ends_now, fairleads=fairleads, seats=seats))
     points += kind == "point"
     if found.settled:

@@ -16,7 +16,7 @@ from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats
 from hybrid.model.network import NetworkModel, balanced_places, starts_between
-from hybrid.model.plane import as_kept
+from hybrid.model.plane import as_kept, leaves_plane, planar
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.network_scene import Network, floating_groups
@@ -154,10 +154,12 @@ def _together(model: NetworkModel, t: float, found: Sequence[Equilibrium]) -> Li
     states = NetworkState([x.state for x in found], model.body_places)
 
     def solver() -> NetworkSolver:
-        lines = [
-            x._replace(line=x.line._replace(bits=x.line.bits & ~WAVES & ~(0 if k in rubs else FRICTION)))
-            for k, x in enumerate(joined_lines(model, t))
-        ]
+        lines = []
+        for k, (x, own, one) in enumerate(zip(joined_lines(model, t), model.models, found, strict=True)):
+            line = x.line._replace(bits=x.line.bits & ~WAVES & ~(0 if k in rubs else FRICTION))
+            if own.plane is not None and not leaves_plane(own.plane, one.state, own.length):
+                line = planar(line, own.plane)  # in which it was found, so that nothing is compiled for space
+            lines.append(x._replace(line=line))
         made = NetworkSolver(lines, 0, model.body_numbers(t))
         made.blurred = {k for k, x in enumerate(found) if x.blurred}
         made.evaluate_forces(states, made.anchor)

@@ -25,32 +25,25 @@ from hybrid.simulation.network_run import ALONE, NetworkRun, Recording, start_of
 from hybrid.simulation.run_file import Cable
 from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, catenary_share, compared_cells
 from hybrid.simulation.run_zones import Start
-from hybrid.simulation.static_case_of_cable import StaticCaseOfCable
-from hybrid.simulation.switch import at_rest_as_network
 from hybrid.store.array_recorder import ArrayRecorder, Target
 from hybrid.store.records import ERROR_ESTIMATE
 from hybrid.store.writer import Recorder
 
 
-class StaticCase(StaticCaseOfCable):
+class StaticCase:
     """The equilibrium of one scene at t = 0, under loads that have grown to their full size."""
 
     def __init__(self, scene: LineScene) -> None:
-        super().__init__(scene)
+        self.scene = scene
         self._first: tuple[Resolution, Start] | None = None
-        self._by_network = at_rest_as_network(scene)
 
     def record(self, resolution: Resolution, target: Target) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it."""
-        if not self._by_network:
-            return super().record(resolution, target)
         begin, pending = clock.process_time(), ERROR_ESTIMATE if wants_errors(self.scene) else ""
         return _sample(self._run(resolution, target, Recording(pending=pending)), begin)
 
     def sample(self, resolution: Resolution) -> RunSample:
         """Compute for comparison only."""
-        if not self._by_network:
-            return super().sample(resolution)
         begin = clock.process_time()
         return _sample(self._run(resolution, None), begin)
 
@@ -59,8 +52,6 @@ class StaticCase(StaticCaseOfCable):
 
         resolution: of the result.  ComputationError: there is none, and the scene gives cells to a layer.
         """
-        if not self._by_network:
-            return super().survey(resolution, coarse)
         try:
             model, _ = self.first_shape(coarse)
             s = survey_points(model, coarse)
@@ -75,8 +66,6 @@ class StaticCase(StaticCaseOfCable):
 
     def first_shape(self, resolution: Resolution) -> tuple[Model, State]:
         """Model and state of an equilibrium, which are kept for a result of this resolution that comes next."""
-        if not self._by_network:
-            return super().first_shape(resolution)
         with short_form(self.scene).said():
             start = self._start(resolution)
         assert start.found is not None
