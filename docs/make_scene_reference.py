@@ -540,7 +540,7 @@ def page() -> str:
     """The whole page."""
     order: list[str] = []
     lines = [HEAD]
-    forms = {"Short form of one line": LineScene, "Points and lines": Network}
+    forms: dict[str, type[Table]] = {"Short form of one line": LineScene, "Points and lines": Network}
     for title, schema in ((title, form.model_json_schema()) for title, form in forms.items()):
         tables = schema.pop("$defs")
         known = len(order)

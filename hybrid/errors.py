@@ -268,7 +268,7 @@ class ComputationError(HybridError):
 
     `t` is the time in s (None in statics), `s` the arc length in m where it showed
     first, `snapshot` the file that holds the last good state (or None); `line_name` the
-    line of a system of several ("": one cable, or a point).
+    line, by its name ("": of the short form, or a point).
     """
 
     def __init__(

@@ -18,7 +18,7 @@ class NodeState(NamedTuple):
     """What a user criterion receives; the arrays are read-only.
 
     t: s; s: (N+1,) m; position, velocity: (N+1, 3) m, m/s; tension: (N,) N, of cells; curvature: (N+1,) 1/m;
-    bending_stiffness: (N+1,) N m2; line: its name among several, empty of one cable.
+    bending_stiffness: (N+1,) N m2; line: its name, empty in the short form of a scene.
     """
 
     t: float

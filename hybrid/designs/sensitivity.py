@@ -49,11 +49,11 @@ def sensitivity(scene: str | Path, of: str) -> list[Influence]: ...
 
 
 def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bool = False) -> Any:
-    """Derivatives of results of the equilibrium of a cable, or of several lines, by numbers of its scene.
+    """Derivatives of results of an equilibrium, or of a motion, by numbers of the scene.
 
     Without `by`, what each variable of a study does to the result `of` (`hybrid.studies.sensitivity`).
 
-    of: results such as `tension@0` (at s, m), `max curvature`, `position.z@125`, `reaction_end.x`; of several lines
+    of: results such as `tension@0` (at s, m), `max curvature`, `position.z@125`, `reaction_end.x`; of named lines
     `east/tension@end`, `max hose/curvature`.  by: keys of numbers such as `cable.sections[0].length`.  Friction of the
     bed is left out.  motion: of a run with friction, of results such as `max tension@end` (`hybrid.designs.in_motion`),
     with errors of the way to them.  SceneError: a key or result that the scene does not have, or what has

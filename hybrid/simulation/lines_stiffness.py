@@ -84,7 +84,7 @@ class Offsets:
 
 
 def stiffness(scene: SceneLike, at: str) -> Stiffness:
-    """Stiffness of a system of lines at `point:NAME` or `body:NAME`, free or held; from the factors of the equilibrium.
+    """Stiffness of the lines at `point:NAME` or `body:NAME`, free or held; from the factors of the equilibrium.
 
     SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
     """

@@ -39,7 +39,7 @@ class Arrays(Store):
 def plot_space(result: Result, colour: str | None = None) -> Figure:
     """The cable, or all lines, in space (m, inertial frame, z up) as a plotly figure with a slider over time.
 
-    colour: "zone", "tension" or "curvature" of one cable, "line" or "tension" of several lines; None: by zone, or by
+    colour: "zone", "tension" or "curvature" of the short form, "line" or "tension" of named lines; None: by zone, or by
     line.  Of long runs at most 81 moments and about 121 points are in it.  ResultError: a result without an output, or
     a colour that it does not have.
     """
