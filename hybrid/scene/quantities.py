@@ -70,9 +70,7 @@ class Quantity(Table):
     """A quantity over time, recorded at every output under the name that it has here."""
 
     kind: Literal[tuple(KINDS)] = Field(description="what is recorded: " + ", ".join(KINDS))  # type: ignore[valid-type]
-    line: Text | None = Field(
-        default=None, min_length=1, description="which line, by its name; absent: the only one"
-    )
+    line: Text | None = Field(default=None, min_length=1, description="which line, by its name; absent: the only one")
     end: Literal["start", "end"] | None = Field(
         default=None, description="at which end, of all kinds but clearance: s = 0 or s = length"
     )
@@ -96,9 +94,7 @@ class Quantity(Table):
     path: Annotated[tuple[Vector, ...], Field(min_length=2)] | None = Field(
         default=None, description="of clearance: points of another line that does not move, such as a pipeline [m]"
     )
-    other: Text | None = Field(
-        default=None, min_length=1, description="of clearance: another line"
-    )
+    other: Text | None = Field(default=None, min_length=1, description="of clearance: another line")
     diameter: NonNegative = Field(
         default=0.0, description="of clearance: diameter of what is around the point or along the path [m]"
     )
