@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ResultError, optional_package
+from hybrid.scene.base import places_of_files
 from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.short_form import ENDS
@@ -80,18 +81,11 @@ def _write_scene(scene: Scene, folder: Path) -> list[Path]:
     """The scene in `folder`, and copies there of the files that it names."""
     data, copies = scene.model_dump(mode="json", exclude_none=True), dict[str, Path]()
 
-    def walk(node: Any) -> None:
-        pairs = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
-        for key, value in pairs:
-            if key in ("file", "rao") and isinstance(value, str):
-                if value not in copies:
-                    copies[value] = folder / f"file{len(copies) + 1}{Path(value).suffix}"
-                    copies[value].write_bytes(Path(value).read_bytes())
-                node[key] = copies[value].name
-            else:
-                walk(value)
-
-    walk(data)
+    for table, key, path in places_of_files(data):
+        if path not in copies:
+            copies[path] = folder / f"file{len(copies) + 1}{Path(path).suffix}"
+            copies[path].write_bytes(Path(path).read_bytes())
+        table[key] = copies[path].name
     (folder / SCENE).write_text(scene_text(scene) if not copies else _yaml(data), encoding="utf-8")
     return list(copies.values())
 

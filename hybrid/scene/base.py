@@ -124,10 +124,23 @@ class Table(BaseModel):
         """Keys of the shortest example: those that are required, and the usual ones."""
         return [name for name, field in cls.model_fields.items() if field.is_required() or name in cls.usual]
 
+    def named_files(self) -> list[str]:
+        """Paths of the files that are read, for this table and for those within it."""
+        return sorted({path for *_, path in places_of_files(self.model_dump(mode="json"))})
+
     def __dir__(self) -> list[str]:
         """Without the names that pydantic has deprecated (`copy`, `dict`, `json`, ...) and its class methods."""
         kept = {"model_copy", "model_dump", "model_dump_json"}
         return sorted(n for n in super().__dir__() if n in kept or n.startswith("__") or not hasattr(BaseModel, n))
+
+
+def places_of_files(data: Any) -> Iterator[tuple[Any, Any, str]]:
+    """Where tables name files that are read: a table, its key and the path that it has there."""
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
+        if key in ("file", "rao") and isinstance(value, str):
+            yield data, key, value
+        else:
+            yield from places_of_files(value)
 
 
 def as_written(table: Mapping[str, Any], key: str) -> str:

@@ -27,7 +27,6 @@ from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurr
 from hybrid.scene.stretch import (
     Creep,
     Curve,
-    CurveFile,
     DynamicStiffness,
     Layer,
     SlipLayer,
@@ -92,12 +91,6 @@ class Environment(Table):
         default=None,
         description="the ground (sea floor) at the depth of the water; absent: none",
     )
-
-    def files(self) -> list[str]:
-        """Paths of the files that are read."""
-        depths = self.seabed.depths if self.seabed is not None else None
-        named = (getattr(depths, "file", None), getattr(self.waves, "file", None))
-        return [file for file in named if file is not None]
 
     @property
     def waves(self) -> Waves | None:
@@ -686,8 +679,3 @@ class Cable(Table):
     def inextensible(self) -> bool:
         """Whether no section can stretch."""
         return all(section.stiffness is None for section in self.sections)
-
-    def files(self) -> list[str]:
-        """Paths of the files that are read."""
-        tables = [x.syrope.curve if x.syrope is not None else x.tension_strain for x in self.sections]
-        return [x.file for x in tables if isinstance(x, CurveFile)]

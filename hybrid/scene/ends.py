@@ -340,12 +340,3 @@ class Ends(Table):
     def bodies(self) -> dict[str, Body]:
         """The bodies at the ends, by name (`start`, `end`)."""
         return {name: end for name, end in self.named().items() if isinstance(end, Body)}
-
-    def files(self) -> list[str]:
-        """Files that motions and loads of the ends are read from."""
-        motions = [end.prescribed_motion.file for end in self.both if end.prescribed_motion is not None]
-        motions += [x.prescribed_motion.vessel.rao for x in self.both
-                    if x.prescribed_motion is not None and x.prescribed_motion.vessel is not None]  # fmt: skip
-        loads = [given.load.file for end in self.both for given in end.loads]
-        winches = [end.payout.file for end in self.both if isinstance(end, Pinned | Clamped) and end.payout is not None]
-        return sorted({path for path in (*motions, *loads, *winches) if path is not None})

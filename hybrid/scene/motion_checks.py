@@ -322,7 +322,7 @@ def stationary_from(scene: Moving) -> tuple[float, float] | None:
     ends, environment = scene.ends, scene.environment
     periods = _all_periods(ends, environment)
     changes = [getattr(end, "payout", None) or end.release for end in ends.both]
-    if not periods or any(changes) or ends.files() or any(m.velocity for _, _, m in _motions(ends)):
+    if not periods or any(changes) or ends.named_files() or any(m.velocity for _, _, m in _motions(ends)):
         return None
     return max(ramp_ends(scene), default=0.0), max(periods.values())
 

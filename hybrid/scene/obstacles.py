@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from operator import mul
 from typing import Annotated, Literal, Self
 
@@ -261,15 +261,6 @@ class MeshObstacle(_Rotated):
         w = [(p - q) / self.scale for p, q in zip(x, self.at, strict=True)]
         u, v, z = (sum(map(mul, w, a)) for a in self.axes)
         return self.scale * distance_to(read_mesh(self.file), (u, v, z))
-
-
-def files_of(obstacles: Mapping[str, _Obstacle]) -> list[str]:
-    """Paths of the files that obstacles and their motions are read from."""
-    found = [x.file for x in obstacles.values() if isinstance(x, MeshObstacle)]
-    for motion in (x.motion for x in obstacles.values() if x.motion is not None):
-        vessel = motion.vessel
-        found += [x for x in (motion.file, vessel.rao if vessel is not None else None) if x is not None]
-    return found
 
 
 def _about(

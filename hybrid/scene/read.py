@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
-from itertools import product
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
@@ -18,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import usual_model
-from hybrid.scene.base import Finding, Place, Renamed, Table, as_written, dotted
+from hybrid.scene.base import Finding, Place, Renamed, Table, as_written, dotted, places_of_files
 from hybrid.scene.checks import contradictions
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.root import Scene, form_of
@@ -153,7 +152,9 @@ def read_text(text: str, file: str = "", overrides: Sequence[str] = ()) -> tuple
     if isinstance(root.value, dict):
         complaints += [c for c in (override(root, each, schema) for each in overrides) if c is not None]
         data = root.plain()
-    _resolve_motion_files(data, Path(file).parent)
+    for table, key, path in places_of_files(data):  # absolute: a scene is used from anywhere
+        if path and "\0" not in path:
+            table[key] = str((Path(file).parent / path).absolute())
     return _validated(data, root, complaints, file)
 
 
@@ -217,48 +218,6 @@ def _text_in_yaml(dumper: Any, text: str) -> Any:
 
 
 # --- helpers -----------------------------------------------------------------------------------
-
-
-def _resolve_motion_files(data: Any, folder: Path) -> None:
-    """Make the paths of files that motions, loads and obstacles name absolute: a scene is used from anywhere."""
-    points, bodies = (data.get(x) if isinstance(data, dict) else None for x in ("points", "bodies"))
-    files = [*product(("ends",), ("start", "end"), ("motion", "force", "moment", "thrust", "payout"))]
-    files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force", "moment"))
-    files += product(("bodies",), bodies if isinstance(bodies, dict) else (), ("motion", "force", "moment"))
-    obstacles = _at(data, ("obstacles",))
-    for name in obstacles if isinstance(obstacles, dict) else ():
-        _make_absolute(obstacles[name], folder)
-        _make_absolute(_at(obstacles[name], ("motion",)), folder)
-    files += [("environment", "seabed", "depths"), ("environment", "fluid", "waves")]
-    for path in files:
-        _make_absolute(_at(data, path), folder)
-    lines = data.get("lines") if isinstance(data, dict) else None
-    for cable in (("cable",), *(("lines", name) for name in (lines if isinstance(lines, dict) else ()))):
-        for end in ("start", "end"):
-            _make_absolute(_at(data, (*cable, "connections", end, "payout")), folder)
-        sections = _at(data, (*cable, "sections"))
-        for section in sections if isinstance(sections, list) else ():
-            _make_absolute(_at(section, ("tension_strain",)), folder)
-            _make_absolute(_at(section, ("syrope", "curve")), folder)
-
-
-def _at(data: Any, path: Iterable[str]) -> Any:
-    """What is at a path of keys; None: nothing."""
-    for key in path:
-        data = data.get(key) if isinstance(data, dict) else None
-    return data
-
-
-def _make_absolute(here: Any, folder: Path) -> None:
-    """Make the paths of files that a table names absolute."""
-    if isinstance(here, dict):
-        carried = here.get("vessel")
-        rao = carried.get("rao") if isinstance(carried, dict) else None
-        if isinstance(carried, dict) and isinstance(rao, str) and rao and "\0" not in rao:
-            carried["rao"] = str((folder / rao).absolute())
-        name = here.get("file")
-        if isinstance(name, str) and name and "\0" not in name:
-            here["file"] = str((folder / name).absolute())
 
 
 def _warn_renamed(scene: Any, renamed: list[RenamedKey]) -> Any:

@@ -13,9 +13,7 @@ from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE
-from hybrid.scene.bodies import FixedBody, FreeBody
-from hybrid.scene.network_scene import Network
-from hybrid.scene.obstacles import files_of as obstacle_files
+from hybrid.scene.root import Scene
 from hybrid.simulation.lines_contact_start import touch_each_other
 from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.old_checkpoints import FIRST_REPORT, FIRST_WORKS, as_of_line, is_of_cable, zoning_of_today
@@ -277,18 +275,6 @@ def kept_changes(source: Path, most: int) -> int:
         return made
 
 
-def files_of(system: Network) -> dict[str, str]:
-    """Digests of the files that a scene of several lines reads, by path."""
-    scenes = system.scenes_of_lines.values()
-    found = {path for scene in scenes for path in scene.ends.files()}
-    found |= {path for scene in scenes for path in scene.cable.files()} | set(system.environment.files())
-    found |= set(obstacle_files(system.obstacles))
-    for body in system.bodies.values():
-        if isinstance(body, FixedBody) and body.motion is not None:
-            vessel = body.motion.vessel
-            found |= {x for x in (body.motion.file, vessel.rao if vessel is not None else None) if x is not None}
-        elif isinstance(body, FreeBody):
-            found |= {given.load.file for given in body.end.loads if given.load.file is not None}
-    for name in system.rigid:
-        found |= {given.load.file for given in system.moments_on(name) if given.load.file is not None}
-    return {path: digest_of(Path(path)) for path in sorted(found)}
+def files_of(scene: Scene) -> dict[str, str]:
+    """Digests of the files that a scene reads, by path."""
+    return {path: digest_of(Path(path)) for path in scene.named_files()}

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.base import places_of_files
 from hybrid.scene.read import as_scene, read_text, text_of
 from hybrid.scene.root import Scene
 from hybrid.scene.study import MOST_CASES, TAKEN, Study
@@ -71,7 +72,8 @@ class Cases:
     @property
     def files(self) -> dict[str, str]:
         """Hashes of the files that scenes read, by path."""
-        named = _files_in(self.base) | {x for row in self.rows for x in row.values() if isinstance(x, str)}
+        named = {x for row in self.rows for x in row.values() if isinstance(x, str)}
+        named |= {x for *_, x in places_of_files(self.base)}
         return {x: digest_of(x) for x in sorted(named) if len(x) < LONGEST_PATH and Path(x).is_file()}
 
 
@@ -230,13 +232,3 @@ def _set(data: Any, path: str, value: Any) -> None:
             data[part] = {} if isinstance(after, str) else []
         data = data[part]
     data[parts[-1]] = value
-
-
-def _files_in(data: Any) -> set[str]:
-    """Paths of files that tables name."""
-    if isinstance(data, dict):
-        named = {x for k, x in data.items() if k in ("file", "rao", "depths") and isinstance(x, str)}
-        return {x for x in named if Path(x).is_file()} | set().union(*(_files_in(x) for x in data.values()))
-    if isinstance(data, list):
-        return set().union(*(_files_in(x) for x in data))
-    return set()

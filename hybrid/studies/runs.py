@@ -20,7 +20,6 @@ from hybrid.errors import Complaint, ComputationError, ResultError, SceneError
 from hybrid.scene.accuracy import of_length
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.base import Kinds
-from hybrid.scene.obstacles import files_of
 from hybrid.scene.read import as_scene, one_line, scene_text
 from hybrid.scene.schema import LineScene, Model
 from hybrid.simulation.progress import Progress
@@ -231,7 +230,7 @@ class RunStore:
 def key_of(scene: LineScene, repeat: int, also: str = "") -> str:
     """Hash of all that decides the result of a run: scene, files it reads, package, repetitions."""
     digest = hashlib.sha256(f"{version('hybrid-cable')} {repeat}{also}\n{scene_text(scene)}".encode())
-    for path in (*scene.ends.files(), *scene.environment.files(), *scene.cable.files(), *files_of(scene.obstacles)):
+    for path in scene.named_files():
         digest.update(Path(path).read_bytes())
     package = Path(__file__).parents[1]
     for source in sorted(package.rglob("*.py")):

@@ -241,7 +241,7 @@ def test_waves_one_by_one(tmp_path: Path):
     values = surroundings(given, 5).values
     np.testing.assert_allclose(values.waves, waves, rtol=1e-12, atol=1e-12)
     assert given.environment.waves.significant_height == pytest.approx(3.0)
-    assert given.environment.files() == [str(tmp_path / "sea.csv")]
+    assert given.environment.named_files() == [str(tmp_path / "sea.csv")]
 
 
 def record(folder: Path, begin=-20.0, mean=0.3, rows=400, step=0.5):

@@ -105,7 +105,7 @@ def test_a_scene_moves_as_with_the_table_of_the_same_numbers(tmp_path: Path) -> 
     by_dataset = build(made)
     for t in (3.0, 20.0, 33.3):
         assert by_dataset.ends.at(t).position[1] == pytest.approx(by_table.ends.at(t).position[1], abs=1e-9)
-    assert made.ends.files() == [str(tmp_path / "ship.nc")]
+    assert made.ends.named_files() == [str(tmp_path / "ship.nc")]
 
 
 REFUSED: dict[str, tuple[Any, str]] = {

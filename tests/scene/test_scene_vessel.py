@@ -117,7 +117,7 @@ def test_it_runs_and_resumes_with_its_table(tmp_path: Path) -> None:
         for k in (10, 50, 80):
             wanted = model.ends.at(float(result.t[k])).position[1]
             np.testing.assert_allclose(result.position[k, -1], wanted, rtol=0, atol=1e-8)
-    assert made.ends.files() == [str(tmp_path / "rao.csv")]
+    assert made.ends.named_files() == [str(tmp_path / "rao.csv")]
 
 
 REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 from scene_texts import complaints
 
 import hybrid
@@ -28,6 +29,23 @@ def test_a_file_is_the_table_that_it_holds(tmp_path: Path) -> None:
     (tmp_path / "rope.csv").write_text("tension,strain\n0,0\n1000,0.01\n900,0.03\n", encoding="utf-8")
     with pytest.raises(SceneError, match=r"rope.csv, line 4: 0.03, 900"):
         hybrid.load_scene(scene)
+
+
+@pytest.mark.parametrize("network", [False, True])
+def test_a_file_of_the_reel_is_beside_the_scene_and_among_its_files(network: bool, tmp_path: Path) -> None:
+    (tmp_path / "rope.csv").write_text("tension,strain\n0,0\n1000,0.01\n", encoding="utf-8")
+    rope = "tension_strain: {file: rope.csv}"
+    end = (
+        f"{{kind: pinned, position: [8, 0, 0], payout: {{rate: 0.1, ramp: 5, reel: [{{length: 5, mass: 1, {rope}}}]}}}}"
+    )
+    tables = yaml.safe_load(SCENE % (rope, end)) | {"model": "catenary"}
+    if network:
+        line = {"start": "a", "end": "b", "sections": tables["cable"]["sections"], "model": "catenary"}
+        line["connections"] = {"end": {"payout": tables["ends"]["end"]["payout"]}}
+        points = {"a": {"position": [0.0, 0.0, 0.0]}, "b": {"position": [8.0, 0.0, 0.0]}}
+        tables = {"points": points, "lines": {"rope": line}}
+    (tmp_path / "scene.yaml").write_text(yaml.safe_dump(tables), encoding="utf-8")
+    assert hybrid.load_scene(tmp_path / "scene.yaml").named_files() == [str(tmp_path / "rope.csv")]
 
 
 def test_a_cable_with_a_table_is_a_rod_by_default() -> None:
