@@ -2,27 +2,20 @@
 
     pytest bench/test_bench_parts.py -m bench -s
 
-Steps of one line are timed at the compiled call, bare and with one part more, in turns within one process; printed are
-medians.  All share one compiled signature: what is off is a bit that is not set.
+Runs of one line are timed from their first step on, bare and with one part more, in turns within one process; printed
+are medians.  All share one compiled signature: what is off is a bit that is not set.
 """
 
-import time
 from statistics import median
 
 import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.state import books
-from hybrid.model.build import build
-from hybrid.model.plane import planar, untwist
-from hybrid.solve.plane_stability import seed
-from hybrid.solve.run import CompiledRun
-from hybrid.solve.statics import Search, solve_statics
-from hybrid.solve.stepper import Stepper
 
 pytestmark = pytest.mark.bench
-CELLS, STEPS, ROUNDS, STEP = 200, 60, 9, 0.02
+CELLS, ROUNDS, STEP = 200, 9, 0.02
+MOTION = {"heave": {"amplitude": 0.1, "period": 2.0}, "surge": {"amplitude": 0.1, "period": 3.0}}
 
 SECTION = {"length": 20.0, "mass": 1.0, "axial_stiffness": 1e6, "bending_stiffness": 1.0, "rotary_inertia": 0}
 WATER = {"density": 1025.0}
@@ -54,73 +47,35 @@ def scene(model="rod", section=None, around=None, attached=(), **tables):
             "cable": {"sections": [SECTION | (section or {})], "attachments": list(attached)},
             "ends": {
                 "start": {"kind": "pinned", "position": [0, 0, 0]},
-                "end": {"kind": "pinned", "position": [12, 0, 0]},
+                "end": {"kind": "pinned", "position": [12, 0, 0], "motion": MOTION},
             },
             "initial": "equilibrium",
             "model": model,
             "mesh": {"cells": CELLS},
-            "time": {"duration": 1.0, "step": STEP},
+            "time": {"duration": 1.2, "step": STEP},
+            "output": {"every": 1.2, "errors": False},
         }
         | tables
     )
 
 
 class Line:
-    """A line in motion, ready to be timed."""
+    """Whole runs of a line in motion, to be timed."""
 
-    def __init__(self, asked, dimension=3, watched=True, extremes=False):
-        model = build(asked)
-        self.sea, self.ends = model.sea.at(0.0), model.ends.at(0.0)
-        found = solve_statics(
-            model.line,
-            self.sea,
-            self.ends,
-            model.start,
-            model.length,
-            model.tension_scale,
-            search=Search(others=model.other_starts),
-        )
-        self.start, line = found.state, model.line
-        if dimension == 2:
-            assert model.plane is not None
-            line = planar(line, model.plane)
-            untwist(line, self.ends, model.cable.held_tangent, self.start)
-        self.stepper = Stepper(line, model.length, model.tension_scale)
-        self.start.v[:, 2] = 0.1 * np.sin(np.pi * model.line.s / model.length)
-        self.stepper.consistent_accelerations(self.sea, self.ends, np.zeros((2, 3)), self.start)
-        self.line, self.model, self.watched = line, model, dimension == 2 and watched
-        self.extremes = extremes
-        self.cells, self.each, self.iterations = model.cells, [], 0.0
+    def __init__(self, asked, dimension=3):
+        self.scene, self.each, self.iterations = asked.model_copy(update={"dimension": dimension}), [], 0.0
 
     def time(self):
-        """One round in the compiled run: STEPS steps; seconds a step."""
-        run, line = CompiledRun(0.5, np.zeros(0), self.extremes), self.line
-        nodes, unbroken = np.arange(self.cells + 1), np.full(self.cells, np.inf)
-        run.attach(
-            self.stepper, self.sea, self.ends, self.model.ends.moves(), self.start.copy(), unbroken, nodes,
-            np.zeros(nodes.size, np.int8),
-        )  # fmt: skip
-        if self.watched:
-            push = seed(line.s, self.model.length / self.model.time_scale)
-            run.carry((push, np.zeros_like(push)))
-        run.place(self.start.r.copy())
-        clock, count = run.clock, run.count
-        clock.stop, clock.leg_step, count.leg_parts = np.inf, STEP, 10**9
-        clock.floor = clock.slack_limit = -np.inf
-        clock.bend_limit = clock.twist_limit = clock.scaled_jump = clock.most_turn = np.inf
-        count.phase = books.BEGIN_STEP
-        begin, total = time.process_time(), 0
-        while run.count.steps < STEPS:
-            code = run.go()
-            assert code in (books.PAUSED, books.STEPPED), code
-            total += int(run.log()[:, 2].sum())
-        self.each.append((time.process_time() - begin) / int(run.count.steps))
-        self.iterations = total / int(run.count.steps)
+        """One run; seconds a step, from its first on."""
+        with hybrid.run(self.scene) as result:
+            cpu = result.steps["cpu"]
+            self.each.append((cpu[-1] - cpu[0]) / (len(cpu) - 1))
+            self.iterations = float(np.mean(result.steps["iterations"]))
 
     @property
     def per_cell(self):
         """Microseconds per cell and step."""
-        return 1e6 * median(self.each) / self.cells
+        return 1e6 * median(self.each) / CELLS
 
 
 def timed(*lines):
@@ -131,16 +86,6 @@ def timed(*lines):
     for line in lines:
         del line.each[0]
     return lines
-
-
-def test_what_extremes_cost():
-    """Lowest and highest of six quantities at every node, with their times, after every step."""
-    for model in ("catenary", "rod"):
-        for dimension in (2, 3):
-            bare, kept = timed(*(Line(scene(model=model), dimension, extremes=x) for x in (False, True)))
-            more = CELLS * (kept.per_cell - bare.per_cell)
-            print(f"{model} {dimension}D: {CELLS * bare.per_cell:.1f} us a step, {more:+.1f} us with extremes")
-            assert more < 0.2 * CELLS * bare.per_cell
 
 
 def test_what_each_part_costs():
@@ -160,7 +105,7 @@ def test_what_each_part_costs():
 
 
 def test_what_torsion_and_the_third_dimension_cost():
-    """The same scenes in space and in their plane, with the watch on what would leave it, and without."""
+    """The same scenes in space and in their plane, with the watch on what would leave it."""
     wet, around, _ = PARTS["drag in a current"]
     cases = {
         "rod": scene(),
@@ -173,14 +118,11 @@ def test_what_torsion_and_the_third_dimension_cost():
             {"kind": "zones", "zones": [{"rod": 10.0, "cells": 100}, {"catenary": 10.0, "cells": 100}]}, mesh=None
         ),
     }
-    print(f"\n{'':26s} in space  in a plane, watched   ratio   not watched   ratio    us per cell and step")
+    print(f"\n{'':26s} in space  in a plane, watched   ratio    us per cell and step")
     for name, asked in cases.items():
-        space, flat, blind = timed(Line(asked), Line(asked, 2), Line(asked, 2, watched=False))
+        space, flat = timed(Line(asked), Line(asked, 2))
         ratio = space.per_cell / flat.per_cell
-        print(
-            f"  {name:24s} {space.per_cell:8.3f}  {flat.per_cell:18.3f} {ratio:8.2f} "
-            f"{blind.per_cell:12.3f} {space.per_cell / blind.per_cell:8.2f}"
-        )
+        print(f"  {name:24s} {space.per_cell:8.3f}  {flat.per_cell:18.3f} {ratio:8.2f}")
         assert ratio >= (1.8 if "rod" in name and "catenary" not in name else 1.3), name
 
 
@@ -191,7 +133,6 @@ def test_what_is_absent_costs_nothing():
     )
     for dimension in (3, 2):
         bare, same, again = timed(Line(scene(), dimension), Line(named, dimension), Line(scene(), dimension))
-        assert bare.stepper.line.bits == same.stepper.line.bits
         ratio, noise = same.per_cell / bare.per_cell, again.per_cell / bare.per_cell
         print(f"\ndimension {dimension}: all named and zero over bare {ratio:.3f}, bare over itself {noise:.3f}")
         assert abs(ratio - 1.0) < 0.05 + 2.0 * abs(noise - 1.0)

@@ -27,8 +27,8 @@ from hybrid.kernels.watch import observed_outputs
 from hybrid.model.build import build
 from hybrid.model.plane import planar, untwist
 from hybrid.outputs import output_grid
+from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.plane_stability import seed
-from hybrid.solve.run import CompiledRun
 from hybrid.solve.statics import Search, solve_statics
 from hybrid.solve.stepper import Stepper
 
@@ -68,7 +68,7 @@ def kernel_time(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[float]]:
 
         return inside
 
-    monkeypatch.setattr(CompiledRun, "go", timed(CompiledRun.go, "run"))
+    monkeypatch.setattr(NetworkSteps, "go", timed(NetworkSteps.go, "run"))
     for room, name in (
         (entry, "in_plane"), (entry, "in_space"), (observed_outputs, "observe_outputs"), (output_grid, "add_rows"),
     ):  # fmt: skip

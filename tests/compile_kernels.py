@@ -50,12 +50,11 @@ LINES = {
 
 # Those of the plane first where both halves need one: who comes second loads it, or waits.
 BY_TABLE = {
-    "plane": """run.run.in_plane run.run.run mesh.zone_step.follow_zones mesh.zone_switch.begin_switch
+    "plane": """run.entry.in_plane mesh.zone_step.follow_zones mesh.zone_switch.begin_switch
         mesh.zone_switch.end_switch mesh.zone_step.plan_nodes mesh.zone_step.take_arcs mesh.zone_transfer.transfer
         mesh.cell_changes.lay_out mesh.cell_changes.clear_state mesh.cell_changes.renew run.following_run.put_cells
-        run.following_run.begin_cells run.following_run.end_cells run.following_run.cells_may_change
-        reel.payout.stand_among""",
-    "space": """run.run.in_space watch.bending_error.advance_error contact.self_contact.contact_task
+        run.following_run.begin_cells run.following_run.end_cells""",
+    "space": """run.entry.in_space watch.bending_error.advance_error contact.self_contact.contact_task
         contact.self_distance.watch_itself junctions.lines_contact.touch_system
         watch.named_quantities.note_quantities junctions.shared_contact.shared_task
         junctions.joined_sheaves.spin_sheaves junctions.body_contact.meet_bodies""",

@@ -494,7 +494,8 @@ class FirstLines:
             else:
                 found[end] = self._system.direction(name, end)
         clamps = [self._system.clamp(name, end) for end in ("start", "end")]
-        if all(x is not None and not x.swivel for x in clamps) and found["start"] and found["end"]:
+        guessed = self._system.is_joined(line.start) or self._system.is_joined(line.end)  # else the first shape counts
+        if guessed and all(x is not None and not x.swivel for x in clamps) and found["start"] and found["end"]:
             found["start"], found["end"] = untwisted(found["start"], found["end"])
         return found
 

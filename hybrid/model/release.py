@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from hybrid.kernels.state.state import NO_TORSION, Line
 from hybrid.model.build import Model
 from hybrid.model.line import with_spin_inertia
 from hybrid.model.line_on_base import LineOnBase
-
-NAMES = ("start", "end")
 
 
 def without_hold(model: Model, k: int, t: float) -> Model:
@@ -47,10 +43,3 @@ def without_clamp(line: Line, node: int) -> Line:
 def without_torque(line: Line) -> Line:
     """The line without catenary zones that a torque passes through: it passes where both ends hold the twist."""
     return line._replace(torsion=NO_TORSION) if line.torsion.size else line
-
-
-def released_as(model: Model, released: np.ndarray, t: float) -> Model:
-    """The model with the ends free that are marked, (2,) 0 or 1."""
-    for k in np.flatnonzero(released).tolist():
-        model = without_hold(model, k, t)
-    return model

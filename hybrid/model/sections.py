@@ -91,11 +91,6 @@ def outer_diameter(scene: LineScene, s: np.ndarray) -> np.ndarray:
     return _along(scene, s, [np.nan if x.diameter is None else x.diameter for x in scene.cable.sections], np.fmax)
 
 
-def borne_tension(scene: LineScene, s: np.ndarray) -> np.ndarray:
-    """Tension (ns,) N at which a section reaches its max_strain, at arc lengths s (m); the smaller one at a seam."""
-    return _along(scene, s, [x.borne for x in scene.cable.sections], np.fmin)
-
-
 def _along(scene: LineScene, s: np.ndarray, of_section: Sequence[float], choose: np.ufunc) -> np.ndarray:
     """A number per section at arc lengths s (ns,); where two sections meet, what `choose` makes of both."""
     ends = np.cumsum([x.length for x in scene.cable.sections])[:-1]

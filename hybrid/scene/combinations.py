@@ -360,7 +360,6 @@ RESPONSE_TO_MOTION = Refusal(
     OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of what is constant or a sum of harmonics",
     "harmonics, and loads that stay", "hybrid run computes it in time",
 )  # fmt: skip
-PAID = "line is paid out ({key})"
 REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         TWO_STIFFNESSES, MOVING_ZONES, "physics",

@@ -208,7 +208,8 @@ class ClampedConnection(Table):
     normal: Direction | None = Field(
         default=None,
         description="direction of the material axis a1 at this end, in the same axes; only its part across the tangent "
-        "counts; absent: no twist of a line that is bent the short way from tangent to tangent [-]",
+        "counts; absent: no twist along the first shape between held points, else of a line that is bent the short way "
+        "from tangent to tangent [-]",
     )
     turns: Number = Field(default=0.0, description=TWISTED_BY)
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")

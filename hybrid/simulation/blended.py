@@ -23,14 +23,6 @@ AT_REST = 1e-9  # m, deg, m/s or deg/s, below which a record starts at rest
 DRAWN = 0.02
 
 
-def note_blended(scene: LineScene, events: EventLog) -> None:
-    """An event for every motion file with a ramp: where it starts, how fast, and until when it is blended in."""
-    for k, (name, end) in enumerate(scene.ends.named().items()):
-        held = end.held_tangent is not None
-        if text := blended_text(f"ends.{name}", end.prescribed_motion, end.held_position, held):
-            events.event(0.0, k * scene.length, k * scene.length, "motion blended in", text)
-
-
 def blended_text(where: str, motion: Motion | None, position: Triple | None, turns: bool) -> str:
     """How the file of a motion begins, and until when it is blended in; empty: it has no file or no ramp.
 

@@ -83,10 +83,6 @@ from hybrid.store.writer import Recorder, WriteMode
 
 # Of every step, what extremes of the end forces follow from.
 FORCES = ("t", "end_force_start", "end_force_end")
-ZONES_FIXED = (
-    "zones stay rod: in equilibrium, catenary where the criteria allow it is further from the rod than the tolerance; "
-    "more mesh.cells, or a larger model.tolerance, let them move"
-)
 
 # Steps of a result from which on runs to compare with are computed in threads: before, all takes about 0.1 s.
 WORTH_THREADS = 500

@@ -32,7 +32,6 @@ from hybrid.kernels.mesh.zone_switch import AFTER, BEFORE, NUMBERS, begin_switch
 from hybrid.kernels.mesh.zone_transfer import Match, Transfer
 from hybrid.kernels.run import following_run as f
 from hybrid.kernels.run.network import begin_line
-from hybrid.kernels.run.run import run as steps
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.state import Line
@@ -64,7 +63,6 @@ class CellChanges:
     """Changes of the cells of a line of a run, and of what is rod."""
 
     alone = True  # whether cells change without a return to Python
-    by_parity: tuple[Table, Table] | None = None  # of one of several lines: its tables in steps of all, even and odd
 
     def __init__(self, owner: OneOfMany) -> None:
         """Room for all; `adopt` before the first change."""
@@ -211,7 +209,7 @@ class CellChanges:
 
         lines, kinds = for_sides(blank_line_job, line_job), for_sides(blank_kinds_job, kinds_job)
         of_run, of_zones = for_sides(blank_job, in_run), for_sides(blank_zone_job, in_zones)
-        of_odd = for_sides(blank_job, in_odd) if owner.of_many else []
+        of_odd = for_sides(blank_job, in_odd)
         switches = [Shaped(Table(blank_switch_job), partial(switch_job, *pair)) for pair in pairs]
         renews = [Shaped(Table(blank_renew_job), partial(renew_job, *pair)) for pair in pairs]
         of_itself = for_sides(blank_itself_job, in_itself) if self._watch is not None else []
@@ -231,6 +229,7 @@ class CellChanges:
                 "renew": (renew, renews[0].table),
                 "before_forces": (before_forces, self._run.table),
                 "after_forces": (after_forces, self._run.table),
+                "books": (begin_line, self._run.table),
             },
         )
 
@@ -254,7 +253,6 @@ class CellChanges:
             self._at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
         numbers: dict[str, Any] = {
             "calls": self._calls, "at": self._at, "clock": run.clock, "own": run.books.clock, "counts": run.count,
-            "outputs": run.books.outputs,
             "work": run.books.work, "zone_clock": zones.clock, "zone_counts": zones.counts, "numbers": self._numbers,
             "run": run.table.numbers, "run_places": in_run, "in_run": stacked(of_run, in_run),
             "zones": self._switching.table.numbers, "zone_places": in_zones, "in_zones": stacked(of_zones, in_zones),
@@ -266,22 +264,13 @@ class CellChanges:
         }  # fmt: skip
         self._following.bind(**numbers)
         self._at.task = run.table.part("task").start
-        samples = self._on.samples.__array_interface__["data"][0]
-        self._samples_at = np.flatnonzero(of_run[0].numbers[0] == samples)
 
     def _bind_calls(self, of_odd: list[Shaped], calls: dict[str, tuple[Any, Any]]) -> None:
-        """Addresses of what a change calls; of_odd: of one of several lines, what its table of odd steps gets."""
-        at, run, on = self._at, self._run, self._on
-        if self.by_parity is not None:
-            even, odd = self.by_parity
-            places = of_odd[0].places(IN_RUN)
-            in_odd = np.array([x.numbers[:, places] for x in of_odd])
-            self._following.bind(even=even.numbers, odd=odd.numbers, in_odd=in_odd)
-            calls, at.of_many = calls | {"books": (begin_line, run.table)}, 1
-        else:
-            at.room, at.room_size, at.most_rows = on.samples.__array_interface__["data"][0], on.samples.size, on.rows
-            at.samples_at = int(self._samples_at.item())
-            calls = calls | {"steps": (steps, run.table)}
+        """Addresses of what a change calls; of_odd: what the table of odd steps gets."""
+        even, odd = self._run.table.even, self._run.table.odd
+        places = of_odd[0].places(IN_RUN)
+        in_odd = np.array([x.numbers[:, places] for x in of_odd])
+        self._following.bind(even=even.numbers, odd=odd.numbers, in_odd=in_odd)
         for name, (kernel, table) in calls.items():
             setattr(self._calls, name, kernel.address(table.numbers))
 

@@ -14,7 +14,7 @@ from hybrid.kernels.machine.binding import Packed, Room
 from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.run.following_run import FollowingPlaces
-from hybrid.kernels.state.books import Books, sample_size
+from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.state import (
     NO_GRIP,
     NO_PEAK,
@@ -33,7 +33,6 @@ from hybrid.kernels.state.state import (
 )
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Cells, Side, blank_kept, seas, works
 from hybrid.simulation.line_of_run import OneOfMany
-from hybrid.solve.run import MOST_SAMPLED, ROWS
 
 
 class CellViews:
@@ -49,9 +48,6 @@ class CellViews:
         self.sides = Side(most, base), Side(most, base)
         self._kept = Room(Packed(lambda n: blank_kept(n, marked, some)), most)
         self._sea, self._work = Room(seas, most), Room(works, most)
-        size = 0 if owner.of_many else sample_size(most, True)
-        self.rows = max(1, min(ROWS, MOST_SAMPLED // max(size, 1)))
-        self.samples = np.zeros(self.rows * size)  # those of one of several lines are in rows of the most cells
         self.watched = owner.itself is not None and owner.itself.on
         self.itself: Itself = blank_itself(np.zeros(most))
         self._turn = np.zeros((0, 3))
@@ -135,12 +131,8 @@ class CellViews:
 
     def books(self, cells: int) -> Books:
         own = self._view(self._kept, cells)._asdict() | {"base": self.base}
-        size, used = sample_size(cells, True), int(self._at.used)
-        if not self._owner.of_many:
-            rows = min(self.rows, (self.samples.size - used) // size)
-            own["samples"] = self.samples[used : used + rows * size].reshape(rows, size)
         if not self._binding:
             return self._run.books._replace(**own)
-        if (size, cells) not in self._views:
-            self._views[size, cells] = self._run.books._replace(**own)
-        return self._views[size, cells]
+        if (Books, cells) not in self._views:
+            self._views[Books, cells] = self._run.books._replace(**own)
+        return self._views[Books, cells]

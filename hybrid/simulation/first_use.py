@@ -25,12 +25,11 @@ if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.network_scene import Network
 
 # What is compiled together, by the kernel that stands for it: the last.
-SOLVER = ("run.run.in_plane", "run.run.in_space")
+SOLVER = ("run.entry.in_plane", "run.entry.in_space")
 OUTPUTS = "watch.observed_outputs.observe_outputs"
 ZONES = "mesh.zone_step.follow_zones"
 CRITERIA = "mesh.zone_step.evaluate_criteria"
 MODEL_ERROR = "watch.bending_error.advance_error"
-PAYOUT = "run.payout_run.go_on"
 STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
 # Of several lines: what all of them call, steps, equilibria, those that touch, those that are paid out.
 OF_LINES = ("run.network.solve_system", SOLVER[1], OUTPUTS)
@@ -38,7 +37,7 @@ STEPS_OF_LINES, REST_OF_LINES = "run.network_run.run_system", "run.network_run.s
 BOOKS_OF_LINES, START_OF_LINES = "run.network.book_system_step", "run.network.begin_line"
 TOUCHING_LINES = "junctions.lines_contact.touch_system", "junctions.shared_contact.shared_task"
 _OF_TOUCHING = OF_LINES[0], TOUCHING_LINES[0]  # of a line that touches itself
-PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "run.payout_run.change_node"
+PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "run.payout_run.change_node"  # this one: the rest
 
 # A cable for the second process to compile with; nothing is computed of it.
 SAMPLE = {
@@ -157,13 +156,13 @@ def command_to_compile(names: Sequence[str]) -> list[str]:
 
 def compile_all(names: Sequence[str]) -> None:
     """Compile kernels in this process, but for what another one is compiling."""
-    from hybrid.kernels.run.run import in_space
+    from hybrid.kernels.run.entry import in_space
 
     table = np.zeros(0, np.int64)  # of which only the type counts
-    for name in (*OF_LINES[:1], START_OF_LINES, REST_OF_LINES, BOOKS_OF_LINES, STEPS_OF_LINES, *PAYOUT_OF_LINES):
+    for name in (*OF_LINES[:1], START_OF_LINES, REST_OF_LINES, BOOKS_OF_LINES, STEPS_OF_LINES, *PAYOUT_OF_LINES[:2]):
         if name in names:
             entry(name).compile_unless_busy(table)
-    if PAYOUT in names:
+    if PAYOUT_OF_LINES[2] in names:
         for kernel in payout_kernels():
             kernel.compile_unless_busy(table)
     scene = LineScene.model_validate(SAMPLE)
@@ -186,6 +185,7 @@ def payout_kernels() -> tuple[Any, ...]:
 
     first = (
         payout.pay_out,
+        payout.stand_among,
         payout.iterate,
         payout.fit_line,
         payout.stand_still,
@@ -197,7 +197,15 @@ def payout_kernels() -> tuple[Any, ...]:
     )
     line = payout_run.change_line, payout_run.fit_changed, payout_run.book_change, payout_run.renew_run
     forces = cell_changes.before_forces, cell_changes.after_forces
-    return *first, *line, *forces, payout_run.put_paid, payout_run.change_paid, payout_run.make_line, payout_run.go_on
+    return (
+        *first,
+        *line,
+        *forces,
+        payout_run.put_paid,
+        payout_run.ask_node,
+        payout_run.change_node,
+        payout_run.make_line,
+    )
 
 
 def _compile_outputs(model: Model) -> None:

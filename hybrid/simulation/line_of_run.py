@@ -130,11 +130,6 @@ class Marching(NamedTuple):
 class OneOfMany:
     """A line of several, as changes of its cells see it: the line, its books and the clock of all."""
 
-    of_many = True
-
-    pays_out = True  # where a node is to enter or leave at a winch
-    correction = None
-
     def __init__(self, run: OfRun, number: int, switching: ZoneSwitching | None = None) -> None:
         self._system, self._number, self.switching = run, number, switching
         line = run.lines[number]

@@ -49,7 +49,6 @@ class LineCells(CellChanges):
     def __init__(self, run: OfRun, number: int, switching: ZoneSwitching) -> None:
         self._many, self._line, self._solver = run, run.lines[number], run.solver
         owner = OneOfMany(run, number, switching)
-        self.by_parity = owner.table.even, owner.table.odd
         super().__init__(owner)
 
     @staticmethod

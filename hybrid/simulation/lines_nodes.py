@@ -22,7 +22,6 @@ class LineNodes(NodeChanges):
     def __init__(self, run: OfRun, number: int) -> None:
         self._many, self._of_line, self._solver = run, run.lines[number], run.solver
         owner = OneOfMany(run, number)
-        self.by_parity = owner.table.even, owner.table.odd
         super().__init__(owner)
 
     @staticmethod

@@ -24,9 +24,8 @@ from hybrid.kernels.run import payout_run as f
 from hybrid.kernels.run.entry import NO_PUSH, workspace
 from hybrid.kernels.run.network import begin_line
 from hybrid.kernels.run.payout_run import NodeJob, blank_line_job, blank_node_job, blank_paid_run_job, make_line
-from hybrid.kernels.run.run import run as steps
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, sample_size
+from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.forces import REMEMBERS
 from hybrid.kernels.state.state import (
     NO_GRIP,
@@ -53,7 +52,6 @@ from hybrid.outputs.joined_lines import Output
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Kept, Shaped, blank_kept, seas
 from hybrid.simulation.envelope import marks_on
 from hybrid.simulation.line_of_run import OneOfMany
-from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.solve.stepper import HEAVY
 
 # Of the tables of a run, what depends on the cells.
@@ -84,8 +82,6 @@ class Side:
 class NodeChanges:
     """Nodes of a line of a run that enter and leave, where zones stay."""
 
-    by_parity: tuple[Table, Table] | None = None  # of one of several lines: its tables in steps of all, even and odd
-
     def __init__(self, owner: OneOfMany) -> None:
         """Room for all; `adopt` before the first change."""
         assert owner.payout is not None
@@ -101,10 +97,8 @@ class NodeChanges:
         self._sides = Side(self.most, reels, kept), Side(self.most, reels, kept)
         self._sea = Room(seas, self.most)
         self._work = Room(Packed(partial(workspace, keep=twice), given=("torsion",)), self.most)
-        size = sample_size(self.most)
-        self._rows = max(1, min(ROWS, MOST_SAMPLED // size))
-        # some MB, of which a run with few outputs touches little; of one of several lines for its reels alone
-        self._samples = np.empty(MOST_WAITING * f.OF_REEL * self.most if owner.of_many else self._rows * size)
+        # for what cells lack whose outputs wait; some MB, of which a run with few outputs touches little
+        self._lacks = np.empty(MOST_WAITING * f.OF_REEL * self.most)
         self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
         self._itself = blank_itself(np.zeros(self.most))
         self._base = np.zeros(owner.run.books.base.size, np.int64)
@@ -172,10 +166,6 @@ class NodeChanges:
 
     def _books(self, k: int, cells: int) -> Books:
         kept = self._sides[k].kept.view(cells)._asdict()
-        if not self._owner.of_many:  # else they are in rows of the most cells
-            size, used = sample_size(cells), int(self._at.used)
-            rows = min(self._rows, (self._samples.size - used) // size)
-            kept["samples"] = self._samples[used : used + rows * size].reshape(rows, size)
         return self._run.books._replace(base=self._base, **kept)
 
     # --- tables -------------------------------------------------------------------------------------
@@ -252,23 +242,21 @@ class NodeChanges:
             of_itself = shaped(blank_itself_job, self._in_itself, (0,), (1,))
             in_itself, itself = of_itself[0].places(IN_ITSELF), self._watch.table.numbers
             tables = np.array([x.numbers[:, in_itself] for x in of_itself])
-        of_odd = [] if self.by_parity is None else shaped(blank_job, self._in_odd, (0,), (1,))
+        of_odd = shaped(blank_job, self._in_odd, (0,), (1,))
         self._tables = of_run, of_paid, of_itself, nodes, of_odd  # what is bound there stays alive
         in_run, in_paid = of_run[0].places(IN_RUN), of_paid[0].places(IN_PAID)
         numbers: dict[str, Any] = {
             "calls": self._calls, "at": self._at, "clock": run.clock, "own": run.books.clock, "counts": run.count,
-            "outputs": run.books.outputs,
             "winch": paying.reel.winch, "first": self._reel(0, self.most), "second": self._reel(1, self.most),
             "run": run.table.numbers, "run_places": in_run, "in_run": np.array([x.numbers[:, in_run] for x in of_run]),
             "paid": paying.table.numbers, "paid_places": in_paid,
             "in_paid": np.array([x.numbers[:, in_paid] for x in of_paid]), "node": nodes[0].table.numbers,
             "itself": itself, "itself_places": in_itself,
             "in_itself": tables,
-            "nodes": np.array([x.numbers for x in nodes]), "waiting": self._waiting, "room": self._samples,
+            "nodes": np.array([x.numbers for x in nodes]), "waiting": self._waiting, "room": self._lacks,
         }  # fmt: skip
         self._following.bind(**numbers)
-        at, samples = self._at, self._samples.__array_interface__["data"][0]
-        at.room, at.most_rows, at.most = samples, self._rows, self.most
+        at = self._at
         at.task = run.table.part("task").start
         if self._watch is not None:
             tree = self._itself.tree.__array_interface__["data"][0]
@@ -276,22 +264,17 @@ class NodeChanges:
         self._bind_calls(of_run, of_odd, nodes[0].table)
 
     def _bind_calls(self, of_run: list[Shaped], of_odd: list[Shaped], node: Table) -> None:
-        """Addresses of what a change calls; of_odd: of one of several lines, what its table of odd steps gets."""
-        run, paying, at = self._run, self._paying, self._at
+        """Addresses of what a change calls; of_odd: what the table of odd steps gets."""
+        run, paying = self._run, self._paying
         calls: dict[str, tuple[Any, Any]] = {
             "change": (f.change_line, node), "carry": (carry_node, Table(blank_carry_job)),
             "fit": (f.fit_changed, node), "book": (f.book_change, node), "renew": (f.renew_run, node),
             "before_forces": (before_forces, run.table), "stand_still": (stand_still, paying.table),
-            "after_forces": (after_forces, run.table),
+            "after_forces": (after_forces, run.table), "books": (begin_line, run.table),
         }  # fmt: skip
-        if self.by_parity is None:
-            at.samples_at = int(np.flatnonzero(of_run[0].numbers[0] == at.room).item())
-            calls["steps"] = steps, run.table
-        else:
-            (even, odd), in_run = self.by_parity, of_run[0].places(IN_RUN)
-            in_odd = np.array([x.numbers[:, in_run] for x in of_odd])
-            self._following.bind(even=even.numbers, odd=odd.numbers, in_odd=in_odd)
-            calls["books"], at.of_many = (begin_line, run.table), 1
+        in_run = of_run[0].places(IN_RUN)
+        in_odd = np.array([x.numbers[:, in_run] for x in of_odd])
+        self._following.bind(even=run.table.even.numbers, odd=run.table.odd.numbers, in_odd=in_odd)
         for name, (kernel, table) in calls.items():
             setattr(self._calls, name, kernel.address(table.numbers))
 
@@ -322,11 +305,6 @@ class NodeChanges:
         f.put_paid(self._following.numbers)
         self.adopted, self._synced = True, -1
         run.count.parity = parity
-        self.sync()
-
-    def change(self) -> None:
-        """A node enters or leaves now; no outputs wait."""
-        f.change_paid(self._following.numbers)
         self.sync()
 
     def sync(self) -> None:
@@ -362,9 +340,9 @@ class NodeChanges:
     # --- outputs that wait --------------------------------------------------------------------------
 
     def _outputs_of(self, batch: Batch, cells: int, at: int) -> list[Output]:
-        """Outputs of a line of before, of so many cells; at: where in the memory for samples is what they lacked."""
+        """Outputs of a line of before, of so many cells; at: where what they lacked is kept."""
         k, paying, model = int(self._at.on), self._paying, self._owner.model
-        lacks = self._samples[at : at + f.OF_REEL * cells].reshape(f.OF_REEL, cells)
+        lacks = self._lacks[at : at + f.OF_REEL * cells].reshape(f.OF_REEL, cells)
         line, reel = lines(cells, bits=model.line.bits, plane=model.line.plane, **ABSENT), self._reel(1 - k, cells)
         reel.numbers[:] = paying.reel.numbers
         self._line_table.bind(line=model.line, whole=self._whole, out=line, reel=reel, nodes=paying.plan.nodes)

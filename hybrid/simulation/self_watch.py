@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,6 @@ from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.self_reach import COST
-from hybrid.solve.run import CompiledRun
 from hybrid.solve.self_contact import SelfContact
 from hybrid.store.format import Field
 
@@ -115,30 +113,7 @@ class SelfWatch:
         self.on, self.why, self.remedy = bool(diameters(model).any()), why, remedy
         self.asks = False  # whether it is asked when the line comes near itself, so that contact begins
         self.itself = blank_itself(np.ones(1))
-        self._address = UNBENT
         self._touches = False  # whether contact is computed
-
-    @cached_property
-    def _job(self) -> Table:
-        """What the kernel gets."""
-        return Table(blank_itself_job)
-
-    @property
-    def watching(self) -> bool:
-        """Whether every step looks how near the line comes to itself."""
-        return self._address != UNBENT
-
-    def attach(self, model: Model, run: CompiledRun) -> None:
-        """Go on with a (new) line of a run."""
-        if not self.on:
-            return
-        self.renew(model)
-        old, new = run.states
-        self._job.bind(
-            line=model.line, ends=model.ends.values, old=old, new=new, clock=run.clock, counts=run.count,
-            itself=self.itself,
-        )  # fmt: skip
-        run.watch_itself(self._job.numbers, self._address)
 
     def renew(self, model: Model) -> None:
         """Go on with the cells of a model; events tell of contact from now on where it is computed."""
@@ -148,21 +123,6 @@ class SelfWatch:
         self.asks = bool(model.line.bits & MAY_TOUCH) and not self._touches
         ends = self._touches and bool(model.line.bits & MAY_TOUCH)
         self.itself.ahead.asked = 1.0 if self.asks else WIDER if ends else -1.0
-
-    @property
-    def table(self) -> Table:
-        """What compiled steps know of it."""
-        return self._job
-
-    def look(self, run: CompiledRun) -> int:
-        """Look at the last step of a line that is so bent that it could come near itself, and let every step do so from
-
-        now on; MEETS and NEARS of kernels.contact.self_distance.
-        """
-        if self._address == UNBENT:
-            self._address = watch_itself.address(self._job.numbers)
-            run.watch_itself(self._job.numbers, self._address)
-        return int(watch_itself(self._job.numbers))
 
     def foresees(self, state: State, step: float, look: Callable[[], int]) -> bool:
         """Whether a look at a state, from which steps (s) are to be made, finds that the line will be near itself."""
@@ -200,11 +160,6 @@ class SelfWatch:
         if found.clearance < 0.0 and found.told == 0.0:
             found.told = 1.0
             self.tell(t, dt, event)
-
-    def look_at_start(self, run: CompiledRun, event: Callable[..., None]) -> None:
-        """Look at the state of a run that has made no step."""
-        if self.on and is_bent(run.state) and self.look(run) & MEETS:
-            self.tell(run.t, 0.0, event)
 
     def tell(self, t: float, dt: float, event: Callable[..., None]) -> None:
         """An event for what was found; dt: s, the step in which it was, 0: in none."""
@@ -340,7 +295,7 @@ class LineWatch:
         return found & (NEARS | PARTS)
 
     def is_near(self, t: float, state: State, step: float) -> bool:
-        """As `SelfWatch.is_near`, of a state at t (s)."""
+        """Whether a line that may touch itself is near itself at t (s), from which a step (s) is to be made."""
         watch = self._watch
         if not (watch.on and watch.asks and is_bent(state)):
             return False
@@ -360,11 +315,6 @@ def is_bent(state: State) -> bool:
     c = state.r[-1] - state.r[0]
     along, size = state.e @ c, TURNED * TURNED * (c @ c) * np.einsum("ij,ij->i", state.e, state.e)
     return not bool(((along > 0.0) & (along * along > size)).all())
-
-
-def within_itself(contact: SelfContact, model: Model) -> str:
-    """Where parts of a line are in each other, and contact could not tell to which side they belong; empty: nowhere."""
-    return "" if math.isfinite(contact.energy()) else deepest_text(contact, model)
 
 
 def deepest_text(contact: SelfContact, model: Model) -> str:

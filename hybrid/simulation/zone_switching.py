@@ -44,8 +44,6 @@ from hybrid.store.named_arrays import matched
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many paces.
 LETTING_GO = 1.0
-# Times the tension floor above which tension, not bending, says where new nodes are in balance.
-TAUT = 2.0
 NONE, NO_STRAIN = np.zeros(0, int), np.zeros((0, 3))
 LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
 READY = 2.0  # times as long may it be before: a step that is much shorter than the one before is damped much

@@ -18,8 +18,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
-from hybrid.kernels.run.run import in_space
+from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, in_space, out_of_balance
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.forces import FRICTION, SELF_FRICTION, WAVES
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, TWIST

@@ -32,9 +32,8 @@ from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.run.entry import NO_PUSH, in_plane, in_space
 from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_system_step, solve_system
-from hybrid.kernels.run.run import in_plane, in_space
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.forces import FRICTION, PLANAR, TOUCHES, WAVES
 from hybrid.kernels.state.obstacle_rows import FREE, MOVES

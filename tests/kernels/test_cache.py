@@ -34,7 +34,7 @@ print(places[1, 0])
 
 SCENE = """
 import hybrid
-from hybrid.kernels.run.run import in_space
+from hybrid.kernels.run.entry import in_space
 section = {"length": 1.0, "mass": 2.0, "bending_stiffness": 300.0, "torsional_stiffness": 1.0}
 scene = hybrid.validate_scene({
     "cable": {"sections": [section]},
@@ -190,12 +190,14 @@ def test_an_edit_means_new_code_of_the_kernels_that_it_reaches_and_of_no_others(
     anew = changed("kernels/algebra/rotations.py", VECTOR, TWICE)
     assert reaches <= anew and len(anew) < len(before) - 10
     assert not changed("kernels/algebra/rotations.py", VECTOR, f"    # as a tuple\n{VECTOR}")
-    assert not changed("kernels/run/run.py", '"""Steps of a line of either kind', '"""Some steps of a line')
-    constant = changed("kernels/state/books.py", "FAILED = range(7)", "FAILED = range(50, 57)")
-    assert "hybrid.kernels.run.run.run" in constant and "hybrid.kernels.run.run.in_plane" not in constant
-    field = "    zones: int = 0  # address of"
+    assert not changed("kernels/run/network_run.py", '"""Steps of all lines until', '"""Steps of lines until')
+    constant = changed("kernels/state/books.py", "FAILED = range(6)", "FAILED = range(50, 56)")
+    assert (
+        "hybrid.kernels.run.network_run.run_system" in constant and "hybrid.kernels.run.entry.in_plane" not in constant
+    )
+    field = "    itself: int = 0  # address of"
     moved = changed("kernels/step/job.py", field, "    another: int = 0\n" + field)
-    assert "hybrid.kernels.run.run.in_plane" in moved and len(moved) < len(before)
+    assert "hybrid.kernels.run.entry.in_plane" in moved and len(moved) < len(before)
 
 
 @pytest.mark.long

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import hybrid
 import hybrid.solve.run
 from hybrid.simulation import progress as reports
 from hybrid.simulation.progress import Progress
-from hybrid.solve.run import CELL_STEPS, CompiledRun
+from hybrid.solve.network_steps import NetworkSteps
+from hybrid.solve.run import CELL_STEPS
 
 SEA = Path(__file__).parents[2] / "examples" / "irregular_sea.yaml"
 CELLS = 60  # at the start
@@ -29,9 +29,10 @@ def test_changes_of_zones_do_not_put_off_interrupts(monkeypatch: pytest.MonkeyPa
 
 
 def test_calls_in_many_waves_are_shorter() -> None:
-    run = CompiledRun(0.5, np.zeros(0), False)
-    run.set_quota(1000)
-    assert run.quota == CELL_STEPS // 1000
-    run._waves = 90
-    run.set_quota(1000)
-    assert run.quota == CELL_STEPS // 10_000
+    steps = NetworkSteps(0.5)
+    steps._cells, most = 1000, int(CELL_STEPS)
+    steps.set_quota(most)
+    assert steps.counts.quota == CELL_STEPS // 1000
+    steps._waves = 90
+    steps.set_quota(most)
+    assert steps.counts.quota == CELL_STEPS // 10_000

@@ -46,9 +46,9 @@ def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: p
 
 
 def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
-    """All entries that take a table, of which none is forgotten, but for what a line of several and a release ask for."""
-    others = {"stand_among", "end_payout", "iterate_with_others", "ask_node", "change_node"}
-    entry = type(payout_run.go_on)
+    """All entries that take a table, of which none is forgotten, but for what joined lines and a release ask for."""
+    others = {"end_payout", "iterate_with_others"}
+    entry = type(payout_run.change_node)
     used = {
         x.__qualname__
         for module in (payout, payout_nodes, payout_run)
@@ -114,7 +114,7 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
     hybrid.static(scene) if static else hybrid.run(scene)
     texts = [x for value in vars(first_use).values() for x in (value if isinstance(value, tuple) else (value,))]
     large = {x for x in texts if isinstance(x, str) and x.count(".") == 2}
-    assert {"run.run.in_space", "run.network.begin_line"} < large
+    assert {"run.entry.in_space", "run.network.begin_line"} < large
     before = {first_use.ZONES: first_use.CRITERIA, first_use.STEPS_OF_LINES: first_use.REST_OF_LINES}
     stood_for = {before[name] for name in known if name in before}  # compiled before those, by the same calls
     if "zones" in kind:
@@ -125,8 +125,8 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
 @pytest.mark.long
 def test_an_equilibrium_in_a_plane_asks_for_no_solver_in_space() -> None:
     """Whose compilation takes longest; in a process of its own, where nothing is compiled or loaded yet."""
-    code = "import hybrid, json, sys; from hybrid.kernels.run import run; hybrid.static(json.loads(sys.argv[1])); "
-    code += "print(len(run.in_plane.signatures), len(run.in_space.signatures))"
+    code = "import hybrid, json, sys; from hybrid.kernels.run import entry; hybrid.static(json.loads(sys.argv[1])); "
+    code += "print(len(entry.in_plane.signatures), len(entry.in_space.signatures))"
     done = subprocess.run(
         [sys.executable, "-c", code, json.dumps(KINDS["rod in a plane"])], capture_output=True, text=True, check=True
     )
@@ -143,4 +143,4 @@ def test_a_line_that_is_joined_to_nothing_asks_for_no_solver_of_joined_ones(
     monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
     hybrid.run(KINDS[kind])
     assert "run.network.solve_system" not in called
-    assert ("run.run.in_space" in called) == (kind == "rod in space")
+    assert ("run.entry.in_space" in called) == (kind == "rod in space")

@@ -11,7 +11,7 @@ import pytest
 
 import hybrid
 import hybrid.solve.run
-from hybrid.simulation import line_result
+from hybrid.simulation import line_result, network_run
 from hybrid.store.recorder import BaseRecorder
 
 ROD = {
@@ -64,7 +64,7 @@ def test_outputs_and_buffers_do_not_shape_the_motion(monkeypatch: pytest.MonkeyP
     few = hybrid.run(swinging("rod", 0.03, 0.4))
     many = hybrid.run(swinging("rod", 0.03, 0.1))
     monkeypatch.setattr(hybrid.solve.run, "ROWS", 7)
-    monkeypatch.setattr(hybrid.solve.run, "MOST_SAMPLED", 1)
+    monkeypatch.setattr(network_run, "MOST_SAMPLED", 1)
     small = hybrid.run(swinging("rod", 0.03, 0.1))
     assert np.array_equal(few["steps/dt"], many["steps/dt"])
     for name in many.names:
@@ -96,7 +96,7 @@ def test_outputs_wait_for_nothing_that_changes(name: str, monkeypatch: pytest.Mo
         file, settings, criterion = "touchdown", ["time={duration: 2, step: 0.1}", *settings[1:]], asks_at_once
     scene = hybrid.load_scene(Path(__file__).parents[2] / "examples" / f"{file}.yaml", settings)
     batches = hybrid.run(scene, criterion=criterion)
-    monkeypatch.setattr(hybrid.solve.run, "MOST_SAMPLED", 1)
+    monkeypatch.setattr(network_run, "MOST_SAMPLED", 1)
     one_by_one = hybrid.run(scene, criterion=criterion)
     assert (name if criterion else "bend") in " ".join(e.text for e in batches.events)
     for field in batches.names:

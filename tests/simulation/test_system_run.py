@@ -227,9 +227,7 @@ def test_a_line_that_stays_stretched_beyond_its_limit_stops_with_its_name() -> N
         hybrid.run(tables)
 
 
-def test_what_takes_one_cable_refuses_several() -> None:
-    with pytest.raises(SceneError, match="one cable"):
-        hybrid.validate_scene(buoy())
+def test_a_run_asks_for_a_duration() -> None:
     with pytest.raises(SceneError, match="duration"):
         hybrid.run({k: x for k, x in buoy().items() if k != "time"})
 

@@ -16,6 +16,8 @@ from hybrid.errors import SceneError
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.bodies import frame_of
 from hybrid.model.build import build
+from hybrid.model.network import build_system
+from hybrid.scene.short_form import network_of
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.solve.statics import solve_statics
 
@@ -478,3 +480,21 @@ def test_a_point_that_turns_must_turn_something() -> None:
     tables["lines"]["line1"]["connections"]["end"] = "pinned"
     with pytest.raises(SceneError, match="lines turn freely at a point"):
         hybrid.plan(tables)
+
+
+@pytest.mark.parametrize("points", [{}, {"points": [[0, 0, 0], [0, 3, 2], [5, 5, 3], [7, 0, 2]]}])
+def test_between_held_points_the_first_shape_carries_the_frame(points: dict[str, Any]) -> None:
+    """Clamps without a normal twist nothing along the first shape, as in the short form before it was a network."""
+    scene = hybrid.validate_scene(
+        {
+            "cable": {"sections": [{"length": 14, "mass": 1, "bending_stiffness": 20, "torsional_stiffness": 10}]},
+            "ends": {
+                "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0.3, 1, 0.5]},
+                "end": {"kind": "clamped", "position": [7, 0, 2], "tangent": [0.5, 0.2, -1]},
+            },
+            "initial": {"kind": "equilibrium"} | points,
+            "model": "rod",
+        }
+    )
+    alone, joined = build(scene), build_system(network_of(scene)).models[0]
+    assert np.allclose(joined.ends.values.frame, alone.ends.values.frame, rtol=0, atol=1e-12)

@@ -64,7 +64,7 @@ from hybrid.kernels.step.newton import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, P
 
 
 class ContactJob(NamedTuple):
-    """Arguments of the entry: two states in turn as kernels.run.run has them, its clock and counts."""
+    """Arguments of the entry: two states in turn as kernels.run.network_run has them, its clock and counts."""
 
     line: Line
     ends: Ends

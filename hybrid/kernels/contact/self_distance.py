@@ -5,7 +5,7 @@ where the distance between them is less than TURNED of the length of line betwee
 of the line that turns by less than that allows (a cone of tangents) is left out as a whole, so that a line that hangs
 costs one pass over its cells.  Boxes hold cells before and after the step: what passes within a step is found.
 
-A run calls `watch_itself` by its address (kernels.run.run), from the step on in which the line is bent so far.
+A run calls `watch_itself` by its address (kernels.run.network_run), from the step on in which the line is bent so far.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def blank_itself(width: Floats) -> Itself:
 
 
 class ItselfJob(NamedTuple):
-    """Arguments of the entry: two states in turn as kernels.run.run has them, its clock and counts."""
+    """Arguments of the entry: two states in turn as kernels.run.network_run has them, its clock and counts."""
 
     line: Line
     ends: Ends
@@ -454,7 +454,7 @@ def watch_itself(table):
 
     asked, NEARS: contact has to begin; PARTS: it may end; HIDES: a bend without a shape hides which.
 
-    The states of the job have changed places after the step, as in kernels.run.run.
+    The states of the job have changed places after the step, as in kernels.run.network_run.
     """
     job = read(table)
     state, before = job.old, job.new

@@ -21,7 +21,7 @@ class NetworkJob(NamedTuple):
     """
 
     asked: NetworkTask
-    tables: NDArray[np.int64]  # (L, ..) jobs of the lines (kernels.run.run), their task ASSEMBLY
+    tables: NDArray[np.int64]  # (L, ..) jobs of the lines (kernels.run.network_run), their task ASSEMBLY
     numbers: Floats  # the same memory
     joints: NDArray[np.int64]  # (L, 2) points, then bodies, that start and end are joined to, -1 where they are held
     fairleads: Floats  # (L, 2, 3) m of ends at bodies, in their axes

@@ -246,7 +246,7 @@ def renew(table):
 
 @kernel
 def before_forces(table):
-    """What the assembly of a state as it is has to know; table: of a kernels.run.run.Job of parity 0."""
+    """What the assembly of a state as it is has to know; table: of a kernels.step.job.Job of parity 0."""
     job = read(table)
     clock = job.books.clock
     ends_at(clock.now, job.moves, job.sea, job.ends, job.books.velocity)
@@ -261,15 +261,12 @@ def before_forces(table):
 
 @kernel
 def after_forces(table):
-    """The books go on from a report of the state as it is."""
+    """What the seabed stores and pushes in the state as it is, of which there is a report."""
     job = read(table)
-    report, clock, count = job.work.report, job.books.clock, job.books.counts
+    report = job.work.report
     if job.line.bits & TOUCHES:
         report[SEABED_ENERGY] = stored_in_contact(job.line, job.sea, job.old.r)
         for i in range(job.sea.bed.shape[0]):
             for j in range(3):
                 job.old.bed[i, j] = job.sea.bed[i, j]
-    for j in range(report.shape[0]):
-        job.books.report[0, j] = report[j]
-    clock.stored = report[SEABED_ENERGY]
-    count.phase, count.after_start, count.new_state = b.START, b.SAMPLE, 1
+    job.books.clock.stored = report[SEABED_ENERGY]

@@ -1,6 +1,6 @@
 """What zones that move ask of every step, compiled: lengths and stiffness before it, criteria and energy after it.
 
-A run calls `follow_zones` by its address (kernels.run.run), so that scenes whose zones stay compile none of it; Python calls
+A run calls `follow_zones` by its address (kernels.run.network_run), so that scenes whose zones stay compile none of it; Python calls
 the same functions where a criterion or joints of its own take part (simulation.zone_switching).
 """
 
@@ -164,7 +164,7 @@ def blank_zones(cells: int, base: int) -> Zones:
 
 
 class ZoneJob(NamedTuple):
-    """Arguments of the entries: two states in turn as kernels.run.run has them, and its clock, counts and work."""
+    """Arguments of the entries: two states in turn as kernels.run.network_run has them, and its clock, counts and work."""
 
     line: Line
     sea: Sea

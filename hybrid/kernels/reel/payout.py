@@ -11,7 +11,7 @@ the mass, the loads and the stiffness that it brings to its two nodes.
     p       place of the last material node                            m
     K       acceleration of the fairlead less that of the material     m/s2
 
-A run calls `pay_out` by its address (kernels.run.run), so that lines of a fixed length compile none of it.
+A run calls `pay_out` by its address (kernels.run.network_run), so that lines of a fixed length compile none of it.
 """
 
 from __future__ import annotations

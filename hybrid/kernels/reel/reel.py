@@ -149,7 +149,7 @@ def zones_that_stay() -> MovingZones:
 
 
 class ReelJob(NamedTuple):
-    """Arguments of the entries: two states in turn as kernels.run.run has them, and its clock, counts, work and report."""
+    """Arguments of the entries: two states in turn as kernels.run.network_run has them, and its clock, counts, work and report."""
 
     line: Line
     sea: Sea

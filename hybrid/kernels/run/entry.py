@@ -1,4 +1,11 @@
-"""What Python asks of the solver: a step, a static solve, the block rows of a configuration (kernels.run.run)."""
+"""The compiled entries to all that needs the march of one line, and what Python asks of them: a step, a static solve,
+
+the block rows of a configuration.
+
+One kernel for each kind of line, so that neither is compiled for a scene that does not have it.  Networks call it by its
+address: what stands around the solver is compiled once for both kinds, and beside them (simulation.first_use).  Both get
+a table of addresses (kernels.machine.binding).
+"""
 
 from __future__ import annotations
 
@@ -10,9 +17,9 @@ from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.algebra.block_elimination_plane import WIDE
 from hybrid.kernels.laws.tension_torque import COUPLES
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
-from hybrid.kernels.run.run import in_plane, in_space
 from hybrid.kernels.state.forces import PLANAR, REMEMBERS
 from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.report import REPORT_SIZE
@@ -29,13 +36,58 @@ from hybrid.kernels.state.state import (
     remembers,
     slip_size,
 )
-from hybrid.kernels.step.job import blank_job
-from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task
+from hybrid.kernels.step.job import blank_job, read
+from hybrid.kernels.step.newton import (
+    ASSEMBLY,
+    CORRECTION,
+    EQUILIBRIUM,
+    OK,
+    RUN,
+    STEP,
+    Calls,
+    Limits,
+    Task,
+    solve,
+)
 from hybrid.kernels.step.step import States
 
 NO_PUSH: Floats = np.zeros((0, 4))
 NO_STRAINS: Floats = np.zeros((0, 3))
 ONE_MARCH = Limits(1.0, 1.0, 1)
+
+
+@inner
+def solve_job(plane, space, job):
+    """Do the task of a job for one kind of line (kernels.march.configuration); of a run, the step that it tries.
+
+    Returns as kernels.step.newton.solve.
+    """
+    task, clock, old, new, was, now = job.task, job.books.clock, job.old, job.new, job.was, job.now
+    iterated = 0
+    if task.what == RUN:
+        iterated = job.iterated
+        if job.books.counts.parity:
+            old, new, was, now = job.new, job.old, job.now, job.was
+        dt = clock.try_end - clock.now
+        limits, cut = task.limits, job.books.counts.most_iterations > 0
+        if cut:
+            left = job.books.counts.most_iterations - job.books.counts.taken
+            limits = Limits(limits.reach, limits.scale, min(left, limits.most))
+        fixed = job.books.counts.controlled == 0
+        task = Task(STEP, dt, clock.step_before, clock.rho, 0.0, 0.0, False, limits, cut, clock.rho_before, fixed)
+    states, calls = States(old, new, was, now), Calls(job.contact, job.contact_table, iterated, job.reel_table)
+    return solve(plane, space, task, job.line, job.sea, job.ends, states, job.work, job.books.strains, calls)
+
+
+@kernel
+def in_plane(table):
+    job = read(table)
+    return solve_job(job.line.plane, None, job)
+
+
+@kernel
+def in_space(table):
+    return solve_job(None, 1, read(table))
 
 
 class _OfThread(threading.local):

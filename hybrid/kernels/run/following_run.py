@@ -19,10 +19,9 @@ from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.mesh.zone_step import ZoneClock, ZoneFlags
 from hybrid.kernels.mesh.zone_switch import AFTER, BEFORE, NUMBERS, RELAXES, TIME
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Clock, sample_size
+from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.newton import ASSEMBLY, RUN
-from hybrid.kernels.step.sampling import SAME_TIME
 
 Numbers = NDArray[np.int64]
 
@@ -30,7 +29,6 @@ Numbers = NDArray[np.int64]
 class FollowingCalls(NamedNumbers, number=np.int64):
     """Addresses of the kernels that are called."""
 
-    steps: int
     solver: int
     lay_out: int
     clear: int
@@ -41,7 +39,7 @@ class FollowingCalls(NamedNumbers, number=np.int64):
     renew: int
     before_forces: int
     after_forces: int
-    books: int  # of kernels.run.network.begin_line, for one of several lines
+    books: int  # of kernels.run.network.begin_line
 
 
 class FollowingPlaces(NamedNumbers, number=np.int64):
@@ -52,16 +50,11 @@ class FollowingPlaces(NamedNumbers, number=np.int64):
     next_cells: int  # of a change that has begun
     changes: int  # so far
     task: int  # where the table of the run has its task, and address and rows of its samples
-    samples_at: int
-    room: int  # address of the memory for samples, and numbers in it
-    room_size: int
-    most_rows: int  # of samples of one line
     alone: int  # 1 where cells may change without Python
     may_wait: int  # 1 where outputs may wait although the cells that they are of change
     waiting: int  # lines whose outputs wait; places of their nodes; numbers of their samples
     placed: int
     used: int
-    of_many: int  # 1 for one of several lines, whose outputs all stand in rows of the most cells, `used` of them aside
     boxes_at: int  # where the table of kernels.contact.self_distance has the rows of its tree
 
 
@@ -77,7 +70,6 @@ class FollowingJob(NamedTuple):
     clock: Clock  # of the run
     own: Clock  # and of the line, which is another one where there are several
     counts: b.Counts
-    outputs: Floats
     work: Floats
     zone_clock: ZoneClock
     zone_counts: ZoneFlags
@@ -85,7 +77,7 @@ class FollowingJob(NamedTuple):
     run: Numbers  # table of the run
     run_places: Numbers  # of those of its numbers that follow the cells
     in_run: NDArray[np.int64]  # (2 sides, 3, run_places.size)
-    even: Numbers  # of one of several: likewise its tables in steps from states of even parity, and of odd
+    even: Numbers  # likewise its tables in steps from states of even parity, and of odd
     odd: Numbers
     in_odd: NDArray[np.int64]  # likewise of those
     zones: Numbers  # likewise of the table of zones
@@ -112,7 +104,7 @@ def blank_following_job() -> FollowingJob:
     """A job with the types that every one has."""
     z, few, pairs, sides = np.zeros, np.zeros(1, np.int64), np.zeros((1, 3), np.int64), np.zeros((2, 3, 1), np.int64)
     return FollowingJob(
-        FollowingCalls(), FollowingPlaces(), b.Clock(), b.Clock(), b.Counts(), z(0), z((2, b.WORKS)),
+        FollowingCalls(), FollowingPlaces(), b.Clock(), b.Clock(), b.Counts(), z((2, b.WORKS)),
         ZoneClock(), ZoneFlags(), z(NUMBERS), few, few, sides, few, few, sides, few, few, sides, few, few, sides,
         z((2, 1), np.int64), few, sides, few, sides, few, sides, few, sides, z(1, bool), pairs, few,
     )  # fmt: skip
@@ -120,7 +112,7 @@ def blank_following_job() -> FollowingJob:
 
 read = reader(blank_following_job())
 call, call_count, call_solver = caller(None), caller(0), caller((0, 0, 0.0, 0))
-numbers_of_sample, boxes = inner(sample_size), inner(boxes_of)
+boxes = inner(boxes_of)
 
 
 @inner
@@ -154,14 +146,6 @@ def begin_change(job):
 
 
 @inner
-def put_samples(job, m):
-    """Samples of the line of now come behind those that wait."""
-    at, size = job.at, numbers_of_sample(m, True)
-    job.run[at.samples_at] = at.room + 8 * at.used
-    job.run[at.samples_at + 1] = min(at.most_rows, (at.room_size - at.used) // size)
-
-
-@inner
 def put_all(job):
     """The run goes on with the line of now."""
     k, m = job.at.side, job.at.cells
@@ -170,11 +154,8 @@ def put_all(job):
     if job.itself_places.shape[0] > 0:
         put_at(job.in_itself[k], job.itself_places, m, job.itself)
         job.itself[job.at.boxes_at] = boxes(m)
-    if job.at.of_many != 0:
-        put_at(job.in_run[k], job.run_places, m, job.even)
-        put_at(job.in_odd[k], job.run_places, m, job.odd)
-    else:
-        put_samples(job, m)
+    put_at(job.in_run[k], job.run_places, m, job.even)
+    put_at(job.in_odd[k], job.run_places, m, job.odd)
 
 
 @inner
@@ -194,33 +175,9 @@ def end_change(job):
     call_solver(calls.solver, job.run)
     job.run[at.task] = RUN
     call(calls.after_forces, job.run)
-    if calls.books != 0:
-        call(calls.books, job.run)
-        job.clock.previous = job.clock.now
+    call(calls.books, job.run)
+    job.clock.previous = job.clock.now
     job.work[0, b.ZONES] += job.numbers[AFTER] - job.numbers[BEFORE]
-
-
-@inner
-def due_within(job):
-    """How many outputs lie within the last step, before its end, and have not been sampled."""
-    clock, outputs, at, count = job.clock, job.outputs, job.counts.output, 0
-    last = clock.now - SAME_TIME * clock.last_dt
-    while at + count < outputs.shape[0] and outputs[at + count] < last:
-        count += 1
-    return count
-
-
-@inner
-def may_change(job):
-    """Whether cells may change now: no outputs of those of now are to come or wait, or there is room for them."""
-    at, some = job.at, due_within(job) + job.counts.samples
-    if some == 0 or at.alone == 0:
-        return at.alone != 0
-    room = at.waiting < job.waiting.shape[0] and at.placed + at.cells + 1 <= job.places.shape[0]
-    # room for one sample of the finest line must be left, or the run could not go on
-    left = at.room_size - at.used - some * numbers_of_sample(at.cells, True)
-    fits = some <= job.run[at.samples_at + 1] and left >= numbers_of_sample(job.here.shape[0] - 1, True)
-    return at.may_wait != 0 and room and fits
 
 
 # --- entries of parts, for Python -------------------------------------------------------------------
@@ -244,45 +201,7 @@ def end_cells(table):
     end_change(read(table))
 
 
-@kernel
-def cells_may_change(table):
-    """`may_change`."""
-    return may_change(read(table))
-
-
 # --- outputs, steps -----------------------------------------------------------------------------------
-
-
-@inner
-def set_aside(job):
-    """The outputs that have been sampled wait, with the places of the nodes that they are of."""
-    at, row = job.at, job.waiting[job.at.waiting]
-    row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, job.counts.samples, at.cells
-    for i in range(job.here.shape[0]):
-        if job.here[i]:
-            job.places[at.placed] = i
-            at.placed += 1
-    at.used += row[COUNT] * numbers_of_sample(row[OF_CELLS], True)
-    at.waiting += 1
-    job.counts.samples = 0
-
-
-@inner
-def leave(job):
-    """Outputs of the cells of now, which are to change: those within the last step are sampled, and all wait."""
-    counts = job.counts
-    if due_within(job) > 0:
-        counts.inside, counts.asks = 1, b.ASK_SAMPLES
-        call_count(job.calls.steps, job.run)
-        counts.inside, counts.asks = 0, 0
-    if counts.samples > 0:
-        set_aside(job)
-
-
-@kernel
-def leave_cells(table):
-    """`leave`."""
-    leave(read(table))
 
 
 @inner
@@ -319,31 +238,3 @@ def change_cells(table):
     begin_change(job)
     end_change(job)
     return 1
-
-
-@kernel
-def go_on(table, reviewed):
-    """Steps of a run and changes of its cells until Python has to decide; a code of kernels.state.books.
-
-    reviewed: the criteria have just been reviewed after a step, and its zones stay as they are.
-    """
-    job = read(table)
-    code = b.STEPPED
-    if not reviewed:
-        code = call_count(job.calls.steps, job.run)
-    while True:
-        if code != b.STEPPED or job.counts.notices != 0 or job.counts.asks != 0:
-            return code
-        due = job.zone_counts.cells_due != 0
-        if due and not may_change(job):
-            return code
-        if not reviewed:
-            asked = job.zone_clock.loudest > 1.0 or job.clock.now >= job.zone_clock.next_review
-            if asked or not due:
-                return code
-        if due:
-            leave(job)
-            begin_change(job)
-            end_change(job)
-        reviewed = False
-        code = call_count(job.calls.steps, job.run)

@@ -13,19 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, UNBENT, is_bent
 from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK
 from hybrid.kernels.junctions.lone_lines import is_grouped_otherwise, is_touched_alone
 from hybrid.kernels.junctions.members_water import read_members
-from hybrid.kernels.junctions.network_job import (
-    read_system,
-)
+from hybrid.kernels.junctions.network_job import read_system
 from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.powers import pull
 from hybrid.kernels.run.network import error_ratio
 from hybrid.kernels.run.network_sampling import BODY_SAMPLE, is_due, keep_bodies, sample_now, sample_within
-from hybrid.kernels.run.run import watch_itself
 from hybrid.kernels.state.books import (
     ASK_BEFORE,
     ASK_STEPS,
@@ -34,10 +32,15 @@ from hybrid.kernels.state.books import (
     BEGIN_STEP,
     END_STEP,
     FAILED,
+    HIDES_ITSELF,
+    IS_BENT,
     JUDGE,
     LINES_NEAR,
     LOG,
+    MEETS_ITSELF,
+    NEARS_ITSELF,
     NODES_DUE,
+    PARTS_ITSELF,
     PAUSED,
     SAMPLE,
     SOLVE,
@@ -53,7 +56,7 @@ from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKES
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import note_cuts, settle, watch_push
 from hybrid.kernels.step.generalized_alpha import before_fixed
-from hybrid.kernels.step.job import call_follower, call_solver, read
+from hybrid.kernels.step.job import call_follower, call_itself, call_solver, read
 from hybrid.kernels.step.newton import ADDRESS, CUT_SHORT, GAIN, OK, SLACK, STEP, TURNED_TOO_FAR, ask_contact
 from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, passes, take_past
 
@@ -378,6 +381,18 @@ def largest_residual(system, arm):
             most = max(most, abs(work[b, OWN + k] + work[b, LINES + k]))
             most = max(most, abs(work[b, OWN + 3 + k] + work[b, LINES + 3 + k]) / arm)
     return most
+
+
+@inner
+def watch_itself(job, state):
+    """How near the line is to itself after a step, as bits: whether it has become so bent, meets itself, is near."""
+    if job.itself == UNBENT:
+        return IS_BENT if is_bent(state) else 0
+    if job.itself == 0:
+        return 0
+    found = call_itself(job.itself, job.itself_table)
+    bits = (MEETS_ITSELF if found & MEETS else 0) | (NEARS_ITSELF if found & NEARS else 0)
+    return bits | (PARTS_ITSELF if found & PARTS else 0) | (HIDES_ITSELF if found & HIDES else 0)
 
 
 @inner

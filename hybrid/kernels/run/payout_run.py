@@ -25,9 +25,9 @@ from hybrid.kernels.reel.paid_length import cell, node, prepare
 from hybrid.kernels.reel.payout_nodes import CarryJob, blank_carry_job, move_row, place_reel
 from hybrid.kernels.reel.reel import Reel, blank_reel
 from hybrid.kernels.reel.winch import Winch, at_its_end
-from hybrid.kernels.run.following_run import call, call_count, call_solver, put, put_at
+from hybrid.kernels.run.following_run import call, call_solver, put, put_at
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, Clock, blank_books, sample_size
+from hybrid.kernels.state.books import Books, Clock, blank_books
 from hybrid.kernels.state.forces import TOUCHES
 from hybrid.kernels.state.state import (
     Ends,
@@ -43,7 +43,6 @@ from hybrid.kernels.state.state import (
     no_work,
 )
 from hybrid.kernels.step.newton import ASSEMBLY, RUN
-from hybrid.kernels.step.sampling import SAME_TIME
 
 Numbers = NDArray[np.int64]
 
@@ -279,7 +278,6 @@ def make_line(table):
 class PaidCalls(NamedNumbers, number=np.int64):
     """Addresses of the kernels that are called."""
 
-    steps: int
     solver: int
     change: int
     carry: int
@@ -289,7 +287,7 @@ class PaidCalls(NamedNumbers, number=np.int64):
     before_forces: int
     stand_still: int
     after_forces: int
-    books: int  # of one of several lines: of kernels.run.network.begin_line
+    books: int  # of kernels.run.network.begin_line
 
 
 class PaidPlaces(NamedNumbers, number=np.int64):
@@ -299,14 +297,9 @@ class PaidPlaces(NamedNumbers, number=np.int64):
     cells: int
     changes: int  # so far
     task: int  # where the table of the run has its task, and address and rows of its samples
-    samples_at: int
-    room: int  # address of the memory for samples
-    most_rows: int  # of samples of one line
-    most: int  # cells that there may be
     may_wait: int  # 1 where outputs may wait although the line that they are of changes
     waiting: int  # lines whose outputs wait; numbers of their samples
     used: int
-    of_many: int  # 1 for one of several lines, whose outputs all stand in rows of the most cells, `used` of them aside
     placed: int  # numbers of its reels that wait with them, in the memory for samples
     boxes_at: int  # where the table of kernels.contact.self_distance has the rows of its tree
 
@@ -324,14 +317,13 @@ class PaidRunJob(NamedTuple):
     clock: Clock  # of the run
     own: Clock  # and of the line, which is another one where there are several
     counts: b.Counts
-    outputs: Floats
     winch: Winch
     first: Reel  # in the two sets of arrays, with all their room
     second: Reel
     run: Numbers  # table of the run
     run_places: Numbers  # of those of its numbers that follow the cells
     in_run: NDArray[np.int64]  # (2 sides, 3, run_places.size)
-    even: Numbers  # of one of several: likewise its tables in steps from states of even parity, and of odd
+    even: Numbers  # likewise its tables in steps from states of even parity, and of odd
     odd: Numbers
     in_odd: NDArray[np.int64]  # likewise of those
     paid: Numbers  # likewise the table of kernels.reel.payout
@@ -343,20 +335,20 @@ class PaidRunJob(NamedTuple):
     node: Numbers  # table of a change
     nodes: NDArray[np.int64]  # (2 old sides x 2 parities, 3, size)
     waiting: NDArray[np.int64]  # (lines, 3)
-    room: Floats  # for samples
+    room: Floats  # for what cells of lines of before lacked
 
 
 def blank_paid_run_job() -> PaidRunJob:
     """A job with the types that every one has."""
     z, few, sides, reel = np.zeros, np.zeros(1, np.int64), np.zeros((2, 3, 1), np.int64), blank_reel(1)
     return PaidRunJob(
-        PaidCalls(), PaidPlaces(), b.Clock(), b.Clock(), b.Counts(), z(0), Winch(), reel, reel, few, few, sides,
+        PaidCalls(), PaidPlaces(), b.Clock(), b.Clock(), b.Counts(), Winch(), reel, reel, few, few, sides,
         few, few, sides, few, few, sides, few, few, sides, few, sides, z((1, 3), np.int64), z(1),
     )  # fmt: skip
 
 
 read = reader(blank_paid_run_job())
-numbers_of_sample, boxes = inner(sample_size), inner(boxes_of)
+boxes = inner(boxes_of)
 
 
 @inner
@@ -374,12 +366,8 @@ def put_all(job):
     if job.itself_places.shape[0] > 0:
         put_at(job.in_itself[k], job.itself_places, m, job.itself)
         job.itself[at.boxes_at] = boxes(m)
-    if at.of_many != 0:
-        put_at(job.in_run[k], job.run_places, m, job.even)
-        put_at(job.in_odd[k], job.run_places, m, job.odd)
-    else:
-        job.run[at.samples_at] = at.room + 8 * at.used
-        job.run[at.samples_at + 1] = min(at.most_rows, (job.room.shape[0] - at.used) // numbers_of_sample(m))
+    put_at(job.in_run[k], job.run_places, m, job.even)
+    put_at(job.in_odd[k], job.run_places, m, job.odd)
 
 
 @inner
@@ -403,30 +391,7 @@ def change(job):
     job.run[at.task] = RUN
     call(calls.stand_still, job.paid)
     call(calls.after_forces, job.run)
-    if calls.books != 0:
-        call(calls.books, job.run)
-
-
-@inner
-def due_within(job):
-    """How many outputs lie within the last step, before its end, and have not been sampled."""
-    clock, outputs, at, count = job.clock, job.outputs, job.counts.output, 0
-    last = clock.now - SAME_TIME * clock.last_dt
-    while at + count < outputs.shape[0] and outputs[at + count] < last:
-        count += 1
-    return count
-
-
-@inner
-def may_change(job):
-    """Whether a node may enter or leave now: no outputs of the line of now are to come or wait, or there is room."""
-    at, some = job.at, due_within(job) + job.counts.samples
-    if some == 0:
-        return True
-    size = numbers_of_sample(at.cells)
-    left = job.room.shape[0] - at.used - some * size - OF_REEL * at.cells
-    fits = some <= job.run[at.samples_at + 1] and left >= numbers_of_sample(at.most)  # or the run could not go on
-    return at.may_wait != 0 and at.waiting < job.waiting.shape[0] and fits
+    call(calls.books, job.run)
 
 
 @inner
@@ -437,17 +402,6 @@ def keep_reel(job, o):
         job.room[o + c], job.room[o + n + c] = reel.lack[c], reel.rate[c]
         job.room[o + 2 * n + c], job.room[o + 3 * n + c] = reel.since[c], reel.span[c]
     return OF_REEL * n
-
-
-@inner
-def set_aside(job):
-    """The outputs that have been sampled wait, with what cells of the line lacked."""
-    at, row = job.at, job.waiting[job.at.waiting]
-    row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, job.counts.samples, at.cells
-    at.used += row[COUNT] * numbers_of_sample(at.cells)
-    at.used += keep_reel(job, at.used)
-    at.waiting += 1
-    job.counts.samples = 0
 
 
 @inner
@@ -486,29 +440,3 @@ def change_node(table):
 def put_paid(table):
     """`put_all`."""
     put_all(read(table))
-
-
-@kernel
-def change_paid(table):
-    """`change`."""
-    change(read(table))
-
-
-@kernel
-def go_on(table):
-    """Steps of a run, and nodes that enter and leave, until Python has to decide; a code of kernels.state.books."""
-    job = read(table)
-    counts = job.counts
-    code = call_count(job.calls.steps, job.run)
-    while code == b.STEPPED and counts.notices == 0 and counts.asks == 0:
-        if reel_of(job).numbers.due == 0.0 or at_its_end(job.winch) or not may_change(job):
-            return code
-        if due_within(job) > 0:
-            counts.inside, counts.asks = 1, b.ASK_SAMPLES
-            call_count(job.calls.steps, job.run)
-            counts.inside, counts.asks = 0, 0
-        if counts.samples > 0:
-            set_aside(job)
-        change(job)
-        code = call_count(job.calls.steps, job.run)
-    return code

@@ -72,8 +72,7 @@ class Counts(NamedNumbers, number=np.int64):
 
     controlled: int  # 1 where the length of steps is controlled by their error
     parity: int  # which of the two states is now
-    phase: int  # what comes next (below), and what after START
-    after_start: int
+    phase: int  # what comes next (below)
     steps: int  # accepted steps; iterations of the last
     iterations: int
     outcome: int  # of the last try: its outcome, iterations, and the cell or node where it was worst
@@ -87,13 +86,11 @@ class Counts(NamedNumbers, number=np.int64):
     rows: int  # in the log
     output: int  # next output that is due
     samples: int  # in the buffer
-    inside: int  # 1: outputs at the end of the step wait, because the line is about to change
-    asks: int  # bits: Python is asked before every try, after it, after every step, after its outputs
+    asks: int  # bits: Python is asked before every try, after it, after every step
     notices: int  # what there is to look at after the last step
     stiff: int  # 1 where no cell stretches
     quota: int  # steps until the call returns
     measured: int  # steps of which `worst` knows
-    new_state: int  # 1 where the state of a START counts among the extremes
     slack_cell: int  # of the step of Clock.slack_step
     varies: int  # 1 where samples have the lengths of cells and the stiffness of elements, which change in a run
     most_iterations: int  # Newton iterations that a step may take in all its tries; 0: as many as converge
@@ -111,11 +108,11 @@ class Counts(NamedNumbers, number=np.int64):
 
 
 # Phases.
-START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
-ASK_BEFORE, ASK_TRIES, ASK_STEPS, ASK_SAMPLES = 1, 2, 4, 8
+BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(6)
+ASK_BEFORE, ASK_TRIES, ASK_STEPS = 1, 2, 4
 # What a call returns: at STOP; a buffer is full or the quota is used up; a try to come; one to be judged; a step to be
-# looked at; its outputs to be looked at; a step that fails however small.
-AT_STOP, PAUSED, TRYING, TRIED, STEPPED, SAMPLED, FAILED = range(7)
+# looked at; a step that fails however small.
+AT_STOP, PAUSED, TRYING, TRIED, STEPPED, FAILED = range(6)
 # Bits of Counts.notices.
 STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SLACK = 1, 2, 4, 8, 16, 32, 64, 128
 UNKNOWN_ERROR = 256

@@ -6,10 +6,9 @@ import math
 
 from hybrid.kernels.algebra.rotations import get3
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.march.powers import book_work, find_powers, pull
+from hybrid.kernels.march.powers import pull
 from hybrid.kernels.march.zone_torque import POWER
 from hybrid.kernels.state.books import (
-    BEGIN_STEP,
     BENT,
     COLLAPSES,
     ITERATIONS_CUT,
@@ -18,30 +17,20 @@ from hybrid.kernels.state.books import (
     LETS_GO,
     NEARS_PLANE,
     PUSH_DIED,
-    SAMPLE,
     SLACKENED,
     STEPS_CUT,
     STEPS_SLACK,
     STRETCHED,
-    TRY,
     ZONES,
 )
 from hybrid.kernels.state.forces import PLANAR, SELF_FRICTION, TOUCHES
 from hybrid.kernels.state.report import (
     BEND,
-    LOCAL_ERROR,
-    LOCAL_ERROR_NODE,
     PUSH_ENERGY,
-    RESIDUAL,
-    SLACKEST,
-    SLACKEST_CELL,
     TWIST,
-    USED_RHO,
     WRONG_PIVOTS,
 )
-from hybrid.kernels.step.newton import CUT_SHORT, OK, SLACK, TURNED_TOO_FAR
 from hybrid.kernels.step.sampling import end_frame, holds_twist, twist_at_end
-from hybrid.kernels.step.step_control import halve, passes
 
 # Twist of an element (rad) that could become its opposite unseen: the log strain ends at pi, and a step may add what
 # an end turns in it (model.resolution.MOST_TURN); what goes beyond pi comes back as more than this.
@@ -53,51 +42,6 @@ GROWN = 1e3
 DIED = 1e-3
 # Steps that are less than TINY of the longest one, MANY after another, have collapsed: somebody has to know.
 TINY, MANY = 1e-3, 200
-
-
-@inner
-def note_try(clock, count, report, outcome, iterations, left, where):
-    """Keep how a try ended; one that leaves a catenary cell at the floor of tension or below has failed."""
-    count.taken += iterations
-    count.is_cut = 0
-    if outcome == CUT_SHORT:
-        outcome, count.is_cut = OK, 1
-    if outcome == OK and not report[SLACKEST] > clock.floor:
-        outcome, where = SLACK, int(report[SLACKEST_CELL])
-    count.outcome, count.tries, count.where = outcome, iterations, where
-    clock.correction = left
-
-
-@inner
-def judge(clock, count, report, dt, gains):
-    """Whether the try over dt is the step (1), is to be repeated in another length (0), or has failed for good (-1).
-
-    gains: whether it is to be repeated in halves because contact has put energy in, as long as it may be halved.
-    """
-    count.cut_at = count.where
-    if gains and 0.5 * clock.tried_dt >= clock.shortest:
-        halve(clock, count, dt)
-        count.cut_by_gain += 1
-    elif count.outcome == OK:
-        if not count.controlled or passes(clock, count, dt, report[LOCAL_ERROR]):
-            return 1
-        count.cut_by_error += 1
-        count.cut_at = int(report[LOCAL_ERROR_NODE])
-    elif 0.5 * clock.tried_dt < clock.shortest or (count.outcome == SLACK and dt <= clock.wave_step):
-        # A catenary that is slack in a step that follows its waves is no matter of the step.
-        return -1
-    else:
-        if count.outcome == SLACK:
-            clock.slack_step, count.slack_cell = dt, count.where
-        halve(clock, count, dt)
-        if count.outcome == TURNED_TOO_FAR:
-            count.cut_by_turn += 1
-        else:
-            count.cut_by_newton += 1
-    count.wasted += count.tries
-    count.repeats += 1
-    count.phase = TRY
-    return 0
 
 
 @inner
@@ -140,15 +84,6 @@ def impose_now(ends, imposed):
 
 
 @inner
-def keep_imposed(ends, imposed):
-    """What the ends impose now, and what they did before the step."""
-    for k in range(2):
-        for j in range(21):
-            imposed[1, k, j] = imposed[0, k, j]
-    impose_now(ends, imposed)
-
-
-@inner
 def keep_end_twist(line, old, books):
     """Twist of the elements at both ends before the step, and before the one before it."""
     n = old.T.shape[0]
@@ -168,7 +103,10 @@ def keep_past(line, ends, old, books, report):
         books.tension[1, c], books.tension[0, c] = books.tension[0, c], old.T[c]
     for i in range(books.touch.shape[1]):
         books.touch[1, i], books.touch[0, i] = books.touch[0, i], books.touch[2, i]
-    keep_imposed(ends, books.imposed)
+    for k in range(2):
+        for j in range(21):
+            books.imposed[1, k, j] = books.imposed[0, k, j]
+    impose_now(ends, books.imposed)
     if not line.bits & PLANAR:
         keep_end_twist(line, old, books)
 
@@ -178,29 +116,6 @@ def book_torques(old, new, dt, books):
     """Work in a step of the torques that zones which are bent pass on."""
     for z in range(new.turn.shape[0]):
         books.work[0, ZONES] += 0.5 * dt * (old.turn[z, POWER] + new.turn[z, POWER])
-
-
-@inner
-def accept(line, ends, old, new, books, work, end, dt):
-    """The step that was tried is taken: clock, books and log."""
-    clock, count, report = books.clock, books.counts, work.report
-    clock.earlier_dt = clock.last_dt if clock.now > clock.previous else 0.0
-    count.parity = 1 - count.parity
-    clock.previous, clock.now, clock.last_dt, clock.last_rho = clock.now, end, dt, report[USED_RHO]
-    count.steps += 1
-    count.iterations = count.tries
-    keep_past(line, ends, old, books, report)
-    for j in range(books.power.shape[1]):
-        books.power[1, j] = books.power[0, j]
-    find_powers(line, ends, books.velocity, new, report, books.power[0])
-    book_work(line, dt, report, books)
-    book_torques(old, new, dt, books)
-    row = books.log[count.rows]
-    row[0], row[1], row[2], row[3] = end, dt, count.tries + count.wasted, clock.correction
-    row[4], row[5], row[6] = report[RESIDUAL], count.repeats, report[LOCAL_ERROR]
-    row[7], row[8] = pull(report, 0), pull(report, 1)
-    count.rows += 1
-    count.wasted, count.phase = 0, SAMPLE
 
 
 @inner
@@ -282,17 +197,6 @@ def watch_push(clock, report):
     if clock.push_grown < DIED:
         return PUSH_DIED
     return LEAVES_PLANE if clock.push_grown >= GROWN else 0
-
-
-@inner
-def end_step(line, state, clock, count):
-    """Go on with the next part of the step, or with the next step."""
-    if not (count.controlled or clock.now >= clock.until):
-        count.phase = TRY
-        return
-    if count.repeats > 0:
-        settle(line, state, clock.until - clock.begin)
-    count.phase = BEGIN_STEP
 
 
 @inner

@@ -1,4 +1,4 @@
-"""All that steps of a line need, by reference: what an entry of kernels.run.run.run gets as its table."""
+"""All that steps of a line need, by reference: what an entry of kernels.run.entry gets as its table."""
 
 from __future__ import annotations
 
@@ -42,7 +42,6 @@ class Job(NamedTuple):
     work: Work
     books: Books
     following: NDArray[np.int64]  # of a run: table of what follows the model error (kernels.watch.bending_error)
-    zone_table: NDArray[np.int64]  # of a kernels.mesh.zone_step.ZoneJob, of a run whose zones move
     itself_table: NDArray[
         np.int64
     ]  # of a kernels.contact.self_distance.ItselfJob, of a line that could come near itself
@@ -51,7 +50,6 @@ class Job(NamedTuple):
     ]  # (3,) of kernels.contact.self_contact: address, 0: no contact; what is asked; whether it is near
     contact_table: NDArray[np.int64]  # of a kernels.contact.self_contact.ContactJob
     reel_table: NDArray[np.int64]  # of a kernels.reel.payout.ReelJob, of a line that is paid out
-    zones: int = 0  # address of kernels.mesh.zone_step.follow_zones; 0: zones stay, or Python follows them
     itself: int = 0  # address of kernels.contact.self_distance.watch_itself; UNBENT: until the line is bent; 0: never
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
     reel: int = 0  # address of kernels.reel.payout.pay_out, of a line of several stand_among; 0: its length stays
@@ -67,11 +65,10 @@ def blank_job() -> Job:
     task = Task(0, limits=limits)
     return Job(
         task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books(),
-        np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(3, np.int64), np.zeros(0, np.int64),
-        np.zeros(0, np.int64),
+        np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(3, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64),
     )  # fmt: skip
 
 
 read = reader(blank_job())
-call_solver, call_follower, call_zones, call_itself = caller((0, 0, 0.0, 0)), caller(0), caller(0), caller(0)
+call_solver, call_follower, call_itself = caller((0, 0, 0.0, 0)), caller(0), caller(0)
 call_reel, call_quantities = caller(0), caller(0)

@@ -3,7 +3,7 @@
 Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
 tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.march.configuration).
 
-`solve` is inlined in the one entry to all that needs the march (kernels.run.run): a second one would compile it once more.
+`solve` is inlined in the one entry to all that needs the march (kernels.run.network_run): a second one would compile it once more.
 """
 
 from __future__ import annotations

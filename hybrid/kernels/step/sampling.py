@@ -328,8 +328,7 @@ def sample_step(line, sea, old, new, books):
     clock, count, outputs = books.clock, books.counts, books.outputs
     dt = clock.last_dt
     near = SAME_TIME * dt
-    last = clock.now - near if count.inside else clock.now + near
-    while count.output < outputs.shape[0] and outputs[count.output] <= last:
+    while count.output < outputs.shape[0] and outputs[count.output] <= clock.now + near:
         if count.samples == books.samples.shape[0]:
             return False
         t, x = outputs[count.output], 1.0
