@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hybrid.kernels.march.link import holds_twist, link_of
+from hybrid.errors import ComputationError
+from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.march.link import LINK, holds_twist, link_of
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.initial_shape import GIVEN
-from hybrid.simulation.self_watch import deepest_text, diameters, least_bending
-from hybrid.solve.contact_statics import contact_energy, settled
+from hybrid.model.self_reach import touching
+from hybrid.simulation.self_watch import diameters, least_bending
+from hybrid.solve.contact_statics import settled_system
+from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
+from hybrid.solve.network_solver import NO_BODIES
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.statics import Equilibrium
 
@@ -21,29 +27,7 @@ from hybrid.solve.statics import Equilibrium
 PARTS, JUMP = 48, 0.5
 FLAT = 1e-9  # volume, over the lengths, of chords that lie in one plane but for round-off, as neighbours do
 MOST_NODES = 300  # of a line that is looked at for whether it passes through itself
-LINK, KEPT = 2, 1e-3  # place in what link_of gives; turns by which the link of a line between two clamps may change
-
-
-def with_contact(model: Model, t: float, found: Equilibrium | None) -> Equilibrium | None:
-    """The equilibrium with the loads of time t of a line that contact is asked for; None: there is none to be had.
-
-    found: without contact, which is taken where nothing touches, unless the line would pass through itself on the
-    straight way there from a shape that the scene gives; None: none was found.  A damped motion leads to rest from the
-    starting shape, or, where that is within itself, from `found`; None comes back where both are.
-    ComputationError: as of `settled_from`.
-    """
-    if not model.line.bits & SELF_CONTACT:
-        return None
-    contact = contact_of(model)
-    sea, ends = model.sea.at(t), model.ends.at(t)
-    energy = math.inf
-    if found is not None:
-        energy = contact_energy(model.line, sea, ends, found.state, contact)
-        if energy == 0.0 and not passes_itself(model, found.state):
-            return found
-    if math.isfinite(contact_energy(model.line, sea, ends, model.start, contact)):
-        return settled_from(model, t, model.start)
-    return settled_from(model, t, found.state) if found is not None and math.isfinite(energy) else None
+KEPT = 1e-3  # turns by which the link of a line between two clamps may change
 
 
 def gauss_integral(a: Floats, b: Floats) -> float:
@@ -87,53 +71,61 @@ def contact_of(model: Model) -> SelfContact:
     return SelfContact(model.line, diameters(model), least_bending(model), model.tension_scale)
 
 
-def settled_from(model: Model, t: float, start: State, near: bool = False) -> Equilibrium:
-    """The equilibrium with contact, with the loads of time t, that a damped motion reaches from a start that is apart.
-
-    near: that start is next to an equilibrium, which Newton's method with contact is asked for before anything moves.
-    ComputationError: the motion does not come to rest, has lost turns, or ends with a catenary that is not taut.
-    """
-    asked = link(model, start)
-
-    def keeps_turns(state: State) -> str:
-        has = link(model, state)
-        if abs(has - asked) < KEPT:
-            return ""
-        why = "it has gone around a clamp, or its cells are too long for its loops"
-        return f"the starting shape has a link of {asked:.6g} turns, the line in contact {has:.6g}: {why}"
-
-    scales = model.length, model.tension_scale, model.slack_floor
-    sea, ends = model.sea.at(t), model.ends.at(t)
-    return settled(model.line, sea, ends, start, scales, contact_of(model), keeps_turns, near)
-
-
 def nearness(model: Model, t: float, state: State) -> Floats:
     """How near nodes (N+1,) of a line at rest are to other parts of it: above 1, nearer than two diameters."""
     contact = contact_of(model)
     near = contact.look_ahead(1.0)
-    contact_energy(model.line, model.sea.at(t), model.ends.at(t), state, contact)
+    contact.energy_of(model.line, model.ends.at(t), state)
     return near
 
 
-def within_itself(model: Model, t: float, state: State) -> str:
-    """Where parts of a line at rest are in each other; empty: nowhere."""
-    contact = contact_of(model)
-    energy = contact_energy(model.line, model.sea.at(t), model.ends.at(t), state, contact)
-    return deepest_text(contact, model) if math.isinf(energy) else ""
+def settled_from(model: Model, t: float, start: State, near: bool = False) -> Equilibrium:
+    """The equilibrium with contact of one line that a damped motion reaches from a start that is apart.
+
+    t: s, of its loads; near: that start is next to an equilibrium, which Newton's method with contact is asked for
+    before anything moves.  ComputationError: the motion does not come to rest, has lost turns, or ends with a catenary
+    that is not taut.
+    """
+    line = touching(model.line, 0.0)
+    scales = model.length, model.tension_scale, model.slack_floor
+    x, first = JoinedLine(line, model.sea.at(t), model.ends.at(t), *scales, (-1, -1)), NetworkState([start])
+    keeps = keeps_turns([x], first, KEPT)
+    try:
+        found = settled_system([x], 0, NO_BODIES, first, lambda: ([contact_of(model)], None), keeps, near)
+    except LineFailed as failed:
+        raise ComputationError(failed.outcome, None, failed.s, failed.detail) from None
+    return Equilibrium(
+        found.state.lines[0], found.path, found.iterations, found.residual, found.solver.work[0].report.copy(), -1,
+        False, False, touches=True,
+    )  # fmt: skip
 
 
-def why_not(model: Model, t: float) -> tuple[str, str]:
-    """Why `with_contact` has nothing to give of a line that contact is asked for: what it takes, and what to do."""
-    contact = contact_of(model)
-    contact_energy(model.line, model.sea.at(t), model.ends.at(t), model.start, contact)
-    where = deepest_text(contact, model)
-    takes = f"a starting shape that is apart, for a damped motion with contact to lead to rest; in this one {where}"
-    return takes, "another `initial_guess`, or `hybrid run` from a start that is apart"
+def is_apart(model: Model, t: float, state: State) -> bool:
+    """Whether no part of a line at rest is in another one."""
+    return math.isfinite(contact_of(model).energy_of(model.line, model.ends.at(t), state))
 
 
-def link(model: Model, state: State) -> float:
-    """Link, in turns, of a line between ends that hold its twist; 0 where they do not."""
-    line, ends = model.line, model.ends.values
-    if not holds_twist(line):
-        return 0.0
-    return float(link_of(line, ends, state.r, state.e, state.a1, state.turn)[LINK])
+def keeps_turns(
+    lines: Sequence[JoinedLine], start: NetworkState, within: float
+) -> Callable[[NetworkState], tuple[int, str]]:
+    """What tells of the first line whose link in a state is not that of the start."""
+    asked = {k: _link(x, start.lines[k]) for k, x in enumerate(lines) if _holds_turns(x)}
+
+    def lost(states: NetworkState) -> tuple[int, str]:
+        for k, link in asked.items():
+            has = _link(lines[k], states.lines[k])
+            if abs(has - link) > within:
+                why = "it has gone around a clamp, or its cells are too long for its loops"
+                return k, f"the start has a link of {link:.6g} turns, the line in contact {has:.6g}: {why}"
+        return -1, ""
+
+    return lost
+
+
+def _holds_turns(x: JoinedLine) -> bool:
+    """Whether the turns of a line cannot change: contact is asked for, and what holds its twist does not turn."""
+    return bool(x.line.bits & SELF_CONTACT) and holds_twist(x.line) and not x.seats[:, TURNS].any()
+
+
+def _link(x: JoinedLine, state: State) -> float:
+    return float(link_of(x.line, x.ends, state.r, state.e, state.a1, state.turn)[LINK])

@@ -24,7 +24,6 @@ from hybrid.kernels.laws.obstacles import (
     put_obstacles,
 )
 from hybrid.kernels.march.resolution_checks import lowest
-from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, Clock
 from hybrid.kernels.state.forces import (
@@ -33,12 +32,11 @@ from hybrid.kernels.state.forces import (
     PLANAR,
     SEABED,
     SELF_CONTACT,
-    SELF_FRICTION,
     SOIL,
 )
 from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RIDES
 from hybrid.kernels.state.report import BEND, TWIST_NODE
-from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, ends_in, state_in
+from hybrid.kernels.state.state import Batch, Floats, Line, Sea, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model
 from hybrid.model.first_state import HUNG
@@ -61,7 +59,6 @@ from hybrid.simulation.slack_bends import (
 )
 from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left, passed_obstacles, rubs_on
 from hybrid.solve.stability import is_stable
-from hybrid.solve.statics import Equilibrium
 
 # A rod that bends or twists by more than this (rad) from one cell to the next is not resolved by its mesh.
 UNRESOLVED = 1.0
@@ -247,26 +244,6 @@ class Diagnostics:
         s = float(self._model.line.s[node])
         self.events.event(t, s, s, kind, text)
 
-    def equilibrium(self, found: Equilibrium) -> None:
-        """What a static solution leaves open."""
-        self.found_by(found.pushed, found.slack, found.state)
-        if not found.with_friction:
-            self.friction_neglected(found.state, "initial", not_settled=found.not_settled)
-        if self._model.line.bits & SELF_FRICTION and found.touch.any():
-            text = "this equilibrium is the one without friction where the line touches itself"
-            where = f"{text}: a run with damping that comes to rest in contact has it"
-            self.events.event(0.0, 0.0, self._model.length, "static friction neglected", where)
-        self.within_plane(found.state, found.with_friction)
-        if not found.judged:
-            why = "an end moment is not conservative"
-            if found.blurred:
-                why = "round-off of the bending of so short cells hides it"
-            if found.touch.size:
-                there = "the line touches itself; " if found.touch.any() else ""
-                why = f"{there}a damped motion with contact, without friction, led there"
-            text = f"the stability of this equilibrium is not judged, because {why}"
-            self.events.event(0.0, 0.0, self._model.length, "stability not judged", text)
-
     def friction_neglected(self, state: State, key: str, shares: bool = False, not_settled: str = "") -> None:
         """Of an equilibrium without friction that touches what has some; key: of the scene, that asks for it.
 
@@ -364,10 +341,6 @@ class Diagnostics:
                 f"may lead to it"
             )
             self.note(0.0, node, "several equilibria", text)
-
-    def still(self, ends: Ends, state: State) -> Stop:
-        """As `shape`, for a state that no step has led to."""
-        return self.shape(0.0, sharpest(self._model.line, ends, state), state)
 
     def shape(self, t: float, sharp: Sequence[float], state: State) -> Stop:
         """Bends and twists that the mesh does not resolve; `sharp`: what kernels.run.entry.sharpest has found."""

@@ -19,10 +19,9 @@ from hybrid.model.equilibrium_hints import reasons_against
 from hybrid.model.first_state import HUNG
 from hybrid.model.initial_shape import GIVEN
 from hybrid.model.plane import leaves_plane, planar, untwist
-from hybrid.model.self_reach import touching
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.contact_equilibrium import settled_from, with_contact
+from hybrid.simulation.contact_equilibrium import is_apart, settled_from
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.solve.flaws import ON_BED, behind_obstacles, passed_obstacles, rubs_on
@@ -39,26 +38,22 @@ MANY = 1000
 def equilibrium_of(scene: LineScene, model: Model, t: float) -> Equilibrium:
     """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size.
 
-    Of a line that touches itself, where contact is asked for, that to which a damped motion with contact leads; so too
-    of a line that may touch itself and has lost turns of its ends on the other ways, on which it passed through itself.
+    Of a line that may touch itself and has lost turns of its ends on all ways, on which it passed through itself, that
+    to which a damped motion with contact leads.
     """
     try:
-        found = _without_contact(scene, model, t)
+        return _without_contact(scene, model, t)
     except ComputationError as failed:
-        keeps = model
-        if failed.outcome == Outcome.TURNS_LOST and model.line.bits & MAY_TOUCH:
-            keeps = replace(model, line=touching(model.line, 0.0))
+        may_touch = failed.outcome == Outcome.TURNS_LOST and model.line.bits & MAY_TOUCH
+        if not may_touch or not is_apart(model, t, model.start):
+            raise
         try:
-            settled = with_contact(keeps, t, None)
+            return settled_from(model, t, model.start)
         except ComputationError as too:
             tried = "\n              ".join(x for x in (failed.detail, too.detail) if x)
             raise ComputationError(
                 failed.outcome, None, failed.s, tried, first=slack_remedy(model, failed.outcome, failed.s)
             ) from None
-        if settled is None:
-            raise
-        return settled
-    return with_contact(model, t, found) or found
 
 
 def _without_contact(scene: LineScene, model: Model, t: float) -> Equilibrium:
@@ -148,7 +143,7 @@ def solve_model(model: Model, t: float, start: State, search: Search) -> Equilib
 
 def solve_like(model: Model, t: float, start: State, like: Equilibrium) -> Equilibrium:
     """The equilibrium near a start, found as another one was: with friction on the bed, or in contact with itself."""
-    if like.touch.size:
+    if like.touches:
         return settled_from(model, t, start, near=True)
     if like.with_friction and not like.pulled:
         return solve_model(model, t, start, Search("start"))

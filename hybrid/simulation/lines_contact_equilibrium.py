@@ -10,8 +10,6 @@ from itertools import chain, pairwise
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.junctions.carried_frames import TURNS
-from hybrid.kernels.march.link import LINK, holds_twist, link_of
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
@@ -20,13 +18,12 @@ from hybrid.model.initial_shape import GIVEN, hung
 from hybrid.model.lines_contact import touching_among
 from hybrid.model.network import NetworkModel
 from hybrid.scene.network_scene import Network
-from hybrid.simulation.contact_equilibrium import KEPT, contact_of, nearness, passes_itself
+from hybrid.simulation.contact_equilibrium import KEPT, contact_of, keeps_turns, nearness, passes_itself
 from hybrid.simulation.lines_contact import crossed, shared_of, watched_pairs
-from hybrid.solve.contact_statics import contact_energy
+from hybrid.solve.contact_statics import settled_system, touching_solver
 from hybrid.solve.flaws import behind_obstacles, passed_obstacles
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest, lines_at_rest
-from hybrid.solve.lines_contact_statics import settled_system, touching_solver
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import Start, Tally, in_slower_currents
 from hybrid.solve.self_contact import SelfContact
@@ -167,7 +164,7 @@ def settle(
     model: NetworkModel, lines: Sequence[JoinedLine], bodies: Floats, start: NetworkState, near: bool = False
 ) -> LinesAtRest:
     """The equilibrium with contact that a damped motion reaches from a start that is apart; near: as of that."""
-    keeps = _keeps_turns(lines, start, KEPT)
+    keeps = keeps_turns(lines, start, KEPT)
     return settled_system(lines, len(model.free), bodies.copy(), start, lambda: contacts_of(model), keeps, near)
 
 
@@ -185,7 +182,7 @@ def touches_alone(model: NetworkModel, number: int) -> bool:
 
 def energy_of(x: JoinedLine, model: Model, state: State) -> float:
     """Energy, J, of contact of a line at rest; infinite: parts are in each other."""
-    return contact_energy(x.line, x.sea, x.ends, state, contact_of(model))
+    return contact_of(model).energy_of(x.line, x.ends, state)
 
 
 def _touch(lines: Iterable[JoinedLine]) -> list[bool]:
@@ -235,30 +232,4 @@ def _first_apart(
 
 def _has_lost(lines: Sequence[JoinedLine], hung: NetworkState, found: LinesAtRest) -> bool:
     """Whether an equilibrium that knows no contact has lost turns, against its lines hung between first places."""
-    return bool(_keeps_turns(lines, hung, OF_SHAPE)(found.state)[1])
-
-
-def _keeps_turns(
-    lines: Sequence[JoinedLine], start: NetworkState, within: float
-) -> Callable[[NetworkState], tuple[int, str]]:
-    """What tells of the first line whose link in a state is not that of the start."""
-    asked = {k: _link(x, start.lines[k]) for k, x in enumerate(lines) if _holds_turns(x)}
-
-    def lost(states: NetworkState) -> tuple[int, str]:
-        for k, link in asked.items():
-            has = _link(lines[k], states.lines[k])
-            if abs(has - link) > within:
-                why = "it has gone around a clamp, or its cells are too long for its loops"
-                return k, f"the start has a link of {link:.6g} turns, the line in contact {has:.6g}: {why}"
-        return -1, ""
-
-    return lost
-
-
-def _holds_turns(x: JoinedLine) -> bool:
-    """Whether the turns of a line cannot change: contact is asked for, and what holds its twist does not turn."""
-    return bool(x.line.bits & SELF_CONTACT) and holds_twist(x.line) and not x.seats[:, TURNS].any()
-
-
-def _link(x: JoinedLine, state: State) -> float:
-    return float(link_of(x.line, x.ends, state.r, state.e, state.a1, state.turn)[LINK])
+    return bool(keeps_turns(lines, hung, OF_SHAPE)(found.state)[1])

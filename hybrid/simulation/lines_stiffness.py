@@ -33,9 +33,9 @@ from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.lines_contact_equilibrium import contacts_of
 from hybrid.simulation.run_contact import refuse_within_itself
 from hybrid.simulation.run_start import equilibrium_of_system
+from hybrid.solve.contact_statics import touching_solver
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
-from hybrid.solve.lines_contact_statics import touching_solver
 from hybrid.solve.network_solver import NetworkSolver
 
 VERTICAL = np.array([0.0, 0.0, 1.0])

@@ -22,7 +22,6 @@ from hybrid.simulation.lines_contact_equilibrium import energy_between, touches_
 from hybrid.simulation.lines_contact_start import given_up_text, lines_near, touch_each_other, touching_now
 from hybrid.simulation.run_of_lines import RunOfLines, change_lines
 from hybrid.simulation.self_watch import deepest_text, diameters
-from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.store.partners import meeting_text
@@ -47,14 +46,14 @@ def refuse_within_itself(
         if not touches_alone(system, k):
             continue
         contact = contact_of(model)
-        energy = contact_energy(x.line, x.sea, x.ends, one, contact)
+        energy = contact.energy_of(x.line, x.ends, one)
         if energy == 0.0 or (moves and math.isfinite(energy)):
             continue
         given = f"self: true, and {where} {deepest_text(contact, model)}"
         expected = "a start in which the line is apart"
         fix = f"lines.{name}.initial: {{points: [...]}}, such as a wide U, a smaller diameter, or leave contact out"
         if where == WITHOUT_CONTACT:
-            contact_energy(x.line, x.sea, x.ends, model.start, contact)
+            contact.energy_of(x.line, x.ends, model.start)
             first = deepest_text(contact, model)
             expected = "a first shape in which the line is apart, for a damped motion with contact to lead to rest"
             expected += f"; in this one {first}"
@@ -100,7 +99,7 @@ def begin_contact(run: RunOfLines) -> None:
     for line in near:
         x, line.nears_itself = run.solver.lines[line.number], False
         model = run.model.models[line.number]
-        energy = contact_energy(x.line, x.sea, x.ends, run.state.lines[line.number], contact_of(model))
+        energy = contact_of(model).energy_of(x.line, x.ends, run.state.lines[line.number])
         watch = line.envelope.itself
         if math.isfinite(energy):
             begun.append(line.number)

@@ -166,7 +166,7 @@ def _together(model: NetworkModel, t: float, found: Sequence[Equilibrium]) -> Li
         return made
 
     path = max(found, key=lambda x: len(x.path)).path  # of the line that took most ways
-    touches = any(x.touch.size for x in found)
+    touches = any(x.touches for x in found)
     why = "a damped motion with contact, without friction, led there" if touches else ""
     return LinesAtRest(
         states, path, sum(x.iterations for x in found), max(x.residual for x in found), solver, touches, why, rubs,
@@ -205,7 +205,7 @@ def _keep_turns(model: NetworkModel, t: float, found: LinesAtRest) -> LinesAtRes
     """
     for k, (name, x, state) in enumerate(zip(model.names, model.models, found.state.lines, strict=True)):
         keeps_link = bool(x.line.bits & SELF_CONTACT) and not model.seats[k, :, TURNS].any()
-        keeps_link = found.settled and (found.alone[k].touch.size > 0 if found.alone else keeps_link)
+        keeps_link = found.settled and (found.alone[k].touches if found.alone else keeps_link)
         try:
             count_turns(model.scenes[name], x, t, state, model.turns[k], keeps_link)
         except ComputationError as failed:

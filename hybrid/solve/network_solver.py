@@ -44,11 +44,11 @@ from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, S
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.step.step_law import REFUSED
 from hybrid.kernels.watch.named_quantities import note_quantities
-from hybrid.solve.contact_statics import DAMPING, left_over
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.joined import JoinedLine, NetworkState, NetworkTaken
 from hybrid.solve.joint_jobs import JointJobs, Rooms
-from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.self_contact import SelfContact, left_over
+from hybrid.solve.settling import CONTACT_DAMPING
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.stability import ANCHOR
 from hybrid.solve.statics import (
@@ -95,7 +95,7 @@ class NetworkSolver:
     It works in space, but for steps of lines that are joined to nothing and are marked as planar.
     """
 
-    settling = DAMPING
+    settling = CONTACT_DAMPING
 
     def __init__(
         self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES,

@@ -16,7 +16,9 @@ from hybrid.kernels.contact.self_contact_pairs import (
     blank_contact,
 )
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.books import Books
+from hybrid.kernels.run import entry
+from hybrid.kernels.run.entry import block_rows, out_of_balance
+from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.forces import ROTARY
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import (
@@ -31,6 +33,7 @@ from hybrid.kernels.state.state import (
     no_ends,
 )
 from hybrid.kernels.step.newton import ADDRESS, ASKED, NEAR, REST
+from hybrid.solve.workspaces import workspace_of
 
 # Sample points of a piece lie at most this part of a diameter apart, but for round-off, which must not decide how many
 # there are: pieces of the same length, in whatever unit, have as many.
@@ -39,6 +42,22 @@ SPACING = 0.25 * (1.0 + 1e-9)
 LEAST_POINTS, MOST_POINTS = 1000, 100_000
 # Least size of the law of contact, N: of EI/D^2; without EI of the tension scale.
 STIFFNESS, TENSION = 0.16, 0.02
+
+
+def left_over(
+    line: Line, sea: Sea, ends: Ends, state: State, force: Floats, anchor: float, work: Work
+) -> tuple[float, Floats]:
+    """Largest force, N, that is left over at a node which nothing holds, contact included; forces (2, 3) N of contact
+
+    on the end nodes.  force: (N+1, 3) N, of contact; work: of the line, with u = 0, whose report becomes that of the
+    state without contact.
+    """
+    rows = block_rows(line)
+    if entry.assembly(line, sea, ends, state, 0.0, anchor, work._replace(rows=rows)) >= 0:
+        return float("inf"), np.zeros((2, 3))
+    left = out_of_balance(line, rows) + force
+    left[[-k for k in (0, 1) if ends.held[k]]] = 0.0
+    return float(np.abs(left).max()), force[[0, -1]]
 
 
 def mean_beside(cells: Floats) -> Floats:
@@ -210,6 +229,12 @@ class SelfContact(ContactBooks):
         self.call[ASKED] = REST
         energy: float = contact_task(self._table)
         return energy
+
+    def energy_of(self, line: Line, ends: Ends, state: State) -> float:
+        """Energy, J, of contact of a state at rest; 0: nothing touches; infinite: parts are in each other."""
+        books = blank_books(line.h.size)._replace(touch=np.zeros((3, line.s.size)))
+        self.attach(line, ends, (state, state.copy()), workspace_of(line, keep=True), books)
+        return self.energy()
 
     def settle(self, state: State, ends: Ends, report: Floats) -> float:
         """Energy, J, of contact of the state of a run, on other cells now: what travels store counts from here.

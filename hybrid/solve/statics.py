@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 from typing import NamedTuple
 
@@ -65,7 +65,7 @@ class Equilibrium:
     with_friction: bool  # True when friction took part
     judged: bool  # False when its stability could not be judged (an end moment, or `blurred`)
     blurred: bool = False  # True when round-off of the bending of very short cells hides whether it buckles
-    touch: Floats = field(default_factory=lambda: np.zeros(0))  # (N+1,) N/m, where the line touches itself
+    touches: bool = False  # whether a damped motion with contact with itself led there
     not_settled: str = ""  # why friction has not settled where a scene leaves that to the program
 
     @property

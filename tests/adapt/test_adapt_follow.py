@@ -20,7 +20,7 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, take_arcs
 from hybrid.kernels.state.state import no_sea
 from hybrid.outputs.probes import Observer
-from hybrid.simulation import initial_zones, run_cells
+from hybrid.simulation import run_cells
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.initial_zones import shares_asked
 from hybrid.simulation.lines_cells import LineCells
@@ -318,7 +318,6 @@ def test_cells_that_become_one_in_a_layer_do_not_kick_the_end_force(monkeypatch:
     def nowhere(*_: object) -> NoReturn:
         raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "no equilibrium on longer cells")
 
-    monkeypatch.setattr(initial_zones, "_on_planned_cells", nowhere)
     monkeypatch.setattr(run_cells, "_on_planned_cells", nowhere)
     result = hybrid.run(
         bight()
