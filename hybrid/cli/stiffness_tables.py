@@ -1,4 +1,4 @@
-"""What `hybrid static --stiffness` and `--offsets` print of several lines."""
+"""What `hybrid static --stiffness` and `--offsets` print."""
 
 from __future__ import annotations
 
@@ -22,19 +22,12 @@ def check_holding(asked: Any, stiffness: str | None, offsets: str | None, reach:
     if reach is not None and offsets is None:
         raise SceneError([Complaint("--reach", f"{reach:g}", "a point or body to shift", "--offsets point:NAME")])
     given = {name: at for name, at in (("--stiffness", stiffness), ("--offsets", offsets)) if at is not None}
-    if not asked.line_names:
-        for name, at in given.items():
-            expected, fix = (
-                "a scene of several lines, with points and lines",
-                "write the cable as one line between two points",
-            )
-            raise SceneError([Complaint(name, at, expected, fix)])
-        return
     if given:
+        from hybrid.scene.short_form import as_network
         from hybrid.simulation.lines_stiffness import target_of
 
         for at in given.values():
-            target_of(asked, at)
+            target_of(as_network(asked)[0], at)
     if offsets is not None:
         if reach is None:
             fix = "add --reach 20 (m), the largest offset to either side"

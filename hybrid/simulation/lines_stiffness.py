@@ -1,4 +1,4 @@
-"""How a system of lines holds a point or a body: its stiffness at the equilibrium, and forces at offsets from it."""
+"""How lines hold a point or a body: its stiffness at the equilibrium, and forces at offsets from it."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from hybrid.scene.network import JoinedLine
 from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
+from hybrid.scene.short_form import as_network
 from hybrid.scene.suggestions import nearest
 from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.lines_contact_equilibrium import contacts_of
@@ -88,7 +89,13 @@ def stiffness(scene: SceneLike, at: str) -> Stiffness:
 
     SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
     """
-    system = _system(scene)
+    system, form = as_network(as_scene(scene))
+    with form.said():
+        return _stiffness_at(system, at)
+
+
+def _stiffness_at(system: Network, at: str) -> Stiffness:
+    """The same of a network."""
     kind, name = target_of(system, at)
     model = build_system(system)
     found = _equilibrium(system, model)
@@ -232,8 +239,8 @@ def offsets(scene: SceneLike, at: str, distances: Sequence[float], heading: floa
 
     Errors: as of `stiffness`; the distance at which no equilibrium is found is in the message.
     """
-    system = _system(scene)
-    kind, name = target_of(system, at)
+    system, form = as_network(as_scene(scene))
+    target_of(system, at)
     try:
         known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())
     except (TypeError, ValueError):
@@ -242,6 +249,13 @@ def offsets(scene: SceneLike, at: str, distances: Sequence[float], heading: floa
         given = f"{distances!r:.60} m, heading {heading!r:.20}"
         fix = "give finite numbers, such as --reach 20 --heading 90"
         raise SceneError([Complaint("offsets", given, "distances (m) and a heading (deg)", fix)])
+    with form.said():
+        return _offsets_at(system, at, distances, heading)
+
+
+def _offsets_at(system: Network, at: str, distances: Sequence[float], heading: float) -> Offsets:
+    """The same of a network."""
+    kind, name = target_of(system, at)
     model = build_system(system)
     found = _equilibrium(system, model)
     shape = getattr(system.bodies[name], "shape", None) if kind == "body" else None
@@ -312,16 +326,6 @@ def _largest_tension(found: LinesAtRest, model: NetworkModel, system: Network, l
     return largest
 
 
-def _system(scene: SceneLike) -> Network:
-    found = as_scene(scene)
-    if not isinstance(found, Network):
-        expected = "a scene of several lines, with points and lines"
-        raise SceneError(
-            [Complaint("cable", "a scene of one cable", expected, "write it as one line between two points")]
-        )
-    return found
-
-
 def target_of(system: Network, at: str) -> tuple[str, str]:
     """Kind and name of what is asked for, `point:NAME` or `body:NAME`; SceneError where the scene has no such one."""
     kind, _, name = at.partition(":")
@@ -383,8 +387,8 @@ def _held(system: Network, kind: str, name: str, pose: tuple[Floats, Floats], sh
         changed = {"bodies": {**system.bodies, name: FixedBody(position=at, rotation=turned)}}
         if not _points_of(system, kind, name):  # which no scene holds
             del changed["bodies"][name]
-    moved, _ = read_text(scene_text(system.model_copy(update=changed)))  # so that lines too short are refused
-    assert isinstance(moved, Network)
+    read, _ = read_text(scene_text(system.model_copy(update=changed)))  # so that lines too short are refused
+    moved, _ = as_network(read)
     if shape is None:
         return moved
     held = HeldBody(position=at, rotation=turned, shape=shape)

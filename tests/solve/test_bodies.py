@@ -278,6 +278,20 @@ def test_offsets_are_equilibria_beside_the_place() -> None:
         hybrid.offsets(moored(), "point:on_a", [1.0])
 
 
+def test_an_end_of_a_cable_is_a_point() -> None:
+    """Its stiffness is the slope of the force at offsets, of an end that is held; it is in a plane."""
+    tables = {
+        "cable": {"sections": [{"length": 12.0, "mass": 2.0, "axial_stiffness": 1e4}]}, "model": "catenary",
+        "mesh": {"cells": 40}, "initial": "equilibrium",
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [9, 0, 2]}},
+    }  # fmt: skip
+    curve, found = hybrid.offsets(tables, "point:end", [-1e-3, 1e-3]), hybrid.stiffness(tables, "point:end").matrix
+    assert (curve.restoring[1] - curve.restoring[0]) / 2e-3 == pytest.approx(found[0, 0], rel=1e-6)
+    assert curve.tension["cable"][1] == pytest.approx(154.45, abs=0.01) and found[1, 1] > 0.0
+    with pytest.raises(SceneError, match="point:start, point:end"):
+        hybrid.offsets(tables, "body:buoy", [1.0])
+
+
 # --- bodies whose motion is known ----------------------------------------------------------------------
 
 
