@@ -44,12 +44,13 @@ def differences(a: Path, b: Path) -> list[str]:
     return out
 
 
-def resumed(scene: dict[str, Any], folder: Path, at: float) -> hybrid.Result:
-    """The run of a scene, after asserting that one until `at` (s), resumed, is the same, bit for bit."""
+def resumed(scene: dict[str, Any], folder: Path, *stops: float) -> hybrid.Result:
+    """The run of a scene, after asserting that one that ends at each of `stops` (s), resumed, is the same, bit for bit."""
     time = scene["time"]
     whole = hybrid.run(scene, folder / "whole.h5")
-    hybrid.run(scene | {"time": time | {"duration": at}}, folder / "part.h5").close()
-    hybrid.resume(folder / "part.h5", until=time["duration"]).close()
+    hybrid.run(scene | {"time": time | {"duration": stops[0]}}, folder / "part.h5").close()
+    for until in (*stops[1:], time["duration"]):
+        hybrid.resume(folder / "part.h5", until=until).close()
     apart = differences(folder / "whole.h5", folder / "part.h5")
     apart = [x for x in apart if not re.fullmatch(r"other values: lines/\w+/scene", x)]  # with a duration each
     assert not apart, apart

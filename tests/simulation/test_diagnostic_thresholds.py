@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +11,8 @@ import numpy as np
 import pytest
 from problems import pinned, scene
 
+import hybrid
+import hybrid.kernels
 from hybrid.errors import Outcome
 from hybrid.model.build import build
 from hybrid.model.resolution import first_resolution
@@ -76,3 +80,33 @@ def test_steps_to_a_period_below_which_a_step_is_too_long(rho: float, few: float
     ((t, s, _, _, text),) = finished(rho, few).events.waiting()
     assert (t, s) == (3.0, 5.0) and f"about {few:.2g} steps to a period" in text
     assert said(finished(rho, few, 1e-7, (20.0, 20.0))) == [], "what Newton's tolerance leaves is no motion"
+
+
+# --- steps that are watched ---
+
+
+def test_steps_that_are_watched_go_on_from_a_checkpoint(tmp_path: Path) -> None:
+    """What is remembered of steps for the end of the run is in the checkpoint: the same event, whenever it stopped."""
+    section = {"length": 30, "mass": 2, "axial_stiffness": 1e6}
+    moved = {"position": [0, 0, 0], "motion": {"heave": {"amplitude": 0.3, "period": 2}, "ramp": 2}}
+    line = {"start": "a", "end": "b", "sections": [section], "model": "catenary", "mesh": {"cells": 12}}
+    more = {"time": {"duration": 6, "step": 0.25}}
+    scene = {"points": {"a": moved, "b": {"position": [20, 0, 0]}}, "lines": {"line": line}}
+    whole = hybrid.run(scene | more)
+    short = {"time": more["time"] | {"duration": 4}}
+    hybrid.run(scene | short, tmp_path / "a.h5")
+    resumed = hybrid.resume(tmp_path / "a.h5", until=6)
+    events = [[(x.t, x.text) for x in r.lines["line"].events if x.kind == "coarse step"] for r in (whole, resumed)]
+    assert events[0] and events[1][-1] == events[0][-1]
+
+
+def test_what_a_kernel_writes_into_a_table_it_does_not_read_there() -> None:
+    """Tables are read as what never changes (kernels.machine.references): what solve_system writes into those of its lines,
+
+    cv, ca and dt of their tasks, is passed to what is inlined in it."""
+    folder = Path(hybrid.kernels.__file__).parent
+    inlined = ("network", "junctions", "joined_lines", "carried_frames", "bodies", "powers", "accept", "extremes")
+    read = {
+        name: re.findall(r"job\.task\.(?:cv|ca|dt)\b", next(folder.rglob(f"{name}.py")).read_text()) for name in inlined
+    }
+    assert not any(read.values()), read

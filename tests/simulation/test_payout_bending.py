@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from test_payout import clamped, exchanged, sagging
+from test_payout import clamped, sagging
 
 import hybrid
 from hybrid.errors import SceneError
@@ -92,38 +91,6 @@ def bent() -> dict[str, Any]:
     scene = paid(TABLE)
     scene["cable"]["attachments"] = [CONE]
     return scene
-
-
-def test_energy_is_balanced_to_second_order() -> None:
-    left, put_in = [], 0.0
-    for step in (0.1, 0.05):
-        found = hybrid.run({**bent(), "time": {"duration": 8.0, "step": step}})
-        left.append(np.abs(found["work/scheme"]).max())
-        put_in = np.abs(found["work/end"]).max()
-    assert left[1] < 3e-4 * put_in
-    assert left[0] > 2.5 * left[1]
-
-
-def test_the_mirror_image_pays_out_the_same() -> None:
-    scene = bent()
-    mirror = exchanged({**scene, "cable": {"sections": scene["cable"]["sections"]}})
-    cone = CONE | {"range": [90, 100], "diameters": [0.06, 0.4]}
-    mirror["cable"]["attachments"] = [cone]
-    one, other = hybrid.run(scene), hybrid.run(mirror)
-    for name, its in (("reaction_end", "reaction_start"), ("work/end", "work/start")):
-        assert np.abs(one[name] - other[its]).max() < 1e-7 * np.abs(one[name]).max(), name
-    assert np.abs(other["moment"][:, ::-1] - one["moment"]).max() < 1e-6 * np.abs(one["moment"]).max()
-
-
-@pytest.mark.long
-def test_resumed_bit_for_bit(tmp_path: Path) -> None:
-    scene = bent()
-    scene["ends"]["end"]["payout"]["longest"] = 120.0
-    whole = hybrid.run(scene, output=tmp_path / "whole.h5")
-    hybrid.run({**scene, "time": {"duration": 5.0, "step": 0.05}}, output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=8.0)
-    for name in ("position", "tension", "reaction_end", "moment", "energy/bending", "work/end", "work/scheme"):
-        assert np.array_equal(whole[name], resumed[name]), name
 
 
 def test_what_cannot_be_is_refused() -> None:

@@ -12,11 +12,10 @@ import pytest
 import hybrid
 from hybrid.cli.tables import zones_over_time
 from tests.inside import OnlyLine
-from tests.simulation.test_payout import G, assert_no_kicks, clamped, hanging, sagging
+from tests.simulation.test_payout import G, hanging
 from tests.simulation.test_payout_zones import touching
 
 FOLLOWING = {"kind": "adaptive", "tolerance": 1e-5, "hold_time": 1.0, "curvature_error": 0.05}
-NAMES = ("position", "tension", "curvature", "reaction_end", "work/end", "work/zones", "envelope/curvature_max")
 
 
 def pinned(rate: float, side: str = "end", model: Any = FOLLOWING, **more: Any) -> dict[str, Any]:
@@ -127,27 +126,6 @@ def test_a_winch_at_the_start_is_the_mirror_image(rate: float) -> None:
             np.testing.assert_allclose(y[::-1][: x.size // 2], x[: x.size // 2], rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(  # every two of stiffness, direction and clamp meet
-    ("EI", "rate", "most", "clamp"),
-    [(2e4, 0.8, 6e-4, False), (500.0, 0.8, 6e-4, True), (500.0, -0.8, 6e-4, False), (2e4, -0.8, 1e-3, True)],
-)
-def test_a_cell_that_enters_or_leaves_does_not_kick(EI: float, rate: float, most: float, clamp: bool) -> None:
-    """The force at the winch, within five steps; of a line taken in with what merges the cells that come near it."""
-    scene = sagging("rod", 2e6, EI, rate, duration=12.0) | {"model": FOLLOWING | {"force_rod": [[0, 100]]}}
-    assert_no_kicks(clamped(scene) if clamp else scene, most)
-
-
-def test_energy_is_balanced_to_second_order() -> None:
-    left = []
-    for step in (0.1, 0.05):
-        model = FOLLOWING | {"force_rod": [[0, 100]], "rod_cell": 0.6}
-        result = hybrid.run(clamped(sagging("rod", 2e6, 2e4, step=step) | {"model": model}))
-        left.append(np.abs(result["work/scheme"]).max() / np.abs(result["work/end"]).max())
-    assert left[1] < 5e-5
-    assert left[0] > 3.0 * left[1]
-
-
 def test_a_winch_that_holds_a_tension() -> None:
     """Its length as with rods as long as the shortest cells."""
     lengths = []
@@ -158,22 +136,6 @@ def test_a_winch_that_holds_a_tension() -> None:
         lengths.append(hybrid.run(scene)["payout/length"])
     assert np.ptp(lengths[1]) > 3.0
     assert np.abs(lengths[0] - lengths[1]).max() < 0.02
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("rate", "clamp"), [(0.8, True), (-0.8, False)])
-def test_resumed_to_the_last_bit(tmp_path: Path, rate: float, clamp: bool) -> None:
-    """Stopped while cells have just been handed over by the winch, or are merged on their way to it."""
-    make = touching if clamp else pinned
-    whole = hybrid.run(make(rate, model=FOLLOWING)) if clamp else followed(rate)
-    assert len({str(x) for x in whole.mesh}) > 5
-    path = tmp_path / "run.h5"
-    hybrid.run(make(rate, model=FOLLOWING, time={"duration": 2.0, "step": 0.05}), output=path).close()
-    hybrid.resume(path, until=4.5).close()
-    resumed = hybrid.resume(path, until=8.0)
-    for name in (*NAMES, "mesh/there"):
-        assert np.array_equal(whole[name], resumed[name], equal_nan=True), name
-    assert whole.zones[-1] == resumed.zones[-1]
 
 
 @pytest.mark.parametrize("model", [FOLLOWING, {"kind": "adaptive", "tolerance": 1e-5, "hold_time": 1.0}])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bits import resumed
-from test_payout import G, clamped, exchanged, hanging, kicks, sagging
+from test_payout import G, clamped, hanging, sagging
 
 import hybrid
 from hybrid.errors import SceneError
@@ -62,53 +62,6 @@ def creeping(step: float = 0.05) -> dict[str, Any]:
 
 
 SCENES = {"creep": creeping, "torque": twisting, "armour": armour, "polyester": polyester, "vortices": shedding}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", SCENES)
-def test_resumed_bit_for_bit(tmp_path: Path, name: str) -> None:
-    scene = SCENES[name](0.05)
-    scene["ends"]["end"]["payout"]["longest"] = 120.0
-    resumed(scene, tmp_path, 5.0)
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_energy_is_balanced(name: str) -> None:
-    """What is left is of second order in the steps, through nodes that enter."""
-    left, put_in = [], 0.0
-    for step in (0.1, 0.05) if name != "vortices" else (0.04, 0.02):
-        found = hybrid.run(SCENES[name](step))
-        left.append(np.abs(found["work/scheme"]).max())
-        put_in = np.abs(found["work/end"]).max()
-    assert left[1] < 1e-3 * put_in
-    assert left[0] > 2.0 * left[1]
-
-
-@pytest.mark.parametrize("name", ["torque", "polyester"])
-def test_the_mirror_image_pays_out_the_same(name: str) -> None:
-    scene = SCENES[name](0.05)
-    one, other = hybrid.run(scene), hybrid.run(exchanged(scene))
-    for mine, its in (("reaction_end", "reaction_start"), ("work/end", "work/start")):
-        assert np.abs(other[its] - one[mine]).max() < 1e-6 * np.abs(one[mine]).max(), mine
-    assert np.abs(other.position[:, ::-1] - one.position).max() < 1e-7 * 100.0
-
-
-def test_torques_at_a_stop_are_those_of_the_line_of_then(tmp_path: Path) -> None:
-    """Outputs are looked at together, the last before a stop without those after it: each has the cells it had."""
-    scene = twisting()
-    scene["ends"]["end"]["payout"]["longest"] = 120.0
-    scene["time"]["duration"] = 1.5
-    resumed(scene, tmp_path, 1.0)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", SCENES)
-def test_a_node_that_enters_does_not_kick(name: str) -> None:
-    scene = SCENES[name](0.05)
-    scene["time"]["duration"] = 14.0
-    if name == "vortices":  # 40 cells are too few for how it vibrates: 1e-2
-        scene["mesh"] = {"cells": 80}
-    assert max(kicks(scene)) < 2e-3
 
 
 def test_a_torque_of_tension_is_that_of_a_line_of_the_final_length() -> None:
@@ -253,7 +206,7 @@ def test_a_release_is_resumed_bit_for_bit_and_balanced(tmp_path: Path) -> None:
     assert left < 1e-2 * whole["energy/kinetic"].max() and finer < 0.6 * left
 
 
-def test_it_is_released_from_outside_and_as_a_system() -> None:
+def test_it_is_released_from_outside() -> None:
     scene = released()
     whole = hybrid.run(scene)
     del scene["ends"]["end"]["release_at"]
@@ -265,14 +218,5 @@ def test_it_is_released_from_outside_and_as_a_system() -> None:
             sim.step()
         found = sim.result()
     assert np.abs(found.position[-1] - whole.position[-1]).max() < 1e-6
-    ends, cable = scene["ends"], scene["cable"]
-    held = {key: ends["end"][key] for key in ("kind", "tangent", "payout")}
-    line = {"start": "a", "end": "b", **cable, "model": "rod", "mesh": scene["mesh"], "connections": {"end": held},
-            "break_at": {"end": "end", "time": 4.0}}  # fmt: skip
-    points = {"a": {"position": [0, 0, 0]}, "b": {"position": [80, 0, 0], "motion": ends["end"]["motion"]}}
-    kept = {key: scene[key] for key in ("time", "output")}
-    other = hybrid.run({**kept, "points": points, "lines": {"one": line}}).lines["one"]
-    assert np.abs(other.position - whole.position).max() < 1e-6
-    assert other["work/zones"][-1] == pytest.approx(whole["work/zones"][-1], rel=1e-6)
-    rate = other["payout/rate"]  # at the release it is that of the moment before
-    assert rate[8] == pytest.approx(0.8) and not rate[9:].any() and np.abs(rate - whole["payout/rate"]).max() < 1e-12
+    rate = whole["payout/rate"]  # at the release it is that of the moment before
+    assert rate[8] == pytest.approx(0.8) and not rate[9:].any()

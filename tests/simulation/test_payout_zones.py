@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import math
 from typing import Any
 
 import numpy as np
@@ -71,16 +71,6 @@ def test_zones_that_move_in_a_current_across_are_those_of_the_turned_scene() -> 
     assert np.abs(found.position[-1, :, 1]).max() > 0.1
 
 
-@pytest.mark.long
-def test_resumed_to_the_last_bit(tmp_path: Path) -> None:
-    whole = hybrid.run(touching())
-    hybrid.run(touching(time={"duration": 5.0, "step": 0.05}), output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=8.0)
-    for name in ("position", "tension", "reaction_end", "work/end", "work/zones"):
-        assert np.array_equal(whole[name], resumed[name], equal_nan=True), name
-    assert whole.zones[-1] == resumed.zones[-1]
-
-
 def test_a_step_is_taken_back() -> None:
     """`save` and `restore` over cells that enter and zones that change."""
     with hybrid.Simulation(touching()) as sim:
@@ -133,3 +123,73 @@ def test_a_rope_by_a_law_is_paid_out_as_with_rods(law: dict[str, Any], rate: flo
     assert np.abs(pulls[0] - pulls[1]).max() < 0.01 * pulls[1].mean()
     left = [np.abs(x["work/scheme"]).max() for x in (found, rods)]
     assert left[0] < 1.05 * left[1]
+
+
+# --- turns of the ends of a catenary ---
+
+
+BY_HAND = {"kind": "zones", "zones": [{"catenary": 4.0}, {"rod": 6.0}]}
+
+
+def twisted(model: Any = "catenary", **more: Any) -> dict[str, Any]:
+    section = {"length": 10.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 30.0,
+               "torsional_stiffness": 40.0, "drag": {"normal": 1.2}}  # fmt: skip
+    paid = {"rate": 0.5, "begin": 0.2, "ramp": 0.5, "longest": 11.0}
+    start = {"kind": "clamped", "position": [6, 0, -7.5], "tangent": [-1, 0, 0.2], "turns": 0.3}
+    return {
+        "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]}, "contact": {"self": False},
+        "ends": {
+            "start": start,
+            "end": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, 1], "payout": paid},
+        },
+        "initial": "equilibrium", "model": model, "mesh": {"cells": 24}, "dimension": 3,
+        "time": {"duration": 1.2, "step": 0.03}, "output": {"every": 0.3},
+    } | more  # fmt: skip
+
+
+def test_outputs_that_wait_have_the_torque() -> None:
+    """GJ theta / L, of the length when the last node entered, in every output; an event says how far off that may be."""
+    result = hybrid.run(twisted())
+    torque, length = np.abs(result.torque), np.asarray(result["payout/length"])
+    exact = 40.0 * 2.0 * np.pi * 0.3 / length
+    assert np.ptp(torque, axis=1) == pytest.approx(0.0, abs=1e-9)
+    (event,) = (x for x in result.events if x.kind == "torque neglected")
+    assert "up to 4.2 % wrong" in event.text
+    assert np.abs(torque[:, 0] / exact - 1.0).max() < 0.042
+
+
+# --- zones after a step that was taken back ---
+
+SCENE: dict[str, Any] = {
+    "environment": {
+        "fluid": {"density": 1025, "surface": 0, "current": [0.3, 0, 0]},
+        "seabed": {"z": -40, "stiffness": 1e4, "damping": 100, "friction": 0.4},
+    },
+    "cable": {"sections": [{"length": 85, "mass": 8, "diameter": 0.04, "axial_stiffness": 5e6, "bending_stiffness": 300,
+                            "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}]},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, -40]},
+             "end": {"kind": "pinned", "position": [60, 0, 0], "payout": {"longest": 110}}},
+    "initial": "equilibrium", "model": "adaptive", "mesh": {"cells": 43},
+    "time": {"duration": 10, "step": 0.05}, "output": {"every": 0.05},
+}  # fmt: skip
+
+
+def driven(again: int) -> hybrid.Result:
+    """32 steps of a length that grows faster and faster; the step `again` is computed, taken back and computed."""
+    with hybrid.Simulation(SCENE) as sim:
+        for n in range(32):
+            turned = 2.0 * math.pi * (sim.t + 0.05) / 10.0
+            length, rate = 89.0 - 4.0 * math.cos(turned), 0.8 * math.pi * math.sin(turned)
+            if n == again:
+                saved = sim.save()
+                sim.set_length(length, rate)
+                sim.step()
+                sim.restore(saved)
+            sim.set_length(length, rate)
+            sim.step()
+        return sim.result()
+
+
+@pytest.mark.long
+def test_rods_at_a_winch_are_those_of_the_last_node_after_a_step_is_taken_back() -> None:
+    assert np.array_equal(driven(-1).tension, driven(22).tension)

@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from bits import FEW_STEPS, Stopping, differences
+from bits import Stopping, differences
 
 import hybrid
 import hybrid.simulation.network_run
@@ -94,56 +94,6 @@ def test_a_result_keeps_its_output_points(errors, tmp_path, monkeypatch):
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
     with hybrid.run(scene) as now:
         assert now.s.size == 12 and now["right/s"].tolist() == [0.45]
-
-
-@pytest.mark.long
-def test_a_load_that_ends_is_a_load_that_is_changed(tmp_path):
-    """A force until 1 s, and the same force taken off by resuming at 1 s: one motion."""
-    free = {"kind": "free", "force": {"value": [0.3, 0, 0], "until": 1.0}}
-    pinned = {"kind": "pinned", "position": [0, 0, 0]}
-    ends = {"start": pinned, "end": free}
-    hybrid.run(swinging(ends=ends), tmp_path / "until.h5").close()
-    for_good = {"start": pinned, "end": {"kind": "free", "force": [0.3, 0, 0]}}
-    hybrid.run(swinging(ends=for_good, time={"duration": 1.0, "step": 0.01}), tmp_path / "pulled.h5").close()
-    hybrid.resume(tmp_path / "pulled.h5", until=2.0, settings=["ends.end.force=null"]).close()
-    with hybrid.open(tmp_path / "until.h5") as one, hybrid.open(tmp_path / "pulled.h5") as other:
-        assert np.allclose(one.position, other.position, rtol=0, atol=1e-12)
-        assert json.loads(other.changes_text)[0]["t"] == 1.0
-        assert "loads change" in {e.kind for e in other.events}
-        assert np.ptp(one.position[:, -1, 0]) > 0.03, "nothing moves"
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("name", "form"),
-    [("slack_on_seabed", None), ("touchdown", None), ("laying", None), ("laying", network_of)],
-    ids=["slack_on_seabed", "touchdown", "laying", "laying, a network"],
-)
-def test_changes_are_made_at_their_time_however_often_it_is_stopped(name, form, tmp_path, monkeypatch):
-    """A current from 3 s on: computed anew, from a checkpoint at 3 s, and stopped on the way; one motion."""
-
-    def lasting(duration):
-        scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", [f"time.duration={duration}", "dimension=null"])
-        return scene if form is None else form(scene)
-
-    more = {"settings": ["environment.fluid.current=[0.4, 0.2, 0]"], "start": 3.0}
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
-    hybrid.run(lasting(6), tmp_path / "long.h5").close()
-    hybrid.resume(tmp_path / "long.h5", tmp_path / "anew.h5", **more).close()
-    hybrid.run(lasting(2), tmp_path / "begun.h5").close()
-    stopping = Stopping(monkeypatch)
-    stopping.left = 30
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.resume(tmp_path / "begun.h5", until=6.0, progress=stopping, **more)
-    hybrid.resume(tmp_path / "begun.h5").close()
-    with hybrid.open(tmp_path / "anew.h5") as one, hybrid.open(tmp_path / "begun.h5") as other:
-        at, there = (dict(x.lines).get("cable", x).position for x in (one, other))
-        assert (one.times == other.times).all() and (at == there).all()
-        with hybrid.open(tmp_path / "long.h5") as without:
-            moved = np.abs(at - dict(without.lines).get("cable", without).position).max(axis=(1, 2))
-        before = one.times <= 3.0
-        assert moved[before].max() == 0.0 and moved[-1] > 1e-4
 
 
 def test_an_end_that_is_moved_from_a_time_on(tmp_path, whole):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.said import both_ways, line_of, said
 
 WIDTH, LENGTH, END = 0.02, 4.0, 3.2
 HOSE = {
@@ -15,21 +16,11 @@ HOSE = {
     "torsional_stiffness": 0.004, "damping": {"mass": 0.5},
 }  # fmt: skip
 FAR = [0, 0, -LENGTH + 0.5 * WIDTH]
-COMMON = {"time": {"duration": END, "step": 0.01}, "output": {"every": 0.1}}
-
-
-def cable() -> tuple[hybrid.Simulation, Any]:
-    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": FAR}}
-    scene = {"cable": {"sections": [HOSE]}, "model": "rod", "mesh": {"cells": 80}, "initial": "equilibrium"}
-    lines = hybrid.Simulation(hybrid.validate_scene(scene | COMMON | {"ends": ends, "dimension": 3}))
-    return lines, lambda x: lines.set_end("end", x)
-
-
-def system() -> tuple[hybrid.Simulation, Any]:
-    line = {"start": "a", "end": "b", "model": "rod", "mesh": {"cells": 80}, "sections": [HOSE]}
-    points = {"a": {"position": [0, 0, 0]}, "b": {"position": FAR}}
-    lines = hybrid.Simulation(COMMON | {"points": points, "lines": {"hose": line}})
-    return lines, lambda x: lines.set_point("b", x)
+SCENE = {
+    "cable": {"sections": [HOSE]}, "model": "rod", "mesh": {"cells": 80}, "initial": "equilibrium", "dimension": 3,
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": FAR}},
+    "time": {"duration": END, "step": 0.01}, "output": {"every": 0.1},
+}  # fmt: skip
 
 
 def place(t: float) -> np.ndarray:
@@ -38,15 +29,13 @@ def place(t: float) -> np.ndarray:
     return np.array([0.6 * np.sin(np.pi * x) - 0.4 * max(t - 3.0, 0.0), 0.0, FAR[2] + 3.5 * x])
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("begin", [cable, system])
-def test_it_touches_itself_and_goes_back_before_that(begin: Any) -> None:
-    """What is taken back takes its contact along: the same state, bit for bit, at the same time again."""
-    stepped, to = begin()
-    with stepped as lines:
+def led_through(scene: dict[str, Any], back: bool) -> hybrid.Result:
+    """The end is led until the line touches itself; back: once it is taken back to 1 s from there."""
+    with hybrid.Simulation(scene) as lines:
+        to = (lambda x: lines.set_point("end", x)) if "points" in scene else (lambda x: lines.set_end("end", x))
         for t in np.arange(1, 33) * 0.1:
             to(place(t))
-            if t == pytest.approx(1.0):
+            if back and t == pytest.approx(1.0):
                 before = lines.save()
                 for later in (1.0, 1.5, 2.0, 2.5, 3.0, END):
                     to(place(later))
@@ -54,16 +43,15 @@ def test_it_touches_itself_and_goes_back_before_that(begin: Any) -> None:
                 lines.restore(before)
                 to(place(t))
             lines.advance(min(t, END))
-        found = lines.result()
-    again, to = begin()
-    with again as lines:
-        for t in np.arange(1, 33) * 0.1:
-            to(place(t))
-            lines.advance(min(t, END))
-        plain = lines.result()
-    for result in (found, plain):
-        line = result.lines["hose"] if result.lines else result
+        return line_of(lines.result())
+
+
+@pytest.mark.long
+@both_ways
+def test_it_touches_itself_and_goes_back_before_that(network: bool) -> None:
+    """What is taken back takes its contact along: the same state, bit for bit, at the same time again."""
+    found = [led_through(said(SCENE, network), back) for back in (True, False)]
+    for line in found:
         assert "line touches itself" in {event.kind for event in line.events}
         assert float(line["self_distance/distance"]) > 0.75 * WIDTH
-    one, other = ((x.lines["hose"] if x.lines else x).position for x in (found, plain))
-    assert np.array_equal(one, other)
+    assert np.array_equal(found[0].position, found[1].position)

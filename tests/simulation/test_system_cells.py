@@ -1,4 +1,4 @@
-"""Cells that follow the curvature in lines of several: as of one cable, beside others, at a winch, resumed, stepped."""
+"""Cells that follow the curvature in lines of several: in compiled steps, beside others, at a winch, resumed, stepped."""
 
 from __future__ import annotations
 
@@ -8,15 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from bits import FEW_STEPS, Stopping, differences
-from test_payout_cells import pinned
-from test_system_contact_zones import alone
-from test_system_contact_zones import system as touching_themselves
-from test_system_payout_zones import as_system
-from test_system_zones import ROPE, SEA, mooring, slackening, stepped_again
+from bits import Stopping, differences, went_on
+from test_system_zones import ROPE, SEA, mooring, stepped_again
 
 import hybrid
-import hybrid.simulation.network_run
 from hybrid.simulation.lines_cells import LineCells
 from hybrid.solve.network_steps import NetworkSteps
 from tests.said import line_of, said
@@ -48,66 +43,26 @@ def three(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
 
 
 @pytest.mark.long
-def test_a_system_of_one_line_has_the_cells_of_the_cable() -> None:
-    one, several = slackening()
-    one["model"] = several["lines"]["rope"]["model"] = FOLLOWS
-    cable, rope = hybrid.run(one), hybrid.run(several).lines["rope"]
-    assert cells(rope) == cells(cable) and len({*cells(cable)}) > 3
-    assert np.abs(rope.position - cable.position).max() < 1e-9
-    assert np.abs(rope.tension - cable.tension).max() < 1e-7 * cable.tension.max()
-    assert np.abs(rope.curvature - cable.curvature).max() < 1e-7 * cable.curvature.max()
-    assert np.isclose(rope["work/zones"][-1], cable["work/zones"][-1], rtol=1e-6)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(
     "model", [FOLLOWS | {"force_rod": [[0, 250]]}, FOLLOWS | {"hold_time": 2.0}], ids=["rod", "zones"]
 )
-def test_cells_change_without_python_as_those_of_a_cable(model: Tables, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cells_change_without_python_as_with_it(model: Tables, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a line that is joined to nothing that moves: steps go on through changes, and outputs of all cells wait."""
     tables = yaml.safe_load(TOUCHDOWN.read_text()) | {
         "model": model, "mesh": {"cells": 24}, "time": {"duration": 8.0, "step": 0.1}, "output": {"every": 0.1},
     }  # fmt: skip
-    calls, go, cable = [], NetworkSteps.go, hybrid.run(said(tables, network=False))
+    calls, go = [], NetworkSteps.go
     monkeypatch.setattr(NetworkSteps, "go", lambda steps: (calls.append(1), go(steps))[1])
     whole = hybrid.run(said(tables, network=True))
     line, compiled = line_of(whole), len(calls)
+    monkeypatch.setattr(LineCells, "may_change", lambda run, number, switching: False)
+    cable = line_of(hybrid.run(said(tables, network=True)))
+    assert compiled <= 0.7 * (len(calls) - compiled)
     assert cells(line) == cells(cable) and len({*cells(cable)}) > 3
     assert [(e.t, e.kind) for e in line.events] == [(e.t, e.kind) for e in cable.events]
     for name in ("position", "tension", "curvature", "work/zones", "energy/bending", "envelope/tension_max"):
         assert np.abs(line[name] - cable[name]).max() <= 1e-9 * np.abs(cable[name]).max(), name
     assert np.array_equal(whole["points/end/position"], line.position[:, -1])
-    monkeypatch.setattr(LineCells, "may_change", lambda run, number, switching: False)
-    hybrid.run(said(tables, network=True))
-    assert compiled <= 0.7 * (len(calls) - compiled)
-
-
-@pytest.mark.long
-def test_a_line_that_touches_itself_has_the_cells_of_the_cable() -> None:
-    """With friction, whose grips find their places on the cells that come: more are asked for as the legs touch."""
-    one, several = alone(), touching_themselves(0.0)
-    one["model"] = several["lines"]["line 0"]["model"] = FOLLOWS | {"curvature_error": 0.01}
-    one["mesh"] = {"cells": 16}
-    several["lines"]["line 0"] = several["lines"]["line 0"] | {"mesh": {"cells": 16}}
-    for scene in (one, several):
-        scene |= {"time": {"duration": 3.4, "step": 0.01}}
-    cable, line = hybrid.run(one), hybrid.run(several).lines["line 0"]
-    touches = cable["energy/self_contact"] > 0.0
-    assert touches.sum() > 5 and cells(line) == cells(cable) and len({*np.array(cells(cable))[touches]}) > 1
-    assert np.abs(line.position - cable.position).max() < 1e-8
-    for name in ("energy/self_contact", "work/friction", "work/zones", "tension"):
-        assert np.abs(line[name] - cable[name]).max() <= 1e-5 * np.abs(cable[name]).max() > 0.0, name
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("rate", [0.8, -0.8])
-def test_a_line_that_is_paid_out_has_the_cells_of_the_cable(rate: float) -> None:
-    scene = pinned(rate, dimension=3)
-    cable, line = hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"]
-    assert cells(line) == cells(cable) and len({*cells(cable)}) > 3
-    for name in ("position", "tension", "reaction_end", "work/end", "work/zones"):  # to Newton's tolerance
-        off = 1e-6 if name == "position" else 5e-5
-        assert np.abs(line[name] - cable[name]).max() < off * np.abs(cable[name]).max(), name
 
 
 @pytest.mark.long  # 1.5 s
@@ -129,14 +84,8 @@ def test_against_rods(three: hybrid.Result) -> None:
 def test_a_stopped_run_goes_on_bit_for_bit(
     three: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
-    stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
-    stopping.left = 70
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(followed(), path, progress=stopping)
-    hybrid.resume(path).close()
-    assert three.file is not None and differences(three.file, path) == []
+    assert went_on(followed(), tmp_path / "run.h5", Stopping(monkeypatch), [70]) == 1
+    assert three.file is not None and differences(three.file, tmp_path / "run.h5") == []
 
 
 @pytest.mark.long

@@ -67,18 +67,6 @@ def test_a_line_touches_itself_as_one_cable_does(whole: Path) -> None:
         assert np.linalg.norm(hose["position"] - alone["position"][:, :81], axis=2).max() < 1e-5
 
 
-@pytest.mark.slow
-def test_it_resumes_bit_for_bit(whole: Path, tmp_path: Path) -> None:
-    with hybrid.open(whole) as result:
-        touching = result.times[np.flatnonzero(result.lines["hose"]["energy/self_contact"])]
-    scene = system()
-    scene["time"] = TIME | {"duration": float(touching[0])}
-    hybrid.run(scene, tmp_path / "part.h5", progress=False).close()
-    with hybrid.open(whole) as one, hybrid.resume(tmp_path / "part.h5", until=1.7) as more:
-        for name in ("position", "tension", "self_contact", "energy/self_contact", "work/friction"):
-            assert np.array_equal(one.lines["hose"][name], more.lines["hose"][name])
-
-
 @pytest.mark.parametrize(
     ("more", "says"),
     [
@@ -158,3 +146,55 @@ def test_contact_elsewhere_leaves_alone_what_is_clamped_to_a_body() -> None:
     for name in ("arm", "hang"):
         assert np.abs(touching[name].position - apart[name].position).max() < 1e-10
         np.testing.assert_allclose(touching[name].tension, apart[name].tension, atol=1e-5)
+
+
+# --- in other units ---
+
+UNITS = (1.0, 1000.0, 0.001)  # lengths of a metre: m, mm, km; the density of the line is the same in all
+WIDE = 0.02
+
+
+def in_units(u: float, model: str) -> dict[str, Any]:
+    """A U whose ends come together, on a tail whose far end heaves so that it goes slack."""
+    hose = {
+        "length": 4 * u, "mass": 0.4 * u**2, "diameter": WIDE * u, "axial_stiffness": 1e5 * u**4,
+        "bending_stiffness": 0.005 * u**6, "torsional_stiffness": 0.004 * u**6, "damping": {"mass": 0.2},
+    }  # fmt: skip
+    closer = {"travel": {"by": [1.22 * u, 0.95 * WIDE * u, 0.0], "over": 1.2}}
+    heave = {"heave": {"amplitude": 0.4 * u, "period": 1.0}, "ramp": 1.0}
+    return {
+        "environment": {"gravity": 9.81 * u},
+        "points": {
+            "low": {"position": [0, 0, 0], "motion": closer},
+            "high": {"position": [1.2 * u, 0, 0.45 * u], "motion": heave},
+            "free": {"kind": "free", "initial_guess": [1.1 * u, 0, 0]},
+        },
+        "lines": {
+            "hose": {"start": "low", "end": "free", "model": "rod", "mesh": {"cells": 64}, "sections": [hose],
+                     "contact": {"friction": 0.3}},
+            "tail": {"start": "free", "end": "high", "model": model, "mesh": {"cells": 16},
+                     "sections": [hose | {"length": u}]},
+        },
+        "time": {"duration": 2.5, "step": 2.0**-7}, "output": {"every": 0.125, "points": 65},
+    }  # fmt: skip
+
+
+@pytest.mark.long
+def test_the_same_motion_in_every_unit() -> None:
+    """Round-off grows to 1e-12 m by the end."""
+    first, *others = (hybrid.run(in_units(u, "rod"), progress=False) for u in UNITS)
+    assert any(event.kind == "line touches itself" for event in first.events)
+    kinds = [(event.t, event.kind) for event in first.events if event.kind != "implausible"]  # numbers of other units
+    for u, other in zip(UNITS[1:], others, strict=True):
+        for name, line in first.lines.items():
+            assert np.abs(other.lines[name].position / u - line.position).max() < 1e-9
+        assert [(event.t, event.kind) for event in other.events if event.kind != "implausible"] == kinds
+
+
+def test_a_tail_that_goes_slack_stops_at_the_same_time_in_every_unit() -> None:
+    stops = []
+    for u in UNITS:
+        with pytest.raises(hybrid.ComputationError, match="compression") as stopped:
+            hybrid.run(in_units(u, "catenary"), progress=False)
+        stops.append((stopped.value.t, stopped.value.s / u))
+    assert stops == [pytest.approx(stops[0], rel=1e-6)] * len(UNITS)

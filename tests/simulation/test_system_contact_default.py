@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from bits import differences
-from test_lines_contact_start import write_as_before
 from test_system_contact import RUBS, TIME, WIDTH, system
 from test_system_contact_zones import system as adaptive
 
@@ -88,18 +87,6 @@ def test_what_is_taken_back_takes_its_contact_with_it() -> None:
     assert np.array_equal(*found)
 
 
-@pytest.mark.long
-def test_a_file_of_before_goes_on_as_it_began(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = system(contact={}) | {"time": TIME | {"duration": 0.2}}
-    with monkeypatch.context() as before:
-        before.setattr(hybrid.model.build, "contact_bits", lambda scene: 0)
-        write_as_before(before)
-        hybrid.run(scene, tmp_path / "run.h5", progress=False).close()
-    with hybrid.resume(tmp_path / "run.h5", until=1.7) as result:
-        assert "self_contact" not in line(result)
-        assert any(event.kind == "line meets itself" for event in line(result).events)
-
-
 @pytest.mark.parametrize(
     ("more", "on", "why"),
     [
@@ -121,17 +108,6 @@ def test_the_plan_says_which_lines_have_it(more: dict[str, Any], on: bool, why: 
     plan = hybrid.plan(scene | {"lines": scene["lines"] | {"other": line}}).lines["other"]
     (entry,) = (x for x in plan.contents if x.what == "contact of the line with itself")
     assert entry.on is on and why in entry.why
-
-
-def test_a_start_within_itself_is_told_once_and_goes_on_without() -> None:
-    """The ends of a hanging line are half a diameter apart, as its legs are."""
-    scene = system(contact={}, end="high")
-    scene["points"] = {"low": {"position": [0, 0, 0]}, "high": {"position": [0.5 * WIDTH, 0, 0]}}
-    del scene["lines"]["tail"]
-    scene["time"] = {"duration": 0.05, "step": 0.01}
-    result = hybrid.run(scene, progress=False)
-    (told,) = (x for x in line(result).events if x.kind == "line meets itself")
-    assert told.t == 0.0 and "parts are in each other" in told.text
 
 
 @pytest.mark.slow

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import FEW_STEPS, Stopping, differences
+from bits import Stopping, differences, went_on
 
 import hybrid
-import hybrid.simulation.network_run
 
 WIDTH = 0.02
 HOSE = {
@@ -34,15 +33,6 @@ def system(*shifts: float) -> dict[str, Any]:
     return {"points": points, "lines": lines, "time": TIME, "output": OUTPUT}
 
 
-def alone() -> dict[str, Any]:
-    """The first of these lines as one cable."""
-    cable = {"cable": {key: LINE[key] for key in ("sections", "attachments")}}
-    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [2, 0, 0], "motion": CLOSER}}  # fmt: skip
-    more = {"initial": "equilibrium", "dimension": 3, "time": TIME, "output": OUTPUT | {"exact": True}, "ends": ends}
-    return cable | {key: LINE[key] for key in ("model", "mesh", "contact")} | more
-
-
 def changes(result: hybrid.Result) -> list[tuple[float, float, float, str]]:
     return [(round(e.t, 9), e.s_a, e.s_b, e.kind) for e in result.events if e.kind in hybrid.errors.ZONE_EVENTS]
 
@@ -55,8 +45,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
 
 
 @pytest.mark.long  # 0.9 s
-def test_lines_have_the_zones_and_the_contact_of_the_cable(whole: hybrid.Result) -> None:
-    cable = hybrid.run(alone(), progress=False)
+def test_lines_have_the_zones_and_the_contact_of_one_alone(whole: hybrid.Result) -> None:
+    cable = hybrid.run(system(0.0), progress=False).lines["line 0"]
     touches = cable["energy/self_contact"] > 0.0
     first = float(cable.times[touches.argmax()])
     assert touches.sum() > 5 and any(t > first for t, *_ in changes(cable))
@@ -70,17 +60,11 @@ def test_lines_have_the_zones_and_the_contact_of_the_cable(whole: hybrid.Result)
             assert np.abs(here - there).max() <= 1e-6 * np.abs(there).max() > 0.0, name
 
 
-@pytest.mark.parametrize("alone_or_not", [alone, lambda: system(0.0)], ids=["cable", "system"])
-def test_ends_that_are_led_through_each_other_are_told(alone_or_not: Any) -> None:
+def test_ends_that_are_led_through_each_other_are_told() -> None:
     """No contact is computed beside ends that are held: what passes through the line there is said at the end."""
-    through = {"travel": {"by": [-2.4, 0.3 * WIDTH, 0], "over": 3.0}}
-    scene = alone_or_not() | {"time": {"duration": 2.4, "step": 0.02}, "output": {"every": 0.2, "points": 41}}
-    if "ends" in scene:
-        scene["ends"]["end"]["motion"] = through
-    else:
-        scene["points"]["b0"]["motion"] = through
-    result = hybrid.run(scene, progress=False)
-    line = result if "ends" in scene else result.lines["line 0"]
+    scene = system(0.0) | {"time": {"duration": 2.4, "step": 0.02}, "output": {"every": 0.2, "points": 41}}
+    scene["points"]["b0"]["motion"] = {"travel": {"by": [-2.4, 0.3 * WIDTH, 0], "over": 3.0}}
+    line = hybrid.run(scene, progress=False).lines["line 0"]
     (told,) = (event for event in line.events if event.kind == "line meets itself")
     assert "ends that are held" in told.text and told.value == float(line["self_distance/distance"]) < 0.85 * WIDTH
     assert told.s_a < 0.3 and told.s_b > 7.7 and told.t == float(line["self_distance/time"])
@@ -90,14 +74,6 @@ def test_ends_that_are_led_through_each_other_are_told(alone_or_not: Any) -> Non
 def test_a_stopped_run_goes_on_bit_for_bit(
     whole: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
-    stopping, path, scene = Stopping(monkeypatch), tmp_path / "run.h5", system(0.0, 5.0)
-    for k, stop in enumerate([290, 70, -1]):  # in contact
-        stopping.left = stop
-        try:
-            (hybrid.resume(path, progress=stopping) if k else hybrid.run(scene, path, progress=stopping)).close()
-        except KeyboardInterrupt:
-            continue
-        break
-    assert k == 2 and whole.file is not None and differences(whole.file, path) == []
+    """Stopped in contact."""
+    assert went_on(system(0.0, 5.0), tmp_path / "run.h5", Stopping(monkeypatch), [290, 70]) == 2
+    assert whole.file is not None and differences(whole.file, tmp_path / "run.h5") == []

@@ -1,4 +1,4 @@
-"""Lines of several that are paid out or taken in: as one cable, to free points and from bodies, resumed, from outside."""
+"""Lines of several that are paid out or taken in: to free points and from bodies, resumed, from outside."""
 
 from __future__ import annotations
 
@@ -10,130 +10,23 @@ from typing import Any
 import numpy as np
 import pytest
 from test_payout import clamped, sagging
+from test_payout_zones import touching
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
+from tests.combinations.pairs import as_network, scene_of
 
 G = 9.81
-ROPE = {"dynamic_stiffness": {"constant": 4e6, "per_tension": 10.0, "relaxation_time": 4.0}}
-TABLE = {"moment_curvature": [[0, 0], [0.004, 80.0], [0.012, 120.0], [0.05, 1500.0]], "bending_stiffness": None}
 WINCH = {"winch": {"tension": 2200.0, "inertia": 200.0, "damping": 100.0, "ramp": 4.0}, "longest": 130.0}
 
 
-def cable(section: dict[str, Any] | None = None, clamp: bool = False, **more: Any) -> dict[str, Any]:
+def cable(clamp: bool = False, **more: Any) -> dict[str, Any]:
     """100 m over 80 m, in space, in a current across it, from a winch that surges."""
     scene = sagging(duration=6.0, **more)
     scene = clamped(scene) if clamp else scene
-    own = scene["cable"]["sections"][0]
-    own |= {"drag": {"normal": 1.2}} | (section or {})
-    scene["cable"]["sections"] = [{key: x for key, x in own.items() if x is not None}]
+    scene["cable"]["sections"][0]["drag"] = {"normal": 1.2}
     scene["environment"] = {"fluid": {"density": 1025, "current": [0.2, 0.5, 0]}}
     return scene | {"contact": {"self": False}, "dimension": 3}
-
-
-def as_system(scene: dict[str, Any]) -> dict[str, Any]:
-    """The cable as the line `one` from point a to point b."""
-    found = deepcopy(scene)
-    ends, line = found.pop("ends"), found.pop("cable")
-    line |= {key: found.pop(key) for key in ("model", "mesh", "contact")} | {
-        "start": "a",
-        "end": "b",
-        "connections": {},
-    }
-    found.pop("dimension"), found.pop("initial")
-    points = {}
-    for name, (key, end) in zip("ab", ends.items(), strict=True):
-        kind = end.pop("kind")
-        held = {x: end.pop(x) for x in ("tangent", "payout") if x in end}
-        if held:
-            line["connections"][key] = {"kind": kind} | held
-        points[name] = {"kind": "free" if kind == "body" else "fixed"} | end
-    return found | {"points": points, "lines": {"one": line}}
-
-
-def assert_same(one: hybrid.Result, other: hybrid.Result, most: float) -> None:
-    """Two results of a line."""
-    assert np.abs(np.diff(one["payout/length"])).sum() > 1.0
-    for name in ("position", "tension", "reaction_end", "payout/length", "payout/power", "work/end", "work/zones"):
-        assert np.abs(other[name] - one[name]).max() <= most * np.abs(one[name]).max(), name
-    for name in ("envelope/tension_max", "envelope/displacement_max"):
-        np.testing.assert_allclose(other[name], one[name], rtol=most)
-
-
-# --- as one cable -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        cable(),
-        cable(model="rod", EA=2e6, EI=2e4, clamp=True),
-        cable(model="rod", EI=2e4, rate=-0.8),
-        cable(TABLE | ROPE, clamp=True, model="rod", EA=2e6, EI=2e4),
-        cable({"damping": {"stiffness": 0.05}}, clamp=True, model="rod", EA=2e6, EI=2e4),
-    ],
-    ids=["catenary", "clamp", "rod, taken in", "tables", "damped"],
-)
-def test_a_system_of_one_line_is_the_cable(scene: dict[str, Any]) -> None:
-    assert_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-9)
-
-
-def test_so_it_is_with_a_winch_that_holds_a_tension() -> None:
-    scene = cable(EA=2e6)
-    scene["ends"]["end"]["payout"] = WINCH
-    assert_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-9)
-
-
-def lowered(clamp: bool = False, **more: Any) -> dict[str, Any]:
-    """A body of 300 kg hangs from the winch."""
-    scene = cable(clamp=clamp, **more)
-    scene["ends"]["start"] = {"kind": "body", "mass": 300.0, "volume": 0.15, "initial_guess": [75, 0, -100]}
-    if clamp:
-        scene["ends"]["end"]["tangent"] = [0.3, 0, 1]
-    return scene
-
-
-@pytest.mark.parametrize(
-    "more",
-    [{"EA": 2e6}, {"model": "rod", "EA": 2e6, "EI": 2e4, "clamp": True, "rate": -0.8}],
-    ids=["catenary", "clamp"],
-)
-def test_a_free_point_is_lowered_as_the_body_of_a_cable(more: dict[str, Any]) -> None:
-    """To Newton's tolerance: its unknown is one of the junctions, and not the last node of the line."""
-    scene = lowered(**more)
-    assert_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-6)
-
-
-def test_what_breaks_off_the_far_end_does_as_an_end_that_is_let_go() -> None:
-    scene = cable(model="rod", EA=2e6, EI=2e4)
-    other = as_system(scene)
-    scene["ends"]["start"]["release_at"] = {"time": 3.0}
-    other["lines"]["one"]["break_at"] = {"end": "start", "time": 3.0}
-    one, two = hybrid.run(scene), hybrid.run(other).lines["one"]
-    assert np.abs(one.position[-1, 0]).max() > 1.0
-    assert np.abs(one.position - two.position).max() < 1e-6
-
-
-@pytest.mark.long
-def test_loads_change_as_of_one_cable(tmp_path: Path) -> None:
-    """In mid-run, of a line that is longer then than at t = 0."""
-    scene, found = cable(EA=2e6), []
-    scene["ends"]["end"]["payout"]["longest"] = 120.0
-    for k, each in enumerate((scene, as_system(scene))):
-        path = tmp_path / f"{k}.h5"
-        hybrid.run(each, output=path)
-        changed = hybrid.resume(path, until=9.0, settings=["environment.fluid.current=[0, -0.6, 0]"])
-        found.append(changed.lines["one"] if changed.lines else changed)
-    assert_same(*found, 1e-9)
-
-
-def test_it_touches_itself_as_one_cable() -> None:
-    """Contact goes on over nodes that enter."""
-    scene = cable(model="rod", EA=2e5, EI=20.0) | {"contact": {"self": True}}
-    assert_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-7)
-
-
-# --- several ----------------------------------------------------------------------------------------
 
 
 def crane(law: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
@@ -161,9 +54,6 @@ def crane(law: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
         },
         "time": {"duration": 6.0, "step": 0.02}, "output": {"every": 0.25}, **more,
     }  # fmt: skip
-
-
-NAMES = ("position", "tension", "reaction_end", "work/end", "work/zones", "work/scheme", "envelope/tension_max")
 
 
 @cache
@@ -208,16 +98,6 @@ def test_turned_it_is_the_same() -> None:
         np.testing.assert_allclose(other.lines[name].position[:, end], there, atol=1e-9)
         size = np.abs(one.lines[name]["reaction_end"]).max()
         assert np.abs(other.lines[name]["reaction_end"] - one.lines[name]["reaction_end"] @ M.T).max() < 1e-5 * size
-
-
-@pytest.mark.long
-def test_resumed_bit_for_bit(tmp_path: Path) -> None:
-    whole, scene = raised()
-    hybrid.run(scene | {"time": {"duration": 3.0, "step": 0.02}}, output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=6.0)
-    for line, found in whole.lines.items():
-        for name in NAMES:
-            assert np.array_equal(found[name], resumed.lines[line][name], equal_nan=True), (line, name)
 
 
 def test_from_outside_it_is_the_same_and_goes_back() -> None:
@@ -289,46 +169,97 @@ def test_a_winch_on_a_free_body_weighs_what_hangs_there_less_its_inertia(sign: f
 # --- with errors, and what is refused ---------------------------------------------------------------
 
 
-def test_an_accuracy_is_met_and_errors_are_those_of_the_cable() -> None:
-    scene = cable(EA=2e6) | {"accuracy": "1%"}
-    del scene["mesh"], scene["time"]["step"]
-    other = as_system(scene | {"mesh": None})
-    del other["lines"]["one"]["mesh"]
-    one, two = hybrid.run(scene), hybrid.run(other).lines["one"]
-    mine, its = (x["errors/total/position"][1:].max() for x in (one, two))
-    assert 0.3 * mine < its < 3.0 * mine
-    assert np.abs(one.position - two.position).max() < 3.0 * (mine + its)
-
-
 def test_errors_of_fixed_steps_are_estimated() -> None:
     """Within 0.5 to 4 of the true one; and of a line that has too few cells for a coarser run an event says so."""
-    scene = as_system(cable(EA=2e6)) | {"time": {"duration": 6.0, "step": 0.1}}
-    found = hybrid.run(scene | {"output": {"every": 0.5, "errors": True}}).lines["one"]
-    scene["lines"]["one"]["mesh"], scene["time"]["step"] = {"cells": 160}, 0.025
-    true = np.linalg.norm(hybrid.run(scene).lines["one"].position - found.position, axis=2).max()
+    scene = as_network(cable(EA=2e6)) | {"time": {"duration": 6.0, "step": 0.1}}
+    found = hybrid.run(scene | {"output": {"every": 0.5, "errors": True}}).lines["cable"]
+    scene["lines"]["cable"]["mesh"], scene["time"]["step"] = {"cells": 160}, 0.025
+    true = np.linalg.norm(hybrid.run(scene).lines["cable"].position - found.position, axis=2).max()
     assert 0.5 * true < found["errors/total/position"].max() < 4.0 * true
-    few = as_system(cable(model="rod", EA=2e6, EI=2e4, clamp=True)) | {"output": {"every": 0.5, "errors": True}}
-    few["lines"]["one"]["mesh"] = {"cells": 16}
+    few = as_network(cable(model="rod", EA=2e6, EI=2e4, clamp=True)) | {"output": {"every": 0.5, "errors": True}}
+    few["lines"]["cable"]["mesh"] = {"cells": 16}
     told = [x.text for x in hybrid.run(few).events if x.kind == "no error figure"]
-    assert told and "line one has too few cells" in told[0]
+    assert told and "line cable has too few cells" in told[0]
 
 
 def test_a_winch_without_more_line_says_so() -> None:
-    scene = as_system(cable(EA=2e6))
+    scene = as_network(cable(EA=2e6))
     payout = WINCH | {"winch": WINCH["winch"] | {"tension": 1500.0}, "longest": 101.0}
-    scene["lines"]["one"]["connections"]["end"]["payout"] = payout
+    scene["lines"]["cable"]["connections"]["end"]["payout"] = payout
     with pytest.raises(ComputationError) as stopped:
         hybrid.run(scene | {"time": {"duration": 20.0, "step": 0.05}})
-    assert stopped.value.outcome == Outcome.WINCH_AT_END and "line one" in str(stopped.value)
+    assert stopped.value.outcome == Outcome.WINCH_AT_END and "line cable" in str(stopped.value)
 
 
 def test_what_is_wrong_is_said_of_the_line() -> None:
-    at = "lines.one.connections.end.payout"
-    held = as_system(cable())
-    held["lines"]["one"]["connections"]["end"]["payout"]["longest"] = 90.0
-    free = as_system(lowered())
-    free["lines"]["one"]["connections"] = {"start": {"payout": {"rate": 1.0, "ramp": 1.0}}}
-    for scene, where in ((held, f"{at}.longest"), (free, "lines.one.connections.start.payout")):
+    at = "lines.cable.connections.end.payout"
+    held, free = as_network(cable()), as_network(scene_of("body"))
+    held["lines"]["cable"]["connections"]["end"]["payout"]["longest"] = 90.0
+    free["lines"]["cable"]["connections"] = {"end": {"payout": {"rate": 1.0, "ramp": 1.0}}}
+    for scene, where in ((held, f"{at}.longest"), (free, at)):
         with pytest.raises(SceneError) as refused:
             hybrid.plan(scene)
         assert where in str(refused.value)
+
+
+# --- zones that move ---
+
+Tables = dict[str, Any]
+
+
+def to_a_buoy(rate: float = 0.8) -> Tables:
+    """The line from a winch that heaves to a buoy, which another line with zones that move holds."""
+    scene = as_network(touching(rate))
+    line = scene["lines"]["cable"]
+    section = line["sections"][0]
+    scene["environment"]["fluid"] = {"density": 1025, "current": [0.1, 0.2, 0]}
+    scene["points"]["start"] = {"kind": "free", "initial_guess": [0, 0, -3], "mass": 50, "volume": 0.6}
+    scene["points"]["ground"] = {"position": [-60, 0, -18]}
+    scene["lines"]["stay"] = {
+        "start": "ground", "end": "start", "sections": [section | {"length": 64.0}], "model": line["model"],
+        "mesh": {"cells": 26},
+    }  # fmt: skip
+    return scene
+
+
+def test_beside_a_buoy_they_move_as_rods() -> None:
+    scene = to_a_buoy()
+    rods = deepcopy(scene)
+    for line in rods["lines"].values():
+        line["model"] = "rod"
+    found, like = hybrid.run(scene), hybrid.run(rods)
+    assert all(any(z.kind == "catenary" for z in x.zones[-1]) for x in found.lines.values())
+    assert found.lines["cable"]["payout/length"][-1] > 104.0
+    for name, line in like.lines.items():
+        assert np.abs(found.lines[name].position - line.position).max() < 2e-3 * 100.0
+        pulls = [np.linalg.norm(x["reaction_end"], axis=1) for x in (found.lines[name], line)]
+        assert np.abs(pulls[0] - pulls[1]).max() < 0.02 * pulls[1].mean()
+
+
+def test_a_step_is_taken_back() -> None:
+    """`save` and `restore` over cells that enter and zones that change."""
+    with hybrid.Simulation(to_a_buoy()) as sim:
+        sim.advance(4.0)
+        saved = sim.save()
+        places = []
+        for _ in range(2):
+            sim.advance(6.0)
+            places.append(sim.forces("cable")[1])
+            sim.restore(saved)
+    assert np.array_equal(*places)
+
+
+@pytest.mark.long
+def test_loads_that_change_on_the_way(tmp_path: Path) -> None:
+    """Another current from the middle on, as with rods."""
+    pulls = []
+    for k, model in enumerate(("adaptive", "rod")):
+        scene = to_a_buoy()
+        if model == "rod":
+            for line in scene["lines"].values():
+                line["model"] = "rod"
+        path = tmp_path / f"{k}.h5"
+        hybrid.run(scene | {"time": {"duration": 4.0, "step": 0.05}}, output=path)
+        found = hybrid.resume(path, until=8.0, settings=["environment.fluid.current=[0.1, 0.6, 0]"])
+        pulls.append(np.linalg.norm(found.lines["cable"]["reaction_end"], axis=1))
+    assert np.abs(pulls[0] - pulls[1]).max() < 0.02 * pulls[1].mean()

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import FEW_STEPS, Stopping, differences
+from bits import Stopping, differences, went_on
 from scipy.optimize import brentq
 
 import hybrid
-import hybrid.simulation.network_run
 from hybrid.errors import SceneError
 from tests.problems import tables_with
 
@@ -62,40 +61,15 @@ def test_a_straight_line_that_nothing_holds_begins_where_its_first_point_is(more
     np.testing.assert_allclose(fallen, np.tile([0, 0, -0.5 * GRAVITY * 0.2**2], (len(fallen), 1)), rtol=1e-6, atol=1e-9)
 
 
-def test_an_inextensible_rope_let_go_level_falls_and_swings_as_one_cable() -> None:
-    """The end is a free point with a mass: the same motion as of one cable with a body."""
-    section = {"length": LENGTH, "mass": 0.5, "diameter": 0.02}
-    rest = {"environment": {"gravity": GRAVITY}, "time": {"duration": 0.5, "step": 0.005}}
-    level = {"kind": "straight", "direction": [1, 0.2, 0]}
-    tip = (LENGTH * np.array([1, 0.2, 0]) / np.hypot(1, 0.2)).tolist()
-    cable = hybrid.run(rest | {
-        "cable": {"sections": [section]}, "initial": level, "model": "catenary", "mesh": {"cells": 8},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "body", "mass": 3.0}},
-    })  # fmt: skip
-    lines = hybrid.run(rest | {
-        "points": {"a": {"position": [0, 0, 0]}, "b": {"initial_guess": tip, "mass": 3.0}},
-        "lines": {"one": {"start": "a", "end": "b", "sections": [section], "initial": level, "model": "catenary",
-                          "mesh": {"cells": 8}}},
-    })  # fmt: skip
-    assert cable.position[-1, -1, 2] < -0.2 * LENGTH
-    assert np.abs(lines.lines["one"].position - cable.position).max() < 1e-9 * LENGTH
-
-
 @pytest.mark.long
 def test_a_run_from_such_a_start_goes_on_bit_for_bit_and_steps_from_outside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     stopping = Stopping(monkeypatch)
-    scene = between_springs(**{"lines.upper.model": "adaptive", "output.exact": True, "time.duration": 0.2})
+    scene: Any = between_springs(**{"lines.upper.model": "adaptive", "output.exact": True, "time.duration": 0.2})
     whole, part = tmp_path / "whole.h5", tmp_path / "part.h5"
     hybrid.run(scene, whole, progress=stopping)
-    stopping.left = stopping.heard // 2
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene, part, progress=stopping)
-    stopping.left = -1
-    hybrid.resume(part, progress=stopping)
+    assert went_on(scene, part, stopping, [stopping.heard // 2]) == 1
     assert differences(whole, part) == []
     with hybrid.Simulation(scene) as stepped:
         for t in np.arange(1, 11) * 0.02:

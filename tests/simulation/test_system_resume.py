@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import FEW_STEPS, Stopping, differences, went_on
+from bits import Stopping, differences, went_on
 
 import hybrid
 import hybrid.simulation.network_run
@@ -111,8 +111,6 @@ SCENES = {"mooring": mooring(), "spar": spar(), "clamped": clamped()}
 @pytest.fixture
 def stopping(monkeypatch: pytest.MonkeyPatch) -> Stopping:
     """Hears of every step, with a checkpoint every few and where the run is stopped."""
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     return Stopping(monkeypatch)
 
 

@@ -146,18 +146,6 @@ def test_what_was_set_before_a_save_is_set_after_restore() -> None:
         assert places[0][-1] == pytest.approx(heave(STEP)[0], abs=1e-12)
 
 
-def test_a_point_that_is_set_first_after_a_save_stands_again_after_restore() -> None:
-    with hybrid.Simulation(scene()) as lines:
-        saved = lines.save()
-        for _ in range(3):
-            step(lines, 5.0)
-        lines.restore(saved)
-        assert lines.point("vessel").position.tolist() == VESSEL.tolist()
-        lines.advance(STEP)
-        lines.advance(2 * STEP)
-        assert lines.point("vessel").position.tolist() == VESSEL.tolist()
-
-
 def test_what_cannot_be_restored_is_refused() -> None:
     with hybrid.Simulation(scene()) as lines, hybrid.Simulation(scene()) as other:
         first, foreign = lines.save(), other.save()

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import FEW_STEPS, Stopping, differences
+from bits import Stopping, differences, went_on
 
 import hybrid
-import hybrid.simulation.network_run
 from hybrid.errors import SceneError
 from hybrid.simulation.run_kinds import RunKinds
+from tests.combinations.pairs import as_network
+from tests.said import ONE, both_ways, line_of, said
 
 ROPE = {
     "length": 60, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100,
@@ -25,21 +25,15 @@ MODEL = {"kind": "adaptive", "hold_time": 0.5, "tolerance": 1e-3}
 LINE = {"sections": [ROPE], "mesh": {"cells": 30}, "model": MODEL}
 
 
-def slackening(**time: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A rope whose end moves towards its start, as one cable and as a system."""
-    end = {"position": [50, 0, 10], "motion": {"travel": {"by": [-14, 0, 0], "over": 3.0}}}
-    common = {"environment": SEA, "time": {"duration": 3.2, "step": 0.02} | time}
-    output = {"every": 0.1, "points": 31, "criteria": True}
-    cable = {
-        "cable": {"sections": [ROPE]}, "mesh": {"cells": 30}, "model": MODEL, "initial": "equilibrium",
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned"} | end},
-        "output": output | {"exact": True}, "contact": {"self": False},
-    }  # fmt: skip
-    system = {
-        "points": {"a": {"position": [0, 0, 0]}, "b": end}, "lines": {"rope": {"start": "a", "end": "b"} | LINE},
-        "output": output,
-    }  # fmt: skip
-    return common | cable, common | system
+def slackening(duration: float, section: dict[str, Any] = ROPE, **more: Any) -> dict[str, Any]:
+    """A rope whose end moves towards its start."""
+    end = {"kind": "pinned", "position": [50, 0, 10], "motion": {"travel": {"by": [-14, 0, 0], "over": 3.0}}}
+    return {
+        "environment": SEA, "time": {"duration": duration, "step": 0.02}, "cable": {"sections": [section]},
+        "mesh": {"cells": 30}, "model": MODEL, "initial": "equilibrium", "contact": {"self": False}, "dimension": 3,
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
+        "output": {"every": 0.1, "points": 31, "criteria": True, "exact": True},
+    } | more  # fmt: skip
 
 
 def mooring(**more: Any) -> dict[str, Any]:
@@ -68,34 +62,6 @@ def changes(result: hybrid.Result) -> list[tuple[float, float, float, str]]:
     return [(round(e.t, 9), e.s_a, e.s_b, e.kind) for e in result.events if e.kind in hybrid.errors.ZONE_EVENTS]
 
 
-@pytest.mark.parametrize(
-    ("model", "held"),
-    [({}, {}), ({"force_catenary": [[10, 20]], "force_rod": [[30, 40]]}, {}), ({}, {"tangent": [1, 0, 0]})],
-    ids=["pinned", "forced", "clamped"],
-)
-def test_a_system_of_one_line_has_the_zones_of_the_cable_at_the_same_times(
-    model: dict[str, Any], held: dict[str, Any]
-) -> None:
-    one, several = (deepcopy(x) for x in slackening(duration=2.4 if model or held else 3.2))
-    one["model"] = several["lines"]["rope"]["model"] = MODEL | model
-    if held:
-        one["ends"]["start"] |= {"kind": "clamped"} | held
-        several["lines"]["rope"]["connections"] = {"start": held}
-    cable, system = (hybrid.run(x) for x in (one, several))
-    rope = system.lines["rope"]
-    assert changes(rope) == changes(cable) and len(changes(cable)) > 5
-    assert [*rope.zones] == [*cable.zones]
-    criteria = {name for name in cable.names if name.startswith("criteria/")}
-    assert criteria == {name for name in rope.names if name.startswith("criteria/")} and len(criteria) > 3
-    for name in criteria:
-        assert np.allclose(rope[name], cable[name], rtol=1e-6, atol=1e-9), name
-    assert max(rope[name].max() for name in criteria) > 1.0
-    assert np.abs(rope.position - cable.position).max() < 1e-9
-    assert np.abs(rope.tension - cable.tension).max() < 1e-6 * cable.tension.max()
-    assert np.isclose(rope["work/zones"][-1], cable["work/zones"][-1], rtol=1e-6)
-    assert np.allclose(rope.envelope["tension_max"], cable.envelope["tension_max"], rtol=1e-6)
-
-
 # A static stiffness by a table, and more than that for what is fast.
 FIBRES = ROPE | {
     "tension_strain": [[0, 0], [0.05, 5e4], [0.1, 2e5]],
@@ -104,46 +70,16 @@ FIBRES = ROPE | {
 FIBRES.pop("axial_stiffness")
 
 
-def of_fibres(**more: Any) -> tuple[hybrid.Result, dict[str, Any]]:
-    """The slackening rope of fibres, as one cable, and its scene as a system; more: of the line there."""
-    one, several = slackening(duration=1.6)
-    one["cable"]["sections"] = several["lines"]["rope"]["sections"] = [FIBRES]
-    several["lines"]["rope"] |= more
-    one["model"] = several["lines"]["rope"]["model"]
-    return hybrid.run(one), several
-
-
-@pytest.mark.long
-def test_fibre_ropes_keep_their_mean_tensions_when_zones_change(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As one cable does, and resumed to the bit."""
-    cable, scene = of_fibres()
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
-    stopping, whole, path = Stopping(monkeypatch), tmp_path / "whole.h5", tmp_path / "run.h5"
-    hybrid.run(scene, whole, progress=stopping).close()
-    stopping.left = stopping.heard // 2
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene, path, progress=stopping)
-    hybrid.resume(path).close()
-    assert differences(whole, path) == []
-    with hybrid.open(whole) as result:
-        rope = result.lines["rope"]
-        assert changes(rope) == changes(cable) and changes(cable)
-        assert np.abs(rope.position - cable.position).max() < 1e-9 * 60
-        assert np.abs(rope.tension - cable.tension).max() < 1e-8 * cable.tension.max()
-
-
 def test_fibre_ropes_keep_their_mean_tensions_when_another_line_breaks() -> None:
     """All lines begin anew then, which the order of steps feels; lost mean tensions would be 74 % of the tension."""
-    cable, scene = of_fibres(model="rod")
-    other = {"start": "a", "end": "c", "sections": [ROPE], "mesh": {"cells": 8}, "model": "rod"}
+    scene = as_network(slackening(1.6, FIBRES, model="rod"))
+    cable = hybrid.run(scene).lines["cable"]
+    other = {"start": "start", "end": "c", "sections": [ROPE], "mesh": {"cells": 8}, "model": "rod"}
     scene["lines"]["other"] = other | {"break_at": {"time": 0.6}}
     scene["points"]["c"] = {"position": [0, 50, 10]}
     found = hybrid.run(scene)
     assert any(e.kind == "end released" for e in found.events)
-    rope = found.lines["rope"]
+    rope = found.lines["cable"]
     assert np.abs(rope.position - cable.position).max() < 1e-4
     assert np.abs(rope.tension - cable.tension).max() < 1e-3 * cable.tension.max()
 
@@ -230,17 +166,8 @@ def test_against_rods(three: hybrid.Result) -> None:
 def test_a_stopped_run_goes_on_bit_for_bit(
     three: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
-    stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
-    for k, stop in enumerate([70, 60, -1]):
-        stopping.left = stop
-        try:
-            (hybrid.resume(path, progress=stopping) if k else hybrid.run(mooring(), path, progress=stopping)).close()
-        except KeyboardInterrupt:
-            continue
-        break
-    assert k == 2 and three.file is not None and differences(three.file, path) == []
+    assert went_on(mooring(), tmp_path / "run.h5", Stopping(monkeypatch), [70, 60]) == 2
+    assert three.file is not None and differences(three.file, tmp_path / "run.h5") == []
 
 
 def test_a_line_breaks_while_zones_move() -> None:
@@ -291,34 +218,31 @@ def test_an_equilibrium_has_zones_too() -> None:
     assert kinds == {"rod", "catenary"}
 
 
-def test_a_criterion_of_ones_own_asks_for_the_rods_of_the_cable() -> None:
-    """Where and when nothing else would, as one cable; it sees the name of the line."""
-    cable, system = slackening(duration=0.6)
-    seen = set()
+def asks_for_the_middle(look: hybrid.NodeState) -> np.ndarray:
+    """A criterion that asks for rods where and when nothing else would."""
+    return np.where((look.s > 20) & (look.s < 30) & (look.t > 0.2), 1.5, 0.0)
+
+
+@both_ways
+def test_a_criterion_of_ones_own_asks_for_rods(network: bool) -> None:
+    """It sees the name of the line, which a cable has none of."""
+    scene, seen = said(slackening(0.6), network), set()
 
     def criterion(look: hybrid.NodeState) -> np.ndarray:
         seen.add(look.line)
-        return np.where((look.s > 20) & (look.s < 30) & (look.t > 0.2), 1.5, 0.0)
+        return asks_for_the_middle(look)
 
-    one, quiet = hybrid.run(cable, criterion=criterion), hybrid.run(system).lines["rope"]
-    assert seen == {""}
-    line = hybrid.run(system, criterion=criterion).lines["rope"]
-    assert seen == {"", "rope"}
-    assert [*line.zones] == [*one.zones] and [*line.zones] != [*quiet.zones]
+    quiet, line = line_of(hybrid.run(scene)), line_of(hybrid.run(scene, criterion=criterion))
+    assert seen == {ONE if network else ""}
+    assert [*line.zones] != [*quiet.zones]
     assert any(x.kind == "rod" and x.s_a < 25 < x.s_b for x in line.zones[-1])
-    assert np.abs(line.position - one.position).max() < 1e-7 * 60
-    assert np.abs(line["work/zones"] - one["work/zones"]).max() < 1e-6 * np.abs(one["work/zones"]).max()
 
 
 @pytest.mark.slow
 def test_a_criterion_of_ones_own_beside_an_accuracy() -> None:
     """The result is that of the cable, and its errors, of runs that the criterion was asked in as well, nearly."""
-    cable, system = (x | {"accuracy": {"position": "5 cm", "tension": "5%"}} for x in slackening(duration=0.6))
-
-    def criterion(look: hybrid.NodeState) -> np.ndarray:
-        return np.where((look.s > 20) & (look.s < 30) & (look.t > 0.2), 1.5, 0.0)
-
-    one, line = hybrid.run(cable, criterion=criterion), hybrid.run(system, criterion=criterion).lines["rope"]
+    asked = slackening(0.6, accuracy={"position": "5 cm", "tension": "5%"})
+    one, line = (line_of(hybrid.run(said(asked, x), criterion=asks_for_the_middle)) for x in (False, True))
     assert [*line.zones] == [*one.zones]
     assert np.abs(line.position - one.position).max() < 1e-9 * 60
     for cause in ("mesh", "time", "total"):
@@ -341,20 +265,13 @@ def test_a_criterion_sees_the_line_that_it_is_asked_for() -> None:
 @pytest.mark.long
 def test_a_resumed_run_asks_the_same_criterion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is the run that was not stopped, bit for bit; without the criterion it is refused."""
-    _, system = slackening(duration=0.6)
-    whole, path = tmp_path / "whole.h5", tmp_path / "run.h5"
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
-
-    def criterion(look: hybrid.NodeState) -> np.ndarray:
-        return np.where((look.s > 20) & (look.s < 30) & (look.t > 0.2), 1.5, 0.0)
-
-    stopping = Stopping(monkeypatch)
-    hybrid.run(system, whole, criterion=criterion, progress=stopping).close()
-    stopping.left = stopping.heard // 2
+    scene: Any = said(slackening(0.6), network=True)
+    whole, path, stopping = tmp_path / "whole.h5", tmp_path / "run.h5", Stopping(monkeypatch)
+    hybrid.run(scene, whole, criterion=asks_for_the_middle, progress=stopping).close()
+    assert went_on(scene, path, stopping, [stopping.heard // 2], criterion=asks_for_the_middle) == 1
+    assert differences(whole, path) == []
+    stopping.left = stopping.heard // 4
     with pytest.raises(KeyboardInterrupt):
-        hybrid.run(system, path, criterion=criterion, progress=stopping)
+        hybrid.run(scene, path, criterion=asks_for_the_middle, progress=stopping)
     with pytest.raises(hybrid.ResultError, match="criterion"):
         hybrid.resume(path)
-    hybrid.resume(path, criterion=criterion).close()
-    assert differences(whole, path) == []

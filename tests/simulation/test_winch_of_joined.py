@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -100,21 +99,6 @@ def test_lines_with_their_ends_exchanged(model: str, clamp: bool) -> None:
     assert np.abs(one.position - other.position[:, ::-1]).max() < (1e-5 if model == "catenary" and not clamp else 1e-6)
 
 
-@pytest.mark.parametrize("model", ["catenary", "rod"])
-def test_a_system_of_one_line_is_the_cable(model: str) -> None:
-    """Whose load is its own end."""
-    scene = lowered(model=model)
-    cable = {key: scene[key] for key in ("environment", "time", "output")} | {
-        "cable": {"sections": [LINE]}, "model": model, "mesh": {"cells": 30}, "initial": "equilibrium", "dimension": 3,
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": MOVES, "payout": WINCH},
-                 "end": {"kind": "body", "mass": 10.0}},
-    }  # fmt: skip
-    one, line = hybrid.run(cable), hybrid.run(scene).lines["one"]
-    assert np.abs(one["payout/length"] - line["payout/length"]).max() < 1e-6
-    assert np.abs(one.position - line.position).max() < 1e-6
-    assert np.abs(one["reaction_start"] - line["reaction_start"]).max() < 1e-5 * np.abs(one["reaction_start"]).max()
-
-
 def test_energy_is_balanced_to_second_order() -> None:
     left, put_in = [], 0.0
     for step in (0.04, 0.02):
@@ -123,16 +107,6 @@ def test_energy_is_balanced_to_second_order() -> None:
         put_in = np.abs(line["work/start"]).max()
     assert left[1] < 1.5e-4 * put_in
     assert left[0] > 3.0 * left[1]
-
-
-@pytest.mark.long
-def test_resumed_bit_for_bit(tmp_path: Path) -> None:
-    scene = lowered(model="adaptive")
-    whole = hybrid.run(scene, output=tmp_path / "whole.h5").lines["one"]
-    hybrid.run(scene | {"time": {"duration": 4.0, "step": STEP}}, output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=10.0).lines["one"]
-    for name in ("position", "tension", "reaction_start", "payout/length", "payout/rate", "work/start"):
-        assert np.array_equal(whole[name], resumed[name]), name
 
 
 def over_a_sheave(inertia: float) -> Tables:

@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 import hybrid.simulation.network_run
-from tests.simulation.bits import FEW_STEPS, Stopping, differences
+from tests.simulation.bits import Stopping, differences
 from tests.validation.test_validation_body_contact import on_two_lines
 from tests.validation.test_validation_lines_contact import AREA, DENSITY, RADIUS, crossing, force_between
 
@@ -104,8 +104,6 @@ def test_a_stopped_run_goes_on_bit_for_bit(
     whole: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Stopped before and in contact, between nodes that enter."""
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
     for k, stop in enumerate([45, 35, 60, -1]):
         stopping.left = stop

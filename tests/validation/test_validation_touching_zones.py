@@ -12,7 +12,7 @@ import pytest
 import hybrid
 import hybrid.simulation.network_run
 from tests.combinations.pairs import scene_of
-from tests.simulation.bits import FEW_STEPS, Stopping, differences
+from tests.simulation.bits import Stopping, differences
 from tests.validation.test_validation_body_contact import RADIUS, STRAND, on_two_lines, pushed
 from tests.validation.test_validation_lines_contact import RADIUS as ROPE
 from tests.validation.test_validation_lines_contact import crossing, force_between, lowered
@@ -123,8 +123,6 @@ def test_what_lines_do_to_each_other_is_booked_through_changes_of_zones(whole: h
 def test_a_stopped_run_goes_on_bit_for_bit(
     down: Tables, whole: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
     stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
     for k, stop in enumerate([95, 30, -1]):  # beside each other, in contact
         stopping.left = stop
