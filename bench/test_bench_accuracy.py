@@ -19,7 +19,9 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
+from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
@@ -272,10 +274,10 @@ def test_accuracy_figures_of_fixed_settings(seeds):
 def runs(scene, resolutions):
     """Errors of position against the last of the resolutions, and CPU seconds, median of five."""
     case = Case(scene, None)
-    exact = case.sample(resolutions[-1])
+    exact = case.sample(NetworkResolution({LINE: resolutions[-1]}))[LINE]
     out = []
     for resolution in resolutions[:-1]:
-        tries = [case.sample(resolution) for _ in range(5)]
+        tries = [case.sample(NetworkResolution({LINE: resolution}))[LINE] for _ in range(5)]
         error = np.linalg.norm(tries[0].values["position"] - exact.values["position"], axis=2).max()
         out.append((float(error), median(t.cpu for t in tries), tries[0].steps))
     return out

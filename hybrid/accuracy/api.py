@@ -8,44 +8,29 @@ resume   continue a run
 from __future__ import annotations
 
 import io
-import time as clock
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from hybrid.accuracy.error_control import ErrorController
-from hybrid.accuracy.error_report import write_errors
-from hybrid.accuracy.finer_result import FinerResult, beside
-from hybrid.accuracy.model_choice import surveyed
-from hybrid.accuracy.passes import Passes, emptied, free_in
-from hybrid.accuracy.rods_where_slack import CHOSEN, rods_instead_of_slack, rods_of_system
+from hybrid.accuracy.finer_result import beside
+from hybrid.accuracy.model_choice import chosen_and_surveyed
+from hybrid.accuracy.passes import Passes, emptied
+from hybrid.accuracy.rods_where_slack import CHOSEN, rods_instead_of_slack
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, ResultError, SceneError
-from hybrid.model.model_costs import NAMED, REST, ModelChoice, with_model
-from hybrid.model.resolution import (
-    Resolution,
-    first_resolution,
-    model_is_free,
-    requested_accuracy,
-    wants_errors,
-    wants_survey,
-)
+from hybrid.model.model_costs import with_model
+from hybrid.model.network import NetworkResolution
+from hybrid.model.resolution import Resolution, model_is_free
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import SceneLike, as_scene, scene_text
-from hybrid.scene.schema import AdaptiveModel, LineScene, missing_time
+from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.schema import missing_time
 from hybrid.simulation.case import Case
+from hybrid.simulation.case_at_rest import CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
-from hybrid.simulation.layer_mesh import layered
-from hybrid.simulation.progress import (
-    Listener,
-    ProgressReporter,
-    listener_of,
-    tell_of_compiling,
-)
-from hybrid.simulation.restart import Remaining, remaining
+from hybrid.simulation.progress import Listener, ProgressReporter, listener_of, tell_of_compiling
+from hybrid.simulation.restart import remaining
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
@@ -53,7 +38,7 @@ from hybrid.store.lock import locked
 from hybrid.store.reader import Result, open_result, written_result
 
 if TYPE_CHECKING:
-    from hybrid.scene.network_scene import Network
+    pass
 
 # Why there is nothing that a criterion could ask for.
 NO_ZONES = "a criterion is for zones that move: the scene's model is not adaptive"
@@ -81,28 +66,26 @@ def run(
     scene = as_scene(scene)
     if scene.time is None:
         raise SceneError([missing_time()])
-    if not isinstance(scene, LineScene):
-        return _several_lines(scene, output, overwrite, progress, criterion)
-    check_motions(scene)
-    if criterion is not None and not isinstance(scene.model, AdaptiveModel):
-        raise TypeError(NO_ZONES)
-    chosen = criterion is None and model_is_free(scene)  # most often rods, which need least to be compiled
-    compile_beside(with_model(scene, "rod") if chosen else scene)
-    case, target = Case(scene, criterion), _target(output, overwrite, wants_errors(scene))
+    _check(scene, criterion)
+    case = Case(scene, criterion)
+    chosen = criterion is None and case.flat and model_is_free(case.scene)  # most often rods: they compile the least
+    compile_beside(with_model(case.scene, "rod") if chosen else scene)
+    target = _target(output, overwrite, case.wants_errors)
     with locked(_path(output)), _supervised(case, progress):
         if isinstance(target, Path):
             beside(target).unlink(missing_ok=True)  # of a run that was cut off
-        try:
-            Passes(case, target).compute()
-        except ComputationError as error:
-            instead = rods_instead_of_slack(scene, error)
-            if instead is None:
-                raise
-            emptied(target, error)
-            case.progress.begin_anew()
-            case.scene, case.late_file, case.late_finer = instead.scene, None, None
-            case.notes.append((CHOSEN, instead.text))
-            Passes(case, target).compute()
+        while True:
+            try:
+                Passes(case, target).compute()
+                break
+            except ComputationError as error:
+                instead = rods_instead_of_slack(case.scene, error)
+                if instead is None:
+                    raise
+                emptied(target, error)
+                case.progress.begin_anew()
+                case.scene, case.late_file, case.late_finer = instead.scene, None, None
+                case.notes.append((CHOSEN, instead.text))
     return written_result(target, case.late_file)
 
 
@@ -112,26 +95,14 @@ def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: boo
     scene, output, overwrite and errors: as of `run`.
     """
     scene = as_scene(scene)
-    if not isinstance(scene, LineScene):
-        return _several_lines(scene, output, overwrite, moves=False)
-    check_motions(scene)
+    _check(scene)
     compile_beside(scene, static=True)
-    case, begin = StaticCase(scene), clock.process_time()
-    target, resolution = _target(output, overwrite, wants_errors(scene)), first_resolution(scene)
+    case = CaseAtRest(scene)
+    target = _target(output, overwrite, case.wants_errors)
     with locked(_path(output)):
-        choice, resolution = _surveyed_at_rest(case, resolution)
-        scene = case.scene
-        if not wants_errors(scene):
-            case.record(resolution, target)
-            return written_result(target)
-        assert not isinstance(target, MemoryTarget)
-        compute = FinerResult(target, case.record, case.record)
-        free = free_in(scene)._replace(steps=False)
-        control = ErrorController(
-            requested_accuracy(scene), free, False, case.sample, compute, choice=choice, settle=compute.settle
-        )
-        result, errors = control.start(resolution)
-        write_errors(target, scene, control, result, errors, clock.process_time() - begin)
+        if isinstance(target, Path):
+            beside(target).unlink(missing_ok=True)
+        Passes(case, target).compute()
     return written_result(target)
 
 
@@ -169,100 +140,31 @@ def resume(
         if left.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
-        if not left.flat:
-            _move_lines(left.scene, target, progress, path, criterion, left)
-            return open_result(target)
+        _check(left.scene, criterion, moves=False)
         case = Case(left.scene, criterion, left.changes, left.points)
         with _supervised(case, progress):
             Passes(case, target, path, left).compute()
     return written_result(target, case.late_file)
 
 
-def _several_lines(
-    system: Network,
-    output: str | Path | None,
-    overwrite: bool,
-    progress: bool | Listener = False,
-    criterion: UserCriterion | None = None,
-    *,
-    moves: bool = True,
-) -> Result:
-    """The motion of several lines, or their equilibrium."""
-    from hybrid.accuracy.passes_of_lines import PassesOfLines, is_refined, system_with_layers
-    from hybrid.simulation.network_run import static_system
-
-    refined = is_refined(system)
-    target = _target(output, overwrite, refined)
-    with locked(_path(output)):
-        if isinstance(target, Path):
-            beside(target).unlink(missing_ok=True)  # of a run that was cut off
-        if not moves and refined:
-            assert not isinstance(target, MemoryTarget)
-            PassesOfLines(system, target, False, ProgressReporter(None, 1.0), lambda: False).compute()
-        elif not moves:
-            resolution = system_with_layers(system, False, ProgressReporter(None, 1.0), lambda: False)
-            static_system(system, target, partial(scene_text, system), resolution)
-        else:
-            _move_lines(system, target, progress, criterion=criterion)
-    return written_result(target)
-
-
-def _move_lines(
-    system: Network, target: Target, progress: bool | Listener, source: Path | None = None,
-    criterion: UserCriterion | None = None, left: Remaining[Network] | None = None,
-) -> None:  # fmt: skip
-    """Compute the motion of several lines; source: the result to go on with; left: what is to be done with it."""
-    changes = left.changes if left is not None else ()
-    source = None if left is not None and left.anew else source
-    from hybrid.accuracy.passes_of_lines import PassesOfLines, is_refined, system_with_layers
-    from hybrid.simulation.network_run import Recording, run_system
-
-    if criterion is not None and not system.adaptive:
-        raise TypeError(NO_ZONES)
-    duration, listener = system.require_time().duration, listener_of(progress)
-    tell_of_compiling(listener, kernels_of(system))
-    with interrupts() as stopped, ProgressReporter(listener, duration) as reporter:
-        notes: list[tuple[str, str]] = []
-        while True:
-            try:
-                if is_refined(system):
-                    assert not isinstance(target, MemoryTarget), "errors are written into a file"
-                    asked = PassesOfLines(system, target, True, reporter, stopped, notes, criterion, changes)
-                    asked.compute(source)
-                    return
-                resolution = None
-                if source is None:
-                    resolution = system_with_layers(system, True, reporter, stopped, criterion)
-                recording = Recording(source=source, notes=notes)
-                run_system(
-                    system, target, scene_text(system), reporter, stopped, resolution=resolution, recording=recording,
-                    criterion=criterion, changes=changes,
-                )  # fmt: skip
-                return
-            except ComputationError as error:
-                instead = rods_of_system(system, error) if source is None else None
-                if instead is None:
-                    raise
-                emptied(target, error)
-                reporter.begin_anew()
-                system = instead.system
-                notes.append((CHOSEN, instead.text))
-
-
-def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
-    """The same of an equilibrium, whose model is rods where the scene names none and asks for an accuracy."""
-    if not wants_survey(case.scene):
-        return NAMED, layered(case, resolution)
-    choice = NAMED
-    if model_is_free(case.scene, moves=False):
-        choice, case.scene = ModelChoice("rod", REST), with_model(case.scene, "rod")
-    return choice, surveyed(case, resolution)
-
-
 def resolution_at_rest(case: StaticCase) -> Resolution:
     """How finely the equilibrium of a case is computed first; where the scene leaves it open, its model is chosen."""
     check_motions(case.scene)
-    return _surveyed_at_rest(case, first_resolution(case.scene))[1]
+    runs = CaseAtRest(case.scene, case)
+    _, found = chosen_and_surveyed(runs, NetworkResolution.of(runs.lines))
+    case.scene = runs.scene
+    return found.one
+
+
+def _check(scene: Any, criterion: UserCriterion | None = None, moves: bool = True) -> None:
+    """SceneError: its motions are none; TypeError: there is nothing that a criterion could ask for.
+
+    moves: whether the former is to be looked at.
+    """
+    if moves and not scene.line_names:  # of several lines they were looked at with the scene
+        check_motions(scene)
+    if criterion is not None and not scene.adaptive:
+        raise TypeError(NO_ZONES)
 
 
 def _path(output: str | Path | None) -> Path | None:

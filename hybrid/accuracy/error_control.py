@@ -1,100 +1,50 @@
 """Computes a scene as often and as finely as it takes for the accuracy that is asked.
 
 First the result, which stands from then on, then the runs that its errors are estimated by; where these are larger
-than asked, finer results follow, each from what the one before has shown.
+than asked, finer results follow, each from what the one before has shown.  What one of several lines asks for, all
+get: their steps are the same, and the error of a line may come from the cells of the next.
 docs/errors.md
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from hybrid.accuracy.budget import Budget
-from hybrid.accuracy.error_estimate import NOTHING, Estimate
 from hybrid.accuracy.error_order import COARSER
-from hybrid.accuracy.error_statistics import (
-    LARGEST,
-    STATISTICS,
-    StatisticEstimate,
-    estimates,
-    irregular_notes,
-    is_chance,
-    resolves_snaps,
-    snaps,
-    statistics_of,
-)
-from hybrid.accuracy.errors_by_cause import Errors
-from hybrid.accuracy.extreme_errors import ExtremeErrors
-from hybrid.accuracy.finer_result import NOT_KEPT, Judged, is_no_better, not_kept_text
-from hybrid.accuracy.refinement import (
-    COSTLY_ACCURACY,
-    MOST_OF_MODEL,
-    RAW,
-    Free,
-    Verdict,
-    costly,
-    missed,
-    not_converged,
-    refined,
-    sizes_of,
-)
-from hybrid.accuracy.snap_scatter import errors_between, finer_between, snap_excess
-from hybrid.errors import ComputationError, Outcome
-from hybrid.model.model_costs import NAMED, WORDS, ModelChoice
+from hybrid.accuracy.finer_result import NOT_KEPT, is_no_better, not_kept_text
+from hybrid.accuracy.line_errors import LineErrors
+from hybrid.accuracy.model_errors import Comparable, model_errors_of, with_model_errors
+from hybrid.accuracy.refinement import COSTLY_ACCURACY, costly
+from hybrid.errors import ComputationError
+from hybrid.model.network import NetworkResolution
 from hybrid.model.output_points import OutputPoints
-from hybrid.model.plan import output_times
-from hybrid.model.resolution import (
-    IRREGULAR_REFINEMENTS,
-    MOST_REFINEMENTS,
-    REFINEMENTS_AT_REST,
-    RequestedAccuracy,
-    Resolution,
-)
+from hybrid.model.resolution import Resolution
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.bounded_model_errors import doubtful
 from hybrid.simulation.restore import resolution_from, resolution_tree
-from hybrid.simulation.run_sample import (
-    ALL,
-    END_FORCES,
-    RunSample,
-    compared_places,
-    restored_notes,
-    restored_sample,
-)
+from hybrid.simulation.run_sample import RunSample, Samples, restored_notes
 from hybrid.store.named_arrays import Tree, matched
-from hybrid.store.stored_rows import MissingRows
 
-# A finer run whose error is more than this part of that before it tells that more will not help: zones that change a
-# little earlier or later, or friction that holds elsewhere, are what is left.
-STALLED = 0.8
-# Processor time, s, after which runs are not made finer for what they miss: a longer wait should be asked for.
-MOST_CPU = 600.0
-# Results of cells half as long, at most, where no equilibrium is found on those of the runs to compare with.
-MOST_HALVINGS = 2
-# Cells from which on an equilibrium is not made finer: it takes seconds.  No clock, by which the first scene of a run,
-# while code is compiled, and one beside others would be less accurate than the same again.
-CELLS_AT_REST = 20_000
-# How much finer a run of an irregular motion may be made: chance is soon more than cells and steps are.
-IRREGULAR_FINER = 2.0
-# A run that is hardly finer is not made of it: what it changes is chance.
-WORTH_REPEATING = 1.2
-# A change of a quantity by less than this part of its largest value is round-off: a thousandth of the least error that
-# can be asked for.
-ROUND_OFF_OF = 1e-9
-# A run of so many times as many cells and steps counts as twice as fine.
-TWICE = 1.8
-# Values at an instant do not converge where halved cells and steps leave more of a difference than this: order 0.25.
-DIVERGES = 0.85
+Beside = AbstractContextManager[Sequence[Callable[[], Samples]]]
 
 
-def comparison_resolutions(resolution: Resolution, moves: bool) -> tuple[Resolution, Resolution, Resolution]:
+class Compares(Comparable, Protocol):
+    """What computes the runs that a result is compared with; all raise ComputationError."""
+
+    def beside(self, samples: Sequence[Callable[[], Samples]]) -> Beside:
+        """Several of them at the same time (simulation.beside)."""
+
+
+def comparison_resolutions(
+    resolution: NetworkResolution, moves: bool
+) -> tuple[NetworkResolution, NetworkResolution, NetworkResolution]:
     """Of the runs to compare with: longer cells and steps; the same cells, longer steps still; longer cells as well.
 
     moves: whether there are steps at all.
@@ -107,572 +57,373 @@ def comparison_resolutions(resolution: Resolution, moves: bool) -> tuple[Resolut
     )
 
 
-Samples = Sequence[Callable[[], RunSample]]
-Beside = Callable[[Samples], AbstractContextManager[Samples]]
-
-
 @dataclass
 class ErrorController:
     """Chooses mesh, step and zones of one run after the other until the accuracy that is asked is met.
 
-    asked: None asks for an error figure alone.  sample: computes a run to compare with; result: computes the result;
-    both raise ComputationError.  beside: computes several of the former at the same time (simulation.beside);
-    None: one after the other.  irregular: extremes and standard deviations are judged from the start
-    (accuracy.error_statistics); else where a line snaps and values at an instant do not converge.  Its `checkpoint`
-    is in the file of every result, so that what was cut off continues with `proceed`.
+    lines: what is known of the errors of each, by name.  case: computes runs to compare with; result: computes the
+    result, and raises ComputationError; settle: lets a finer result take the place of that before it, or drops it.
+    Its `checkpoint` is in the file of every result, so that what was cut off continues with `proceed`.
     """
 
-    asked: RequestedAccuracy | None
-    free: Free
-    moves: bool  # whether there is a time
-    sample: Callable[[Resolution], RunSample]
-    result: Callable[[Resolution], RunSample]
-    beside: Beside | None = None
-    irregular: bool = False
-    choice: ModelChoice = NAMED  # of a scene that leaves the choice
-    settle: Callable[[bool], None] = lambda kept: None  # whether a finer result takes the place of that before it
-    from_rest: bool = True  # whether it begins from an equilibrium, or is one
-    rubs: bool = False  # whether obstacles on which the line may lie have friction
-    times: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) s, of the outputs of a result
+    lines: Mapping[str, LineErrors]
+    case: Compares
+    result: Callable[[NetworkResolution], Samples]
+    settle: Callable[[bool], None] = lambda kept: None
     budget: Budget | None = None  # of all results; None: there is no limit
-    held: bool = True  # whether friction may hold the line here or there, so that its tension jumps
-    stopped: str = ""  # why it is refined no further although it misses what is asked; empty: more would not help
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
-    first: Resolution | None = None  # that the runs to compare with are for; the result may be finer
-    next: Resolution | None = None  # of the result that is to be computed
-    comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
+    first: NetworkResolution | None = None  # that the runs to compare with are for; the result may be finer
+    next: NetworkResolution | None = None  # of the result that is to be computed
     compared: Tree | None = None  # checkpoint of the first result with its comparisons, as long as that stands
-    estimate: Estimate | None = None  # of the result as it is
-    scattered: list[str] = field(default_factory=list)  # end forces whose largest values are by chance: not judged
-    extremes: ExtremeErrors | None = None  # of what limits are held against, of a run with limits
-    excess: np.ndarray = field(default_factory=lambda: np.zeros(2))  # N, by which snaps may exceed the largest forces
-    _ratio: float = np.inf  # of the error of the result to what is asked
-    _judged: int = 0  # results
-    _at_rest: bool = False  # whether the run to compare with that has failed did so before it moved
-    _slow_from: list[float] | None = None  # cells and steps of the first result, where errors fell slowly until then
+    standing: Samples = field(default_factory=dict)  # the result in its place
+    notes: list[tuple[str, str]] = field(default_factory=list)  # events of all lines
+    _touching: bool = False  # whether contact that nobody asks for was computed in the runs to compare with
     _lost: bool = False  # whether the runs to compare with are to be computed again
-    _every: int = 1  # outputs to one of which the statistics are
-    _notes: list[tuple[str, str]] = field(default_factory=list)
-    _statistics: dict[str, StatisticEstimate] = field(default_factory=dict)
-    _of_statistics: Callable[[], dict[str, StatisticEstimate]] | None = None  # what they are to be estimated by
+
+    def __post_init__(self) -> None:
+        for line in self.lines.values():
+            line.runs = self.runs
 
     @property
-    def statistics(self) -> dict[str, StatisticEstimate]:
-        """Errors of extremes and deviations, if it moves; estimated when asked for, as regular motions never do."""
-        if self._of_statistics is not None:
-            self._statistics, self._of_statistics = self._of_statistics(), None
-        return self._statistics
-
-    @statistics.setter
-    def statistics(self, found: dict[str, StatisticEstimate]) -> None:
-        self._statistics, self._of_statistics = found, None
+    def known(self) -> bool:
+        """Whether errors of a line are."""
+        return any(x.estimate is not None for x in self.lines.values())
 
     @property
-    def notes(self) -> tuple[tuple[str, str], ...]:
-        """Events of the result, kind and text: of the control, of the result itself, and of its model error."""
-        found = self.estimate
-        own = [*self.choice.notes, *self._notes, *self._irregular_note()]
-        own += not_converged(self.diverging, self.asked)
-        if found is not None:
-            asked = None if self.asked is None else sizes_of(self.asked, found.run)
-            own += doubtful(found.errors, found.doubt, asked)
-        return (*own, *((*found.several_equilibria, *found.run.notes, *found.notes) if found is not None else ()))
+    def chosen(self) -> list[str]:
+        """Names of lines that were chosen to be catenaries."""
+        return [name for name, x in self.lines.items() if x.choice.kind == "catenary"]
 
-    @property
-    def diverging(self) -> dict[str, float]:
-        """As `Estimate.not_converged`; none of an irregular motion, which is judged otherwise."""
-        if self.estimate is None or self.irregular:
-            return {}
-        return {x: left for x, left in self.estimate.not_converged.items() if not self._is_round_off(x)}
-
-    def _is_round_off(self, name: str) -> bool:
-        """Whether runs differ in a quantity by no more than round-off, or without friction by less than is asked."""
-        assert self.estimate is not None
-        raw, unit = RAW.get(name, name), {"bending_moment": "N m", "curvature": "1/m", "position": "m"}.get(name, "N")
-        least = self.asked.round_off(unit) if self.asked is not None else 0.0
-        values = self.estimate.run.values[raw]
-        asked = self.asked.of_tension if self.asked is not None else None
-        part = ROUND_OFF_OF if self.held else min(NOTHING, asked or NOTHING)
-        return self.estimate.changes[raw][0] <= max(least, part * float(np.abs(np.asarray(values)).max()))
-
-    def _irregular_note(self) -> list[tuple[str, str]]:
-        """What is judged of an irregular motion, and how far the result may be off in what is not."""
-        if self.asked is None or not self.irregular or not self.statistics or self.estimate is None:
-            return []
-        return irregular_notes(
-            self.statistics,
-            self.estimate.errors,
-            self._left_out,
-            self.excess,
-            self.asked,
-            by_snaps=bool(self._slow_from),
-        )
-
-    def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
-        """From a first resolution to the result and its errors, None where they cannot be estimated."""
+    def start(self, resolution: NetworkResolution) -> None:
+        """From a first resolution to the result and its errors."""
         self.first = self.next = resolution
-        return self.proceed()
+        self.proceed()
 
-    def compare_with(self, runs: Sequence[RunSample | None], failed: ComputationError | None = None) -> None:
-        """Take over runs to compare with; failed: why there is not even the first."""
-        if failed is not None:
-            self.lacks_errors(failed)
-        if runs[0] is None:
-            return
-        self.comparisons = runs[0], runs[1], runs[2]
-
-    def proceed(self) -> tuple[RunSample, Errors | None]:
+    def proceed(self) -> None:
         """The same from the next result on."""
         if self._lost:
-            self.runs, self._notes, self._lost = [], [], False
-        unknown: RunSample | None = None  # the last result, as long as its errors are not known
+            self.runs.clear()
+            self.notes.clear()
+            for line in self.lines.values():
+                line.comparisons = None
+                line.forget_notes()
+            self._lost = False
+        unknown: Samples | None = None  # the last result, as long as its errors are not known
         while self.next is not None:
             resolution, own = self.next, len(self.runs)
             try:
                 result = self._counted(self.result(resolution))
             except ComputationError as error:
-                if self.estimate is None and unknown is not None:
-                    self.lacks_errors(error, "finer run")
-                    return unknown, None
-                if self.estimate is None and self.finds_no_rest(error):
-                    self.first = self.next = resolution.coarser(0.5)
-                    continue
-                if self.estimate is None:
-                    raise
-                why = f"a finer run failed: {str(error).splitlines()[0]}"
-                self._notes.append((NOT_KEPT, f"{why}; the result is the one before"))
-                return self.without_refinement(why)
+                if not self._goes_on(error, resolution, unknown):
+                    return
+                continue
             if self.budget is not None:
-                self.budget.spend([result])
-            if self.estimate is None:
-                if self.comparisons is None:
-                    self.comparisons = self._compute_comparisons(self.first or resolution)
-                if self.comparisons is None and self.is_too_coarse(result):
-                    self.settle(True)  # it may be beside the one before
-                    self.halve()
-                    self.first = self.next = result.resolution.coarser(0.5)
-                    unknown = result
-                    continue
-                if self.asked is not None:  # else no finer result follows, and they need not stay in memory
-                    self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own), "budget": []}
-                known = self.first_estimate(result)
-                self.settle(True)  # it may be beside one of another model
-                if not known:
-                    return result, None
-                self._judge(resolution)
+                self.budget.spend([*result.values()])
+            if self.known:
+                self._judge_finer(resolution, result)
             else:
-                self._judge_finer(self.estimate, resolution, result)
-            assert self.estimate is not None
-            if self.next is not None and not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
-                self._notes += costly(self.runs, self.estimate.run, self.next)
-        assert self.estimate is not None
-        errors = self.estimate.errors
-        if self.asked is not None:
-            verdict = self.verdict(self.asked)
-            if verdict.ratio > 1.0:
-                self.note_missed(verdict)
-        return self.estimate.run, errors
+                unknown = self._judge_first(result, own)
+                if unknown is not None:
+                    continue
+            if self.next is not None and not any(kind == COSTLY_ACCURACY for kind, _ in self.notes):
+                self.notes += costly(self.runs, next(iter(self.standing.values())), self.next.one)
+        self._note_missed()
 
-    def finds_no_rest(self, error: ComputationError) -> bool:
-        """Whether cells half as long may find the equilibrium that a result has not: its rods fold or buckle."""
-        again = error.t is None and error.outcome in (Outcome.UNSTABLE, Outcome.FOLDED)
-        again = again and self.asked is not None and self.free.mesh and self._judged < MOST_HALVINGS
-        self._judged += again
-        return again
+    def _goes_on(self, error: ComputationError, resolution: NetworkResolution, unknown: Samples | None) -> bool:
+        """Whether another result follows one that has failed; raises the error where there is none before it."""
+        if self.known:
+            why = f"a finer run failed: {str(error).splitlines()[0]}"
+            self.notes.append((NOT_KEPT, f"{why}; the result is the one before"))
+            self.without_refinement(why)
+            return False
+        if unknown is not None:
+            self._lacks_errors(error, "finer run")
+            self.standing = unknown
+            return False
+        if not any([x.finds_no_rest(error) for x in self.lines.values()]):
+            raise error
+        self.first = self.next = self._halved(resolution)
+        return True
 
-    def is_too_coarse(self, result: RunSample) -> bool:
-        """Whether a result of cells half as long follows, because those of the runs to compare with are too long.
+    def _judge_first(self, result: Samples, own: int) -> Samples | None:
+        """Compare a first result with coarser runs; the result itself where one of shorter cells follows.
 
-        So they are where no equilibrium is found on them; a motion that fails may have other reasons.
+        own: its number among the runs.
         """
-        too_long = self._at_rest and self.asked is not None and self.free.mesh
-        finer = result.resolution.coarser(0.5)
-        allowed = self.budget is None or self.budget.allows([result], [finer])
-        return too_long and self._judged < MOST_HALVINGS and allowed
+        if not self._is_compared:
+            self._compare(self.first or _finely(result))
+        finer = self._halved(_finely(result))
+        if not self._is_compared and any(x.is_too_coarse for x in self.lines.values()) and self._allows(result, finer):
+            self.settle(True)  # it may be beside the one before
+            for line in self.lines.values():
+                line.halve()
+            self.first = self.next = finer
+            return result
+        if any(x.asked is not None for x in self.lines.values()):
+            # else no finer result follows, and they need not stay in memory
+            self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own), "budget": []}
+        self.standing, self.next = result, None
+        judged = self._estimated(result, {})
+        self.settle(True)  # it may be beside one of another model
+        if judged:
+            self._judge(result, judged, stricter=False)
+        return None
 
-    def halve(self) -> None:
-        """Forget that errors are not known: a result of cells half as long follows."""
-        self._judged += 1
-        self._notes.pop()
+    def _lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
+        for line in self.lines.values():
+            line.lacks_errors(error, what)
 
-    def lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
-        """Note that errors are not known, as such a run has failed."""
-        self._at_rest = error.t is None
-        text = f"error not known: a {what} failed: {str(error).splitlines()[0]}"
-        self._notes.append(("no error figure", text))
-
-    def _judge(self, resolution: Resolution) -> None:
-        """Whether the result is as accurate as asked, and what follows."""
-        assert self.estimate is not None
-        if self.estimate.lacks_model_errors():
-            self._renew_model_errors(self.estimate, resolution)
-        found, run, self.stopped = self.next_resolution(), self.estimate.run, ""
-        if found is not None and self.budget is not None and not self.budget.allows([run], [found]):
-            self.stopped, found = self.budget.text([run], [found]), None
-        self.next = found
-
-    def _judge_finer(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
-        """The same of a finer result; where it is the last and no better than that before it, that one stays."""
-        before, excess, notes = self.judged(True).copied(), self.excess, list(self._notes)
-        try:
-            self.next_estimate(estimate, resolution, result)
-            self._judge(resolution)
-        except KeyboardInterrupt:  # in a run to compare with: the finer result stays beside, until it is resumed
-            self.estimate, self.statistics, self.extremes = before.estimate, dict(before.statistics), before.extremes
-            self.excess, self._notes[:] = excess, notes
-            raise
-        if self.asked is None or self.next is not None:
-            self._take_finer()
-            return
-        finer = self.judged(self.irregular)
-        found = is_no_better({"": self.asked}, {"": before}, {"": finer})
-        if found is not None:
-            self.keep(before, finer)
-            self._notes.append((NOT_KEPT, not_kept_text(result, found)))
-            self.settle(False)
-        else:
-            self._take_finer()
-
-    def _take_finer(self) -> None:
-        self.settle(True)
-        self.compared = None
-
-    @property
-    def places(self) -> np.ndarray | None:
-        """Of the output points those at which runs are compared, as of `RunSample`; None: there is none yet."""
-        run = self.estimate.run if self.estimate is not None else self.comparisons and self.comparisons[0]
-        return run.places if run else None
-
-    def judged(self, of_statistics: bool) -> Judged:
-        """The errors of the result; of_statistics: with those of extremes and standard deviations."""
-        assert self.estimate is not None
-        statistics = self.statistics if of_statistics else {}
-        return Judged(self.estimate, statistics, tuple(self._left_out), self.extremes)
-
-    @property
-    def _left_out(self) -> list[str]:
-        """End forces whose largest values are not judged: they are by chance, or a snap may exceed them."""
-        allowed = self.allowed_force
-        if self.scattered or not self.irregular or allowed is None or not self.excess.max() > allowed:
-            return self.scattered
-        found = self.statistics.get(LARGEST)
-        if found is None:
-            return self.scattered
-        return [name for raw, name in END_FORCES.items() if raw in found.order]  # a snap pulls at both
-
-    def keep(self, before: Judged, finer: Judged) -> None:
-        """Go back to the result before a finer one that is no better."""
-        before.set_apart(finer)
-        self.estimate, self.statistics, self.extremes = before.estimate, dict(before.statistics), before.extremes
-        if self.extremes is not None and finer.extremes is not None:
-            self.extremes = self.extremes.set_apart(finer.extremes)
-
-    def verdict(self, asked: RequestedAccuracy) -> Verdict:
-        """How the errors compare with what is asked: at every instant, or of extremes and standard deviations."""
-        return self.judged(self.irregular).verdict(asked)
-
-    @property
-    def allowed_force(self) -> float | None:
-        """Error, N, of forces at the ends that is asked; None: none is."""
-        if self.asked is None or self.estimate is None:
-            return None
-        part = self.asked.of_end_force
-        return part * self.estimate.run.largest_end_force if part is not None else self.asked.tension
-
-    @property
-    def model_misses(self) -> str:
-        """Where leaving bending out makes more of the error than is asked allows, how much; else empty."""
-        if self.asked is None or self.estimate is None:
-            return ""
-        found = self.verdict(self.asked)
-        misses = found.ratio > 1.0 and found.model > MOST_OF_MODEL
-        return f"leaving bending out makes {100 * found.model:.2g} % of what is asked" if misses else ""
-
-    def without_refinement(self, why: str) -> tuple[RunSample, Errors]:
-        """The result as it is and its errors, where a finer one did not come to its end."""
-        assert self.estimate is not None
-        run, errors = self.estimate.run, self.estimate.errors
-        if self.asked is not None:  # else its model error was to be followed
-            verdict = self.verdict(self.asked)
+    def _note_missed(self) -> None:
+        """Say of each line that misses what is asked."""
+        for line in self.lines.values():
+            if line.asked is None or line.estimate is None:
+                continue
+            verdict = line.verdict(line.asked)
             if verdict.ratio > 1.0:
-                self._notes.append(("accuracy missed", f"{verdict.text}; {why}"))
-        return run, errors
+                line.note_missed(verdict)
 
-    def _compute_comparisons(
-        self, resolution: Resolution
-    ) -> tuple[RunSample, RunSample | None, RunSample | None] | None:
-        """The runs to compare with; None: the first has failed."""
-        found: list[RunSample | None] = [None, None, None]
-        follows = not resolution.follow  # else the result itself knows what neglected bending does
-        each = comparison_resolutions(resolution, self.moves)
-        coarser = [replace(x, follow=follows and k == 0) for k, x in enumerate(each)]
-        which = (0, 1, 2) if self.moves else (0, 2)  # without steps the second is the first
-        samples = [partial(self.sample, coarser[k]) for k in which]
-        with self.beside(samples) if self.beside is not None else nullcontext(samples) as runs:
+    def without_refinement(self, why: str) -> None:
+        """Say what the result misses as it is, where a finer one did not come to its end."""
+        for line in self.lines.values():
+            if line.estimate is not None:
+                line.without_refinement(why)
+
+    # --- how finely -----------------------------------------------------------------------------
+
+    def _halved(self, now: NetworkResolution) -> NetworkResolution:
+        """Cells half as long, of lines that leave their mesh open."""
+        return NetworkResolution(
+            {name: x.coarser(0.5) if self.lines[name].free.mesh else x for name, x in now.lines.items()}
+        )
+
+    def _finer(self, now: NetworkResolution, wanted: Mapping[str, Resolution]) -> NetworkResolution:
+        """As fine as the finest that is wanted; what the scene gives stays."""
+        if len(now.lines) == 1:
+            return NetworkResolution(dict(wanted))
+        cells = max(x.fineness / now.lines[name].fineness for name, x in wanted.items())
+        steps = min(x.step / now.one.step if now.one.step else 1.0 for x in wanted.values())
+        found = {}
+        for name, x in now.lines.items():
+            free, zones = self.lines[name].free, min(x.zones, wanted[name].zones if name in wanted else x.zones)
+            finer = x.coarser(1.0 / cells if free.mesh else 1.0, steps if free.steps else 1.0)
+            found[name] = replace(finer, zones=zones)
+        return NetworkResolution(found)
+
+    def _allows(self, result: Samples, finer: NetworkResolution) -> bool:
+        """Whether the budget does."""
+        return self.budget is None or self.budget.allows([*result.values()], [finer.lines[x] for x in result])
+
+    # --- judgement ------------------------------------------------------------------------------
+
+    def _judge(self, result: Samples, judged: Sequence[str], stricter: bool) -> None:
+        """Whether the result is as accurate as asked, and what follows.
+
+        judged: lines with errors; stricter: zones of some are others than those whose model error is known.
+        """
+        if stricter or any(x.estimate is not None and x.estimate.lacks_model_errors() for x in self.lines.values()):
+            self._renew_model_errors(result)
+        asked = {name: self.lines[name].next_resolution() for name in judged}
+        wanted = {name: x for name, x in asked.items() if x is not None}
+        for line in self.lines.values():
+            line.stopped = ""
+        self.next = self._finer(_finely(result), wanted) if wanted else None
+        if self.next is not None and not self._allows(result, self.next):
+            assert self.budget is not None
+            text = self.budget.text([*result.values()], [self.next.lines[x] for x in result])
+            for line in self.lines.values():
+                line.stopped = text
+            self.next = None
+
+    def _judge_finer(self, resolution: NetworkResolution, result: Samples) -> None:
+        """The same of a finer result; where it is the last and no better than that before it, that one stays."""
+        kept, notes = {k: x.state() for k, x in self.lines.items()}, list(self.notes)
+        before = {name: x[0] for name, x in kept.items() if x[0] is not None}
+        try:
+            stricter = [k for k, x in self.lines.items() if x.is_stricter(resolution.lines[k])]
+            anew = any(self.lines[k].estimate.differs_in_zones(result[k]) for k in stricter)  # type: ignore[union-attr]
+            anew = anew or self._touches_now(result)
+            if anew:  # runs to compare with have other zones, or no contact
+                self._compare(resolution)
+                anew = self._is_compared
+            follows = all(x.follow for x in resolution.lines.values())
+            judged = self._estimated(result, before, anew)
+            self._judge(result, judged, bool(stricter) and not anew and not follows)
+        except KeyboardInterrupt:  # in a run to compare with: the finer result stays beside, until it is resumed
+            for name, x in self.lines.items():
+                x.go_back(kept[name])
+            self.notes[:], self.next = notes, resolution
+            raise
+        asked = {n: x.asked for n, x in self.lines.items() if x.asked is not None}
+        if not asked or self.next is not None:
+            self._take_finer(result)
+            return
+        finer = {n: x.judged(x.irregular) for n, x in self.lines.items() if x.estimate is not None}
+        found = is_no_better(asked, before, finer)
+        if found is None:
+            self._take_finer(result)
+            return
+        for name, line in self.lines.items():
+            if name in before and name in finer:
+                line.keep(before[name], finer[name])
+        self.notes.append((NOT_KEPT, not_kept_text(next(iter(result.values())), found)))
+        self.settle(False)
+
+    def _estimated(self, result: Samples, before: Mapping[str, Any], anew: bool = False) -> list[str]:
+        """Take over a result; names of the lines whose errors are known with it.
+
+        before: of those whose errors are known without it; anew: whether they are known from runs that are new.
+        """
+        if not before and self._touches_now(result):
+            self._compare(self.first or _finely(result))  # with contact now
+        faster, judged = cache(self._in_shorter_steps), []
+        for name, line in self.lines.items():
+            shorter = partial(_of_line, faster, name)
+            if (name not in before or anew) and line.first_estimate(result[name], shorter):
+                judged.append(name)
+            elif name in before:
+                line.next_estimate(result[name])
+                judged.append(name)
+        return judged
+
+    def _touches_now(self, result: Samples) -> bool:
+        """Whether lines touch themselves in a result, and did not where they could not, in runs to compare with."""
+        return not self._touching and any(x.touches for x in result.values())
+
+    def _take_finer(self, result: Samples) -> None:
+        self.settle(True)
+        self.standing, self.compared = result, None
+
+    # --- runs to compare with -------------------------------------------------------------------
+
+    @property
+    def _is_compared(self) -> bool:
+        """Whether there are runs to compare with, from which no errors are known yet."""
+        return any(x.comparisons is not None for x in self.lines.values())
+
+    def _compare(self, resolution: NetworkResolution) -> None:
+        """Compute the runs to compare with; there are none where the first of them fails."""
+        for line in self.lines.values():
+            line.comparisons = None
+        found: list[Samples | None] = [None, None, None]
+        follows = not any(x.follow for x in resolution.lines.values())  # else the result knows what bending does
+        plain = NetworkResolution({name: replace(x, follow=False) for name, x in resolution.lines.items()})
+        each = comparison_resolutions(plain, self.case.moves)
+        which = (0, 1, 2) if self.case.moves else (0, 2)  # without steps the second is the first
+        samples = [partial(self.case.sample, each[k], model=follows and k == 0) for k in which]
+        with self.case.beside(samples) as runs:
             for k, run in zip(which, runs, strict=True):
                 try:
                     found[k] = self._counted(run())
                 except ComputationError as error:
                     if not k:
-                        self.lacks_errors(error)
-                        return None
-        assert found[0] is not None
-        return found[0], found[1], found[2]
+                        self._lacks_errors(error)
+                        return
+                if not k and (first := found[0]) is not None:
+                    self._touching = any(x.touches for x in first.values())
+                    found[0] = with_model_errors(self.case, first, self.runs)
+        for name, line in self.lines.items():
+            one, second, third = (None if x is None else x[name] for x in found)
+            assert one is not None
+            line.comparisons = one, second, third
 
-    def _in_shorter_steps(self, coarse: RunSample) -> RunSample | None:
-        """The first of the runs to compare with in steps as short as those of the result; None: it fails."""
-        of_result = replace(coarse.resolution.coarser(1.0, 1.0 / COARSER), every=coarse.every, follow=False)
+    def _renew_model_errors(self, result: Samples) -> None:
+        """Zones are others than those whose model error is known: follow it on the mesh of the result."""
         try:
-            return self._counted(self.sample(of_result))
+            found = model_errors_of(self.case, result, self.runs)
+        except ComputationError as error:
+            text = f"the effect of neglected bending is that of a run before: {str(error).splitlines()[0]}"
+            for line in self.lines.values():
+                line.note("error uncertain", text)
+            return
+        for name, line in self.lines.items():
+            if line.estimate is not None:
+                line.takes_model_errors(found[name])
+
+    def _in_shorter_steps(self) -> Samples | None:
+        """The first of the runs to compare with in steps as short as those of the result; None: it fails."""
+        coarse = {name: x.comparisons[0] for name, x in self.lines.items() if x.comparisons is not None}
+        finely = {k: x.resolution.coarser(1.0, 1.0 / COARSER) for k, x in coarse.items()}
+        finely = {k: replace(x, every=coarse[k].every, follow=False) for k, x in finely.items()}
+        try:
+            return self._counted(self.case.sample(NetworkResolution(finely)))
         except ComputationError:
             return None
 
-    def _counted(self, run: RunSample) -> RunSample:
-        self.runs.append(run.cpu)
+    def _counted(self, run: Samples) -> Samples:
+        self.runs.append(next(iter(run.values())).cpu)
         return run
 
-    def first_estimate(self, result: RunSample) -> bool:
-        """Compare the first result with the coarser runs; False: they say nothing of its errors."""
-        if self.comparisons is not None and result.touches and not self.comparisons[0].touches:
-            self.comparisons = self._compute_comparisons(self.first or result.resolution)  # with contact now
-        if self.comparisons is None:
-            self._notes += result.notes
-            return False
-        estimate = Estimate(result, *self.comparisons, self.from_rest, self.rubs)
-        if estimate.share_unknown and (faster := self._in_shorter_steps(self.comparisons[0])) is not None:
-            estimate.show_steps(faster)
-        self.excess = snap_excess(result.forces, self.comparisons[0].forces)
-        if not self.irregular:  # else statistics count all steps
-            estimate.between = errors_between(self.times, result, self.comparisons[0], self.comparisons[2])
-        self.extremes = ExtremeErrors.of(result, *self.comparisons) if result.extremes and self.moves else None
-        self._set_statistics(result, *self.comparisons)
-        if not estimate.has_mesh:
-            few = f"{result.cells} cells are so few that there is nothing coarser to compare with; mesh: at least 8"
-            if self.free.follows:
-                few = (
-                    "cells follow the curvature, and nearly all are base cells, which stay: coarser runs have the same "
-                    "ones; a smaller model.curvature_error, or fewer base cells (mesh.cells)"
-                )
-            self._notes.append(("no error figure", f"no error figure: {few}"))
-            self._notes += [*result.notes, *estimate.notes]
-            return False
-        if self.moves and not estimate.has_step:
-            text = (
-                "the share of the time step is not known: runs with longer steps fail, or are halved to what they were"
-            )
-            fix = "ask for a smaller error" if self.free.steps else "leave time.step out"
-            self._notes.append(("error uncertain", f"{text}; the error may be larger; {fix}"))
-        self.estimate, self.comparisons = estimate, None
-        return True
-
-    def next_estimate(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
-        """Take over a finer result; where its zones are others, runs to compare with are computed anew."""
-        stricter = resolution.zones < estimate.run.resolution.zones
-        if stricter and estimate.differs_in_zones(result):
-            self.comparisons = self._compute_comparisons(resolution)
-            if self.comparisons is not None and self.first_estimate(result):
-                return
-        self.excess = snap_excess(result.forces, estimate.run.forces)
-        estimate.between = finer_between(self.times, estimate.between, result, estimate.run)
-        estimate.update(result)
-        self.extremes = self.extremes and self.extremes.after(result)
-        if self.statistics:
-            found = statistics_of(result, self._every)
-            for name, of_statistic in self.statistics.items():
-                of_statistic.update(found[name])
-        if stricter and not resolution.follow:
-            self._renew_model_errors(estimate, resolution)
-
-    def _set_statistics(self, result: RunSample, *comparisons: RunSample | None) -> None:
-        """What errors of extremes and standard deviations are estimated by: the outputs that all runs have."""
-        if not self.moves or not (self.irregular or (self.asked is not None and not self.asked.instant)):
-            return
-        coarse, rough, coarsest = comparisons
-        assert coarse is not None
-        self._every = max(run.every for run in comparisons if run is not None)
-        self._of_statistics = partial(estimates, result, coarse, rough, coarsest, self._every)
-
-    def _renew_model_errors(self, estimate: Estimate, resolution: Resolution) -> None:
-        """Zones are others than those whose model error is known: follow it on the mesh of the result."""
-        longer = resolution.coarser(1.0, COARSER if self.moves else 1.0)
-        try:
-            run = self._counted(self.sample(replace(longer, follow=True)))
-            estimate.set_model_errors(run)
-            if self.statistics:
-                found = statistics_of(run, self._every)
-                for name, of_statistic in self.statistics.items():
-                    of_statistic.set_model_errors(found[name])
-        except ComputationError as error:
-            text = f"the effect of neglected bending is that of a run before: {str(error).splitlines()[0]}"
-            self._notes.append(("error uncertain", text))
-
-    def next_resolution(self) -> Resolution | None:
-        """The resolution of the next result; None: what is asked is met, or more of it would not help."""
-        assert self.estimate is not None
-        if self.asked is None:
-            return None
-        run, before, asked = self.estimate.run, self._ratio, self._asked_further(self.asked)
-        verdict = self.verdict(asked)
-        if verdict.limit or asked.limits != self.asked.limits:  # what is asked of a limit, and judged, has changed
-            before = np.inf
-        while verdict.ratio > 1.0 and self._leaves_out(verdict, verdict.ratio / before):
-            verdict, before = self.verdict(asked), np.inf
-        if not self.irregular and self._slow_from is None:
-            self.statistics = {}  # it is judged at every instant from now on
-        before *= 1.0 if self.irregular else self.estimate.revised.get(RAW.get(verdict.name, ""), 1.0)
-        self._ratio, falls = verdict.ratio, verdict.ratio / before  # 0 for the first
-        self._judged += 1
-        most = MOST_REFINEMENTS if self.moves else REFINEMENTS_AT_REST
-        left = (IRREGULAR_REFINEMENTS if self.irregular else most) + 1 - self._judged
-        stalls = falls > STALLED or (left > 0 and verdict.ratio * falls**left > 1.0)
-        hopeless = left <= 0 or (stalls if self.moves else run.cells >= CELLS_AT_REST)
-        along = self.asked.asks("curvature") or self.asked.asks("bending_moment")
-        sharp = run.unresolved and self.free.mesh and (along or not self.irregular)  # else at the instant of a snap
-        met = verdict.ratio <= 1.0 and not sharp
-        if met or hopeless or sum(self.runs) > MOST_CPU or self._by_chance(verdict):
-            return None
-        if self.irregular:  # what neglected bending does to it is known as a bound alone, which moves no zones
-            found = refined(run.resolution, verdict, self.free._replace(zones=False), IRREGULAR_FINER)
-            now = run.resolution
-            worth = found and max(found.fineness / now.fineness, now.step / max(found.step, 1e-300)) >= WORTH_REPEATING
-            return found if worth else None
-        if self.estimate.share_unknown or RAW.get(verdict.name, verdict.name) in self.estimate.shares_mixed:
-            verdict = replace(verdict, time=max(verdict.time, verdict.mesh))  # either may be to blame
-        found = refined(run.resolution, verdict, self.free)
-        if found is None or (self.moves and not verdict.limit) or found.fineness == run.resolution.fineness:
-            return found
-        # cells that are hardly shorter lie otherwise beside edges of contact: their change says little of what is left;
-        # and what is used of a limit grows by about its error, so that less is left
-        return replace(found, fineness=max(found.fineness, COARSER * run.resolution.fineness))
-
-    def _asked_further(self, asked: RequestedAccuracy) -> RequestedAccuracy:
-        """What a finer result may still bring: not what limits ask for whose extremes a finer one showed no better."""
-        if self.extremes is None:
-            return asked
-        return replace(asked, limits=tuple(x for x in asked.limits if not self.extremes.stalls(x.limit)))
-
-    def _leaves_out(self, verdict: Verdict, falls: float) -> bool:
-        """Whether what misses does not converge, and is not judged from now on: every instant, then a largest force."""
-        if self.asked is None or self.asked.instant or verdict.limit:
-            return False
-        name = RAW.get(verdict.name, verdict.name)
-        if not self.irregular:
-            assert self.estimate is not None
-            return self._turns_out_to_snap(self.estimate, name, falls)
-        if not self.statistics:
-            return False
-        estimate, of_largest = self.statistics[LARGEST], verdict.statistic == LARGEST
-        diverges = falls > STALLED or estimate.falls.get(name, np.nan) > DIVERGES
-        if not (diverges or (of_largest and is_chance(self.statistics, LARGEST, name))):
-            return False
-        if verdict.statistic != LARGEST or verdict.name not in END_FORCES.values():
-            return False
-        if self._left_out:
-            return False
-        self.scattered = [name for raw, name in END_FORCES.items() if raw in estimate.order]  # a snap pulls at both
-        return True
-
-    def _turns_out_to_snap(self, estimate: Estimate, name: str, falls: float) -> bool:
-        """Whether values at an instant do not converge, because the line snaps: in two slow falls, one after the other.
-
-        Each is between runs of which one is twice as fine: in the runs that the first result is compared with, and from
-        that to a finer one.  One alone is that of coarse runs, also of a regular motion that converges.
-        """
-        run = estimate.run
-        if self._slow_from is None:
-            slow = self._judged == 0 and self.moves and estimate.falls.get(name, np.nan) > DIVERGES
-            self._slow_from = [float(run.cells), float(run.steps)] if slow else None
-            return False
-        if falls <= STALLED:
-            self._slow_from = None
-            return False
-        cells, steps = run.cells / self._slow_from[0], run.steps / self._slow_from[1]
-        twice = (cells >= TWICE or not self.free.mesh) and (steps >= TWICE or not self.free.steps)
-        self.irregular = twice and falls > STALLED and snaps(run) and resolves_snaps(run)
-        return self.irregular
-
-    def _by_chance(self, verdict: Verdict) -> bool:
-        """Whether what misses is an end force that another run would differ in as much, however fine."""
-        name = RAW.get(verdict.name, "")
-        if not self.irregular or not name or verdict.statistic not in self.statistics:
-            return False
-        diverges = self.statistics[verdict.statistic].falls.get(name, np.nan) > DIVERGES
-        return bool(diverges) or is_chance(self.statistics, verdict.statistic, name)
-
-    def note_missed(self, verdict: Verdict) -> None:
-        """Say that what was asked is not met, whose doing it is, and what to try."""
-        text = missed(verdict, self.free, len(self.runs), self._by_chance(verdict), self.stopped)
-        self._notes.append(("accuracy missed", text))
+    # --- checkpoints ----------------------------------------------------------------------------
 
     def checkpoint(self) -> Tree:
         """What it has found until now, as named arrays and plain values."""
         return {
-            "runs": np.array(self.runs), "next": self.next and resolution_tree(self.next),
-            "first": self.first and resolution_tree(self.first),
-            "coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons],
-            "estimate": self.estimate and self.estimate.checkpoint(),
-            "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
-            "scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice),
-            "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self._notes),
-            "budget": self.budget.checkpoint() if self.budget is not None else [],
-            "extremes": self.extremes and self.extremes.checkpoint(),
-            "slow": list(self._slow_from or ()), "places": self.places if self.places is not None else ALL,
+            "runs": np.array(self.runs), "next": self.next and _tree(self.next),
+            "first": self.first and _tree(self.first),
+            "budget": self.budget.checkpoint() if self.budget is not None else [], "notes": list(self.notes),
+            "touching": self._touching, "lines": {name: x.checkpoint() for name, x in self.lines.items()},
         }  # fmt: skip
 
     def restore(
-        self, tree: Mapping[str, Any], scene: LineScene, points: OutputPoints, source: Path | None = None
-    ) -> None:
-        """Continue as `checkpoint` has said; points: of the result.  source: its file; runs to compare with whose
-        outputs are no longer beside it are computed again.
+        self, tree: Mapping[str, Any], scenes: Mapping[str, LineScene], points: Mapping[str, OutputPoints],
+        source: Path | None = None, kept: NetworkResolution | None = None,
+    ) -> None:  # fmt: skip
+        """Continue as `checkpoint` has said; scenes, points: of the lines, as of the result.
 
-        ResultError or ValueError: it is none of this scene.
+        source: its file; kept: how finely it was computed.  Runs to compare with whose outputs are no longer beside it
+        are computed again.  ResultError or ValueError: it is none of this scene.
         """
-        template = {
-            "runs": np.zeros(0),
-            "slow": [0.0] * len(tree.get("slow", ())),
-            "ratio": np.inf,
-            "finer": 0,
-            "every": 1,
-            "irregular": False,
-        }
-        template |= {"excess": np.zeros(2), "places": ALL, "extremes": None}
-        names = ("next", "first", "coarse", "estimate", "statistics", "scattered", "notes", "choice", "budget")
-        # not in every checkpoint of 0.6
-        older = {"choice": ["", ""], "first": None, "excess": np.zeros(2), "budget": [], "slow": [], "places": ALL}
-        older |= {"extremes": None}  # nor in 1.0
-        saved = matched(older | dict(tree), template | dict.fromkeys(names), "error control")
-        places = saved["places"]
-        if places.size and not np.array_equal(places, compared_places(points)):
-            raise ValueError("runs are compared at other output points than those of this scene")
-        shape = len(output_times(scene)) + 1, places.size or points.s.size, points.jumps.size
-        self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
-        self._every, self.irregular, self.excess = saved["every"], saved["irregular"], saved["excess"]
-        self._slow_from = list(saved["slow"]) or None
-        if self._every < 1:
-            raise ValueError("statistics of no outputs")
-        self._notes = list(restored_notes(saved["notes"]))
-        self.next, self.first = (x and resolution_from(x, scene) for x in (saved["next"], saved["first"]))
+        tree = _as_now(tree, scenes, kept)
+        template: Tree = {"runs": np.zeros(0), "touching": True}
+        names = ("next", "first", "lines", "budget", "notes")
+        saved = matched(
+            {"touching": True, "notes": [], "first": None, "budget": []} | dict(tree),
+            template | dict.fromkeys(names),
+            "error control",
+        )
+        self.runs[:] = saved["runs"].tolist()
+        self._touching, self.notes = saved["touching"], list(restored_notes(saved["notes"]))
+        self.next, self.first = (x and _resolution(x, scenes) for x in (saved["next"], saved["first"]))
         if self.budget is not None and saved["budget"]:
             self.budget.restore(matched(saved["budget"], [0.0, 0.0], "budget"))
-        if saved["coarse"] is not None:
-            try:
-                first, second, third = (
-                    x and replace(restored_sample(x, scene, shape, source), places=places) for x in saved["coarse"]
-                )
-                self.comparisons = first, second, third
-            except MissingRows:
-                self._lost = True
-        if saved["estimate"] is not None:
-            self.estimate = Estimate.restored(saved["estimate"], scene, shape)
-            self.estimate.run = replace(self.estimate.run, places=places)
-            if saved["extremes"]:
-                self.extremes = ExtremeErrors.restored(saved["extremes"], self.estimate.run)
-        if saved["statistics"]:
-            trees = matched(saved["statistics"], dict.fromkeys(STATISTICS), "statistics")
-            self.statistics = {name: StatisticEstimate.restored(x, scene, (1, *shape[1:])) for name, x in trees.items()}
-        self.choice = ModelChoice(*matched(saved["choice"], ["", ""], "choice"))
-        if self.choice.kind not in ("", *WORDS):
-            raise ValueError(f"model chosen: got {self.choice.kind!r}, expected one of {', '.join(WORDS)}")
-        self.scattered = [name for name in END_FORCES.values() if name in list(saved["scattered"])]
-        if self.next is None and self.estimate is None:
+        if set(saved["lines"]) - set(scenes):
+            raise ValueError("errors of other lines")
+        for name, line in saved["lines"].items():
+            on_disk = name if len(scenes) > 1 else ""
+            self._lost |= not self.lines[name].restore(line, scenes[name], points[name], source, on_disk)
+        self.standing = {k: x.estimate.run for k, x in self.lines.items() if x.estimate is not None}
+        if self.next is None and not self.known:
             raise ValueError("neither a result nor one that is to come")
+
+
+def _of_line(faster: Callable[[], Samples | None], name: str) -> RunSample | None:
+    found = faster()
+    return None if found is None else found[name]
+
+
+def _finely(runs: Samples) -> NetworkResolution:
+    return NetworkResolution({name: x.resolution for name, x in runs.items()})
+
+
+def _tree(resolution: NetworkResolution) -> Tree:
+    return {name: resolution_tree(x) for name, x in resolution.lines.items()}
+
+
+def _resolution(tree: Any, scenes: Mapping[str, LineScene]) -> NetworkResolution:
+    if set(tree) != set(scenes):
+        raise ValueError("resolutions of other lines")
+    return NetworkResolution({name: resolution_from(tree[name], x) for name, x in scenes.items()})
+
+
+def _as_now(
+    tree: Mapping[str, Any], scenes: Mapping[str, LineScene], kept: NetworkResolution | None
+) -> Mapping[str, Any]:
+    """A checkpoint of before as one of now: of a cable, or how finely several lines were computed first."""
+    if "lines" in tree:
+        return tree
+    if "estimate" not in tree:
+        return {"runs": np.zeros(0), "next": kept and _tree(kept), "first": tree, "lines": {}}
+    (name,) = scenes
+    of_all = {key: tree[key] for key in ("runs", "budget") if key in tree}
+    finely = {key: tree[key] and {name: tree[key]} for key in ("next", "first") if key in tree}
+    return of_all | finely | {"lines": {name: tree}}

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,16 +15,19 @@ import numpy as np
 from hybrid.accuracy.error_control import ErrorController
 from hybrid.accuracy.errors_by_cause import Errors, summary
 from hybrid.accuracy.extreme_errors import figures as extreme_figures
+from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.refinement import END_FORCE, asked_quantities, asked_text, figures, not_asked_text, sizes_of
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.plan import output_times
 from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.bounded_model_errors import bounded
+from hybrid.simulation.case import Case
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
 from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, is_along
-from hybrid.store.amend import NOTHING_MORE, Happened, amend
+from hybrid.store.amend import NOTHING_MORE, Block, Happened, Part, amend
 from hybrid.store.format import Field
 from hybrid.store.limits import EXTREME_ERRORS
+from hybrid.store.lines import GROUP
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import not_converged_attribute
 from hybrid.store.whole_file import LateFile
@@ -42,36 +46,91 @@ CAUSES = {
 }  # fmt: skip
 
 
+Attributes = Mapping[str, str | float | int]
+
+
 def write_errors(
-    target: Path | io.BytesIO | LateFile, scene: LineScene, control: ErrorController, result: RunSample,
-    errors: Errors | None, cpu: float, before: Tree | None = NOTHING_MORE,
+    target: Path | io.BytesIO | LateFile, case: Case, control: ErrorController, cpu: float,
+    before: Tree | None = NOTHING_MORE,
 ) -> None:  # fmt: skip
-    """Add errors (None: they could not be estimated), attributes and events to a complete result.
+    """Add errors, attributes and events of all lines to the complete result of a case.
 
     cpu: s, of all passes; before: as of `amend`.
     """
-    attributes = effort(scene, control, result, cpu)
+
+    @cache
+    def lost() -> Mapping[str, LostBy]:
+        from hybrid.accuracy.free_vibrations import lost_by_lines
+
+        return lost_by_lines(case.scene, control.standing)
+
+    found = {
+        name: _of_line(case, control, name, cpu, lambda name=name: lost().get(name, {}))  # type: ignore[misc]
+        for name in control.standing
+    }
+    if case.flat:
+        (report,) = found.values()
+        amend(target, [report.part("", control.notes)], before)
+        return
+
+    def of_all(_: Happened) -> tuple[Attributes, list[tuple[str, str]]]:
+        known = [x.attributes for x in found.values()]
+        keys = {x for each in known for x in each if x.startswith("error_")}
+        largest: dict[str, str | float | int] = {x: max(float(each[x]) for each in known if x in each) for x in keys}
+        largest |= {"effort_runs": len(control.runs), "effort_cpu": cpu}
+        largest |= not_converged_attribute(control.lines[name].diverging for name in found)
+        events = [(kind, f"line {name}: {text}") for name, x in found.items() for kind, text in x.events]
+        return largest, [*control.notes, *events]
+
+    parts = [x.part(f"{GROUP}/{name}", ()) for name, x in found.items()]
+    amend(target, [*parts, Part("", (), (), of_all)], before)
+
+
+@dataclass
+class Report:
+    """What is added to the result of a line; attributes and events: once its errors are written."""
+
+    fields: list[Field]
+    blocks: Iterable[Block]
+    others: Callable[[Happened], tuple[dict[str, str | float | int], list[tuple[str, str]]]]
+    attributes: Attributes = field(default_factory=dict)
+    events: Sequence[tuple[str, str]] = ()
+
+    def part(self, group: str, notes: Sequence[tuple[str, str]]) -> Part:
+        """As part of a result; notes: events beside those of the line."""
+
+        def others(happened: Happened) -> tuple[Attributes, list[tuple[str, str]]]:
+            self.attributes, self.events = self.others(happened)
+            return self.attributes, [*self.events, *notes]
+
+        return Part(group, self.fields, self.blocks, others)
+
+
+def _of_line(case: Case, control: ErrorController, name: str, cpu: float, vibrations: Callable[[], LostBy]) -> Report:
+    """What is added to the result of a line; cpu: s, of all passes; vibrations: as of `known`."""
+    line, result, scene = control.lines[name], control.standing[name], case.lines[name]
+    errors = line.estimate.errors if line.estimate is not None else None
+    attributes = effort(scene, line, result, cpu)
     fields = error_fields(result, errors) if errors is not None else []
-    names = {field.name for field in fields}
+    names = {x.name for x in fields}
 
-    def blocks() -> Iterator[tuple[str, int, np.ndarray]]:
-        for cause, name, begin, values in errors.blocks() if errors is not None else ():
-            if f"errors/{cause}/{name}" in names:
-                along = result.places.size and is_along(name)
-                yield f"errors/{cause}/{name}", begin, at_all_points(values, result.places) if along else values
+    def blocks() -> Iterator[Block]:
+        for cause, quantity, begin, values in errors.blocks() if errors is not None else ():
+            full = f"errors/{cause}/{quantity}"
+            if full in names:
+                along = result.places.size and is_along(quantity)
+                yield full, begin, at_all_points(values, result.places) if along else values
 
-    def known_then(happened: Happened) -> tuple[Mapping[str, str | float | int], list[tuple[str, str]]]:
-        from hybrid.accuracy.free_vibrations import of_cable
-
-        found, notes = known(scene, control, result, errors, happened, partial(of_cable, scene, result))
-        if control.asked is not None:
-            found["accuracy_verdicts"] = accuracy_figures(control, result, errors)
+    def others(happened: Happened) -> tuple[dict[str, str | float | int], list[tuple[str, str]]]:
+        found, notes = known(scene, line, result, errors, happened, vibrations)
+        if line.asked is not None:
+            found["accuracy_verdicts"] = accuracy_figures(line, result, errors)
         return attributes | found, notes
 
-    amend(target, fields, blocks(), known_then, before)
+    return Report(fields, blocks(), others)
 
 
-def accuracy_figures(control: ErrorController, result: RunSample, errors: Errors | None) -> str:
+def accuracy_figures(control: LineErrors, result: RunSample, errors: Errors | None) -> str:
     """What is asked of each quantity and its error, as the attribute of a result; errors: None: they are not known."""
     assert control.asked is not None
     of = [x.errors for x in control.statistics.values()] if control.irregular else [errors]
@@ -79,7 +138,7 @@ def accuracy_figures(control: ErrorController, result: RunSample, errors: Errors
     return json.dumps(figures(control.asked, known, result, control.scattered, control.extremes))
 
 
-def effort(scene: LineScene, control: ErrorController, result: RunSample, cpu: float) -> dict[str, str | float | int]:
+def effort(scene: LineScene, control: LineErrors, result: RunSample, cpu: float) -> dict[str, str | float | int]:
     """What was spent on a result, and what was asked, as its attributes; cpu: s, of all passes."""
     resolution = result.resolution
     attributes: dict[str, str | float | int] = {
@@ -97,7 +156,7 @@ def effort(scene: LineScene, control: ErrorController, result: RunSample, cpu: f
 
 
 def known(
-    scene: LineScene, control: ErrorController, result: RunSample, errors: Errors | None, happened: Happened,
+    scene: LineScene, control: LineErrors, result: RunSample, errors: Errors | None, happened: Happened,
     vibrations: Callable[[], LostBy],
 ) -> tuple[dict[str, float | str], list[tuple[str, str]]]:  # fmt: skip
     """The largest errors, as attributes, and events of a result; happened: its events until now; vibrations: finds what

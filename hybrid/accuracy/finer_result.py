@@ -17,11 +17,12 @@ from hybrid.accuracy.error_order import magnitude
 from hybrid.accuracy.error_statistics import LARGEST, STATISTICS, StatisticEstimate
 from hybrid.accuracy.extreme_errors import ExtremeErrors
 from hybrid.accuracy.refinement import RAW, Verdict, bounds_of, judge
-from hybrid.model.resolution import RequestedAccuracy, Resolution
-from hybrid.simulation.run_sample import RunSample
+from hybrid.model.network import NetworkResolution
+from hybrid.model.resolution import RequestedAccuracy
+from hybrid.simulation.run_sample import RunSample, Samples
 
 Target = Path | io.BytesIO
-Record = Callable[[Resolution, Target], RunSample]
+Record = Callable[[NetworkResolution, Target], Samples]
 T = TypeVar("T")
 
 # The kind of event that says a finer run is not returned.
@@ -189,13 +190,14 @@ class FinerResult(Replacement):
     """Records results one after the other, those after the first beside it."""
 
     def __init__(
-        self, target: Target, first: Record, refinement: Record, waits: Callable[[bool], bool] = lambda kept: False
-    ) -> None:
-        super().__init__(target, waits, goes_on=True)
+        self, target: Target, first: Record, refinement: Record, waits: Callable[[bool], bool] = lambda kept: False,
+        goes_on: bool = True,
+    ) -> None:  # fmt: skip
+        super().__init__(target, waits, goes_on)
         self._first, self._refinement = first, refinement
         self._done = False
 
-    def __call__(self, resolution: Resolution) -> RunSample:
+    def __call__(self, resolution: NetworkResolution) -> Samples:
         if not self._done:
             found, self._done = self._first(resolution, self.target), True
             return found

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from itertools import pairwise
 from math import pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -30,11 +30,8 @@ from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_a
 from hybrid.linear.rest import Rest, line_at_rest, system_at_rest
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.motion_tables import Motion
-from hybrid.scene.network_scene import Network
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE
-from hybrid.simulation.run_sample import END_FORCES, RunSample
+from hybrid.simulation.run_sample import END_FORCES, RunSample, Samples
 from hybrid.simulation.static_case import StaticCase
 
 RAW = {shown: raw for raw, shown in END_FORCES.items()}
@@ -108,20 +105,19 @@ def uncertain_by_vibrations(
     return [("error uncertain", text)]
 
 
-def of_cable(scene: LineScene, result: RunSample) -> LostBy:
-    """By quantity, what steps of the result of one cable make of free vibrations; empty where none is left, or it is
+def lost_by_lines(asked: Any, result: Samples) -> Mapping[str, LostBy]:
+    """By line and quantity, what steps of a result make of free vibrations; empty where none is left, or it is not
 
-    not known.
+    known.
     """
-    if result.touches:
+    if any(x.touches for x in result.values()):
         return {}
-    found = lost_vibrations(scene, lambda: line_at_rest(StaticCase(scene), result.resolution), result.forces[:, 0])
-    return found.get(LINE, {})
+    finely = NetworkResolution({name: x.resolution for name, x in result.items()})
 
+    def rest() -> Rest:
+        return system_at_rest(asked, finely) if asked.line_names else line_at_rest(StaticCase(asked), finely.one)
 
-def of_system(system: Network, resolution: NetworkResolution, times: Floats) -> Mapping[str, LostBy]:
-    """The same of several lines, by their names; times: (n,) s, ends of the steps of the result."""
-    return lost_vibrations(system, lambda: system_at_rest(system, resolution), times)
+    return lost_vibrations(asked, rest, next(iter(result.values())).forces[:, 0])
 
 
 def lost_vibrations(asked: Scene, rest: Callable[[], Rest], times: Floats) -> Mapping[str, LostBy]:

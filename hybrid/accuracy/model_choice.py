@@ -6,13 +6,14 @@ that it needs.  docs/zone_rules.md
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from math import ceil, isinf
 
 from hybrid.model.build import Model
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.model_costs import (
-    NAMED,
+    REST,
     ModelChoice,
     cheapest,
     costs,
@@ -21,35 +22,18 @@ from hybrid.model.model_costs import (
     reasons,
     rods_of_zones,
     structural,
-    with_model,
 )
-from hybrid.model.resolution import Resolution, for_motion, model_is_free, wants_survey
+from hybrid.model.network import NetworkResolution
+from hybrid.model.resolution import Resolution, model_is_free, wants_survey
 from hybrid.model.run_time import foretold_steps
 from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.initial_zones import HOLD
-from hybrid.simulation.layer_mesh import layered, survey_of
-from hybrid.simulation.mesh_survey import Survey, lack_along, with_survey
-from hybrid.simulation.static_case import StaticCase
+from hybrid.simulation.mesh_survey import CELLS, STEPS, Survey, lack_along, with_survey
 from hybrid.simulation.zone_switching import LONGEST_IN_PACE, READY
 
 # Why a line may be no catenary that has come near itself in a pre-run.
 NEAR = "it comes near itself, and contact of catenaries alone is not asked for"
-
-
-def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
-    """Give the scene of a case the model that costs least; with cells, and zones, as a pre-run of rods asks for."""
-    scene = case.scene
-    case.scene = with_model(scene, "rod")
-    survey, coarse = survey_of(case, resolution)
-    if survey is None:
-        failed = ModelChoice("rod", "the pre-run that would show what others cost failed")
-        return failed, replace(resolution, grading=coarse.grading)
-    near = NEAR if case.came_near_itself else ""
-    choice, resolution = choice_of(scene, case.scene, survey, resolution, near)
-    if choice.kind != "rod":
-        case.scene = with_model(scene, choice.kind)
-    return choice, resolution
 
 
 def choice_of(
@@ -81,32 +65,47 @@ def _steps_of_zones(scene: LineScene, model: Model, resolution: Resolution) -> f
     return max(1.0, time.duration / longest / rods)
 
 
-def chosen_and_surveyed(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
-    """The model, if the scene names none, and cells by a pre-run, if it wants one."""
-    if not wants_survey(case.scene):
-        return NAMED, layered(case, resolution)
-    if case.criterion is None and model_is_free(case.scene):
-        return choose_model(case, resolution)
-    return NAMED, surveyed(case, resolution)
+def chosen_and_surveyed(
+    case: Case, resolution: NetworkResolution, chosen: Collection[str] = ()
+) -> tuple[dict[str, ModelChoice], NetworkResolution]:
+    """Models for lines whose scene names none, and cells by a pre-run for those that want one.
+
+    chosen: lines whose model has been chosen already.
+    """
+    resolution = case.layered(resolution)
+    scenes = {name: x for name, x in case.lines.items() if wants_survey(x)}
+    open_yet = [x for x, scene in scenes.items() if x not in chosen and model_is_free(scene, case.moves)]
+    choices = dict[str, ModelChoice]()
+    if not scenes:
+        return choices, resolution
+    if not case.moves:
+        choices = dict.fromkeys(open_yet, ModelChoice("rod", REST))
+        case.scene, open_yet = case.with_models(dict.fromkeys(open_yet, "rod")), []
+        scenes = {name: case.lines[name] for name in scenes}
+    if case.criterion is not None:
+        open_yet = []
+    # of rods, which alone show what zones would leave out of a bend
+    moving = [name for name, x in scenes.items() if name in open_yet or isinstance(x.model, AdaptiveModel)]
+    rods = case.with_models(dict.fromkeys(moving, "rod"))
+    with case.instead(rods):
+        coarse = case.shown(resolution.coarser(CELLS, STEPS if case.moves else 1.0))
+        surveys, of_rods = case.survey(resolution, coarse), case.lines
+    if surveys is None:
+        failed = ModelChoice("rod", "the pre-run that would show what others cost failed")
+        case.scene = case.with_models(dict.fromkeys(open_yet, "rod"))
+        return choices | dict.fromkeys(open_yet, failed), _placed_as(resolution, coarse, {*open_yet, *chosen})
+    finely = dict(resolution.lines)
+    for name, scene in scenes.items():
+        if name in open_yet:
+            near = NEAR if name in case.near_themselves else ""
+            choices[name], finely[name] = choice_of(scene, of_rods[name], surveys[name], finely[name], near)
+        else:
+            finely[name] = with_survey(finely[name], scene, surveys[name])
+    case.scene = case.with_models({name: choices[name].kind for name in open_yet})
+    return choices, NetworkResolution(finely)
 
 
-def surveyed(case: Case | StaticCase, resolution: Resolution) -> Resolution:
-    """With cells, and zones, as a pre-run asks for: of rods, which alone show what zones would leave out of a bend."""
-    scene = case.scene
-    if isinstance(scene.model, AdaptiveModel):
-        case.scene = with_model(scene, "rod")
-    try:
-        survey, _ = survey_of(case, resolution)
-    finally:
-        case.scene = scene
-    return with_survey(resolution, scene, survey)
-
-
-def rods_instead(case: Case, resolution: Resolution, why: str) -> tuple[ModelChoice, Resolution]:
-    """Give the scene of a case rods, after what was chosen has failed; how finely it is computed then."""
-    case.scene = with_model(case.scene, "rod")
-    choice = ModelChoice("rod", f"catenaries, which cost less, were tried: {why}")
-    survey, coarse = survey_of(case, resolution)
-    if survey is None:
-        return choice, replace(resolution, grading=coarse.grading)
-    return choice, replace(for_motion(resolution, case.scene, survey.reach), grading=survey.grading())
+def _placed_as(resolution: NetworkResolution, coarse: NetworkResolution, names: Collection[str]) -> NetworkResolution:
+    """With the cells of a pre-run that failed, as the equilibrium has placed them, of lines with these names."""
+    found = {k: replace(x, grading=coarse.lines[k].grading) if k in names else x for k, x in resolution.lines.items()}
+    return NetworkResolution(found)

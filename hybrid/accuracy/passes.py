@@ -10,41 +10,40 @@ import io
 import time as clock
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hybrid.accuracy.budget import Budget
 from hybrid.accuracy.error_control import ErrorController, comparison_resolutions
 from hybrid.accuracy.error_report import write_errors
-from hybrid.accuracy.errors_by_cause import Errors
 from hybrid.accuracy.finer_result import FinerResult
-from hybrid.accuracy.model_choice import chosen_and_surveyed, rods_instead
+from hybrid.accuracy.line_errors import LineErrors
+from hybrid.accuracy.model_choice import chosen_and_surveyed
 from hybrid.accuracy.refinement import WORTH_WRITING, Free, times_the_cost
 from hybrid.errors import ComputationError
 from hybrid.model.build import zone_plans
 from hybrid.model.model_costs import NAMED, ModelChoice
+from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
-    Resolution,
-    first_resolution,
     follows_curvature,
     is_irregular,
     may_be_held,
     mesh_is_free,
     requested_accuracy,
     rubs_on_obstacles,
-    wants_errors,
     wants_survey,
     zones_are_free,
 )
 from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import compile_beside
-from hybrid.simulation.mesh_survey import survey_resolution
+from hybrid.simulation.mesh_survey import CELLS, STEPS
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT
 from hybrid.simulation.restart import Remaining
 from hybrid.simulation.restore import refused
-from hybrid.simulation.run_sample import RunSample
+from hybrid.simulation.run_sample import Samples
 from hybrid.store.amend import may_be_amended
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.named_arrays import Tree
@@ -56,32 +55,32 @@ class Passes:
     """Computes a result and, where they are wanted, its errors."""
 
     def __init__(
-        self, case: Case, target: Target, source: Path | None = None, remaining: Remaining[LineScene] | None = None
+        self, case: Case, target: Target, source: Path | None = None, remaining: Remaining[Any] | None = None
     ) -> None:
         """source, remaining: what to continue."""
         self.case, self.target, self.source, self.remaining = case, target, source, remaining
         self.control: ErrorController | None = None
         self._instead: ErrorController | None = None  # of the result in its place, which one of another model will take
+        self._choices = dict[str, ModelChoice]()  # of lines whose model was chosen
         self._begin = clock.process_time()
 
     def compute(self) -> None:
         """All passes."""
         case, remaining = self.case, self.remaining
-        resolution = first_resolution(case.scene) if remaining is None else remaining.resolution.one
-        if not wants_errors(case.scene):
-            self._first(self._surveyed(resolution)[1] if remaining is None else resolution, self.target)
+        resolution = NetworkResolution.of(case.lines) if remaining is None else remaining.resolution
+        if not case.wants_errors:
+            self._first(self._surveyed(resolution) if remaining is None else resolution, self.target)
             return
         target, kept = self.target, False
         assert not isinstance(target, MemoryTarget)
-        case.beside_result = target if isinstance(target, Path) else None
+        case.beside_result = target if isinstance(target, Path) and case.moves else None
         try:
-            result, errors = self._to_the_end(resolution, target)
-            assert self.control is not None
-            self._write(self.control, result, errors)
+            self._write(self._to_the_end(resolution, target))
         except KeyboardInterrupt:
             standing = self._standing()
-            if standing is not None:
-                self._write(standing, *standing.without_refinement("a finer run was stopped from outside"), done=False)
+            if standing is not None and case.moves:
+                standing.without_refinement("a finer run was stopped from outside")
+                self._write(standing, done=False)
             self._place()
             kept = self.control is not None and isinstance(target, Path) and target.exists()  # it can be resumed
             raise
@@ -96,76 +95,82 @@ class Passes:
             if late is not None:
                 late.place()
 
-    def _to_the_end(self, resolution: Resolution, target: Path | io.BytesIO) -> tuple[RunSample, Errors | None]:
+    def _to_the_end(self, resolution: NetworkResolution, target: Path | io.BytesIO) -> ErrorController:
         """The result, as fine as it takes, and its errors; with rods where catenaries that were chosen do not do."""
         case, remaining = self.case, self.remaining
-        compute = FinerResult(target, self._first, self._finer, case.settle)
+        compute = FinerResult(target, self._first, self._finer, case.settle, goes_on=case.moves)
         if remaining is not None and remaining.before:
             control = self._controls(compute)
             with refused(self.source or Path()):
-                control.restore(remaining.before, case.scene, case.points, self.source)
-            if control.places is not None:
-                case.places = control.places
+                control.restore(remaining.before, case.lines, case.points, self.source, resolution)
+            case.places |= {name: x.places for name, x in control.lines.items() if x.places is not None}
             go_on = control.proceed
         else:
-            choice, resolution = self._surveyed(resolution) if remaining is None else (NAMED, resolution)
-            control = self._controls(compute, choice)
-            first = replace(resolution, follow=_has_joints(case.scene))
+            resolution = self._surveyed(resolution) if remaining is None else resolution
+            control = self._controls(compute)
+            first = _followed(resolution, case)
 
-            def go_on() -> tuple[RunSample, Errors | None]:
-                return control.start(first)
+            def go_on() -> None:
+                control.start(first)
 
-        failed = ""
+        tried = control.chosen
         try:
-            result, errors = go_on()
-            failed = control.model_misses
+            go_on()
+            failed = {name: x.model_misses for name, x in control.lines.items() if name in tried and x.model_misses}
+            if not failed:
+                return control
+            self._instead = self._standing()
         except ComputationError as error:
-            if control.choice.kind != "catenary":
+            name = error.line_name or next(iter(case.lines))
+            if name not in tried:
                 raise
-            failed = str(error).splitlines()[0]
+            failed = {name: str(error).splitlines()[0]}
             if case.late_file is not None:
                 case.late_file.drop()
                 case.late_file = None
             emptied(target, error)
-            compute = FinerResult(target, self._anew, self._finer, case.settle)
-        if control.choice.kind != "catenary" or not failed:
-            return result, errors
-        self._instead = self._standing()
-        choice, resolution = rods_instead(case, first_resolution(case.scene), failed)
-        return self._controls(compute, choice).start(resolution)
+            compute = FinerResult(target, self._anew, self._finer, case.settle, goes_on=case.moves)
+        why = "catenaries, which cost less, were tried: "
+        self._choices = {name: x.choice for name, x in control.lines.items() if x.choice.kind}
+        self._choices |= {name: ModelChoice("rod", why + text) for name, text in failed.items()}
+        case.scene = case.with_models({name: "rod" for name in failed})
+        more, resolution = chosen_and_surveyed(case, NetworkResolution.of(case.lines), self._choices)
+        self._choices |= more
+        control = self._controls(compute)
+        control.start(resolution)
+        return control
 
     # --- results --------------------------------------------------------------------------------
 
-    def _first(self, resolution: Resolution, to: Target) -> RunSample:
+    def _first(self, resolution: NetworkResolution, to: Target) -> Samples:
         """The first result, or the rest of it."""
         if self.remaining is None or self.remaining.anew or self.source is None or not isinstance(to, Path):
             return self.case.record(resolution, to, self._found())
         return self.case.resume(self.source, to, self._found())
 
-    def _anew(self, resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
+    def _anew(self, resolution: NetworkResolution, to: Path | io.BytesIO) -> Samples:
         """The first result of another model."""
         return self.case.record(resolution, to, self._found())
 
-    def _finer(self, resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
+    def _finer(self, resolution: NetworkResolution, to: Path | io.BytesIO) -> Samples:
         """A finer result beside the one that is there, or the rest of it."""
         self._stands(resolution)
-        if isinstance(to, Path) and self.case.is_unfinished(to, resolution):
+        if isinstance(to, Path) and self.case.moves and self.case.is_unfinished(to, resolution):
             return self.case.resume(to, to, self._found())
         return self.case.record(resolution, to, self._found())
 
     def _standing(self) -> ErrorController | None:
         """That of the result in its place; None: its errors are not known yet."""
-        known = self.control is not None and self.control.estimate is not None
-        return self.control if known else self._instead
+        return self.control if self.control is not None and self.control.known else self._instead
 
-    def _stands(self, finer: Resolution) -> None:
+    def _stands(self, finer: NetworkResolution) -> None:
         """A finer run begins: the errors of the result in its place are written now, if that takes long."""
         standing = self._standing()
-        if standing is None or standing.estimate is None:
+        if standing is None or not standing.known:
             return
-        run = standing.estimate.run
-        if run.cpu * times_the_cost(run.resolution, finer) > WORTH_WRITING:
-            self._write(standing, run, standing.estimate.errors, done=False)
+        run = next(iter(standing.standing.values()))
+        if run.cpu * times_the_cost(run.resolution, finer.one) > WORTH_WRITING:
+            self._write(standing, done=False)
 
     def _found(self) -> Tree:
         return self.control.checkpoint() if self.control is not None else {}
@@ -179,37 +184,54 @@ class Passes:
         case.late_file = None  # they go into the file alone
         return target
 
-    def _write(self, control: ErrorController, result: RunSample, errors: Errors | None, done: bool = True) -> None:
+    def _write(self, control: ErrorController, done: bool = True) -> None:
         cpu = clock.process_time() - self._begin
-        before = {} if done else control.compared
-        write_errors(self._complete(), self.case.scene, control, result, errors, cpu, before)
+        write_errors(self._complete(), self.case, control, cpu, {} if done else control.compared)
 
     # --- how finely -----------------------------------------------------------------------------
 
-    def _controls(self, compute: FinerResult, choice: ModelChoice = NAMED) -> ErrorController:
+    def _controls(self, compute: FinerResult) -> ErrorController:
         """What chooses how finely the case is computed from now on."""
-        case, scene = self.case, self.case.scene
-        from_rest = scene.initial.kind == "equilibrium" and not any(end.release for end in scene.ends.both)
-        times = output_times(scene)
-        self.control = ErrorController(
-            requested_accuracy(scene), free_in(scene), True, case.sample, compute, case.beside, is_irregular(scene),
-            choice, compute.settle, from_rest, rubs_on_obstacles(scene), np.array([0.0, *times]),
-            Budget(len(times), case.points.s.size), may_be_held(scene),
-        )  # fmt: skip
+        case = self.case
+        lines = {name: self._errors_of(name, scene) for name, scene in case.lines.items()}
+        times = output_times(case.lines[next(iter(lines))]) if case.moves else []
+        budget = Budget(len(times), sum(x.s.size for x in case.points.values())) if case.moves else None
+        self.control = ErrorController(lines, case, compute, compute.settle, budget)
         return self.control
 
-    def _surveyed(self, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
-        """The model, if the scene names none, and cells by a pre-run, if an accuracy is asked for."""
-        case, named = self.case, self.case.scene.model
-        passes = [(PRE_RUN, survey_resolution(resolution))] if wants_survey(case.scene) else []
-        passes += [(RESULT, resolution)]
-        if wants_errors(case.scene):
-            passes += [(ESTIMATION, x) for x in comparison_resolutions(resolution, moves=True)]
-        case.progress.expect(passes, resolution)
-        found = chosen_and_surveyed(case, resolution)
-        if case.scene.model != named:
+    def _errors_of(self, name: str, scene: LineScene) -> LineErrors:
+        """What will be known of the errors of a line."""
+        case = self.case
+        times = output_times(scene) if case.moves else []
+        free = free_in(scene)
+        return LineErrors(
+            requested_accuracy(scene), free if case.moves else free._replace(steps=False), case.moves,
+            case.moves and is_irregular(scene), self._choices.get(name, NAMED), case.from_rest,
+            rubs_on_obstacles(scene), np.array([0.0, *times]), may_be_held(scene),
+        )  # fmt: skip
+
+    def _surveyed(self, resolution: NetworkResolution) -> NetworkResolution:
+        """Models, of lines whose scene names none, and cells by a pre-run, if an accuracy is asked for."""
+        case, asked = self.case, self.case.scene
+        if case.moves:
+            surveyed = any(wants_survey(x) for x in case.lines.values())
+            passes = [(PRE_RUN, resolution.coarser(CELLS, STEPS).one)] if surveyed else []
+            passes += [(RESULT, resolution.one)]
+            if case.wants_errors:
+                passes += [(ESTIMATION, x.one) for x in comparison_resolutions(resolution, moves=True)]
+            case.progress.expect(passes, resolution.one)
+        self._choices, found = chosen_and_surveyed(case, resolution)
+        if case.scene is not asked and case.moves:
             compile_beside(case.scene)
         return found
+
+
+def _followed(resolution: NetworkResolution, case: Case) -> NetworkResolution:
+    """The resolution of a first result, which may follow itself what its model leaves out."""
+    if not (case.flat and case.moves):
+        return resolution
+    follow = _has_joints(case.scene)
+    return NetworkResolution({name: replace(x, follow=follow) for name, x in resolution.lines.items()})
 
 
 def free_in(scene: LineScene) -> Free:

@@ -10,12 +10,13 @@ show a bend.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.payout import payout_of
 from hybrid.scene.analysis import RodModel
 from hybrid.scene.cable import Section
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import Environment, LineScene
 
 if TYPE_CHECKING:  # its tables take long to make
@@ -31,37 +32,36 @@ GRAVITY = 9.81  # m/s2
 class Instead(NamedTuple):
     """What is computed in place of a scene, and the text of the event."""
 
-    scene: LineScene
+    scene: Any
     text: str
 
 
-class LinesInstead(NamedTuple):
-    """The same of several lines."""
-
-    system: Network
-    text: str
-
-
-def rods_instead_of_slack(scene: LineScene, error: ComputationError) -> Instead | None:
+def rods_instead_of_slack(scene: Scene, error: ComputationError) -> Instead | None:
     """A scene with rods in place of catenaries that stood for no model; None: they did not, or did not go slack."""
-    named = "model" in scene.model_fields_set or payout_of(scene) is not None
-    if error.outcome != Outcome.SLACK or error.t is None or named or scene.model.kind != "catenary":
+    if error.outcome != Outcome.SLACK or error.t is None:
+        return None
+    asked: Any = scene
+    return _rods_in_network(asked, error) if scene.line_names else _rods_of_cable(asked, error)
+
+
+def _rods_of_cable(scene: LineScene, error: ComputationError) -> Instead | None:
+    if "model" in scene.model_fields_set or payout_of(scene) is not None or scene.model.kind != "catenary":
         return None
     sections, given = _stiffened(scene.cable.sections, scene.environment)
     cable = scene.cable.model_copy(update={"sections": sections})
     return Instead(scene.model_copy(update={"cable": cable, "model": RodModel()}), _text(error, given))
 
 
-def rods_of_system(system: Network, error: ComputationError) -> LinesInstead | None:
-    """The same of the line of a system that an error names."""
+def _rods_in_network(system: Network, error: ComputationError) -> Instead | None:
+    """Rods in the line that the error names."""
     line = system.lines.get(error.line_name)
-    if error.outcome != Outcome.SLACK or error.t is None or line is None or line.model is not None:
+    if line is None or line.model is not None:
         return None
     sections, given = _stiffened(line.sections, system.environment)
     other = line.model_copy(update={"sections": sections, "model": RodModel()})
     lines = {name: other if name == error.line_name else x for name, x in system.lines.items()}
     text = f"line {error.line_name}: {_text(error, given)}" + "; no other line has changed" * (len(lines) > 1)
-    return LinesInstead(system.model_copy(update={"lines": lines}), text)
+    return Instead(system.model_copy(update={"lines": lines}), text)
 
 
 def _stiffened(sections: tuple[Section, ...], around: Environment) -> tuple[tuple[Section, ...], list[float]]:

@@ -23,12 +23,14 @@ from hybrid.kernels.state.state import State
 from hybrid.model import plan as tables
 from hybrid.model.build import Model, build
 from hybrid.model.contents import with_accuracy
-from hybrid.model.model_costs import NAMED
+from hybrid.model.model_costs import NAMED, ModelChoice, with_model
+from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import NetworkPlan, Plan, count_steps
 from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
 from hybrid.model.run_time import COST_STEP
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import LineScene
+from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import kernels_of
 from hybrid.simulation.network_run import NetworkRun, Recording
@@ -71,12 +73,10 @@ def plan(scene: SceneLike, *, measure: bool = True) -> Any:
     that of a run; False: nothing is computed, and they are estimated from tables, as where kernels are not compiled
     yet.  Of several lines it is a NetworkPlan.
     """
-    scene = as_scene(scene)
-    if not isinstance(scene, LineScene):
-        made = tables.plan(scene)
-        return _measured_lines(scene, made) if measure and scene.time is not None else made
-    found = tables.plan(scene)
-    return _measured(scene, found) if measure and scene.time is not None else found
+    asked: Any = as_scene(scene)
+    made: Any = tables.plan(asked)
+    measured: Any = _measured_lines if asked.line_names else _measured
+    return measured(asked, made) if measure and asked.time is not None else made
 
 
 class Seen(NamedTuple):
@@ -136,7 +136,7 @@ class _Probe(Case):
         self.seen = [Seen(clock.process_time(), 0, 0.0)]
         return self.run
 
-    def first_steps(self, resolution: Resolution) -> tuple[NetworkRun, float, float]:
+    def first_steps(self, resolution: NetworkResolution) -> tuple[NetworkRun, float, float]:
         """A result after its first steps; s of processor time before them, and of so many without what is done
         once."""
         begin = begun = clock.process_time()
@@ -144,7 +144,7 @@ class _Probe(Case):
         run = self._network_run(resolution, None, Recording(touches=self.touches_itself))
         (line,), (model,) = run.state.lines, run.model.models
         self.at_rest = None if run.found is None else (model, line.copy())
-        known = resolution.local is None and model.payout is None
+        known = resolution.one.local is None and model.payout is None
         self.allow(FIRST_STEPS, ENOUGH_STEPS if known else np.inf)
         try:
             run.begin_motion()
@@ -171,22 +171,24 @@ def _measured(scene: LineScene, found: Plan) -> Plan:
     """
     if sum(found.cells) > MOST_CELLS or not is_warm(kernels_of(scene)):
         return found
-    case, first, choice, cut = _Probe(scene), first_resolution(scene), NAMED, False
-    resolution, begin = first, clock.process_time()
+    case, first, cut = _Probe(scene), first_resolution(scene), False
+    finely, choices, begin = NetworkResolution({LINE: first}), dict[str, ModelChoice](), clock.process_time()
     case.allow(CHOICE if found.choice else PRE_RUN)
     try:
         try:
-            choice, resolution = chosen_and_surveyed(case, first)
+            choices, finely = chosen_and_surveyed(case, finely)
         except KeyboardInterrupt:
             cut = True
+            if found.choice:  # as the pre-run is
+                case.scene = with_model(scene, "rod")
         survey, coarse = clock.process_time() - begin, case.run
         still = _still_to_come(case.seen, scene.require_time().duration) if cut and coarse is not None else 0.0
         if not is_warm(kernels_of(case.scene)):
             return found
-        run, setup, spent = case.first_steps(resolution)
+        run, setup, spent = case.first_steps(finely)
     except ComputationError:
         return found  # the run will say why
-    duration = scene.require_time().duration
+    duration, resolution, choice = scene.require_time().duration, finely.one, choices.get(LINE, NAMED)
     survey += still
     steps = _steps(scene, resolution, run, coarse, case.seen)
     motion = steps * _dearer(found) * spent / max(run.steps, 1)

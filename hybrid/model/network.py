@@ -58,9 +58,18 @@ class NetworkResolution:
     @classmethod
     def first(cls, system: Network) -> NetworkResolution:
         """The resolution for the accuracy of each line, before anything is known of its errors."""
-        found = {name: first_resolution(system.scene_of(name)) for name in system.lines}
+        return cls.of({name: system.scene_of(name) for name in system.lines})
+
+    @classmethod
+    def of(cls, scenes: Mapping[str, LineScene]) -> NetworkResolution:
+        """The same of lines by name; scenes: of them."""
+        found = {name: first_resolution(scene) for name, scene in scenes.items()}
         step, later = min(x.step for x in found.values()), min(x.later or x.step for x in found.values())
         return cls({name: replace(x, step=step, later=later if x.later else 0.0) for name, x in found.items()})
+
+    def coarser(self, cells: float = 1.0, steps: float = 1.0) -> NetworkResolution:
+        """With cells and steps longer by these factors."""
+        return NetworkResolution({name: x.coarser(cells, steps) for name, x in self.lines.items()})
 
     @property
     def one(self) -> Resolution:

@@ -1,15 +1,15 @@
-"""The passes of one scene in motion: results, in files that can be resumed, and runs to compare with."""
+"""The runs of one scene in motion: results, in files that can be resumed, and runs to compare with."""
 
 from __future__ import annotations
 
 import math
 import threading
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,36 +18,36 @@ from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model
+from hybrid.model.model_costs import with_model, with_models
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.resolution import (
     Reach,
     Resolution,
-    first_resolution,
     follows_curvature,
     has_limits,
     judges_bends,
     requested_accuracy,
     wants_errors,
+    wants_survey,
 )
-from hybrid.model.self_reach import self_reach, without_contact
+from hybrid.model.self_reach import self_reach, system_without_contact, without_contact
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.scene.read import scene_text
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE, network_of, short_form
+from hybrid.scene.short_form import LINE, as_network, short_form
 from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.interrupts import at_once
+from hybrid.simulation.layer_mesh import layered, layered_lines, shown, shown_lines
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
+from hybrid.simulation.load_change import with_loads_of
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
 from hybrid.simulation.network_run import NetworkRun, Recording, start_of
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
-from hybrid.simulation.restore import (
-    is_cut_off,
-    refused,
-    resolution_from,
-)
+from hybrid.simulation.restore import is_cut_off, kept_resolution
 from hybrid.simulation.result_checks import damped_vibrations
 from hybrid.simulation.run_file import AnyRecorder, Cable
 from hybrid.simulation.run_sample import (
@@ -57,22 +57,24 @@ from hybrid.simulation.run_sample import (
     NOT_ESTIMATED,
     Notes,
     RunSample,
+    Samples,
     catenary_share,
     compared_cells,
     compared_places,
     is_along,
     most_at_places,
+    rods_of,
     rows_key,
     split_outputs,
     usual_cells,
 )
 from hybrid.simulation.run_zones import Start
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
-from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.envelope import GROUP as ENVELOPE
 from hybrid.store.hdf5_file import open_file, opened
 from hybrid.store.limits import EXTREMES, extremes_about
+from hybrid.store.lines import GROUP
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE, THERE
@@ -80,6 +82,9 @@ from hybrid.store.stored_array import StoredArray
 from hybrid.store.stored_rows import RowsRecorder, rows_path
 from hybrid.store.whole_file import LateFile
 from hybrid.store.writer import Recorder, WriteMode
+
+if TYPE_CHECKING:  # its tables take long to make
+    from hybrid.scene.network_scene import Network
 
 # Of every step, what extremes of the end forces follow from.
 FORCES = ("t", "end_force_start", "end_force_end")
@@ -90,60 +95,121 @@ WORTH_THREADS = 500
 MOST_IN_MEMORY = 1_000_000
 
 
-class Computed(NamedTuple):
-    """What is asked of the run of a complete result."""
-
-    resolution: Resolution
-    model: Model  # at its end
-    steps: int
-    zones_move: bool
-    doubt: Floats  # of `RunSample`
-
-
 class Case:
-    """One scene in motion, computed as often and as finely as it takes."""
+    """One scene in motion, of any number of lines, computed as often and as finely as it takes.
+
+    What it gives of a run is by the names of the lines; that of a cable is `LINE`, as in the network of it.
+    """
+
+    moves = True
 
     def __init__(
         self,
-        scene: LineScene,
+        scene: Scene,
         criterion: UserCriterion | None,
-        changes: Sequence[LoadChange] = (),
+        changes: Sequence[LoadChange[Any]] = (),
         points: OutputPoints | None = None,
     ) -> None:
         """changes: scenes that hold from some time on; what they may differ in, `remaining_run` has checked.
 
-        points: of the result that is continued; None: those of the scene.
+        points: of the result of a cable that is continued; None: those of the scene.
         """
-        self.scene, self.criterion, self.changes = scene, of_line(criterion, ""), tuple(changes)
-        self.points = points if points is not None else output_points(scene, longest_out(scene), not winch_side(scene))
+        self.scene: Any = scene  # what is computed, as the user wrote it
+        # Whether it is of a cable: its file is flat, and the error of leaving bending out is followed along its run,
+        # which moves no ends.  Lines that are joined move each other, and are compared with rods.
+        self.flat = not scene.line_names
+        self.criterion = of_line(criterion, "") if self.flat else criterion
+        self.changes: tuple[LoadChange[Any], ...] = tuple(changes)
+        if not self.flat:
+            self.changes = tuple(replace(x, scene=with_loads_of(self.network, x.scene)) for x in changes)
+        self.points = {name: points or self._points_of(x) for name, x in self.lines.items()}
         # Of these, where runs are compared: a bend may be sharp between a hundred places.
-        self.places = ALL if judges_bends(scene) else compared_places(self.points)
+        self.places = {
+            name: ALL if judges_bends(x) else compared_places(self.points[name]) for name, x in self.lines.items()
+        }
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
         self.late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
         self.late_finer: LateFile | None = None  # of a finer one, which may take its place
         self._results = 0  # that were begun
-        self._told: tuple[LineScene, str] | None = None  # a scene, and what it is as a text
+        self._told: tuple[object, str] | None = None  # a scene, and what it is as a text
         self._owner = threading.get_ident()  # the thread that puts files in their places
-        self._start_of_lines: tuple[Resolution, Start] | None = None
-        self.reach: Reach | None = None  # how far the line moves, by a pre-run
-        self.came_near_itself = False  # whether the line did in a run to compare with
-        # Whether contact with itself is computed in runs to compare with: where it is asked for, or the line has
-        # touched itself in a result.  Before, coarse cells would meet where those of the result do not.
-        self.touches_itself = bool(scene.contact.self)
+        self._start: tuple[Resolution, Start] | None = None
+        self.reach: Reach | None = None  # how far the first line moves, by a pre-run
+        self.near_themselves = set[str]()  # lines that came near themselves in a run to compare with
+        # Whether contact of lines with themselves is computed in runs to compare with: where it is asked for, or a line
+        # has touched itself in a result.  Before, coarse cells would meet where those of the result do not.
+        self.touches_itself = self.flat and bool(self.network.lines[LINE].contact.self)
         self.notes: list[tuple[str, str]] = []  # events (kind, text) of the whole of every result
         self._unwanted = threading.Event()  # what runs to compare with still compute
 
+    # --- the scene ------------------------------------------------------------------------------
+
+    def _points_of(self, scene: LineScene) -> OutputPoints:
+        """Where outputs of a line are."""
+        if not self.moves:
+            return output_points(scene)
+        return output_points(scene, longest_out(scene), not winch_side(scene))
+
+    @property
+    def network(self) -> Network:
+        """The same as a network."""
+        return as_network(self.scene)[0]
+
+    @property
+    def lines(self) -> dict[str, LineScene]:
+        """The lines by name, as scenes of their own."""
+        scenes = [self.scene.scene_of(name) for name in self.scene.lines]
+        return dict(zip(self.network.lines, scenes, strict=True))
+
+    def with_models(self, kinds: Mapping[str, str]) -> Any:
+        """The scene with models of these kinds for lines by name."""
+        if not self.flat:
+            return with_models(self.scene, kinds)
+        return with_model(self.scene, kinds[LINE]) if kinds else self.scene
+
+    @contextmanager
+    def instead(self, scene: Any) -> Iterator[None]:
+        """Runs within are of another scene, with the same lines."""
+        asked, self.scene = self.scene, scene
+        try:
+            yield
+        finally:
+            self.scene = asked
+
+    @property
+    def wants_errors(self) -> bool:
+        """Whether errors of a line are estimated."""
+        return any(wants_errors(x) for x in self.lines.values())
+
+    @property
+    def from_rest(self) -> bool:
+        """Whether it begins from an equilibrium, or is one."""
+        ends = self.scene.ends.both if self.flat else ()
+        return not (self.moves and (self.scene.starts_as_placed or any(end.release for end in ends)))
+
+    @property
+    def _duration(self) -> float:
+        """When the run ends, s."""
+        return float(self.scene.require_time().duration)
+
+    @property
+    def _texts(self) -> tuple[str, str]:
+        """What the file says of the scene, and of what changes."""
+        if self._told is None or self._told[0] is not self.scene:
+            self._told = self.scene, scene_text(self.scene)
+        return self._told[1], changes_text(self.changes)
+
     # --- results --------------------------------------------------------------------------------
 
-    def record(self, resolution: Resolution, target: Target, before: Tree | None = None) -> RunSample:
+    def record(self, resolution: NetworkResolution, target: Target, before: Tree | None = None) -> Samples:
         """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before.
 
         A file that errors will be added to, and that is complete before it had to be there, waits in `late_file`.
         """
         first = self._takes_its_place(target)
-        begin = self._begin_result(resolution, first)
+        begin = self._begin_result(resolution.one, first)
         kept = before or {} if isinstance(target, Path) else None
         mode = WriteMode(kept, late=not (first and self.progress.heard), unseen=not first)
         recording = Recording(mode, pending=ERROR_ESTIMATE if before else "", notes=self.notes)
@@ -176,28 +242,28 @@ class Case:
             late.drop()
         return waits
 
-    def resume(self, source: Path, target: Path, before: Tree | None = None) -> RunSample:
+    def resume(self, source: Path, target: Path, before: Tree | None = None) -> Samples:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
-        with opened(source) as file:
-            if "self_contact" not in file and self_reach(self.scene).may:
-                told, self.scene = self._texts["scene"], without_contact(self.scene)
-                self.changes = tuple(replace(x, scene=without_contact(x.scene)) for x in self.changes)
-                self._told = self.scene, told  # the file keeps what was asked for
-            with refused(source):
-                resolution = resolution_from(read_checkpoint(file).resolution, self.scene)
+        if self.flat:
+            with opened(source) as file:
+                if "self_contact" not in file and self_reach(self.scene).may:
+                    told, self.scene = self._texts[0], without_contact(self.scene)
+                    self.changes = tuple(replace(x, scene=without_contact(x.scene)) for x in self.changes)
+                    self._told = self.scene, told  # the file keeps what was asked for
+        resolution = kept_resolution(self.network, source)
         first = self._takes_its_place(target)
-        begin = self._begin_result(resolution, first)
+        begin = self._begin_result(resolution.one, first)
         recording = Recording(WriteMode(before or {}), source, ERROR_ESTIMATE if before else "")
         run = self._network_run(resolution, target, recording)
         return self._move(run, begin - run.cpu, first)
 
-    def is_unfinished(self, source: Path, resolution: Resolution) -> bool:
+    def is_unfinished(self, source: Path, resolution: NetworkResolution) -> bool:
         """Whether a file holds a run of this case, with this resolution, that was cut off."""
-        texts = self._texts["scene"], self._texts["changes"]
-        if not is_cut_off(source, texts, NetworkResolution({LINE: resolution})):
+        if not is_cut_off(source, self._texts, resolution):
             return False
         with open_result(source) as result:
-            return np.array_equal(result["s"], self.points.s)
+            parts = result.lines or {LINE: result}
+            return all(np.array_equal(parts[name]["s"], x.s) for name, x in self.points.items())
 
     def _begin_result(self, resolution: Resolution, first: bool) -> float:
         """The pass of a result begins; s of processor time.  first: it takes the place of one that may be there."""
@@ -208,195 +274,266 @@ class Case:
         self._results += 1
         return clock.process_time()
 
-    @property
-    def _duration(self) -> float:
-        """When the run ends, s."""
-        return self.scene.require_time().duration
-
-    @property
-    def _judges(self) -> bool:
-        """Whether limits are held against extremes, whose errors are estimated."""
-        return wants_errors(self.scene) and has_limits(self.scene)
-
-    @property
-    def _texts(self) -> dict[str, str]:
-        """What the file says of the scene, and of what changes."""
-        if self._told is None or self._told[0] is not self.scene:
-            self._told = self.scene, scene_text(self.scene)
-        return {"scene": self._told[1], "changes": changes_text(self.changes)}
-
-    def _compared(self, run: Computed, target: Target, cpu: float, late: LateFile | None) -> RunSample:
-        """What is to be compared of a complete result; late: it has no file yet."""
-        resolution, cells = run.resolution, compared_cells(run.model)
-        if not wants_errors(self.scene):
-            return RunSample(resolution, {}, cells, run.steps, 0.0)
-        assert not isinstance(target, MemoryTarget), "errors are written into a file"
-        with ExitStack() as stack:
-            data = late.data if late is not None else stack.enter_context(open_file(target, summed=False))
-            errors = [*(MODEL_ERRORS + x for x in data.get(MODEL_ERRORS, ())), *(x for x in data if MODEL_ERRORS in x)]
-            stored = {name: data[name] for name in (*COMPARED, *errors) if name in data}
-            # they stay in the file, if they are many, that is one, and no finer result may replace it
-            many = late is None and sum(x.size for x in stored.values()) > MOST_IN_MEMORY
-            stay = target if many and isinstance(target, Path) and requested_accuracy(self.scene) is None else None
-            found = {
-                name: StoredArray(stay, name, self._places_of(name)) if stay is not None else self._at_places(name, x)
-                for name, x in stored.items()
-            }
-            edges = [x for x in MISSED if EDGE_ERRORS + x in data]
-            missed = {x: most_at_places(data[EDGE_ERRORS + x], self.places) for x in edges}
-            kinds = data["events/kind"][()]
-            unresolved, touches = b"unresolved bend" in kinds, b"line touches itself" in kinds
-            if follows_curvature(self.scene):
-                cells = compared_cells(run.model, resolution.fineness, usual_cells(data[THERE][()]))
-            forces = np.column_stack([data[f"steps/{name}"][()] for name in FORCES])
-            held = {x: data[x][()] for x in _datasets(data, ENVELOPE, EXTREMES)} if self._judges else {}
-        self.touches_itself |= touches
-        values, model_error = split_outputs(found)
-        notes: Notes = ()
-        catenary, bound = np.zeros(0), 0.0
-        if run.zones_move:
-            bound = resolution.zones * run.model.length
-        if resolution.local is not None or run.zones_move:
-            whole = Result(late.path, contents=late.contents) if late is not None else None
-            with written_result(target) if whole is None else nullcontext(whole) as result:
-                if resolution.local is not None:
-                    notes = damped_vibrations(result)
-                if run.zones_move:
-                    catenary = np.array([catenary_share(x) for x in result.zones])
-        return RunSample(
-            resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, bound, notes, forces=forces,
-            catenary=catenary, doubt=run.doubt, touches=touches, places=self.places, at_edges=missed,
-            extremes=extremes_about(held, self.points.s),
-        )  # fmt: skip
-
-    def _places_of(self, name: str) -> np.ndarray | None:
-        """Of an output, or an error of one, the numbers of the points where runs are compared; None: all."""
-        return self.places if self.places.size and is_along(name.removeprefix(MODEL_ERRORS)) else None
-
-    def _at_places(self, name: str, values: Any) -> np.ndarray:
-        """The values (nt, ...) of a dataset where runs are compared."""
-        places, found = self._places_of(name), np.asarray(values[()])
-        return found if places is None else found[:, places]
-
-    # --- runs to compare with -------------------------------------------------------------------
-
-    def beside(
-        self, samples: Sequence[Callable[[], RunSample]]
-    ) -> AbstractContextManager[Sequence[Callable[[], RunSample]]]:
-        """Runs to compare with, in threads where that is worth it (simulation.beside).
-
-        A criterion of the user may not expect to be called by several threads.
-        """
-        steps = self._duration / first_resolution(self.scene).step
-        threads = thread_count() if self.criterion is None and steps >= WORTH_THREADS else 1
-        self._unwanted.clear()
-        return beside(samples, threads, self.progress.look, self._unwanted.set)
-
-    def sample(self, resolution: Resolution, points: Floats | None = None, until: float | None = None) -> RunSample:
-        """Compute for comparison only; points: places, m, instead of those of the result; until: s, None: to the end.
-
-        A resolution with longer steps has as many times fewer outputs, to save time, and so that outputs do not
-        shorten its steps where these end at outputs.
-        """
-        begin = clock.thread_time()
-        self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)
-        s = points if points is not None else self.points.s[self.places] if self.places.size else self.points.s
-        recording = Recording(points=self.points._replace(s=s), until=until, touches=self.touches_itself)
-        run = self._network_run(resolution, None, recording)
-        line = run.lines[0]
-        numbers = (len(run.times) + 1) * sum(math.prod(field.shape) for field in line.observer.fields)
-        if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
-            line.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)), FORCE_COLUMNS)
-        found = line.recorder
-        assert isinstance(found, ComparisonRecorder)
-        try:
-            with short_form(self.scene).said():
-                run.record_motion(self.progress, self._comparison_interrupted)
-        finally:
-            found.close("", "")
-        self.came_near_itself |= run.came_near_itself or line.contact is not None
-        values, errors = split_outputs({name: found[name] for name in found.names})
-        cpu = clock.thread_time() - begin
-        moves, follows = line.manager is not None, follows_curvature(self.scene)
-        unknown = [f"in a run to compare with, {text}" for kind, text in found.events if kind == NOT_ESTIMATED]
-        notes = tuple((NOT_ESTIMATED, text) for text in unknown[:1])
-        rows = found.reference() if isinstance(found, RowsRecorder) else {}
-        held: dict[str, Any] = {}
-        if points is None and self._judges:
-            held = {x.name: y for x, y in line.envelope.fixed()}
-            held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t)
-        return RunSample(
-            resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
-            resolution.every, False, errors, resolution.zones * line.model.length if moves else 0.0, notes, rows,
-            found.steps, found.catenary if moves else np.zeros(0), doubt_of_line(line), run.lets_touch, self.places,
-            extremes=extremes_about(held, self.points.s),
-        )  # fmt: skip
-
-    def survey(self, resolution: Resolution, coarse: Resolution) -> Survey | None:
-        """A coarse run that shows where cells should be short; None: it failed.
-
-        resolution: of the result.  ComputationError: it failed in steps as short as those of the result too, and the
-        scene gives cells to a layer.
-        """
-        until = None if self.changes else survey_duration(self.scene)
-        try:
-            model, _ = self.first_shape(coarse)
-            s = survey_points(model, coarse)
-            found = self.sample(coarse, s, until).values
-        except ComputationError:
-            if self.scene.resolution is None:
-                return None
-            coarse = coarse.coarser(steps=resolution.step / coarse.step)  # as short as those of the result
-            model, _ = self.first_shape(coarse)
-            s = survey_points(model, coarse)
-            found = self.sample(coarse, s, until).values
-        survey = Survey.of(self.scene, resolution, model, s, found)
-        self.reach = survey.reach
-        return survey
-
-    # --- as a network of one line -----------------------------------------------------------------
-
-    def _network_run(self, resolution: Resolution, target: Target | None, recording: Recording) -> NetworkRun:
-        """The run of the network, as yet without a first output; recording: beside what the case says."""
-        system, changes = network_of(self.scene), [replace(x, scene=network_of(x.scene)) for x in self.changes]
-        recording = recording._replace(planes=True, error=True, cable=Cable(self.scene, self.changes))
-        if recording.points is None:
-            recording = recording._replace(points=self.points)
-        with short_form(self.scene).said():
-            if recording.source is None:
-                recording = recording._replace(start=self._network_start(resolution))
-            finely = NetworkResolution({LINE: resolution})
-            return NetworkRun(system, target, self._texts["scene"], True, finely, recording, self.criterion, changes)
-
-    def _move(self, run: NetworkRun, begin: float, first: bool) -> RunSample:
+    def _move(self, run: NetworkRun, begin: float, first: bool) -> Samples:
         """A result to its end; begin: s of processor time, when it was begun; first: as of `_begin_result`."""
         recorder, target = run.recorder, run.target
         assert target is not None and isinstance(recorder, Recorder | ArrayRecorder)
         if isinstance(recorder, Recorder):
             recorder.amended = self.beside_result is not None
-        with recorder, short_form(self.scene).said():
-            run.record_motion(self.progress, self._result_interrupted)
-        (line,) = run.lines
-        done = Computed(run.resolution.one, line.model, run.steps, line.manager is not None, doubt_of_line(line))
-        return self._compared(done, target, clock.process_time() - begin, self._take_late_file(recorder, first))
+        with recorder, self._said():
+            self._compute(run, self._result_interrupted)
+        return self._compared(run, target, clock.process_time() - begin, self._take_late_file(recorder, first))
 
-    def _network_start(self, resolution: Resolution) -> Start:
+    def _compute(self, run: NetworkRun, interrupted: Callable[[], bool]) -> None:
+        """Compute a run to its end."""
+        run.record_motion(self.progress, interrupted)
+
+    def _compared(self, run: NetworkRun, target: Target, cpu: float, late: LateFile | None) -> Samples:
+        """What is to be compared of a complete result; late: it has no file yet."""
+        if not self.wants_errors:
+            found = {x.name: (run.resolution.lines[x.name], compared_cells(x.model)) for x in run.lines}
+            return {name: RunSample(finely, {}, cells, run.steps, 0.0) for name, (finely, cells) in found.items()}
+        assert not isinstance(target, MemoryTarget), "errors are written into a file"
+        whole = Result(late.path, contents=late.contents) if late is not None else None
+        stay, samples = target if late is None and isinstance(target, Path) else None, Samples()
+        with ExitStack() as stack:
+            data = late.data if late is not None else stack.enter_context(open_file(target, summed=False))
+            result = stack.enter_context(written_result(target) if whole is None else nullcontext(whole))
+            parts = result.lines or {LINE: result}
+            for line in run.lines:
+                group = "" if self.flat else f"{GROUP}/{line.name}/"
+                samples[line.name] = self._sample_of(line, run, data, group, parts[line.name], cpu, stay)
+        self.touches_itself |= any(x.touches for x in samples.values())
+        return samples
+
+    def _sample_of(
+        self, line: LineResult, run: NetworkRun, data: Any, group: str, result: Result, cpu: float, stay: Path | None
+    ) -> RunSample:
+        """What is compared of a line in a complete result.
+
+        data, result: the file, and the line in it; group: of the line in the file; stay: a file in which many outputs
+        may stay, None: there is none.
+        """
+        name, model, scene = line.name, line.model, self.lines[line.name]
+        own, resolution = data[group] if group else data, run.resolution.lines[line.name]
+        errors = [*(MODEL_ERRORS + x for x in own.get(MODEL_ERRORS, ())), *(x for x in own if MODEL_ERRORS in x)]
+        stored = {x: own[x] for x in (*COMPARED, *errors) if x in own}
+        # they stay in the file, if they are many, and no finer result may replace it
+        finer = any(requested_accuracy(x) is not None for x in self.lines.values())
+        stays = stay if not finer and sum(x.size for x in stored.values()) > MOST_IN_MEMORY else None
+        found = {
+            x: StoredArray(stays, group + x, self._places_of(x, name))
+            if stays is not None
+            else self._at_places(x, y, name)
+            for x, y in stored.items()
+        }
+        places, kinds = self.places[name], own["events/kind"][()]
+        unasked = self.flat or self.network.lines[name].contact.self is None
+        missed = {x: most_at_places(own[EDGE_ERRORS + x], places) for x in MISSED if EDGE_ERRORS + x in own}
+        cells = compared_cells(model)
+        if follows_curvature(scene):
+            cells = compared_cells(model, resolution.fineness, usual_cells(own[THERE][()]))
+        held: dict[str, Any] = {}
+        if self._judges(name):
+            held = {x: own[x][()] for x in _datasets(own, ENVELOPE, EXTREMES)}
+            asked = (x for x, q in self.network.output.quantities.items() if group and q.line == name)
+            held |= {full: data[full][()] for x in asked if (full := f"{EXTREMES}/{x}") in data}
+        values, model_error = split_outputs(found)
+        moves, notes, forces = line.manager is not None, Notes(), np.zeros((0, 3))
+        if self.moves:
+            forces = np.column_stack([own[f"steps/{x}"][()] for x in FORCES])
+        if self.flat and resolution.local is not None:
+            notes = damped_vibrations(result)
+        return RunSample(
+            resolution, values, cells, max(run.steps, 1), cpu, 1, b"unresolved bend" in kinds, model_error,
+            resolution.zones * model.length if moves and self.flat else 0.0, notes,
+            forces=forces, catenary=np.array([catenary_share(x) for x in result.zones]) if moves else np.zeros(0),
+            doubt=doubt_of_line(line), touches=b"line touches itself" in kinds and unasked, places=places,
+            at_edges=missed, extremes=extremes_about(held, self.points[name].s),
+            rods=() if self.flat else rods_of(result.zones),
+        )  # fmt: skip
+
+    def _judges(self, name: str) -> bool:
+        """Whether limits are held against extremes of a line, or ranges of several lines are asked for by name."""
+        asked = not self.flat and any(x.line == name for x in self.network.output.quantities.values())
+        return self.moves and self.wants_errors and (asked or has_limits(self.lines[name]))
+
+    def _places_of(self, name: str, line: str) -> np.ndarray | None:
+        """Of an output, or an error of one, the numbers of the points where runs are compared; None: all."""
+        places = self.places[line]
+        return places if places.size and is_along(name.removeprefix(MODEL_ERRORS)) else None
+
+    def _at_places(self, name: str, values: Any, line: str) -> np.ndarray:
+        """The values (nt, ...) of a dataset where runs are compared."""
+        places, found = self._places_of(name, line), np.asarray(values[()])
+        return found if places is None else found[:, places]
+
+    # --- runs to compare with -------------------------------------------------------------------
+
+    def beside(
+        self, samples: Sequence[Callable[[], Samples]]
+    ) -> AbstractContextManager[Sequence[Callable[[], Samples]]]:
+        """Runs to compare with, in threads where that is worth it (simulation.beside).
+
+        A criterion of the user may not expect to be called by several threads.
+        """
+        steps = self._duration / NetworkResolution.of(self.lines).one.step
+        threads = thread_count() if self.criterion is None and steps >= WORTH_THREADS else 1
+        self._unwanted.clear()
+        return beside(samples, threads, self.progress.look, self._unwanted.set)
+
+    def sample(
+        self, resolution: NetworkResolution, points: Mapping[str, Floats] | None = None, until: float | None = None,
+        *, model: bool = False,
+    ) -> Samples:  # fmt: skip
+        """Compute for comparison only; points: places, m, instead of those of the result; until: s, None: to the end.
+
+        model: what leaving bending out changes is followed along it, of a cable.  A resolution with longer steps has as
+        many times fewer outputs, to save time, and so that outputs do not shorten its steps where these end at outputs.
+        """
+        if model and self.flat:
+            resolution = NetworkResolution({name: replace(x, follow=True) for name, x in resolution.lines.items()})
+        begin = clock.thread_time()
+        if self.moves:
+            self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution.one)
+        s = points or {
+            name: x.s[self.places[name]] if self.places[name].size else x.s for name, x in self.points.items()
+        }
+        looked = {name: x._replace(s=s[name]) if name in s else x for name, x in self.points.items()}
+        recording = Recording(points=looked, until=until, touches=not self.flat or self.touches_itself)
+        run = self._network_run(resolution, None, recording)
+        if points is None and self.beside_result is not None:
+            for line in run.lines:
+                numbers = (len(run.times) + 1) * sum(math.prod(field.shape) for field in line.observer.fields)
+                if numbers > MOST_IN_MEMORY:
+                    key = rows_key(resolution.lines[line.name], "" if self.flat else line.name)
+                    line.recorder = RowsRecorder(rows_path(self.beside_result, key), FORCE_COLUMNS)
+        try:
+            with self._said():
+                self._compute(run, self._comparison_interrupted)
+        finally:
+            for line in run.lines:
+                line.recorder.close("", "")
+        for line in run.lines:
+            if line.contact is not None or (self.flat and run.came_near_itself):
+                self.near_themselves.add(line.name)
+        cpu = clock.thread_time() - begin
+        return {x.name: self._compared_line(x, run, cpu, judged=points is None) for x in run.lines}
+
+    def _compared_line(self, line: LineResult, run: NetworkRun, cpu: float, judged: bool) -> RunSample:
+        """What is compared of a line in a run for comparison; judged: extremes, too."""
+        name, resolution, found = line.name, run.resolution.lines[line.name], line.recorder
+        assert isinstance(found, ComparisonRecorder)
+        values, errors = split_outputs({x: found[x] for x in found.names})
+        moves, follows = line.manager is not None, follows_curvature(self.lines[name])
+        unknown = [f"in a run to compare with, {text}" for kind, text in found.events if kind == NOT_ESTIMATED]
+        notes = tuple((NOT_ESTIMATED, text) for text in unknown[:1])
+        rows = found.reference() if isinstance(found, RowsRecorder) else {}
+        held: dict[str, Any] = {}
+        if judged and self._judges(name):
+            held = {x.name: y for x, y in line.envelope.fixed()}
+            held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t) | run.quantities.ranges_of(name)
+        return RunSample(
+            resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
+            resolution.every, False, errors, resolution.zones * line.model.length if moves and self.flat else 0.0,
+            notes, rows, found.steps, found.catenary if moves else np.zeros(0), doubt_of_line(line),
+            run.lets_touch if self.flat else self.touches_itself, self.places[name],
+            extremes=extremes_about(held, self.points[name].s), rods=tuple(sorted(found.rods)),
+        )  # fmt: skip
+
+    # --- how finely -----------------------------------------------------------------------------
+
+    def layered(self, resolution: NetworkResolution) -> NetworkResolution:
+        """With cells as the equilibrium asks for, of lines that have no pre-run (simulation.layer_mesh)."""
+        if not self.flat:
+            return layered_lines(self.network, resolution, self.moves)
+        return resolution if wants_survey(self.scene) else _of_cable(layered(self, resolution.one))
+
+    def shown(self, resolution: NetworkResolution) -> NetworkResolution:
+        """With cells of a pre-run on which the equilibrium is found (simulation.layer_mesh)."""
+        return (
+            _of_cable(shown(self, resolution.one)) if self.flat else shown_lines(self.network, resolution, self.moves)
+        )
+
+    def survey(self, resolution: NetworkResolution, coarse: NetworkResolution) -> dict[str, Survey] | None:
+        """A coarse run that shows where cells of lines should be short that leave them open; None: it failed.
+
+        resolution: of the result.  ComputationError: it failed in steps as short as those of the result too, and a
+        line gives cells to a layer.
+        """
+        free = {name: scene for name, scene in self.lines.items() if wants_survey(scene)}
+        until = max(survey_duration(x) for x in free.values()) if self.moves and not self.changes else None
+        try:
+            models, points, found = self._surveyed(coarse, until)
+        except ComputationError:
+            if all(x.resolution is None for x in free.values()):
+                return None
+            if not self.moves:
+                raise
+            coarse = coarse.coarser(steps=resolution.one.step / coarse.one.step)  # as short as those of the result
+            models, points, found = self._surveyed(coarse, until)
+        surveys = {
+            name: Survey.of(scene, resolution.lines[name], models[name], points[name], found[name].values)
+            for name, scene in free.items()
+        }
+        self.reach = next(iter(surveys.values())).reach
+        return surveys
+
+    def _surveyed(
+        self, coarse: NetworkResolution, until: float | None
+    ) -> tuple[dict[str, Model], dict[str, Floats], Samples]:
+        """Models of a pre-run, where they are looked at, m, and what is seen there."""
+        with self._said():
+            start = self._first_state(coarse, self._compared_network)
+        self._start = coarse.one, start
+        models = dict(zip(start.model.names, start.model.models, strict=True))
+        points = {name: survey_points(x, coarse.lines[name]) for name, x in models.items()}
+        return models, points, self.sample(coarse, points, until)
+
+    # --- runs of the network ----------------------------------------------------------------------
+
+    def _said(self) -> AbstractContextManager[None]:
+        """What fails within, in the words of the scene."""
+        return short_form(self.scene).said() if self.flat else nullcontext()
+
+    def _network_run(self, resolution: NetworkResolution, target: Target | None, recording: Recording) -> NetworkRun:
+        """The run of the network, as yet without a first output; recording: beside what the case says."""
+        network, changes = self.network, [replace(x, scene=as_network(x.scene)[0]) for x in self.changes]
+        network = self._compared_network if target is None else network
+        cable = Cable(self.scene, self.changes) if self.flat else None
+        recording = recording._replace(planes=True, error=self.flat, cable=cable)
+        if recording.points is None:
+            recording = recording._replace(points=self.points)
+        with self._said():
+            if recording.source is None:
+                recording = recording._replace(start=self._first_state(resolution, network))
+            texts, end = self._texts, (self.criterion, changes)
+            return NetworkRun(network, target, texts[0], self.moves, resolution, recording, *end)
+
+    @property
+    def _compared_network(self) -> Network:
+        """The network of runs to compare with."""
+        apart = self.moves and not self.flat and not self.touches_itself
+        return system_without_contact(self.network) if apart else self.network
+
+    def _first_state(self, resolution: NetworkResolution, network: Network | None = None) -> Start:
         """The first state of the network, which may have been kept for a run of this resolution."""
-        kept, self._start_of_lines = self._start_of_lines, None
-        if kept is not None and kept[0] is resolution:
+        kept, self._start = self._start, None
+        if kept is not None and kept[0] is resolution.one:
             return kept[1]
-        system = network_of(self.scene)
+        asked = network or self.network
         with at_once(self.interrupted):
-            model = build_system(system, NetworkResolution({LINE: resolution}))
-            return start_of(system, model, True, self.criterion)
-
-    # --- parts of a run -------------------------------------------------------------------------
+            return start_of(asked, build_system(asked, resolution), self.moves, self.criterion)
 
     def first_shape(self, resolution: Resolution) -> tuple[Model, State]:
-        """Model and state of a run as it begins, which are kept for a run of this resolution that comes next."""
-        with short_form(self.scene).said():
-            start = self._network_start(resolution)
-        self._start_of_lines = resolution, start
+        """Model and state of the run of a cable as it begins, which are kept for one of this resolution that comes
+
+        next.
+        """
+        finely = NetworkResolution({LINE: resolution})
+        with self._said():
+            start = self._first_state(finely)
+        self._start = resolution, start
         line = start.model.models[0]
         return line, line.start if start.found is None else start.found.state.lines[0]
 
@@ -410,6 +547,10 @@ class Case:
     def _comparison_interrupted(self) -> bool:
         """The same of a run to compare with."""
         return self._unwanted.is_set() or self._result_interrupted()
+
+
+def _of_cable(resolution: Resolution) -> NetworkResolution:
+    return NetworkResolution({LINE: resolution})
 
 
 def _datasets(data: Mapping[str, Any], *groups: str) -> list[str]:

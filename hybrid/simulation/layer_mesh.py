@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -27,14 +27,11 @@ from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free, shows_bends, wants_survey
 from hybrid.scene.schema import AdaptiveModel, Equilibrium, LineScene
 from hybrid.simulation.interrupts import at_once
-from hybrid.simulation.mesh_survey import Survey, survey_resolution
 from hybrid.simulation.section_layers import MORE
 
 if TYPE_CHECKING:  # of several lines, which most scenes do not have
     from hybrid.model.network import NetworkResolution
     from hybrid.scene.network_scene import Network
-    from hybrid.simulation.case import Case
-    from hybrid.simulation.static_case import StaticCase
 
 # Cells to a length lambda at a place that bends a rod, and beyond how many such lengths a longer cell hides the bend:
 # the curvature at the end of an exponential layer is then off by 1 % and by about 4 %.
@@ -51,7 +48,15 @@ MOST_FOLD, ROUNDS = 0.6, 6
 BESIDE = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 40)])
 
 
-def layered(case: Case | StaticCase, resolution: Resolution) -> Resolution:
+class BeginsAtRest(Protocol):
+    """What computes the first state of a cable."""
+
+    scene: Any
+
+    def first_shape(self, resolution: Resolution) -> tuple[Model, State]: ...
+
+
+def layered(case: BeginsAtRest, resolution: Resolution) -> Resolution:
     """With cells as bends and layers of the equilibrium ask for, of rods whose mesh is left open.
 
     Zones that move have the mesh of rods, hence that of an equilibrium of rods.
@@ -130,13 +135,7 @@ def shown_lines(system: Network, resolution: NetworkResolution, moves: bool) -> 
     return found
 
 
-def survey_of(case: Case | StaticCase, resolution: Resolution) -> tuple[Survey | None, Resolution]:
-    """The pre-run of rods that shows where cells should be short, and how finely it was computed; None: it failed."""
-    coarse = shown(case, survey_resolution(resolution))
-    return case.survey(resolution, coarse), coarse
-
-
-def shown(case: Case | StaticCase, resolution: Resolution) -> Resolution:
+def shown(case: BeginsAtRest, resolution: Resolution) -> Resolution:
     """With cells on which the equilibrium is found, and bends no rod by more than MOST_FOLD from one cell to the next.
 
     A slack bend is often shorter than the cells of a pre-run by far, and on such cells it may be anywhere.  A shape

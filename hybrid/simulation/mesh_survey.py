@@ -38,11 +38,6 @@ OFTEN = 0.98
 OF_ALONG = 0.5
 
 
-def survey_resolution(resolution: Resolution) -> Resolution:
-    """How finely the pre-run is computed."""
-    return resolution.coarser(CELLS, STEPS)
-
-
 def survey_points(model: Model, coarse: Resolution) -> Floats:
     """Places (K,) m at which a pre-run is looked at: evenly spread, and its nodes where a bend has placed these."""
     s = np.linspace(0.0, model.length, POINTS)

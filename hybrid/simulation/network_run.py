@@ -101,10 +101,10 @@ class Recording(NamedTuple):
     mode: how a file is written; source: the result to go on with, from its checkpoint, in place of a start; pending:
     what is to come when it is complete (store.records); notes: events (kind, text) of the whole of the run; begun:
     called behind the first output; planes: whether lines that are joined to nothing are computed in the planes in
-    which they lie; start: the first state, if it is known; points: of outputs of the only line, None: those of its
-    scene; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself where
-    lines come near themselves, else that is only noticed; error: whether that of leaving bending out is followed, of
-    lines whose resolution says so; cable: what the network was made of, whose file it gets.
+    which they lie; start: the first state, if it is known; points: of outputs of lines by name, None: those of
+    their scenes; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself
+    where lines come near themselves, else that is only noticed; error: whether that of leaving bending out is followed,
+    of lines whose resolution says so; cable: what the network was made of, whose file it gets.
     """
 
     mode: WriteMode = AT_ONCE
@@ -114,7 +114,7 @@ class Recording(NamedTuple):
     begun: Callable[[NetworkRun], None] | None = None
     planes: bool = False
     start: Start | None = None
-    points: OutputPoints | None = None
+    points: Mapping[str, OutputPoints] | None = None
     until: float | None = None
     touches: bool = True
     error: bool = False
@@ -191,7 +191,7 @@ class NetworkRun:
             self.payout = RunPayout(me)
         reels = self.payout.lines if self.payout is not None else {}
         self.rotations = Rotations(system, self.model)
-        form = LinesFile if recording.cable is None else CableFile
+        form, points = LinesFile if recording.cable is None else CableFile, recording.points or {}
         self.file: LinesFile | CableFile = form(me, text, recording)
         self.lines = list[LineResult]()
         for k, (name, scene, model, state) in enumerate(
@@ -199,7 +199,7 @@ class NetworkRun:
         ):
             manager, error = managers.get(k), recording.error and model.follows_error
             record = partial(self.file.line_recorder, manager=manager) if target is not None else None
-            wanted = Wanted(record, recording.points, error, _torque_of(manager))
+            wanted = Wanted(record, points.get(name), error, _torque_of(manager))
             shown, outputs = self.file.scene_of(scene), len(self.times)
             self.lines.append(LineResult(k, name, shown, model, self.found, state, outputs, wanted, reels.get(k)))
             self.lines[k].manager = manager

@@ -74,6 +74,7 @@ class RunSample:
     at_edges: Mapping[str, np.ndarray] = field(default_factory=dict)
     # what limits are held against, of all steps (store.limits.extremes_about); {}: the scene has no limits
     extremes: Mapping[str, np.ndarray] = field(default_factory=dict)
+    rods: tuple[tuple[float, float], ...] = ()  # m, stretches that were rod at any output; in no checkpoint
 
     def some(self, name: str, numbers: np.ndarray) -> np.ndarray:
         """The values of an output with these numbers, which increase."""
@@ -102,11 +103,14 @@ class RunSample:
 
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
-        kept_fields = [x.name for x in fields(self) if x.name != "places"]
+        kept_fields = [x.name for x in fields(self) if x.name not in ("places", "rods")]
         out = {name: getattr(self, name) for name in kept_fields} | {"resolution": resolution_tree(self.resolution)}
         kept = {} if self.rows else {"values": self.values, "model_error": self.model_error}
         blank: Tree = {"values": {}, "model_error": {}}
         return out | blank | {x: {name: np.asarray(y) for name, y in found.items()} for x, found in kept.items()}
+
+
+Samples = dict[str, RunSample]  # of the lines of a run, by name
 
 
 def compared_places(points: OutputPoints) -> np.ndarray:
@@ -176,6 +180,11 @@ def usual_cells(nodes: np.ndarray) -> float:
     return float(np.median(bits.sum(axis=1))) - 1.0
 
 
+def rods_of(zones: Sequence[Sequence[ZoneRow]]) -> tuple[tuple[float, float], ...]:
+    """Stretches (m) of a line that are rod at any output; zones: of the outputs."""
+    return tuple(sorted({(zone.s_a, zone.s_b) for each in zones for zone in each if zone.kind == "rod"}))
+
+
 def catenary_share(zones: Sequence[Zone | ZoneRow]) -> float:
     """Part of a line that is catenary."""
     return float(sum(zone.s_b - zone.s_a for zone in zones if zone.kind == "catenary") / zones[-1].s_b)
@@ -191,16 +200,18 @@ def every_of(count: int, step: int) -> np.ndarray:
 # --- from a checkpoint --------------------------------------------------------------------------
 
 
-def rows_key(resolution: Resolution) -> str:
-    """What tells files of outputs apart (store.stored_rows)."""
-    return hashlib.blake2b(pack(resolution_tree(resolution)), digest_size=4).hexdigest()
+def rows_key(resolution: Resolution, name: str = "") -> str:
+    """What tells files of outputs apart (store.stored_rows); name: of the line, if there are several."""
+    return hashlib.blake2b(pack(resolution_tree(resolution)) + name.encode(), digest_size=4).hexdigest()
 
 
-def restored_sample(tree: Any, scene: LineScene, shape: tuple[int, int, int], result: Path | None = None) -> RunSample:
+def restored_sample(
+    tree: Any, scene: LineScene, shape: tuple[int, int, int], result: Path | None = None, name: str = ""
+) -> RunSample:
     """A sample from a checkpoint; shape: number of outputs of the result, of its output points, and of its jumps.
 
-    result: the file that the checkpoint is in.  ResultError or ValueError: it is none of this scene; MissingRows: its
-    outputs are not beside it.
+    result: the file that the checkpoint is in; name: as of `rows_key`.  ResultError or ValueError: it is none of this
+    scene; MissingRows: its outputs are not beside it.
     """
     blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
     free = dict.fromkeys(("resolution", "values", "model_error", "at_edges", "extremes", "notes", "rows"))
@@ -215,7 +226,7 @@ def restored_sample(tree: Any, scene: LineScene, shape: tuple[int, int, int], re
     if not all(isinstance(x, np.ndarray) and x.ndim == 1 and np.isfinite(x).all() for x in saved["extremes"].values()):
         raise ValueError("extremes that no run has")
     if saved["rows"] and result is not None:
-        found = rows_from(saved["rows"], rows_path(result, rows_key(resolution)))
+        found = rows_from(saved["rows"], rows_path(result, rows_key(resolution, name)))
         saved["values"], saved["model_error"] = split_outputs(found)
     if min(saved["cells"], saved["steps"], saved["every"]) < 1 or saved["bound"] < 0.0:
         raise ValueError("a run without cells, steps or outputs")

@@ -55,7 +55,7 @@ class StaticCase:
         try:
             model, _ = self.first_shape(coarse)
             s = survey_points(model, coarse)
-            run = self._run(coarse, None, Recording(points=output_points(self.scene)._replace(s=s)))
+            run = self._run(coarse, None, Recording(points={LINE: output_points(self.scene)._replace(s=s)}))
         except ComputationError:
             if self.scene.resolution is not None:
                 raise

@@ -6,7 +6,6 @@ import io
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, nullcontext
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -26,7 +25,7 @@ from hybrid.scene.schema import missing_time
 from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.layer_mesh import layered_lines
-from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution, with_survey
+from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, with_survey
 from hybrid.simulation.network_run import NetworkRun, Recording, static_system
 from hybrid.simulation.run_file import Cable
 from hybrid.simulation.run_start import named
@@ -53,7 +52,7 @@ def layers_at_rest(system: Network) -> NetworkResolution:
     if not asked:
         return first
     memory = MemoryTarget()
-    coarse = NetworkResolution({name: replace(survey_resolution(x), every=1) for name, x in first.lines.items()})
+    coarse = first.coarser(CELLS)
     output = system.output.model_copy(update={"points": POINTS, "quantities": {}})
     shown = system.model_copy(update={"output": output})
     run = static_system(shown, memory, partial(scene_text, shown), coarse)

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import nan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -19,7 +19,6 @@ from hybrid.store.checkpoint import BEFORE, write_before
 from hybrid.store.format import EVENTS, Field, annotate, attach_scales, checked, plain_text
 from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
 from hybrid.store.integrity import copy_unsigned, sign_new
-from hybrid.store.lines import GROUP
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import FINER_RESULT, PENDING
 from hybrid.store.table import NUMBERS, Table, write_rows
@@ -35,19 +34,25 @@ Happened = Sequence[tuple[float, str]]  # events of the result: t, s, and kind
 Others = tuple[Mapping[str, str | float | int], Sequence[tuple[str, str]]]
 
 
-def amend(
-    target: Path | io.BytesIO | LateFile,
-    fields: Sequence[Field],
-    blocks: Iterable[Block],
-    others: Callable[[Happened], Others],
-    before: Tree | None = NOTHING_MORE,
-) -> None:
+class Part(NamedTuple):
+    """What is added to a result, or to that of a line in it.
+
+    group: of the line in the file; empty: the result itself.  fields: quantities over the output times, (nt, ...);
+    blocks: all their values: name, number of the first output, and values (n, ...) of n outputs; others: gives
+    attributes, and events of all of the line (kind, text), after the last block, from the events that there are.
+    """
+
+    group: str
+    fields: Sequence[Field]
+    blocks: Iterable[Block]
+    others: Callable[[Happened], Others]
+
+
+def amend(target: Path | io.BytesIO | LateFile, parts: Sequence[Part], before: Tree | None = NOTHING_MORE) -> None:
     """Add to a complete result what is known only afterwards.
 
-    fields: quantities over the output times, (nt, ...); blocks: all their values: name, number of the first output, and
-    values (n, ...) of n outputs; others: gives attributes, and events of all the cable (kind, text), after the last
-    block, from the events that the result has; before: what a run needs that goes on from here, None: what is there;
-    a finer result is to come then, and what is added here is taken back when more is added.  Else all is done.
+    parts: one after the other; before: what a run needs that goes on from here, None: what is there; a finer result is
+    to come then, and what is added here is taken back when more is added.  Else all is done.
     """
     done = before is not None and not before
 
@@ -55,12 +60,14 @@ def amend(
         if before is not None and BEFORE in file:
             del file[BEFORE]
         write_before(file, before)
-        _add(file, fields, blocks, others, done)
+        for part in parts:
+            _add(file[part.group] if part.group else file, part, done)
 
     if isinstance(target, LateFile):
+        (part,) = parts
         if before is not None:
             target.before = before or None
-        _add_to_arrays(target.contents, fields, blocks, others, done)
+        _add_to_arrays(target.contents, part, done)
         target.placed = False  # it may be there without them, because they took long
         target.place()
     else:
@@ -70,35 +77,6 @@ def amend(
 def may_be_amended(late: LateFile) -> bool:
     """Whether a result that is in memory can be added to there; what was added before is taken back in its file."""
     return AMENDED not in late.contents.attributes
-
-
-def amend_lines(
-    target: Path | io.BytesIO,
-    fields: Mapping[str, Sequence[Field]],
-    values: Mapping[str, Mapping[str, np.ndarray]],
-    attributes: Mapping[str, Mapping[str, str | float | int]],
-    of_all: Mapping[str, str | float | int],
-    events: Sequence[tuple[str, str]],
-    of_lines: Mapping[str, Sequence[tuple[str, str]]] | None = None,
-    done: bool = True,
-) -> None:
-    """Add to a complete result of several lines what is known of each only afterwards.
-
-    fields, values, attributes: by the name of the line, as of `amend`; of_all: attributes of the system; events: of it,
-    of_lines: of lines; done: whether nothing is left to go on with, as of `amend`.
-    """
-    notes = of_lines or {}
-
-    def add(file: h5py.File) -> None:
-        if done and BEFORE in file:
-            del file[BEFORE]
-        for name, each in fields.items():
-            blocks = [(field.name, 0, values[name][field.name]) for field in each]
-            known = attributes[name], notes.get(name, ())
-            _add(file[f"{GROUP}/{name}"], each, blocks, lambda _, known=known: known, done)  # type: ignore[misc]
-        _add(file, (), (), lambda _: (of_all, events), done)
-
-    change_complete(target, add)
 
 
 def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], None]) -> None:
@@ -126,11 +104,9 @@ def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], Non
         new.unlink(missing_ok=True)
 
 
-def _add_to_arrays(
-    contents: ArrayContents, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others],
-    done: bool,
-) -> None:  # fmt: skip
+def _add_to_arrays(contents: ArrayContents, part: Part, done: bool) -> None:
     """The same of a result that is in memory."""
+    _, fields, blocks, others = part
     times, named, found = contents.values("t", None), {x.name: x for x in fields}, dict[str, np.ndarray]()
     for name, begin, values in blocks:
         field = named[name]
@@ -153,9 +129,8 @@ def _add_to_arrays(
             contents.data[name].values = values
 
 
-def _add(
-    file: h5py.Group, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others], done: bool
-) -> None:
+def _add(file: h5py.Group, part: Part, done: bool) -> None:
+    _, fields, blocks, others = part
     _take_back(file)
     count, named, scales = len(file["t"]), {field.name: field for field in fields}, dict[str, h5d.DatasetID]()
     with_groups = h5p.create(h5p.LINK_CREATE)

@@ -88,7 +88,8 @@ def recorded(run: NetworkRun, looks: int | None = None) -> NetworkRun:
 def both_files(scene: Scene, folder: Path, changes: Sequence[LoadChange[Scene]] = ()) -> tuple[Path, Path]:
     """The files of a cable and of its network, which gets that of a cable; each is computed once."""
     cable, network = folder / "cable.h5", folder / "network.h5"
-    Case(scene, None, changes).record(first_resolution(scene), cable)
+    case = Case(scene, None, changes)
+    case.record(NetworkResolution.of(case.lines), cable)
     recorded(network_run(scene, network, changes))
     return cable, network
 

@@ -7,17 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from controlled import OneLine
 from scipy.interpolate import CubicSpline
 
 import hybrid
-from hybrid.accuracy import error_control, error_estimate
-from hybrid.accuracy.error_control import ErrorController
+from hybrid.accuracy import error_estimate, line_errors
 from hybrid.accuracy.error_estimate import OF_SIZES, SAFETY, Estimate
 from hybrid.accuracy.error_order import LEAST_FORCE_ORDER, ORDER, ORDERS, START_ORDERS, confirmed_order
 from hybrid.accuracy.error_report import error_fields
 from hybrid.accuracy.error_statistics import statistics_of
 from hybrid.accuracy.errors_by_cause import Errors
 from hybrid.accuracy.finer_result import Judged
+from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.refinement import OF_MODEL, Free, Verdict, bounds_of, costly, judge, not_converged, refined
 from hybrid.cli.console import Console
 from hybrid.cli.tables import errors_facts, errors_table, extremes_facts, extremes_table
@@ -26,6 +27,7 @@ from hybrid.model.build import build
 from hybrid.model.mesh_grading import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
+from hybrid.scene.short_form import LINE
 from hybrid.simulation.result_checks import cubic_spline
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.named_arrays import pack, unpack
@@ -258,12 +260,12 @@ def test_the_force_at_the_first_output_has_an_order_of_its_own():
 def test_statistics_are_estimated_where_a_motion_is_judged_by_them(monkeypatch):
     """They took a twentieth of a run that is judged at every instant."""
     made = []
-    monkeypatch.setattr(error_control, "estimates", lambda *runs: made.append(runs) or {})
+    monkeypatch.setattr(line_errors, "estimates", lambda *runs: made.append(runs) or {})
     hybrid.run(swinging(accuracy="10%", model="rod"))
     assert not made
     resolution = Resolution(1.0, 0.1, None, 1e-3)
     runs = [sample(resolution, 100, 2.0), *(sample(resolution.coarser(2, k), 100 // k, 2.0) for k in (2, 4))]
-    control = ErrorController(RequestedAccuracy(1.0, None, None), Free(True, True, False), True, None, None)
+    control = LineErrors(RequestedAccuracy(1.0, None, None), Free(True, True, False), True)
     control.comparisons = runs[1], runs[2], None
     assert control.first_estimate(runs[0]) and not made
     assert control.statistics == {} and len(made) == 1
@@ -274,12 +276,8 @@ def test_a_run_is_refined_further_where_its_order_has_turned_out_lower():
     resolution = Resolution(1.0, 0.1, None, 1e-3)
     runs = [sample(resolution, 100, 1.0), sample(resolution.coarser(2, 2), 50, 1.0)]
     runs += [sample(resolution.coarser(2, 4), 25, 1.0), sample(resolution.coarser(4, 4), 25, 1.0)]
-
-    def refused(_: Resolution) -> RunSample:
-        raise AssertionError
-
     asked = RequestedAccuracy(None, SAFETY * 0.01 / 6.0, None)
-    control = ErrorController(asked, Free(True, True, False), True, refused, refused)
+    control = LineErrors(asked, Free(True, True, False), True)
     control.estimate = Estimate(*runs)
     assert control.next_resolution() is not None
     control.estimate.update(sample(replace(resolution, fineness=3.0), 300, 1.0))
@@ -304,10 +302,11 @@ def test_where_longer_steps_show_nothing_shorter_ones_do(rough_steps):
         asked.append(coarse)
         return sample(coarse, 100, 2.0, coarse.every)
 
-    control = ErrorController(None, Free(True, True, False), True, compute, compute)
+    one = OneLine(None, Free(True, True, False), compute, compute)
+    control = one.line
     rough = sample(resolution.coarser(2, 4), rough_steps, 2.0, 4) if rough_steps else None
     control.comparisons = sample(resolution.coarser(2, 2), 50, 2.0, 2), rough, None
-    assert control.first_estimate(sample(resolution, 100, 2.0))
+    assert one.control._estimated({LINE: sample(resolution, 100, 2.0)}, {}) == [LINE]
     assert [(x.fineness, x.step, x.local, x.every) for x in asked] == [(0.5, 0.1, 1e-3, 2)]
     estimate = control.estimate
     assert not control.notes and estimate.has_step and not estimate.share_unknown
@@ -776,12 +775,8 @@ def test_notes_and_model_error_are_of_the_runs_that_count():
     before = made_up([("model error not estimated", "before")], 0.004, 0.1, 0.5, 50)
     after = made_up((), 0.0005, 0.1, 4.5, 450)
     comparisons = iter([before, made_up(fineness=0.5, steps=25), made_up(fineness=0.25, steps=25), after])
-    control = ErrorController(
-        RequestedAccuracy(0.005, None, None),
-        Free(True, True, True),
-        True,
-        lambda _: next(comparisons),
-        lambda _: next(said),
+    control = OneLine(
+        RequestedAccuracy(0.005, None, None), Free(True, True, True), lambda _: next(comparisons), lambda _: next(said)
     )
     final, errors = control.start(Resolution(1.0, 0.1, 1e-6, 1e-3))
     assert final.cells == 900 and len(control.runs) == 6

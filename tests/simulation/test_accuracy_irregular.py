@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bits import Stopping, differences, went_on
+from controlled import OneLine
 
 import hybrid
-from hybrid.accuracy.error_control import ErrorController
 from hybrid.accuracy.error_statistics import STATISTICS, WINDOWS, StatisticEstimate, snaps, statistics_of
 from hybrid.accuracy.refinement import Free
 from hybrid.accuracy.snap_scatter import snap_excess, snap_times
@@ -92,7 +92,7 @@ def test_model_errors_are_those_at_the_extremes():
     assert windows < 0.5
 
 
-def estimated(irregular: bool, instant: bool = False, slack: float = 0.0, rise: int = 5) -> ErrorController:
+def estimated(irregular: bool, instant: bool = False, slack: float = 0.0, rise: int = 5) -> OneLine:
     """A controller of runs that agree but for when things happen; a hundredth is asked.
 
     slack: N, the smallest force; rise: steps from there until the line is taut.
@@ -110,13 +110,13 @@ def estimated(irregular: bool, instant: bool = False, slack: float = 0.0, rise: 
 
     asked = RequestedAccuracy(None, None, 0.01, instant=instant)
     free = Free(mesh=True, steps=True, zones=False)
-    return ErrorController(asked, free, True, sample, sample, irregular=irregular)
+    return OneLine(asked, free, sample, sample, irregular=irregular)
 
 
 def test_values_that_do_not_converge_are_judged_by_statistics():
     control = estimated(False)
     control.start(FINENESS)
-    assert control.irregular
+    assert control.line.irregular
     assert len(control.runs) == 5, "one repetition, which falls as slowly: extremes meet what is asked"
     notes = [x for x in control.notes if x[0] != "several equilibria"]  # these begin at other places, too
     assert [kind for kind, _ in notes] == ["snaps"]
@@ -128,22 +128,22 @@ def test_motion_that_turns_out_irregular_after_its_last_refinement():
     """What missed before is not judged any more, and no refinement is left: the run is kept as it is."""
     control = estimated(False)
     control.start(FINENESS)
-    control._judged, control._ratio = 6, np.inf
-    assert control.next_resolution() is None
+    control.line._judged, control.line._ratio = 6, np.inf
+    assert control.line.next_resolution() is None
 
 
 def test_a_line_that_stays_taut_is_judged_at_every_instant():
     """Where nothing snaps, runs that do not converge are too coarse."""
     control = estimated(False, slack=4e3)
     control.start(FINENESS)
-    assert not control.irregular and "accuracy missed" in {kind for kind, _ in control.notes}
+    assert not control.line.irregular and "accuracy missed" in {kind for kind, _ in control.notes}
 
 
 def test_snaps_of_which_steps_show_nothing_are_judged_at_every_instant():
     """One step from slack to taut: that runs differ says that steps are too long."""
     control = estimated(False, rise=2)
     control.start(FINENESS)
-    assert not control.irregular
+    assert not control.line.irregular
 
 
 def test_one_slow_fall_is_that_of_coarse_runs():
@@ -157,13 +157,13 @@ def test_one_slow_fall_is_that_of_coarse_runs():
 
     control.result = finer
     control.start(FINENESS)
-    assert not control.irregular
+    assert not control.line.irregular
 
 
 def test_every_instant_can_be_asked():
     control = estimated(False, instant=True)
     control.start(FINENESS)
-    assert not control.irregular
+    assert not control.line.irregular
 
 
 def test_a_largest_force_by_chance_is_not_judged():
@@ -179,9 +179,9 @@ def test_a_largest_force_by_chance_is_not_judged():
         return replace(found, resolution=resolution, forces=steps)
 
     asked = RequestedAccuracy(None, None, 0.01)
-    control = ErrorController(asked, Free(True, True, False), True, sample, sample, irregular=True)
+    control = OneLine(asked, Free(True, True, False), sample, sample, irregular=True)
     control.start(FINENESS)
-    assert control.scattered == ["end_force_end"]  # the only one there
+    assert control.line.scattered == ["end_force_end"]  # the only one there
     assert [kind for kind, _ in control.notes] == ["irregular motion", "largest force uncertain", "windows uncertain"]
     assert len(control.runs) == 4
 
@@ -201,12 +201,12 @@ def test_chance_in_means_over_windows_is_seen_from_window_to_window(scatter, unc
         return replace(found, resolution=resolution, forces=np.column_stack([t, force, force]))
 
     asked = RequestedAccuracy(None, None, 0.01)  # 200 N
-    control = ErrorController(asked, Free(False, False, False), True, sample, sample, irregular=True)
+    control = OneLine(asked, Free(False, False, False), sample, sample, irregular=True)
     control.start(FINENESS)
-    chance = control.statistics["windows_largest"].chance
+    chance = control.line.statistics["windows_largest"].chance
     assert chance == pytest.approx(2.0 * scatter * np.sqrt(2.0 / 50.0), rel=0.4)
     assert ("windows uncertain" in {kind for kind, _ in control.notes}) == uncertain
-    saved = unpack(pack(control.statistics["windows_largest"].checkpoint()))
+    saved = unpack(pack(control.line.statistics["windows_largest"].checkpoint()))
     again = StatisticEstimate.restored(saved, SCENE, (1, 1, 0))
     np.testing.assert_array_equal(again.chance, chance)
 
@@ -227,10 +227,10 @@ def test_a_largest_force_within_the_scatter_of_windows_is_not_refined(scatter, r
         return replace(found, resolution=resolution, forces=steps)
 
     asked = RequestedAccuracy(None, None, 0.02)
-    control = ErrorController(asked, Free(True, True, False), True, sample, sample, irregular=True)
+    control = OneLine(asked, Free(True, True, False), sample, sample, irregular=True)
     control.start(FINENESS)
     assert (len(control.runs) > 4) == repeated
-    assert bool(control.scattered) != repeated
+    assert bool(control.line.scattered) != repeated
 
 
 @pytest.mark.parametrize("scatter, uncertain", [(30.0, False), (1500.0, True)])
@@ -251,16 +251,14 @@ def test_a_largest_force_that_snaps_may_exceed_is_not_judged(scatter, uncertain)
         found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
         return replace(found, resolution=resolution, forces=steps)
 
-    control = ErrorController(
-        RequestedAccuracy(None, None, 0.01), Free(False, False, False), True, sample, sample, irregular=True
-    )
+    asked = RequestedAccuracy(None, None, 0.01)
+    control = OneLine(asked, Free(False, False, False), sample, sample, irregular=True)
     control.start(FINENESS)
     assert ("largest force uncertain" in {kind for kind, _ in control.notes}) == uncertain
-    again = ErrorController(control.asked, control.free, True, sample, sample, irregular=True)
-    tree = {k: x for k, x in control.checkpoint().items() if k not in ("estimate", "statistics")}
-    tree |= {"estimate": None, "statistics": {}, "next": tree["first"]}
+    again = OneLine(asked, Free(False, False, False), sample, sample, irregular=True).line
+    tree = control.line.checkpoint() | {"estimate": None, "statistics": {}}
     again.restore(unpack(pack(tree)), SCENE, output_points(SCENE))
-    np.testing.assert_array_equal(again.excess, control.excess)
+    np.testing.assert_array_equal(again.excess, control.line.excess)
 
 
 def test_a_snap_is_from_slack_to_the_next_fall_and_others_are_none():
@@ -313,7 +311,7 @@ def test_means_over_windows_that_do_not_converge_are_not_refined():
         return replace(found, resolution=resolution, forces=steps)
 
     asked = RequestedAccuracy(None, 100.0, None)
-    control = ErrorController(asked, Free(True, True, False), True, sample, sample, irregular=True)
+    control = OneLine(asked, Free(True, True, False), sample, sample, irregular=True)
     control.start(FINENESS)
     assert len(control.runs) == 4
     missed = [text for kind, text in control.notes if kind == "accuracy missed"]

@@ -11,6 +11,7 @@ from bits import differences
 
 import hybrid
 import hybrid.solve.run
+from hybrid.model.network import NetworkResolution
 from hybrid.simulation import case as cases
 from hybrid.simulation import progress as reports
 from hybrid.simulation.beside import THREADS, beside, thread_count
@@ -38,9 +39,9 @@ def test_any_number_of_threads_gives_the_same_bits(
     used: set[str] = set()
     sample = Case.sample
 
-    def noted(self: Case, *given: Any) -> Any:
+    def noted(self: Case, *given: Any, **more: Any) -> Any:
         used.add(threading.current_thread().name)
-        return sample(self, *given)
+        return sample(self, *given, **more)
 
     monkeypatch.setattr(Case, "sample", noted)
     for count in ("1", "2", "3"):
@@ -112,7 +113,7 @@ def test_a_run_that_fails_ends_the_others(monkeypatch: pytest.MonkeyPatch) -> No
 
     def second() -> None:
         begun.set()
-        case.sample(cases.first_resolution(case.scene))
+        case.sample(NetworkResolution.of(case.lines))
 
     with pytest.raises(hybrid.ComputationError), case.beside([first, second]) as runs:  # type: ignore[list-item]
         runs[0]()

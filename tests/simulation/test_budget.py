@@ -13,6 +13,7 @@ from bits import differences
 import hybrid
 from hybrid.accuracy import budget as module
 from hybrid.accuracy.budget import OUTPUT, POINT, Budget
+from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
 from hybrid.simulation.run_sample import RunSample
 
@@ -64,10 +65,13 @@ def test_what_is_beyond_is_not_computed_and_said(tmp_path: Path, monkeypatch: py
 
     surveyed = passes.Passes._surveyed
 
-    def rougher(self: passes.Passes, resolution: Resolution) -> Any:
-        choice, found = surveyed(self, resolution)
-        assert found.local is not None
-        return choice, replace(found.coarser(8.0, 1.0), local=10.0 * found.local)
+    def rougher(self: passes.Passes, first: NetworkResolution) -> NetworkResolution:
+        return NetworkResolution(
+            {
+                name: replace(x.coarser(8.0, 1.0), local=10.0 * (x.local or 0.0))
+                for name, x in surveyed(self, first).lines.items()
+            }
+        )
 
     monkeypatch.setattr(passes.Passes, "_surveyed", rougher)
     with hybrid.run(scene, tmp_path / "free.h5") as free:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,9 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.model.network import NetworkResolution
 from hybrid.scene.read import as_scene
+from hybrid.scene.short_form import LINE
 from hybrid.simulation import line_result
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample
@@ -29,12 +29,7 @@ SAME = 1e-8  # of the scale of a quantity: errors of forces are differences over
 
 def sample(case: Case, **more: Any) -> RunSample:
     """The run of a case with the error of leaving bending out."""
-    return case.sample(finely(case), **more)
-
-
-def finely(case: Case) -> Resolution:
-    """How finely."""
-    return replace(first_resolution(case.scene), follow=True)
+    return case.sample(NetworkResolution.of(case.lines), model=True, **more)[LINE]
 
 
 def assert_same(a: RunSample, b: RunSample) -> None:
@@ -60,7 +55,7 @@ def assert_same(a: RunSample, b: RunSample) -> None:
 def test_a_pre_run_ends_before_the_run_at_places_of_its_own() -> None:
     case = Case(as_scene(SCENE | {"model": "catenary", "dimension": 3}), None)
     places = np.array([0.0, 3.3, 20.0])
-    found = sample(case, points=places, until=0.32)
+    found = sample(case, points={LINE: places}, until=0.32)
     assert found.values["tension"].shape == (8, 3) and found.model_error
     assert sample(Case(as_scene(SCENE | {"model": "rod"}), None)).model_error == {}
 

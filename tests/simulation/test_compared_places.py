@@ -13,6 +13,7 @@ from test_result_first import asked, rough, stopped_in  # noqa: F401
 
 import hybrid
 from hybrid.model.output_points import OutputPoints
+from hybrid.scene.short_form import LINE
 from hybrid.simulation import run_sample
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, REFINEMENT
@@ -40,9 +41,9 @@ def test_errors_are_at_all_output_points(tmp_path: Path, monkeypatch: pytest.Mon
     compared: list[int] = []
     sample = Case.sample
 
-    def counting(self: Case, *arguments: object) -> object:
-        found = sample(self, *arguments)  # type: ignore[arg-type]
-        compared.append(np.shape(found.values["position"])[1])
+    def counting(self: Case, *arguments: Any, **more: Any) -> Any:
+        found = sample(self, *arguments, **more)
+        compared.append(np.shape(found[LINE].values["position"])[1])
         return found
 
     monkeypatch.setattr(Case, "sample", counting)
@@ -79,7 +80,7 @@ def test_where_bends_are_judged_it_is_everywhere(
     """A bend of a long line lies between a hundred places."""
     scene = described() | {"model": "adaptive", "output": {"points": POINTS}} | more
     scene["cable"] = {"sections": [scene["cable"]["sections"][0] | {"bending_stiffness": 1e-3} | section]}
-    assert (Case(hybrid.validate_scene(scene), None).places.size == 0) == everywhere
+    assert (Case(hybrid.validate_scene(scene), None).places[LINE].size == 0) == everywhere
 
 
 @pytest.mark.long

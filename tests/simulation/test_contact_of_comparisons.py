@@ -10,9 +10,10 @@ from test_self_contact_default import led_through
 from test_system_contact import RUBS, TIME, system
 
 import hybrid
+from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
 from hybrid.simulation.network_run import NetworkRun
-from hybrid.simulation.run_sample import RunSample
+from hybrid.simulation.run_sample import Samples
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 
@@ -23,9 +24,9 @@ def touched(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     found: list[bool] = []
     sample = Case.sample
 
-    def noted(self: Case, *args: Any, **more: Any) -> RunSample:
+    def noted(self: Case, *args: Any, **more: Any) -> Samples:
         run = sample(self, *args, **more)
-        found.append(run.touches)
+        found.append(run[LINE].touches)
         return run
 
     monkeypatch.setattr(Case, "sample", noted)

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from controlled import OneLine
 
 import hybrid
 from hybrid.accuracy import error_control
-from hybrid.accuracy.error_control import ErrorController
 from hybrid.accuracy.error_estimate import Estimate
-from hybrid.accuracy.error_statistics import STATISTICS, estimates
+from hybrid.accuracy.error_statistics import STATISTICS, estimates, statistics_of
 from hybrid.accuracy.finer_result import NOT_KEPT, Judged, is_no_better
 from hybrid.accuracy.refinement import Free, Verdict
 from hybrid.errors import ComputationError, Outcome
@@ -34,7 +34,7 @@ def comparisons() -> list[RunSample]:
     return [made_up(0.5, 50), made_up(0.5, 25), made_up(0.25, 25)]
 
 
-def refined(second: RunSample | ComputationError) -> tuple[RunSample, ErrorController, list[bool]]:
+def refined(second: RunSample | ComputationError) -> tuple[RunSample, OneLine, list[bool]]:
     """What control returns of a first result and what follows it, and what became of both."""
     samples, results, settled = iter(comparisons()), iter([made_up(), second]), list[bool]()
 
@@ -45,7 +45,7 @@ def refined(second: RunSample | ComputationError) -> tuple[RunSample, ErrorContr
         return found
 
     free = Free(True, True, True)
-    control = ErrorController(ASKED, free, True, lambda _: next(samples), result, settle=settled.append)
+    control = OneLine(ASKED, free, lambda _: next(samples), result, settled.append)
     found, _ = control.start(Resolution(1.0, 0.1, 1e-6, 1e-3))
     return found, control, settled
 
@@ -63,8 +63,8 @@ def test_a_finer_run_far_off_does_not_replace_the_one_before() -> None:
     """
     found, control, settled = refined(made_up(3.0, 300, off=2.0))
     assert found.cells == 100 and settled == [True, False]
-    assert control.estimate is not None and control.estimate.run is found
-    total = {name: x for cause, name, _, x in control.estimate.errors.blocks() if cause == "total"}["position"]
+    assert control.line.estimate is not None and control.line.estimate.run is found
+    total = {name: x for cause, name, _, x in control.line.estimate.errors.blocks() if cause == "total"}["position"]
     assert total[5, 2] > 2.0 and total[2, 1] < 0.03
     said = dict(control.notes)
     assert "300 cells" in said[NOT_KEPT] and "no better" in said[NOT_KEPT] and "accuracy missed" in said
@@ -72,7 +72,7 @@ def test_a_finer_run_far_off_does_not_replace_the_one_before() -> None:
 
 def test_a_finer_run_that_fails_leaves_the_one_before() -> None:
     found, control, _ = refined(ComputationError(Outcome.SINGULAR, 3.0, 1.0))
-    assert found.cells == 100 and control.estimate is not None and control.estimate.run is found
+    assert found.cells == 100 and control.line.estimate is not None and control.line.estimate.run is found
     said = dict(control.notes)
     assert Outcome.SINGULAR.cause in said[NOT_KEPT] and "a finer run failed" in said["accuracy missed"]
 
@@ -121,7 +121,7 @@ def test_of_an_irregular_motion_statistics_decide(most: float) -> None:
     before = Judged(estimate, found).copied()
     ratio = before.verdict(every).ratio
     estimate.update(finer)
-    for name, statistic in error_control.statistics_of(finer, 1).items():
+    for name, statistic in statistics_of(finer, 1).items():
         found[name].update(statistic)
     now = Judged(estimate, found)
     decides = is_no_better({"": every}, {"": before}, {"": now})

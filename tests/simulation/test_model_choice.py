@@ -14,7 +14,9 @@ from hybrid.accuracy import model_choice
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.build import build
 from hybrid.model.model_costs import CHOSEN, REST, Cost, cheapest
-from hybrid.model.resolution import first_resolution, model_is_free
+from hybrid.model.network import NetworkResolution
+from hybrid.model.resolution import model_is_free
+from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
 from tests.said import both_ways, line_of, said
 
@@ -138,6 +140,11 @@ def test_the_choice_survives_a_stop(tmp_path: Path, monkeypatch):
         assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
 
 
+def surveyed(case: Case) -> NetworkResolution:
+    """How finely a case is computed whose model is not chosen."""
+    return model_choice.chosen_and_surveyed(case, NetworkResolution.of(case.lines), [LINE])[1]
+
+
 @pytest.mark.parametrize("curvature", ["none", "5%"])
 def test_zones_that_move_have_the_mesh_of_rods(curvature: str) -> None:
     """To the last bit, whatever is asked: kinds of cells change, and cells do not."""
@@ -145,7 +152,7 @@ def test_zones_that_move_have_the_mesh_of_rods(curvature: str) -> None:
     def layout(model, accuracy):
         scene = hybrid.validate_scene(CLAMPED | {"model": model, "accuracy": accuracy})
         case = Case(scene, None)
-        return build(scene, model_choice.surveyed(case, first_resolution(scene)))
+        return build(scene, surveyed(case).one)
 
     asked = {"position": "1%", "tension": "1%", "curvature": curvature}
     rods, moving = (layout(model, asked) for model in ("rod", MOVING))
@@ -226,7 +233,7 @@ def test_zones_begin_with_rods_where_a_pre_run_shows_that_they_will_be_needed() 
     text = ["accuracy={position: 1%, tension: 1%, curvature: 5%}", "output.points=251", "output.every=0.5"]
     scene = hybrid.load_scene(Path(__file__).parents[2] / "examples" / "touchdown.yaml", asked + text)
     case = Case(scene, None)
-    resolution = model_choice.surveyed(case, first_resolution(scene))
+    resolution = surveyed(case).one
     assert resolution.rods and all(0.0 <= a < b <= 250.0 and x > 1.0 for a, b, x in resolution.rods)
     result = hybrid.run(scene)
     edge = np.asarray(result.touchdown)[:, -1]

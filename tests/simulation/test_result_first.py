@@ -14,7 +14,7 @@ from test_late_file import described
 from typer.testing import CliRunner
 
 import hybrid
-from hybrid.accuracy import error_control, passes, passes_of_lines
+from hybrid.accuracy import error_control, passes
 from hybrid.accuracy.refinement import Verdict
 from hybrid.cli.commands import app
 from hybrid.cli.console import Console
@@ -63,18 +63,13 @@ def rougher(resolution: Resolution) -> Resolution:
 @pytest.fixture
 def rough(monkeypatch: pytest.MonkeyPatch) -> None:
     """First results that are far too coarse for what is asked, so that finer ones follow."""
-    one, several = passes.Passes._surveyed, passes_of_lines.PassesOfLines.surveyed
+    surveyed = passes.Passes._surveyed
 
-    def of_one(self: passes.Passes, resolution: Resolution) -> tuple[Any, Resolution]:
-        choice, found = one(self, resolution)
-        return choice, rougher(found)
-
-    def of_several(self: passes_of_lines.PassesOfLines, first: NetworkResolution) -> NetworkResolution:
-        return NetworkResolution({name: rougher(x) for name, x in several(self, first).lines.items()})
+    def made(self: passes.Passes, first: NetworkResolution) -> NetworkResolution:
+        return NetworkResolution({name: rougher(x) for name, x in surveyed(self, first).lines.items()})
 
     monkeypatch.setattr(network_run, "LOOK", 1)
-    monkeypatch.setattr(passes.Passes, "_surveyed", of_one)
-    monkeypatch.setattr(passes_of_lines.PassesOfLines, "surveyed", of_several)
+    monkeypatch.setattr(passes.Passes, "_surveyed", made)
 
 
 def fixed() -> dict[str, Any]:
@@ -104,8 +99,14 @@ def stopped_in(name: str, scene: dict[str, Any], path: Path) -> None:
 @pytest.mark.parametrize("scene", [asked(), two_lines()], ids=["one", "several"])
 @pytest.mark.usefixtures("rough")
 def test_stopped_after_the_result(scene: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The result is complete and says what is to come; resumed, it is what it would have been."""
+    """The result is complete and says what is to come; resumed, it is what it would have been.
+
+    Runs to compare with that had ended are not computed again: those of several lines were.
+    """
     Stopping(monkeypatch)
+    compared: list[object] = []
+    sample = Case.sample
+    monkeypatch.setattr(Case, "sample", lambda self, *x, **y: compared.append(x) or sample(self, *x, **y))
     hybrid.run(scene, tmp_path / "whole.h5").close()
     for name, pending in ((ESTIMATION, ERRORS), (REFINEMENT, FINER)):
         folder = tmp_path / name
@@ -118,7 +119,9 @@ def test_stopped_after_the_result(scene: dict[str, Any], tmp_path: Path, monkeyp
             assert any(x.startswith("error_total") for x in result.attributes) == (name == REFINEMENT)
         left = (folder / ".run.h5.finer").exists()  # from which a finer result goes on
         assert left == (name == REFINEMENT)
+        compared.clear()
         hybrid.resume(folder / "run.h5").close()
+        assert bool(compared) == (name == ESTIMATION)
         assert differences(tmp_path / "whole.h5", folder / "run.h5") == []
         assert [x.name for x in folder.iterdir()] == ["run.h5"]
         with hybrid.open(folder / "run.h5") as result:
@@ -195,14 +198,13 @@ def test_stopped_in_the_result_what_there_is_goes_on(
 
 @pytest.mark.long
 @pytest.mark.usefixtures("rough")
-@pytest.mark.parametrize("module", [passes, passes_of_lines])
+@pytest.mark.parametrize("scene", [asked(), two_lines()], ids=["one", "several"])
 def test_errors_are_written_before_a_long_finer_run(
-    module: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    scene: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They are there while it runs, and the file that comes out is the same."""
-    scene = asked() if module is passes else two_lines()
     hybrid.run(scene, tmp_path / "whole.h5").close()
-    monkeypatch.setattr(module, "WORTH_WRITING", -1.0)
+    monkeypatch.setattr(passes, "WORTH_WRITING", -1.0)
     seen: list[tuple[str, bool]] = []
 
     def look(progress: Progress) -> None:
@@ -235,7 +237,7 @@ def test_what_was_added_is_taken_back(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_a_comparison_that_fails_leaves_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(self: Case, resolution: Any, points: Any = None, until: Any = None) -> Any:
+    def failing(self: Case, resolution: Any, points: Any = None, until: Any = None, **more: Any) -> Any:
         raise ComputationError(Outcome.SINGULAR, 1.0, 0.0)
 
     monkeypatch.setattr(Case, "sample", failing)

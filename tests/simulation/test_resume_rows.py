@@ -10,14 +10,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 from bits import Stopping, differences
 
 import hybrid
 from hybrid.accuracy.passes import Passes
-from hybrid.model.resolution import Resolution
+from hybrid.model.network import NetworkResolution
 from hybrid.simulation import case as cases
 from hybrid.simulation.progress import PRE_RUN, REFINEMENT, Progress
 from hybrid.store.checkpoint import read_before
@@ -32,10 +31,13 @@ def always(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cases, "MOST_IN_MEMORY", 0)
     surveyed = Passes._surveyed
 
-    def rougher(self: Passes, resolution: Resolution) -> tuple[Any, Resolution]:
-        choice, found = surveyed(self, resolution)
-        assert found.local is not None
-        return choice, replace(found.coarser(8.0, 1.0), local=10.0 * found.local)
+    def rougher(self: Passes, first: NetworkResolution) -> NetworkResolution:
+        return NetworkResolution(
+            {
+                name: replace(x.coarser(8.0, 1.0), local=10.0 * (x.local or 0.0))
+                for name, x in surveyed(self, first).lines.items()
+            }
+        )
 
     monkeypatch.setattr(Passes, "_surveyed", rougher)
 
@@ -110,7 +112,7 @@ def test_a_stopped_run_goes_on_bit_for_bit(
         shutil.copy(file, tmp_path)
     computed: list[object] = []
     sample = cases.Case.sample
-    monkeypatch.setattr(cases.Case, "sample", lambda self, *x: computed.append(x) or sample(self, *x))
+    monkeypatch.setattr(cases.Case, "sample", lambda self, *x, **y: computed.append(x) or sample(self, *x, **y))
     if harm is not None:
         harm(rows(tmp_path)[1])
     hybrid.resume(tmp_path / "run.h5").close()
@@ -124,7 +126,7 @@ def test_the_file_of_the_result_does_not_hold_them(made: Callable[[str], Path]) 
     beside = sum(x.stat().st_size for x in rows(made("rods")))
     assert (made("rods") / "run.h5").stat().st_size > beside > 0
     with opened(made("rods") / "run.h5") as file:
-        kept = read_before(file)["coarse"]
+        kept = read_before(file)["lines"]["cable"]["coarse"]
     assert len(kept) == 3 and all(x["rows"] and not x["values"] for x in kept)
 
 
@@ -160,13 +162,14 @@ def test_killed_and_resumed(made: Callable[[str], Path], tmp_path: Path, monkeyp
         from dataclasses import replace
         import hybrid
         from hybrid.accuracy import passes, refinement
+        from hybrid.model.network import NetworkResolution
         from hybrid.simulation import case
         case.MOST_IN_MEMORY, passes.WORTH_WRITING = 0, -1.0
         refinement.LITTLE = float("inf")  # an event that goes by clocks
         surveyed = passes.Passes._surveyed
-        def rougher(self, resolution):
-            choice, found = surveyed(self, resolution)
-            return choice, replace(found.coarser(8.0, 1.0), local=10.0 * found.local)
+        def rougher(self, first):
+            found = surveyed(self, first).lines
+            return NetworkResolution({{k: replace(x.coarser(8.0), local=10.0 * x.local) for k, x in found.items()}})
         passes.Passes._surveyed = rougher
         def kill(progress):
             if progress.name == "refinement":
@@ -180,7 +183,7 @@ def test_killed_and_resumed(made: Callable[[str], Path], tmp_path: Path, monkeyp
     assert not (tmp_path / ".run.h5.lock").exists()  # it was left, and opening has removed it
     computed: list[object] = []
     sample = cases.Case.sample
-    monkeypatch.setattr(cases.Case, "sample", lambda self, *x: computed.append(x) or sample(self, *x))
+    monkeypatch.setattr(cases.Case, "sample", lambda self, *x, **y: computed.append(x) or sample(self, *x, **y))
     hybrid.resume(tmp_path / "run.h5").close()
     assert not computed and not rows(tmp_path)
     assert differences(made("rods") / "whole.h5", tmp_path / "run.h5") == []

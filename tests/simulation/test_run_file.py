@@ -77,9 +77,9 @@ def test_a_result_in_memory(tmp_path: Path) -> None:
 
 def test_what_fails_is_said_of_the_cable(tmp_path: Path) -> None:
     scene = exact_scene(tables_with(scene_of(), {END: {"kind": "free", "force": {"value": [1e7, 0, 0], "ramp": 0.4}}}))
-    said = []
+    said, case = [], Case(scene, None)
     for k, compute in enumerate(
-        (lambda x: Case(scene, None).record(first_resolution(scene), x), lambda x: recorded(network_run(scene, x)))
+        (lambda x: case.record(NetworkResolution.of(case.lines), x), lambda x: recorded(network_run(scene, x)))
     ):
         target = tmp_path / f"{k}.h5"
         with pytest.raises(ComputationError) as failed:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.accuracy import passes_of_lines
 from hybrid.errors import ComputationError
+from hybrid.simulation.case import Case
 from hybrid.store.limits import extreme_errors
 
 LEG = {"length": 140, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
@@ -90,14 +90,10 @@ def test_a_longer_run_has_figures_of_all_of_it(result: hybrid.Result, tmp_path: 
 
 
 def test_where_a_coarser_run_fails_an_event_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    computed = passes_of_lines.run_system
+    def fails(*_: Any, **__: Any) -> None:
+        raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
 
-    def result_alone(*x: Any) -> Any:
-        if "result" not in x:
-            raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
-        return computed(*x)
-
-    monkeypatch.setattr(passes_of_lines, "run_system", result_alone)
+    monkeypatch.setattr(Case, "sample", fails)
     found = hybrid.run(mooring(errors=True) | {"time": {"duration": 1.0, "step": 0.1}})
     for line in found.lines.values():
         assert [e.kind for e in line.events].count("no error figure") == 1

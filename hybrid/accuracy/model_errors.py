@@ -1,31 +1,75 @@
-"""What leaving bending out changes in several lines: they are computed once more, as rods, and compared.
+"""What leaving bending out changes in a run.
 
-As of one cable the figure is that of a run to compare with, whose cells and steps are longer.  The rods have the cells
-of that run, and where zones have moved those of its rods, so that both have the same error by the mesh.
+Of a cable it is followed along a run to compare with.  Lines that are joined move each other: they are computed once
+more, as rods, and compared.  As of one cable the figure is that of a run to compare with, whose cells and steps are
+longer.  The rods have the cells of that run, and where zones have moved those of its rods, so that both have the same
+error by the mesh.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import replace
+from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.accuracy.error_order import magnitude
+from hybrid.accuracy.error_order import COARSER, magnitude
+from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.scene.analysis import CatenaryZone, Mesh, RodModel, RodZone, ZonesModel
 from hybrid.scene.network import JoinedLine
 from hybrid.scene.network_scene import Network
-from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample
-from hybrid.store.reader import Result
+from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample, Samples
 
 Stretches = Collection[tuple[float, float]]  # m, of s
 
 
-def rods_of(result: Result) -> set[tuple[float, float]]:
-    """Stretches of a line that are rod at any output."""
-    return {(zone.s_a, zone.s_b) for zones in result.zones for zone in zones if zone.kind == "rod"}
+class Comparable(Protocol):
+    """What of a case is asked here."""
+
+    moves: bool
+    flat: bool
+
+    @property
+    def network(self) -> Network: ...
+    def instead(self, scene: Any) -> AbstractContextManager[None]: ...
+    def sample(self, resolution: NetworkResolution, *, model: bool = False) -> Samples: ...
+
+
+def with_model_errors(case: Comparable, runs: Samples, costs: list[float]) -> Samples:
+    """A run with what leaving bending out changes in it, where none could follow that.
+
+    costs: s of processor time, to which that of the rods is added.
+    """
+    if case.flat:
+        return runs
+    finely = NetworkResolution({name: x.resolution for name, x in runs.items()})
+    rods, finely, names = as_rods(case.network, finely, {name: x.rods for name, x in runs.items()})
+    found, failed = None, ""
+    try:
+        if names:
+            with case.instead(rods):
+                found = case.sample(finely)
+            costs.append(next(iter(found.values())).cpu)
+    except (ComputationError, SceneError) as error:
+        failed = str(error).splitlines()[0]
+    return against_rods(runs, found, names, failed)
+
+
+def model_errors_of(case: Comparable, result: Samples, costs: list[float]) -> Samples:
+    """A run with what leaving bending out changes in a result: on its cells in longer steps, or beside rods.
+
+    costs: as of `with_model_errors`.  ComputationError.
+    """
+    if not case.flat:
+        return with_model_errors(case, result, costs)
+    finely = NetworkResolution({name: x.resolution for name, x in result.items()})
+    found = case.sample(finely.coarser(1.0, COARSER if case.moves else 1.0), model=True)
+    costs.append(next(iter(found.values())).cpu)
+    return found
 
 
 def leaves_bending_out(line: JoinedLine) -> bool:
@@ -56,9 +100,9 @@ def as_rods(
     return system.model_copy(update={"lines": lines}), NetworkResolution(finely), names
 
 
-def with_model_errors(
+def against_rods(
     runs: Mapping[str, RunSample], rods: Mapping[str, RunSample] | None, names: Collection[str], failed: str = ""
-) -> dict[str, RunSample]:
+) -> Samples:
     """Samples of a run with what leaving bending out changes in them.
 
     rods: samples of the same lines as rods; None: there are none, because that run failed; names: of the lines that

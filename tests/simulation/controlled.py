@@ -1,0 +1,58 @@
+"""The error control of one line, whose runs are made up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from typing import Any
+
+from hybrid.accuracy.error_control import ErrorController
+from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.line_errors import LineErrors
+from hybrid.accuracy.refinement import Free
+from hybrid.model.network import NetworkResolution
+from hybrid.model.resolution import RequestedAccuracy, Resolution
+from hybrid.scene.short_form import LINE
+from hybrid.simulation.run_sample import RunSample, Samples
+
+Made = Callable[[Resolution], RunSample]
+
+
+class OneLine:
+    """A control of a line in motion, and the case that it computes; sample, result: make its runs up."""
+
+    moves = flat = True
+
+    def __init__(
+        self, asked: RequestedAccuracy | None, free: Free, sample: Made, result: Made,
+        settle: Callable[[bool], None] = lambda kept: None, **more: Any,
+    ) -> None:  # fmt: skip
+        """more: of `LineErrors`."""
+        self.made, self.result = sample, result
+        self.line = LineErrors(asked, free, True, **more)
+        case: Any = self
+        self.control = ErrorController({LINE: self.line}, case, self._result, settle)
+        self.runs = self.control.runs
+
+    def _result(self, resolution: NetworkResolution) -> Samples:
+        return {LINE: self.result(resolution.one)}
+
+    def sample(self, resolution: NetworkResolution, *, model: bool = False) -> Samples:
+        """A run to compare with."""
+        return {LINE: self.made(replace(resolution.one, follow=True) if model else resolution.one)}
+
+    def beside(self, samples: Sequence[Any]) -> AbstractContextManager[Sequence[Any]]:
+        """One after the other."""
+        return nullcontext(samples)
+
+    def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
+        """From a first resolution to the result and its errors."""
+        self.control.start(NetworkResolution({LINE: resolution}))
+        estimate = self.line.estimate
+        return self.control.standing[LINE], None if estimate is None else estimate.errors
+
+    @property
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """Events of the line, and of its results."""
+        return (*self.line.notes, *self.control.notes)
