@@ -59,7 +59,8 @@ def kinds_in_code() -> set[str]:
             if isinstance(node, ast.Call):
                 name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
                 place = {"event": 3, "note": 2 if len(node.args) > 2 else 0}.get(name)
-                given = [] if place is None else node.args[place : place + 1]
+                args = [x for arg in node.args for x in [arg] * (1 + isinstance(arg, ast.Starred))]  # two places, s
+                given = [] if place is None else args[place : place + 1]
                 given += [k.value for k in node.keywords if k.arg == "event"]
                 if name == "append" and node.args and isinstance(node.args[0], ast.Tuple):  # notes of the error figure
                     given += node.args[0].elts[:1] if "_notes" in ast.unparse(node.func) else []
