@@ -325,7 +325,7 @@ def begin_books_of(table, job, t):
     note_quantities(table, job, t)
 
 
-@kernel
+@kernel(inlined=False)
 def begin_line(table):
     """Books of a line in other cells, with a report of its first state, as which both count from here."""
     job = read(table)
@@ -401,7 +401,7 @@ def end_system_step(system, task, s, solved):
     return OK, -1, -1
 
 
-@kernel
+@kernel(inlined=False)
 def book_system_step(table):
     """Books of the step that was solved last, and is kept."""
     system = read_system(table)
@@ -441,7 +441,7 @@ def give_scheme(system, task, s):
     return rubs
 
 
-@kernel
+@kernel(inlined=False)
 def solve_system(table):
     """Do a task (kernels.step.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system (NetworkJob).
 

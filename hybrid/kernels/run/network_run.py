@@ -511,7 +511,7 @@ def between_steps(steps, table):
     return -1
 
 
-@kernel
+@kernel(inlined=False)
 def sample_system(table):
     """Sample the outputs that are due: within the last step where that comes next, else those at the state of now.
 
