@@ -280,7 +280,7 @@ class AdaptiveModel(Table):
     hold_time: Positive | None = Field(
         default=None,
         validation_alias=AliasChoices("hold_time", "dwell"),
-        description="time for which a rod must have been calm before it becomes catenary; "
+        description="time for which criteria must stay below their limits before a rod becomes catenary; "
         "absent: chosen, and with curvature_error it stays a rod [s]",
     )
     force_rod: Stretches | None = Field(
