@@ -23,11 +23,11 @@ def check_holding(asked: Any, stiffness: str | None, offsets: str | None, reach:
         raise SceneError([Complaint("--reach", f"{reach:g}", "a point or body to shift", "--offsets point:NAME")])
     given = {name: at for name, at in (("--stiffness", stiffness), ("--offsets", offsets)) if at is not None}
     if given:
-        from hybrid.scene.short_form import as_network
+        from hybrid.scene.short_form import network_of
         from hybrid.simulation.lines_stiffness import target_of
 
         for at in given.values():
-            target_of(as_network(asked)[0], at)
+            target_of(network_of(asked), at)
     if offsets is not None:
         if reach is None:
             fix = "add --reach 20 (m), the largest offset to either side"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -112,7 +111,7 @@ def replay(
     SceneError, ComputationError: as of `hybrid.run`.
     """
     network, target = with_outputs(scene, course, more, each_step, finer), MemoryTarget()
-    with nullcontext() if scene.line_names else short_form(course.scene).said():
+    with short_form(course.scene).said():
         run_system(
             network, target, scene_text(network), ProgressReporter(None, scene.require_time().duration), lambda: False,
             resolution=NetworkResolution(course.at(finer)), recording=Recording(begun=begun),

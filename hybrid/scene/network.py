@@ -16,7 +16,6 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.accuracy import USUAL, Accuracy, AskedAccuracy, of_unnamed_model
 from hybrid.scene.analysis import (
-    EVERY,
     AdaptiveModel,
     CatenaryModel,
     Equilibrium,
@@ -24,6 +23,7 @@ from hybrid.scene.analysis import (
     LineInitial,
     Mesh,
     Model,
+    Output,
     OutputPoints,
     Resolution,
     RodModel,
@@ -35,10 +35,7 @@ from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import (
     Finding,
     NonNegative,
-    Pair,
-    Positive,
     Table,
-    Truth,
     Whole,
     refuse,
     turned,
@@ -64,7 +61,6 @@ from hybrid.scene.points import (
     Name,
     Point,
 )
-from hybrid.scene.quantities import Quantities
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 
@@ -205,36 +201,17 @@ LinePoints = Annotated[
 ]
 
 
-class NetworkOutput(Table):
+class NetworkOutput(Output):
     """What is kept."""
 
-    every: Positive | None = Field(default=None, description=EVERY)
-    points: LinePoints = Field(
+    points: LinePoints = Field(  # type: ignore[assignment]  # by name of the line
         default=DEFAULT_POINTS,
         description="points along each line, evenly over its length, its ends included, or by name of the line its "
         "number or a list of arc lengths, of others 101; those of `history`, point loads, changes of section and "
         "joints are added [m]",
     )
-    history: dict[Name, Annotated[tuple[NonNegative, ...], Field(min_length=1)]] = Field(
+    history: dict[Name, Annotated[tuple[NonNegative, ...], Field(min_length=1)]] = Field(  # type: ignore[assignment]
         default={}, description="by name of the line: arc lengths that plots follow over time [m]"
-    )
-    elevation: tuple[Pair, ...] | None = Field(
-        default=None, min_length=1, description="places [x, y] at which the elevation of the sea is recorded [m]"
-    )
-    quantities: Quantities = Field(
-        default={},
-        description="further quantities over time by name: forces and angles at ends, touchdown, layback, clearance",
-    )
-    exact: Truth = Field(
-        default=False,
-        description="steps end at outputs; else an output within a step is interpolated in time, to second order",
-    )
-    criteria: Truth = Field(
-        default=False, description="also write the criteria of lines whose zones move, as fields over time and s"
-    )
-    errors: Truth | None = Field(
-        default=None,
-        description="estimate how wrong the result is, by mesh and time step; absent: where an accuracy is asked",
     )
 
     def points_of(self, line: str) -> int | tuple[float, ...]:

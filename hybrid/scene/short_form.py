@@ -30,6 +30,7 @@ from hybrid.scene.combinations import value_at
 from hybrid.scene.ends import End, Release
 from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Failure
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 
 LINE = "cable"
@@ -64,9 +65,10 @@ class NotInNetwork(SceneError):
 
 @dataclass(frozen=True)
 class ShortForm:
-    """Where keys of a network are in the scene of the cable that it was made of.
+    """Where keys of a network are in the scene that it was made of.
 
-    pairs: places in the network and in the scene; what is below such a place is below the other one.
+    pairs: places in the network and in the scene; what is below such a place is below the other one.  Without any the
+    scene is that network.
     """
 
     pairs: tuple[tuple[Place, Place], ...]
@@ -81,6 +83,8 @@ class ShortForm:
 
     def text(self, message: str) -> str:
         """A message about the network in words of the scene."""
+        if not self.pairs:
+            return message
         for there, here in sorted(self.pairs, key=lambda x: -len(x[0])):
             message = re.sub(rf"\b{re.escape(dotted(there))}\b", dotted(here), message)
         message = re.sub(rf"\bline {LINE}\b", "the cable", message)
@@ -132,9 +136,12 @@ class _This:
         return isinstance(other, _This) and other.scene is self.scene
 
 
-def network_of(scene: LineScene) -> Network:
-    """The network of one line that computes what a scene of a cable does.  NotInNetwork: there is none yet."""
-    return _made_of(_This(scene))
+def network_of(scene: Scene) -> Network:
+    """The network that computes what a scene asks for: itself, or of one line.  NotInNetwork: there is none yet."""
+    if isinstance(scene, LineScene):
+        return _made_of(_This(scene))
+    assert isinstance(scene, Network)
+    return scene
 
 
 @lru_cache(maxsize=MOST_KEPT)
@@ -162,13 +169,10 @@ def _made_of(key: _This) -> Network:
         raise NotInNetwork(list(_complaints(scene, error))) from None
 
 
-def as_network(scene: LineScene | Network) -> tuple[Network, ShortForm]:
-    """The network that computes what a scene asks for, and where the keys of that are in the scene."""
-    return (network_of(scene), short_form(scene)) if isinstance(scene, LineScene) else (scene, ShortForm(()))
-
-
-def short_form(scene: LineScene) -> ShortForm:
+def short_form(scene: Scene) -> ShortForm:
     """Where the keys of the network of a scene are in that."""
+    if not isinstance(scene, LineScene):
+        return ShortForm(())
     pairs: list[tuple[Place, Place]] = [(("lines", LINE), ("cable",))]
     pairs += [(("lines", LINE, name), (name,)) for name in ("model", *OF_LINE)]
     pairs += [(("output", name, LINE), ("output", name)) for name in ("points", "history")]

@@ -37,7 +37,7 @@ from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE, as_network, short_form
+from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.layer_mesh import layered, layered_lines, shown, shown_lines
@@ -155,7 +155,7 @@ class Case:
     @property
     def network(self) -> Network:
         """The same as a network."""
-        return as_network(self.scene)[0]
+        return network_of(self.scene)
 
     @property
     def lines(self) -> dict[str, LineScene]:
@@ -498,7 +498,7 @@ class Case:
 
     def _network_run(self, resolution: NetworkResolution, target: Target | None, recording: Recording) -> NetworkRun:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
-        network, changes = self.network, [replace(x, scene=as_network(x.scene)[0]) for x in self.changes]
+        network, changes = self.network, [replace(x, scene=network_of(x.scene)) for x in self.changes]
         network = self._compared_network if target is None else network
         cable = Cable(self.scene, self.changes) if self.flat else None
         recording = recording._replace(planes=True, error=self.flat, cable=cable)

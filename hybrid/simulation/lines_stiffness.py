@@ -28,7 +28,7 @@ from hybrid.scene.network import JoinedLine
 from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
-from hybrid.scene.short_form import as_network
+from hybrid.scene.short_form import network_of, short_form
 from hybrid.scene.suggestions import nearest
 from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.lines_contact_equilibrium import contacts_of
@@ -89,7 +89,8 @@ def stiffness(scene: SceneLike, at: str) -> Stiffness:
 
     SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
     """
-    system, form = as_network(as_scene(scene))
+    asked = as_scene(scene)
+    system, form = network_of(asked), short_form(asked)
     with form.said():
         return _stiffness_at(system, at)
 
@@ -239,7 +240,8 @@ def offsets(scene: SceneLike, at: str, distances: Sequence[float], heading: floa
 
     Errors: as of `stiffness`; the distance at which no equilibrium is found is in the message.
     """
-    system, form = as_network(as_scene(scene))
+    asked = as_scene(scene)
+    system, form = network_of(asked), short_form(asked)
     target_of(system, at)
     try:
         known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())
@@ -388,7 +390,7 @@ def _held(system: Network, kind: str, name: str, pose: tuple[Floats, Floats], sh
         if not _points_of(system, kind, name):  # which no scene holds
             del changed["bodies"][name]
     read, _ = read_text(scene_text(system.model_copy(update=changed)))  # so that lines too short are refused
-    moved, _ = as_network(read)
+    moved = network_of(read)
     if shape is None:
         return moved
     held = HeldBody(position=at, rotation=turned, shape=shape)

@@ -10,7 +10,7 @@ from hybrid.model.network import build_system
 from hybrid.model.resolution import model_is_free, wants_errors
 from hybrid.scene.quantities import KINDS, Quantity
 from hybrid.scene.read import SceneLike, as_scene
-from hybrid.scene.short_form import as_network
+from hybrid.scene.short_form import network_of
 from hybrid.simulation.line_result import Wanted, observer_of
 from hybrid.simulation.pair_forces import fields_of_pairs
 from hybrid.simulation.result_file import STEP_FIELDS
@@ -35,7 +35,7 @@ def listed_outputs(scene: SceneLike) -> list[Listed]:
     Of several lines: what is recorded of points and bodies, and of every line under `lines/<name>/`.
     """
     asked = as_scene(scene)
-    moves, named, (system, _) = asked.time is not None, bool(asked.line_names), as_network(asked)
+    moves, named, system = asked.time is not None, bool(asked.line_names), network_of(asked)
     free = [name for name in system.lines if model_is_free(system.scene_of(name))]
     system = with_models(system, dict.fromkeys(free, "adaptive"))
     model, found, scenes = build_system(system), list[Listed](), system.scenes_of_lines

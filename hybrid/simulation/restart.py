@@ -21,7 +21,7 @@ from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.base import dotted
 from hybrid.scene.read import as_scene, read_text, scene_text
-from hybrid.scene.short_form import as_network
+from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.restore import kept_resolution, refused, restored_points
 from hybrid.store.checkpoint import read_before, read_checkpoint
 from hybrid.store.hdf5_file import opened
@@ -127,7 +127,7 @@ def _found(path: Path) -> tuple[Remaining[Any], bool]:
                     longest = longest_out(scene)
                     points = restored_points(result, longest, None if winch_side(scene) else scene.length)
             done = result.done and not (flat and before)
-    resolution = kept_resolution(as_network(scene)[0], path)
+    resolution = kept_resolution(network_of(scene), path)
     return Remaining(scene, changes, flat, resolution, before, False, reached, points), done
 
 
@@ -153,7 +153,7 @@ def _scene_until(scene: Any, until: float, every: float) -> Any:
 
 def _refuse_more_out(before: Any, after: Any, until: float) -> None:
     """SceneError: by `until` (s) more of a line is out than its result has points for."""
-    (one, form), (other, _) = as_network(before), as_network(after)
+    one, other, form = network_of(before), network_of(after), short_form(before)
     for name in one.lines:
         scene, longer = one.scene_of(name), other.scene_of(name)
         out = longest_out(longer)
@@ -170,7 +170,7 @@ def _check(last: LoadChange[Any], changed: Any, resolution: NetworkResolution, b
     from hybrid.model.network import build_system
 
     _check_what_changes(last, changed, begin, end)
-    (before, form), (system, _) = as_network(last.scene), as_network(changed)
+    before, system, form = network_of(last.scene), network_of(changed), short_form(last.scene)
     old = build_system(before, resolution)
     new = build_system(system, resolution, old)
     for name, one, other, joints in zip(old.names, old.models, new.models, old.joints, strict=True):
