@@ -21,7 +21,7 @@ from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, ResultError, SceneError
 from hybrid.model.model_costs import with_model
 from hybrid.model.network import NetworkResolution
-from hybrid.model.resolution import Resolution, model_is_free
+from hybrid.model.resolution import model_is_free
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import missing_time
@@ -31,7 +31,6 @@ from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.progress import Listener, ProgressReporter, listener_of, tell_of_compiling
 from hybrid.simulation.restart import remaining
-from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
@@ -147,13 +146,12 @@ def resume(
     return written_result(target, case.late_file)
 
 
-def resolution_at_rest(case: StaticCase) -> Resolution:
-    """How finely the equilibrium of a case is computed first; where the scene leaves it open, its model is chosen."""
-    check_motions(case.scene)
-    runs = CaseAtRest(case.scene, case)
-    _, found = chosen_and_surveyed(runs, NetworkResolution.of(runs.lines))
-    case.scene = runs.scene
-    return found.one
+def first_at_rest(scene: Any) -> tuple[Any, NetworkResolution]:
+    """How finely the equilibrium of a scene is computed first, and the scene, with models where it leaves them open."""
+    _check(scene)
+    case = CaseAtRest(scene)
+    _, found = chosen_and_surveyed(case, NetworkResolution.of(case.lines))
+    return case.scene, found
 
 
 def _check(scene: Any, criterion: UserCriterion | None = None, moves: bool = True) -> None:

@@ -27,12 +27,11 @@ from hybrid.linear.eigen import BELOW, lowest_modes
 from hybrid.linear.excitation import frequencies_of
 from hybrid.linear.loaded_line import LoadedLine
 from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_at_rest, sparse_rows
-from hybrid.linear.rest import Rest, line_at_rest, system_at_rest
+from hybrid.linear.rest import Rest, rest_of
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.root import Scene
 from hybrid.simulation.run_sample import END_FORCES, RunSample, Samples
-from hybrid.simulation.static_case import StaticCase
 
 RAW = {shown: raw for raw, shown in END_FORCES.items()}
 UNITS = {
@@ -114,10 +113,7 @@ def lost_by_lines(asked: Any, result: Samples) -> Mapping[str, LostBy]:
         return {}
     finely = NetworkResolution({name: x.resolution for name, x in result.items()})
 
-    def rest() -> Rest:
-        return system_at_rest(asked, finely) if asked.line_names else line_at_rest(StaticCase(asked), finely.one)
-
-    return lost_vibrations(asked, rest, next(iter(result.values())).forces[:, 0])
+    return lost_vibrations(asked, lambda: rest_of(asked, finely), next(iter(result.values())).forces[:, 0])
 
 
 def lost_vibrations(asked: Scene, rest: Callable[[], Rest], times: Floats) -> Mapping[str, LostBy]:

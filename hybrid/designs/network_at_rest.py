@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from hybrid.accuracy.api import resolution_at_rest
+from hybrid.accuracy.api import first_at_rest
 from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
 from hybrid.designs.contact_at_rest import ContactAtRest
 from hybrid.designs.factors import Factors
@@ -44,10 +44,8 @@ from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE, ShortForm, network_of, short_form
-from hybrid.simulation.layer_mesh import layered_lines
+from hybrid.scene.short_form import LINE, ShortForm, as_network
 from hybrid.simulation.network_run import static_system
-from hybrid.simulation.static_case import StaticCase
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
@@ -70,11 +68,9 @@ NO_PLACES: Places = MappingProxyType({})
 
 def _network_of(scene: Any) -> tuple[Any, Network, NetworkResolution, ShortForm | None]:
     """The scene as it is computed, the network that does, how finely, and where keys of the scene are in that."""
-    if scene.line_names:
-        return scene, scene, layered_lines(scene, NetworkResolution.first(scene), False), None
-    case = StaticCase(scene)
-    resolution = NetworkResolution({LINE: resolution_at_rest(case)})  # which chooses the model
-    return case.scene, network_of(case.scene), resolution, short_form(case.scene)
+    scene, resolution = first_at_rest(scene)
+    network, form = as_network(scene)
+    return scene, network, resolution, None if scene.line_names else form
 
 
 def parse_result_of(scene: Scene, text: str) -> tuple[str, Wanted]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,13 +15,11 @@ from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching
 from hybrid.model.network import NetworkModel, NetworkResolution
-from hybrid.model.resolution import Resolution
 from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
-from hybrid.scene.short_form import LINE, network_of, short_form
+from hybrid.scene.short_form import as_network
 from hybrid.simulation.network_run import static_system
-from hybrid.simulation.static_case import StaticCase
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
 
@@ -44,14 +43,16 @@ class Rest:
     tips: Mapping[tuple[str, int], str] = field(default_factory=dict)  # points that are one end (0, 1) alone
 
 
-def line_at_rest(case: StaticCase, resolution: Resolution) -> Rest:
-    """Of a cable; ComputationError: there is no equilibrium."""
-    with short_form(case.scene).said():
-        return replace(system_at_rest(network_of(case.scene), NetworkResolution({LINE: resolution})), tips={})
+def rest_of(scene: Any, resolution: NetworkResolution) -> Rest:
+    """The equilibrium of a scene on such cells; ComputationError: there is none."""
+    system, form = as_network(scene)
+    if scene.line_names:
+        return _network_at_rest(system, resolution)
+    with form.said():
+        return replace(_network_at_rest(system, resolution), tips={})
 
 
-def system_at_rest(system: Network, resolution: NetworkResolution) -> Rest:
-    """Several lines; errors as of `line_at_rest`."""
+def _network_at_rest(system: Network, resolution: NetworkResolution) -> Rest:
     run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
     assert run.found is not None
     bodies = (*(body.name for body in run.model.bodies), *run.model.rigid)

@@ -10,13 +10,14 @@ from hybrid.errors import Complaint, ComputationError, HybridError, SceneError
 from hybrid.kernels.machine.compile import is_warm
 from hybrid.live import drawing
 from hybrid.model.model_costs import with_model
+from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import plan
-from hybrid.model.resolution import first_resolution, model_is_free
+from hybrid.model.resolution import model_is_free
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import located_in, read_text, scene_text
+from hybrid.simulation.case_at_rest import CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.network_run import static_system
-from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.reader import Result, written_result
 
@@ -80,7 +81,8 @@ def _cable_at_rest(scene: Any, made: Any, target: MemoryTarget) -> None:
         points = min(max(sum(made.cells) + 1, LEAST_POINTS), MOST_POINTS)
         output = scene.output.model_copy(update={"points": points, "errors": False})
         scene = scene.model_copy(update={"output": output})
-    StaticCase(scene).record(first_resolution(scene), target)
+    case = CaseAtRest(scene)
+    case.record(NetworkResolution.of(case.lines), target)
 
 
 def _begin_to_compile(scene: Scene, compiling: Callable[[], None]) -> None:

@@ -4,31 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from hybrid.accuracy.api import resolution_at_rest
+from hybrid.accuracy.api import first_at_rest
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import FRAME, MASS, V
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.eigen import Eigen, lowest_modes
 from hybrid.linear.matrices import LinearLine, LinearNetwork, linear_network
-from hybrid.linear.rest import Rest, line_at_rest, system_at_rest
+from hybrid.linear.rest import Rest, rest_of
 from hybrid.modal.touching_validity import name_of, obstacle_of
-from hybrid.model.network import NetworkResolution
 from hybrid.model.payout import payout_of
 from hybrid.scene.base import Table
 from hybrid.scene.motion_tables import Harmonic
-from hybrid.scene.network_scene import Network
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import LineScene
-from hybrid.simulation.layer_mesh import layered_lines
-from hybrid.simulation.static_case import StaticCase
 
 MOST = 200  # modes that may be asked for
 # A motion whose w^2 is below this part of that of the first other mode costs nothing.
@@ -173,22 +167,8 @@ def equilibrium_of(asked: Scene, cells: float = 1.0, friction: bool = True) -> R
     friction: whether that settles where the scene says nothing of it.  SceneError: the scene is refused;
     ComputationError: there is no equilibrium.
     """
-    at_rest: Any = _network_at_rest if asked.line_names else _cable_at_rest
-    found: Rest = at_rest(asked if friction else asked.without_friction(), cells)
-    return found
-
-
-def _cable_at_rest(asked: LineScene, cells: float) -> Rest:
-    case = StaticCase(asked)
-    resolution = resolution_at_rest(case)
-    return line_at_rest(case, resolution.coarser(cells=cells) if cells > 1.0 else resolution)
-
-
-def _network_at_rest(asked: Network, cells: float) -> Rest:
-    system = layered_lines(asked, NetworkResolution.first(asked), False)
-    if cells > 1.0:
-        system = replace(system, lines={k: x.coarser(cells=cells) for k, x in system.lines.items()})
-    return system_at_rest(asked, system)
+    scene, resolution = first_at_rest(asked if friction else asked.without_friction())
+    return rest_of(scene, resolution.coarser(cells) if cells > 1.0 else resolution)
 
 
 class _Shape:

@@ -3,71 +3,49 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from hybrid.kernels.state.state import Floats
+import numpy as np
+
+from hybrid.kernels.state.forces import SEABED
+from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.network import NetworkResolution
-from hybrid.model.resolution import Resolution, wants_survey
+from hybrid.outputs.edge_errors import edge_errors
+from hybrid.outputs.layer_errors import layer_errors
 from hybrid.scene.root import Scene
 from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
-from hybrid.simulation.layer_mesh import layered, shown
-from hybrid.simulation.mesh_survey import Survey
+from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.network_run import NetworkRun, Recording
-from hybrid.simulation.run_sample import Samples
-from hybrid.simulation.static_case import StaticCase
+from hybrid.simulation.run_sample import (
+    ALL,
+    COMPARED,
+    MODEL_ERRORS,
+    RunSample,
+    Samples,
+    catenary_share,
+    compared_cells,
+)
 from hybrid.store.array_recorder import Target
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import ERROR_ESTIMATE
-
-if TYPE_CHECKING:  # its tables take long to make
-    pass
+from hybrid.store.whole_file import LateFile
 
 
 class CaseAtRest(Case):
-    """The equilibrium of one scene, computed as finely as it takes; that of a cable by its own search."""
+    """The equilibrium of one scene at t = 0, under loads that have grown to their full size."""
 
     moves = False
 
-    def __init__(self, scene: Scene, cable: StaticCase | None = None) -> None:
-        """cable: computes the equilibria of a cable, if there is such a one."""
+    def __init__(self, scene: Scene) -> None:
         super().__init__(scene, None)
-        self._own = cable
-
-    @property
-    def _cable(self) -> StaticCase:
-        """What computes the equilibria of a cable, of the scene as it is now."""
-        if self._own is None:
-            self._own = StaticCase(self.scene)
-        self._own.scene = self.scene
-        return self._own
+        self.places = dict.fromkeys(self.lines, ALL)  # there is one output
 
     def record(self, resolution: NetworkResolution, target: Target, before: Tree | None = None) -> Samples:
         """Compute the result into a file, or memory; what is to be compared of it.  before: nobody goes on with it."""
-        if self.flat:
-            return {LINE: self._cable.record(resolution.one, target)}
-        recording = Recording(pending=ERROR_ESTIMATE if self.wants_errors else "")
-        return self._move(self._network_run(resolution, target, recording), clock.process_time(), first=True)
-
-    def sample(
-        self, resolution: NetworkResolution, points: Mapping[str, Floats] | None = None, until: float | None = None,
-        *, model: bool = False,
-    ) -> Samples:  # fmt: skip
-        """Compute for comparison only; arguments as of `Case`."""
-        if not self.flat:
-            return super().sample(resolution, points, until, model=model)
-        one = resolution.one
-        return {LINE: self._cable.sample(replace(one, follow=True) if model else one)}
-
-    def survey(self, resolution: NetworkResolution, coarse: NetworkResolution) -> dict[str, Survey] | None:
-        """A coarse equilibrium that shows where cells should be short; None: there is none."""
-        if not self.flat:
-            return super().survey(resolution, coarse)
-        found = self._cable.survey(resolution.one, coarse.one)
-        return None if found is None else {LINE: found}
+        begin, recording = clock.process_time(), Recording(pending=ERROR_ESTIMATE if self.wants_errors else "")
+        return self._move(self._network_run(resolution, target, recording), begin, first=True)
 
     def beside(
         self, samples: Sequence[Callable[[], Samples]]
@@ -75,23 +53,33 @@ class CaseAtRest(Case):
         """Equilibria are found one after the other."""
         return nullcontext(samples)
 
-    def layered(self, resolution: NetworkResolution) -> NetworkResolution:
-        """As of `Case`."""
-        if not self.flat:
-            return super().layered(resolution)
-        return (
-            resolution if wants_survey(self.scene) else NetworkResolution({LINE: layered(self._cable, resolution.one)})
-        )
-
-    def shown(self, resolution: NetworkResolution) -> NetworkResolution:
-        """As of `Case`."""
-        if not self.flat:
-            return super().shown(resolution)
-        return _of_cable(shown(self._cable, resolution.one))
-
     def _compute(self, run: NetworkRun, interrupted: Callable[[], bool]) -> None:
         run.record_equilibrium()
 
+    def _compared(self, run: NetworkRun, target: Target, cpu: float, late: LateFile | None) -> Samples:
+        return {LINE: _sample(run, cpu)} if self.flat else super()._compared(run, target, cpu, late)
 
-def _of_cable(resolution: Resolution) -> NetworkResolution:
-    return NetworkResolution({LINE: resolution})
+    def _compared_line(self, line: LineResult, run: NetworkRun, cpu: float, judged: bool) -> RunSample:
+        return _sample(run, cpu) if self.flat else super()._compared_line(line, run, cpu, judged)
+
+
+def _sample(run: NetworkRun, cpu: float) -> RunSample:
+    """What is compared of the equilibrium of a cable that has been recorded; cpu: s, that it took."""
+    (line,), (state,), solver = run.lines, run.state.lines, run.solver
+    model, correction = line.model, line.correction
+    batch = line.state_now(0.0, solver.lines[0].ends, state, solver.work[0])
+    seen = line.observer.look(batch)
+    shift = correction.shift(correction.corrector.sampled[:1], batch) if correction is not None else None
+    values = line.observer.values_of(seen, shift=shift)
+    missed = edge_errors(seen) if model.line.bits & SEABED else {}
+    at_edges = {name: error[:, 0] for name, error in missed.items()}
+    for name, error in layer_errors(seen, [int(np.argmin(np.abs(model.line.s - at))) for at in model.attached]).items():
+        at_edges[name] = np.maximum(error, at_edges.get(name, 0.0))
+    return RunSample(
+        run.resolution.one, {name: np.array(values[name]) for name in COMPARED if name in values},
+        compared_cells(model), 1, cpu, 1, False,
+        {k.removeprefix(MODEL_ERRORS): np.array(x) for k, x in values.items() if k.startswith(MODEL_ERRORS)},
+        catenary=np.array([catenary_share(model.zones)]) if model.layout is not None else np.zeros(0),
+        doubt=np.array(NO_DOUBT) if correction is None else correction.doubt,
+        at_edges={name: error[None] for name, error in at_edges.items()},
+    )  # fmt: skip

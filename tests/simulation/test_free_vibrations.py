@@ -9,11 +9,11 @@ import pytest
 
 import hybrid
 from hybrid.accuracy import free_vibrations as f
-from hybrid.linear.rest import line_at_rest, system_at_rest
+from hybrid.linear.rest import rest_of
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import as_scene
-from hybrid.simulation.static_case import StaticCase
+from hybrid.scene.short_form import LINE
 
 
 def cantilever(**more):
@@ -49,7 +49,7 @@ def taut(**more):
 
 def at_rest(scene):
     """The line about its equilibrium on its first mesh."""
-    return line_at_rest(StaticCase(scene), first_resolution(scene))
+    return rest_of(scene, NetworkResolution({LINE: first_resolution(scene)}))
 
 
 def lost(scene, steps):
@@ -100,7 +100,7 @@ def apart(tables, line=None):
     late = runs[0].times > 1.7
     rough, fine = (run.lines[line].position if line else run.position for run in runs)
     asked, times = as_scene(tables), np.arange(1, 101) * 0.1
-    rest = partial(system_at_rest, asked, NetworkResolution.first(asked)) if line else partial(at_rest, asked)
+    rest = partial(rest_of, asked, NetworkResolution.first(asked)) if line else partial(at_rest, asked)
     found = f.lost_vibrations(asked, rest, times)[line or "cable"]["position"]
     return float(np.linalg.norm(rough - fine, axis=2)[late].max()), found
 

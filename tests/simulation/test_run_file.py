@@ -14,10 +14,10 @@ from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.short_form import LINE, network_of
 from hybrid.simulation.case import Case
+from hybrid.simulation.case_at_rest import CaseAtRest
 from hybrid.simulation.network_run import NetworkRun, Recording
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_file import Cable
-from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.reader import open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE
@@ -104,8 +104,8 @@ def test_what_fails_is_said_of_the_cable(tmp_path: Path) -> None:
 def test_a_file_at_rest_is_that_of_a_cable(tmp_path: Path) -> None:
     scene = exact_scene(tables_with(scene_of("seabed"), {"time": None, "output.every": None} | QUANTITIES))
     cable, network = tmp_path / "cable.h5", tmp_path / "network.h5"
-    StaticCase(scene).record(first_resolution(scene), cable)
     resolution = NetworkResolution({LINE: first_resolution(scene)})
+    CaseAtRest(scene).record(resolution, cable)
     run = NetworkRun(network_of(scene), network, scene_text(scene), False, resolution, Recording(cable=Cable(scene)))
     run.record_equilibrium()
     assert files_differ(cable, network) == []
