@@ -19,7 +19,7 @@ BY_HAND = [
     for page in sorted(DOCS.rglob("*.md"))
     if page.parent.name == "howto" or (page.parent == DOCS and page.stem not in MADE | FOR_DEVELOPERS)
 ]
-MOST_LINES, MOST_WORDS = 3809, 30
+MOST_LINES, MOST_WORDS = 3804, 30
 HISTORY = {"changes"}  # which grows, and whose sentences name several keys and figures
 
 
