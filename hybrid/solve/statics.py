@@ -21,7 +21,6 @@ from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import (
     buckling_line,
     flaw_of_lines,
-    slack_cell,
 )
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, NetworkTaken
 from hybrid.solve.search import (
@@ -40,7 +39,7 @@ from hybrid.solve.settling import DAMPING as SETTLING
 from hybrid.solve.settling import (
     stop,
 )
-from hybrid.solve.stability import Stability, is_judged
+from hybrid.solve.stability import Stability
 from hybrid.solve.stepper import Stepper, Taken
 from hybrid.solve.workspaces import workspace_of
 
@@ -60,10 +59,7 @@ class Equilibrium:
     path: tuple[str, ...]
     iterations: int
     residual: float
-    report: Floats
-    slack: int  # a catenary cell without tension, or -1
     with_friction: bool  # True when friction took part
-    judged: bool  # False when its stability could not be judged (an end moment, or `blurred`)
     blurred: bool = False  # True when round-off of the bending of very short cells hides whether it buckles
     touches: bool = False  # whether a damped motion with contact with itself led there
     not_settled: str = ""  # why friction has not settled where a scene leaves that to the program
@@ -249,9 +245,5 @@ def solve_statics(
         raise ComputationError(failed.outcome, None, failed.s, failed.detail) from None
     solver = smooth if tried.solver is smooth else rough
     state, residual = tried.states.lines[0], solver.proof(tried.states)
-    blurred = bool(solver.blurred)
-    judged = (is_judged(solver.lines[0].line, ends, length) and not blurred) or not line.element.any()
-    return Equilibrium(
-        state, path, tally.total, residual, solver.work.report.copy(), slack_cell(solver.lines[0], state),
-        bool(solver.lines[0].line.bits & FRICTION), judged, blurred,
-    )  # fmt: skip
+    rubbed = bool(solver.lines[0].line.bits & FRICTION)
+    return Equilibrium(state, path, tally.total, residual, rubbed, bool(solver.blurred))
