@@ -44,7 +44,7 @@ from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE, ShortForm, as_network
+from hybrid.scene.short_form import LINE, ShortForm, network_of, short_form
 from hybrid.simulation.network_run import static_system
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
@@ -69,7 +69,7 @@ NO_PLACES: Places = MappingProxyType({})
 def _network_of(scene: Any) -> tuple[Any, Network, NetworkResolution, ShortForm | None]:
     """The scene as it is computed, the network that does, how finely, and where keys of the scene are in that."""
     scene, resolution = first_at_rest(scene)
-    network, form = as_network(scene)
+    network, form = network_of(scene), short_form(scene)
     return scene, network, resolution, None if scene.line_names else form
 
 

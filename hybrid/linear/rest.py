@@ -18,7 +18,7 @@ from hybrid.model.network import NetworkModel, NetworkResolution
 from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
-from hybrid.scene.short_form import as_network
+from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.network_run import static_system
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
@@ -45,7 +45,7 @@ class Rest:
 
 def rest_of(scene: Any, resolution: NetworkResolution) -> Rest:
     """The equilibrium of a scene on such cells; ComputationError: there is none."""
-    system, form = as_network(scene)
+    system, form = network_of(scene), short_form(scene)
     if scene.line_names:
         return _network_at_rest(system, resolution)
     with form.said():
