@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
+from pydantic import AliasChoices, Discriminator, Field, PrivateAttr, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape, sphere_diameter
 from hybrid.scene.base import (
@@ -69,8 +69,24 @@ PAYOUT = "line is paid out here, or taken in, by a winch; at one end alone; abse
 _RELEASE = "when the end is let go and becomes free, in mid-motion; absent: never"
 
 
+class AtPoint(NamedTuple):
+    """What an end of a network's line is by the point that it is at, and no key of the end says."""
+
+    moves: bool = False  # by what pulls there, or once something has broken: its position is where it is first
+    axes_of_others: bool = False  # it is clamped to a free point, whose axes other lines may give
+    twisted: bool = False  # by turns of the other end: nothing there lets it spin
+    near: Triple | None = None  # where the search of the equilibrium puts a free end first, m
+
+
 class EndTable(Table):
     """What the program asks of an end, whatever its kind: by the keys of the kind, or by what it overrides."""
+
+    _at: AtPoint = PrivateAttr(default=AtPoint())
+
+    def at_point(self, at: AtPoint) -> Self:
+        """The same at a point of a network."""
+        self._at = at
+        return self
 
     def _own(self, key: str) -> Any:
         """The value of a key, None where the kind has none."""
@@ -85,12 +101,12 @@ class EndTable(Table):
     @property
     def is_placed(self) -> bool:
         """Whether a position that is held is known, and no first guess of what lines move."""
-        return True
+        return not self._at.moves
 
     @property
     def first_position(self) -> Triple | None:
         """Where the search of the equilibrium puts the end first [m]."""
-        return self.held_position or self._own("initial_guess")
+        return self.held_position or self._own("initial_guess") or self._at.near
 
     @property
     def held_tangent(self) -> Triple | None:
@@ -123,7 +139,7 @@ class EndTable(Table):
     @property
     def is_twisted_against(self) -> bool:
         """Whether turns of the other end twist the cable."""
-        return self.holds_twist
+        return self.holds_twist or self._at.twisted
 
     @property
     def fixes_frame(self) -> bool:
@@ -133,7 +149,7 @@ class EndTable(Table):
     @property
     def gives_axes(self) -> bool:
         """Whether it is known from the end where the material axes point."""
-        return self.fixes_frame
+        return self.fixes_frame or self._at.axes_of_others
 
     @property
     def prescribed_motion(self) -> Motion | None:

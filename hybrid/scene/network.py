@@ -44,7 +44,7 @@ from hybrid.scene.base import (
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
 from hybrid.scene.cable import Cable, Contact, Section
 from hybrid.scene.end_loads import GivenLoad
-from hybrid.scene.ends import Clamped, End, Ends, Guided, Pinned, Triple
+from hybrid.scene.ends import AtPoint, Clamped, End, Ends, Guided, Pinned, Triple
 from hybrid.scene.lines_contact import LinesContact
 from hybrid.scene.motion_checks import Held, lasting_period, moved_in
 from hybrid.scene.motion_tables import Motion
@@ -66,41 +66,6 @@ from hybrid.scene.schema import LineScene
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
-
-
-class _JoinedPin(Pinned):
-    """The end of a line at a point that may move or let go, held where that is first.
-
-    The point is free, or on a free body, or the line may break from it.
-    """
-
-    @property
-    def is_placed(self) -> bool:
-        return False
-
-
-class _CarriedPin(Pinned):
-    """A line that is clamped to a free point, before the axes of this are known: other lines may give them."""
-
-    @property
-    def gives_axes(self) -> bool:
-        return True
-
-
-class _KnottedPin(_JoinedPin):
-    """The same of a free point, without a swivel."""
-
-    @property
-    def is_twisted_against(self) -> bool:
-        return True
-
-
-class _JoinedClamp(Clamped):
-    """The same of an end that is clamped there."""
-
-    @property
-    def is_placed(self) -> bool:
-        return False
 
 
 class LineFailure(Failure):
@@ -497,7 +462,7 @@ class NetworkTables(Scene):
         for key in ("start", "end"):
             point, body = self.points[getattr(line, key)], self.body_of(getattr(line, key))
             held = self.direction(name, key) if directions is None else directions.get(key)
-            place, motion, payout = first[key], None, getattr(line.connections, key).payout
+            place, motion = first[key], None
             if self.is_free_end(getattr(line, key)):
                 ends[key] = self._free_end(name, key, place)
                 continue
@@ -512,19 +477,8 @@ class NetworkTables(Scene):
             assert place is not None
             if key in carrying and isinstance(point, FreePoint):
                 ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
-            elif held is None:
-                tied = self.clamp(name, key)
-                carried = _CarriedPin if tied is not None else Pinned
-                joined = _KnottedPin if tied is not None and not tied.swivel else _JoinedPin
-                kind = joined if self.may_leave(name, key) else carried
-                ends[key] = kind(position=place, motion=motion, payout=payout)
             else:
-                clamp = getattr(line.connections, key)
-                ends[key] = (_JoinedClamp if self.may_leave(name, key) else Clamped)(
-                    position=place, tangent=held[0], normal=held[1], swivel=clamp.swivel,
-                    turns=0.0 if carrying else clamp.turns,  # a first shape is that of the line with no point
-                    bend_stiffness=clamp.bend_stiffness, motion=motion, payout=payout,
-                )  # fmt: skip
+                ends[key] = self._held_end(name, key, held, place, motion, carrying)
         initial = _placed(line.initial, first["start"]) if self.starts_as_placed else _between(line.initial, ends)
         tables: dict[str, Any] = {"ends": Ends(**ends), "initial": initial}
         if places is not None:
@@ -548,6 +502,21 @@ class NetworkTables(Scene):
         if self.output.errors is False and not (strict and (line.accuracy or self.accuracy)):
             late["accuracy"] = tables.pop("accuracy")  # that nobody has asked for, or a chosen model has brought along
         return LineScene.model_validate(tables).model_copy(update=late)
+
+    def _held_end(
+        self, name: str, key: Literal["start", "end"], held: tuple[Triple, Triple | None] | None, place: Triple,
+        motion: Motion | None, carrying: Sequence[str],
+    ) -> End:  # fmt: skip
+        """The end of a line at a point that is held, or is a body or a knot, where this is; held: as of `direction`."""
+        clamp, moves = self.clamp(name, key), self.may_leave(name, key)
+        given: dict[str, Any] = {"position": place, "motion": motion}
+        given["payout"] = getattr(self.lines[name].connections, key).payout
+        if held is None or clamp is None:
+            twisted = moves and clamp is not None and not clamp.swivel
+            return Pinned(**given).at_point(AtPoint(moves, clamp is not None and not moves, twisted))
+        turns = 0.0 if carrying else clamp.turns  # a first shape is that of the line with no point
+        given |= {"tangent": held[0], "normal": held[1], "swivel": clamp.swivel, "turns": turns}
+        return Clamped(**given, bend_stiffness=clamp.bend_stiffness).at_point(AtPoint(moves))
 
     def _free_end(self, name: str, key: Literal["start", "end"], near: Triple | None) -> End:
         """The end of a line at a point that is no more than that; near: as of `FreePoint.only_end`."""

@@ -25,7 +25,7 @@ from hybrid.scene.base import (
     refuse,
 )
 from hybrid.scene.end_loads import GivenLoad, Loading, Triple
-from hybrid.scene.ends import BEND_STIFFNESS, PAYOUT, TWISTED_BY, Body, Free, moved_guides
+from hybrid.scene.ends import BEND_STIFFNESS, PAYOUT, TWISTED_BY, AtPoint, Body, Free, moved_guides
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.payout import Payout
 
@@ -67,12 +67,6 @@ class Failure(Table):
             fix = "time: 12 (s) or tension: 50e3 (N), or leave break_at out"
             refuse([Finding((), "time or tension", fix)])
         return self
-
-
-class _FreeNear(Free):
-    """A free end that the search of the equilibrium puts somewhere first."""
-
-    initial_guess: Vector | None = None
 
 
 class FixedPoint(Table):
@@ -139,7 +133,7 @@ class FreePoint(Table):
         """The end of the one line that ends there; near: where it is first looked for [m], None: nowhere."""
         if self.is_body:
             return self.end.model_copy(update={"initial_guess": near})
-        return _FreeNear(force=self.force, moment=self.moment, initial_guess=near)
+        return Free(force=self.force, moment=self.moment).at_point(AtPoint(near=near))
 
 
 class GuidedPoint(Table):
