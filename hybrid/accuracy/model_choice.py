@@ -29,6 +29,7 @@ from hybrid.model.run_time import foretold_steps
 from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.initial_zones import HOLD
+from hybrid.simulation.layer_mesh import layered, shown
 from hybrid.simulation.mesh_survey import CELLS, STEPS, Survey, lack_along, with_survey
 from hybrid.simulation.zone_switching import LONGEST_IN_PACE, READY
 
@@ -72,7 +73,7 @@ def chosen_and_surveyed(
 
     chosen: lines whose model has been chosen already.
     """
-    resolution = case.layered(resolution)
+    resolution = layered(case.lines, resolution, case.first_shapes)
     scenes = {name: x for name, x in case.lines.items() if wants_survey(x)}
     open_yet = [x for x, scene in scenes.items() if x not in chosen and model_is_free(scene, case.moves)]
     choices = dict[str, ModelChoice]()
@@ -88,8 +89,10 @@ def chosen_and_surveyed(
     moving = [name for name, x in scenes.items() if name in open_yet or isinstance(x.model, AdaptiveModel)]
     rods = case.with_models(dict.fromkeys(moving, "rod"))
     with case.instead(rods):
-        coarse = case.shown(resolution.coarser(CELLS, STEPS if case.moves else 1.0))
-        surveys, of_rods = case.survey(resolution, coarse), case.lines
+        of_rods, coarse = case.lines, resolution.coarser(CELLS, STEPS if case.moves else 1.0)
+        if not (case.moves and case.scene.starts_as_placed):  # a shape that is given has the bends that it has
+            coarse = shown(of_rods, coarse, case.first_compared)
+        surveys = case.survey(resolution, coarse)
     if surveys is None:
         failed = ModelChoice("rod", "the pre-run that would show what others cost failed")
         case.scene = case.with_models(dict.fromkeys(open_yet, "rod"))

@@ -40,7 +40,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.interrupts import at_once
-from hybrid.simulation.layer_mesh import layered, layered_lines, shown, shown_lines
+from hybrid.simulation.layer_mesh import rods_at_rest
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.load_change import with_loads_of
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
@@ -135,7 +135,8 @@ class Case:
         self._results = 0  # that were begun
         self._told: tuple[object, str] | None = None  # a scene, and what it is as a text
         self._owner = threading.get_ident()  # the thread that puts files in their places
-        self._start: tuple[Resolution, Start] | None = None
+        self._start: tuple[Network, NetworkResolution, Start] | None = None  # that was looked at last
+        self._apart: tuple[Network, Network] | None = None  # a network, and the same without contact
         self.reach: Reach | None = None  # how far the first line moves, by a pre-run
         self.near_themselves = set[str]()  # lines that came near themselves in a run to compare with
         # Whether contact of lines with themselves is computed in runs to compare with: where it is asked for, or a line
@@ -443,18 +444,6 @@ class Case:
 
     # --- how finely -----------------------------------------------------------------------------
 
-    def layered(self, resolution: NetworkResolution) -> NetworkResolution:
-        """With cells as the equilibrium asks for, of lines that have no pre-run (simulation.layer_mesh)."""
-        if not self.flat:
-            return layered_lines(self.network, resolution, self.moves)
-        return resolution if wants_survey(self.scene) else _of_cable(layered(self, resolution.one))
-
-    def shown(self, resolution: NetworkResolution) -> NetworkResolution:
-        """With cells of a pre-run on which the equilibrium is found (simulation.layer_mesh)."""
-        return (
-            _of_cable(shown(self, resolution.one)) if self.flat else shown_lines(self.network, resolution, self.moves)
-        )
-
     def survey(self, resolution: NetworkResolution, coarse: NetworkResolution) -> dict[str, Survey] | None:
         """A coarse run that shows where cells of lines should be short that leave them open; None: it failed.
 
@@ -483,10 +472,7 @@ class Case:
         self, coarse: NetworkResolution, until: float | None
     ) -> tuple[dict[str, Model], dict[str, Floats], Samples]:
         """Models of a pre-run, where they are looked at, m, and what is seen there."""
-        with self._said():
-            start = self._first_state(coarse, self._compared_network)
-        self._start = coarse.one, start
-        models = dict(zip(start.model.names, start.model.models, strict=True))
+        models = {name: model for name, (model, _) in self.first_compared(coarse).items()}
         points = {name: survey_points(x, coarse.lines[name]) for name, x in models.items()}
         return models, points, self.sample(coarse, points, until)
 
@@ -513,29 +499,36 @@ class Case:
     @property
     def _compared_network(self) -> Network:
         """The network of runs to compare with."""
-        apart = self.moves and not self.flat and not self.touches_itself
-        return system_without_contact(self.network) if apart else self.network
+        if not self.moves or self.flat or self.touches_itself:
+            return self.network
+        if self._apart is None or self._apart[0] is not self.network:
+            self._apart = self.network, system_without_contact(self.network)
+        return self._apart[1]
 
-    def _first_state(self, resolution: NetworkResolution, network: Network | None = None) -> Start:
-        """The first state of the network, which may have been kept for a run of this resolution."""
+    def _first_state(self, resolution: NetworkResolution, network: Network) -> Start:
+        """The first state of a network, which may have been kept for a run of this resolution."""
         kept, self._start = self._start, None
-        if kept is not None and kept[0] is resolution.one:
-            return kept[1]
-        asked = network or self.network
+        if kept is not None and kept[0] is network and _is_same(kept[1], resolution):
+            return kept[2]
         with at_once(self.interrupted):
-            return start_of(asked, build_system(asked, resolution), self.moves, self.criterion)
+            return start_of(network, build_system(network, resolution), self.moves, self.criterion)
 
-    def first_shape(self, resolution: Resolution) -> tuple[Model, State]:
-        """Model and state of the run of a cable as it begins, which are kept for one of this resolution that comes
+    def first_shapes(self, resolution: NetworkResolution) -> dict[str, tuple[Model, State]]:
+        """Models and first states of a result, by line; they are kept for that of this resolution, if it comes next."""
+        return self._shapes(resolution, self.network)
 
-        next.
-        """
-        finely = NetworkResolution({LINE: resolution})
+    def first_compared(self, resolution: NetworkResolution) -> dict[str, tuple[Model, State]]:
+        """The same of a run to compare with."""
+        return self._shapes(resolution, self._compared_network)
+
+    def _shapes(self, resolution: NetworkResolution, network: Network) -> dict[str, tuple[Model, State]]:
+        if network.adaptive:  # as rods, before zones are found
+            return rods_at_rest(network, resolution, self.moves)
         with self._said():
-            start = self._first_state(finely)
-        self._start = resolution, start
-        line = start.model.models[0]
-        return line, line.start if start.found is None else start.found.state.lines[0]
+            start = self._first_state(resolution, network)
+        self._start = network, resolution, start
+        states = [x.start for x in start.model.models] if start.found is None else start.found.state.lines
+        return dict(zip(start.model.names, zip(start.model.models, states, strict=True), strict=True))
 
     def _result_interrupted(self) -> bool:
         """Whether a result is to stop; one before it that has waited long enough is put in its place."""
@@ -549,8 +542,8 @@ class Case:
         return self._unwanted.is_set() or self._result_interrupted()
 
 
-def _of_cable(resolution: Resolution) -> NetworkResolution:
-    return NetworkResolution({LINE: resolution})
+def _is_same(a: NetworkResolution, b: NetworkResolution) -> bool:
+    return a.lines.keys() == b.lines.keys() and all(a.lines[name] is x for name, x in b.lines.items())
 
 
 def _datasets(data: Mapping[str, Any], *groups: str) -> list[str]:

@@ -11,9 +11,8 @@ mesh stays as it is.  Where an accuracy is asked for, a pre-run places the cells
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -22,16 +21,13 @@ from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model, twist_rate
 from hybrid.model.mesh import DEFAULT_CELLS
 from hybrid.model.mesh_grading import GROWTH, SAMPLES, Grading, layers
-from hybrid.model.model_costs import with_model
+from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free, shows_bends, wants_survey
-from hybrid.scene.schema import AdaptiveModel, Equilibrium, LineScene
+from hybrid.scene.network_scene import Network
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.section_layers import MORE
-
-if TYPE_CHECKING:  # of several lines, which most scenes do not have
-    from hybrid.model.network import NetworkResolution
-    from hybrid.scene.network_scene import Network
 
 # Cells to a length lambda at a place that bends a rod, and beyond how many such lengths a longer cell hides the bend:
 # the curvature at the end of an exponential layer is then off by 1 % and by about 4 %.
@@ -48,113 +44,70 @@ MOST_FOLD, ROUNDS = 0.6, 6
 BESIDE = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 40)])
 
 
-class BeginsAtRest(Protocol):
-    """What computes the first state of a cable."""
-
-    scene: Any
-
-    def first_shape(self, resolution: Resolution) -> tuple[Model, State]: ...
+# Gives models of lines with their first states, by name, on such cells.  ComputationError: there is no equilibrium.
+Rests = Callable[[NetworkResolution], Mapping[str, tuple[Model, State]]]
 
 
-def layered(case: BeginsAtRest, resolution: Resolution) -> Resolution:
-    """With cells as bends and layers of the equilibrium ask for, of rods whose mesh is left open.
+def layered(scenes: Mapping[str, LineScene], resolution: NetworkResolution, rests: Rests) -> NetworkResolution:
+    """With cells as bends and layers of the equilibrium ask for, of rods whose mesh is left open, without a pre-run.
 
-    Zones that move have the mesh of rods, hence that of an equilibrium of rods.
+    scenes: of the lines by name.  Zones that move have the mesh of rods, hence that of an equilibrium of rods.
     """
-    scene = case.scene
-    if not _is_open(scene, resolution):
-        return resolution
-    moves = isinstance(scene.model, AdaptiveModel)
-    shown = replace(resolution) if moves else resolution  # a run begins with what was kept for its own resolution
-    if moves:
-        case.scene = with_model(scene, "rod")
-    try:
-        model, state = case.first_shape(shown)
-        grading = grading_of(scene, model, state)
-    except ComputationError:
-        return resolution  # the run says why
-    finally:
-        case.scene = scene
-    return resolution if grading is None else replace(resolution, grading=grading)
-
-
-def layered_lines(system: Network, resolution: NetworkResolution, moves: bool) -> NetworkResolution:
-    """The same of several lines, of those that leave their mesh open and ask for no pre-run.
-
-    moves: the equilibrium is that with which a motion begins, else that under full loads.
-    """
-    scenes = {name: system.scene_of(name) for name in system.lines}
     wanted = [x for x, scene in scenes.items() if _is_open(scene, resolution.lines[x]) and not wants_survey(scene)]
     if not any(shows_bends(scenes[name]) for name in wanted):
         return resolution
     try:
-        rest = _rest_of(system, resolution, moves)
+        rest = rests(resolution)
     except ComputationError:
         return resolution  # the run says why
-    lines = dict(resolution.lines)
-    for name in wanted:
-        if (grading := grading_of(scenes[name], *rest[name])) is not None:
-            lines[name] = replace(lines[name], grading=grading)
-    return replace(resolution, lines=lines)
+    found = {name: grading_of(scenes[name], *rest[name]) for name in wanted}
+    return _graded(resolution, found)
 
 
-def _rest_of(system: Network, resolution: NetworkResolution, moves: bool) -> dict[str, tuple[Model, State]]:
-    """Models of several lines with their first states, by name; moves: as of `layered_lines`.  ComputationError."""
-    from hybrid.model.network import build_system
+def shown(scenes: Mapping[str, LineScene], resolution: NetworkResolution, rests: Rests) -> NetworkResolution:
+    """With cells on which the equilibrium is found, and bends no rod by more than MOST_FOLD from one cell to the next.
+
+    Of lines that have a pre-run.  A slack bend is often shorter than the cells of that by far, and on such cells it may
+    be anywhere.
+    """
+    wanted = [x for x, scene in scenes.items() if _is_open(scene, resolution.lines[x]) and wants_survey(scene)]
+    tried, found = resolution, resolution
+    for _ in range(ROUNDS if wanted else 0):
+        try:
+            rest = rests(tried)
+        except ComputationError:
+            lines = tried.lines.items()
+            tried = NetworkResolution({k: x.coarser(cells=0.5) if k in wanted else x for k, x in lines})
+            continue
+        found, finer = tried, _graded(tried, {name: _unfolded(scenes[name], *rest[name]) for name in wanted})
+        if finer is tried:
+            return tried
+        tried = finer
+    return found
+
+
+def _graded(resolution: NetworkResolution, gradings: Mapping[str, Grading | None]) -> NetworkResolution:
+    """With cells of lines placed, by name; the same where none are."""
+    found = {name: x for name, x in gradings.items() if x is not None}
+    if not found:
+        return resolution
+    lines = resolution.lines.items()
+    return NetworkResolution({k: replace(x, grading=found[k]) if k in found else x for k, x in lines})
+
+
+def rods_at_rest(network: Network, resolution: NetworkResolution, moves: bool) -> dict[str, tuple[Model, State]]:
+    """Models of lines with their first states, by name, before zones move: as rods.  ComputationError.
+
+    moves: the equilibrium is that with which a motion begins, else that under full loads.
+    """
     from hybrid.simulation.run_start import equilibrium_of_system
 
     with at_once():
-        model = build_system(system, resolution=resolution)
+        model = build_system(network, resolution=resolution)
         states: Sequence[State] = [x.start for x in model.models]
-        if not (moves and system.starts_as_placed):
-            states = equilibrium_of_system(system, model, 0.0 if moves else np.inf).state.lines
+        if not (moves and network.starts_as_placed):
+            states = equilibrium_of_system(network, model, 0.0 if moves else np.inf).state.lines
     return dict(zip(model.names, zip(model.models, states, strict=True), strict=True))
-
-
-def shown_lines(system: Network, resolution: NetworkResolution, moves: bool) -> NetworkResolution:
-    """As `shown`, of several lines that have a pre-run; moves: as of `layered_lines`."""
-    if moves and system.starts_as_placed:
-        return resolution
-    scenes = {name: system.scene_of(name) for name in system.lines}
-    wanted = [x for x, scene in scenes.items() if _is_open(scene, resolution.lines[x]) and wants_survey(scene)]
-    wanted = [name for name in wanted if shows_bends(scenes[name])]
-    tried, found = resolution, resolution
-    for _ in range(ROUNDS if wanted else 0):
-        lines = dict(tried.lines)
-        try:
-            rest = _rest_of(system, tried, moves)
-        except ComputationError:
-            finer = {k: x.coarser(cells=0.5) if k in wanted else x for k, x in lines.items()}
-            tried = replace(tried, lines=finer)
-            continue
-        found, gradings = tried, {name: _unfolded(scenes[name], *rest[name]) for name in wanted}
-        lines |= {name: replace(lines[name], grading=x) for name, x in gradings.items() if x is not None}
-        if not any(x is not None for x in gradings.values()):
-            return tried
-        tried = replace(tried, lines=lines)
-    return found
-
-
-def shown(case: BeginsAtRest, resolution: Resolution) -> Resolution:
-    """With cells on which the equilibrium is found, and bends no rod by more than MOST_FOLD from one cell to the next.
-
-    A slack bend is often shorter than the cells of a pre-run by far, and on such cells it may be anywhere.  A shape
-    that the scene gives has the bends that it has.
-    """
-    if not (_is_open(case.scene, resolution) and isinstance(case.scene.initial, Equilibrium)):
-        return resolution
-    tried, found = resolution, resolution
-    for _ in range(ROUNDS):
-        try:
-            model, state = case.first_shape(tried)
-        except ComputationError:
-            tried = tried.coarser(cells=0.5)
-            continue
-        found, grading = tried, _unfolded(case.scene, model, state)
-        if grading is None:
-            return tried
-        tried = replace(tried, grading=grading)
-    return found
 
 
 def _unfolded(scene: LineScene, model: Model, state: State) -> Grading | None:

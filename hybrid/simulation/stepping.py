@@ -24,7 +24,7 @@ from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.first_use import compile_beside
-from hybrid.simulation.layer_mesh import layered_lines
+from hybrid.simulation.layer_mesh import layered, rods_at_rest
 from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, with_survey
 from hybrid.simulation.network_run import NetworkRun, Recording, static_system
 from hybrid.simulation.run_file import Cable
@@ -48,7 +48,8 @@ NUMBER = (int, float, np.integer, np.floating)
 def layers_at_rest(system: Network) -> NetworkResolution:
     """Cells by the equilibrium of the start; where a line says how many cells a layer has, by that of full loads."""
     asked = [name for name, line in system.lines.items() if line.resolution is not None]
-    first = layered_lines(system, NetworkResolution.first(system), True)
+    scenes = {name: system.scene_of(name) for name in system.lines}
+    first = layered(scenes, NetworkResolution.of(scenes), lambda x: rods_at_rest(system, x, True))
     if not asked:
         return first
     memory = MemoryTarget()
