@@ -96,7 +96,7 @@ class Model:
     def hinges(self) -> Floats:
         """`Material.hinges`, without pieces where zones stay: steps look for no stiffness that is under way there."""
         found = self.cable.hinges
-        return found if self.layout is not None else np.vstack([found[:2], np.zeros((1, 3))])
+        return found.copy() if self.layout is not None else np.vstack([found[:2], np.zeros((1, 3))])
 
     @property
     def nodes(self) -> Floats:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -151,7 +152,7 @@ class Material:
             return "intrinsic curvature"
         return "" if self.B.all() else "sections without bending or torsional stiffness"
 
-    @property
+    @cached_property
     def hinges(self) -> Floats:
         """(2 + K, 3) of each end where the curvature of a rod fades to nothing: EI, N m2, and how far from the end, m.
 

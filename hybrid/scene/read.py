@@ -211,10 +211,13 @@ def scene_text(scene: Scene) -> str:
     return str(yaml.dump(data, Dumper=Dumper, **style))  # tables in lines, vectors in brackets
 
 
+# What YAML 1.2 reads as a number.
+_NUMBER = re.compile(r"[-+]?(\d[\d_]*)?\.?\d*([eE][-+]?\d+)?|0o[0-7]+")
+
+
 def _text_in_yaml(dumper: Any, text: str) -> Any:
     """A text, in quotes where YAML 1.2 would read a number: PyYAML knows those of 1.1 only (1e5 and 0o7 are others)."""
-    quoted = re.fullmatch(r"[-+]?(\d[\d_]*)?\.?\d*([eE][-+]?\d+)?|0o[0-7]+", text) is not None
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="'" if quoted else None)
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="'" if _NUMBER.fullmatch(text) else None)
 
 
 # --- helpers -----------------------------------------------------------------------------------

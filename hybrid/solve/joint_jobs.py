@@ -35,14 +35,16 @@ class JointJobs:
     def __init__(self, rooms: Rooms, numbers: NDArray[np.int64], lines: Sequence[int]) -> None:
         """numbers: (2, n, ..) jobs of these lines for both parities; lines: their numbers."""
         self._rooms, self._numbers, self._lines = rooms, numbers, list(lines)
-        self.jobs = Table(blank_system_job), Table(blank_system_job)
+        first, common = Table(blank_system_job), self._common(numbers[0])
+        first.bind(**common, **rooms.job, **self._of_these(rooms.rows))
+        self.jobs = first, first.again(np.empty_like(first.numbers))
         self._meeting = [Table(blank_meeting_job) for _ in numbers] if rooms.meeting else []
         self._spinning = [Table(blank_spinning_job) for _ in numbers] if rooms.spinning else []
         self._touching: list[Table] = []
         begins = rooms.begins[self._lines]
         for parity, (job, tables) in enumerate(zip(self.jobs, numbers, strict=True)):
-            common = self._common(tables)
-            job.bind(numbers=tables.view(np.float64), **common, **rooms.job, **self._of_these(rooms.rows))
+            common["tables"] = tables
+            job.bind(numbers=tables.view(np.float64), tables=tables)
             if self._meeting:
                 meeting = self._meeting[parity]
                 meeting.bind(begins=begins, **common, **rooms.meeting)

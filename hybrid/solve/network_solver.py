@@ -241,7 +241,7 @@ class NetworkSolver:
             table.bind(task=self._task_of_run(k), **self._by_itself(k, own | {"iterated": 0}))
             self._lone_tables[k] = table
         self._together, self._joined_tables = self._all, dict(enumerate(self._tables))
-        if self.lone:
+        if self.lone and not self.is_apart:
             numbers = np.zeros((2, len(self.joined), self._numbers.shape[2]), np.int64)
             self._joined_tables = {
                 k: tuple(mine.again(x[j]) for mine, x in zip(self._tables[k], numbers, strict=True))
@@ -372,7 +372,7 @@ class NetworkSolver:
         }  # fmt: skip
         self._touched = room, tables, shared
         self._all.touch(*self._touched)
-        if self.lone:
+        if self._together is not self._all:
             self._together.touch(*self._touched)
 
     @property
