@@ -117,7 +117,7 @@ def test_memory_of_a_worker_is_flat(folder: Path) -> None:
 def test_empty_tasks() -> None:
     """What the scheduler takes for a task: 10 000 empty ones in one cluster."""
 
-    from hybrid.studies.cluster import client_of
+    from hybrid.studies.dispatch import client_of
 
     with client_of(2, None) as client:
         begin = clock.perf_counter()

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.store.header import Header
+from hybrid.store.format import Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Field, Recorder
 

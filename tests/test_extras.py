@@ -18,7 +18,7 @@ from hybrid.errors import ResultError, command_for
 from hybrid.scene.motion_file import RecordRefused
 from hybrid.scene.rao_dataset import read_dataset
 from hybrid.statistics.fatigue import rainflow_cycles
-from hybrid.studies.expressions import evaluated
+from hybrid.studies.cases import evaluated
 
 PACKAGE = Path(hybrid.__file__).parent
 EXAMPLES = PACKAGE.parent / "examples"

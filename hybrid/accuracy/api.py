@@ -31,9 +31,8 @@ from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.progress import Listener, ProgressReporter, listener_of, tell_of_compiling
 from hybrid.simulation.restart import remaining
-from hybrid.store.array_recorder import MemoryTarget, Target
-from hybrid.store.hdf5_file import check_target
-from hybrid.store.lock import locked
+from hybrid.store.array_contents import MemoryTarget, Target
+from hybrid.store.hdf5_file import check_target, locked
 from hybrid.store.reader import Result, open_result, written_result
 
 if TYPE_CHECKING:

@@ -25,9 +25,9 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
 from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, is_along
 from hybrid.store.amend import NOTHING_MORE, Block, Happened, Part, amend
+from hybrid.store.copying import GROUP
 from hybrid.store.format import Field
 from hybrid.store.limits import EXTREME_ERRORS
-from hybrid.store.lines import GROUP
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import not_converged_attribute
 from hybrid.store.whole_file import LateFile

@@ -27,7 +27,7 @@ from hybrid.linear.eigen import BELOW, lowest_modes
 from hybrid.linear.excitation import frequencies_of
 from hybrid.linear.loaded_line import LoadedLine
 from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_at_rest, sparse_rows
-from hybrid.linear.rest import Rest, rest_of
+from hybrid.linear.touching import Rest, rest_of
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.root import Scene

@@ -45,7 +45,7 @@ from hybrid.simulation.restart import Remaining
 from hybrid.simulation.restore import refused
 from hybrid.simulation.run_sample import Samples
 from hybrid.store.amend import may_be_amended
-from hybrid.store.array_recorder import MemoryTarget, Target
+from hybrid.store.array_contents import MemoryTarget, Target
 from hybrid.store.named_arrays import Tree
 from hybrid.store.stored_rows import remove_rows
 from hybrid.store.whole_file import LateFile

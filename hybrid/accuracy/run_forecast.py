@@ -35,7 +35,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import kernels_of
 from hybrid.simulation.network_run import NetworkRun, Recording
 from hybrid.solve.joined import LineFailed
-from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.stored_rows import ComparisonRecorder
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.network_scene import Network

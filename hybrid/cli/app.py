@@ -17,7 +17,7 @@ import typer
 import typer.core
 
 import hybrid
-from hybrid.cli.pipe import OUTPUT, raise_lost_output
+from hybrid.cli.console import OUTPUT, raise_lost_output
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console

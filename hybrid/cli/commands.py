@@ -19,14 +19,10 @@ import typer
 
 import hybrid
 import hybrid.cli.design_command  # registers its command
-import hybrid.cli.modes_command
 import hybrid.cli.response_command
 import hybrid.cli.result_commands
-import hybrid.cli.seek_command
-import hybrid.cli.sensitivity_command
 import hybrid.cli.statistics_command
 import hybrid.cli.study_command
-import hybrid.cli.view_command
 from hybrid.cli.app import (
     REFUSED,
     Drawn,
@@ -47,7 +43,7 @@ from hybrid.cli.app import (
     tell,
     words,
 )  # fmt: skip
-from hybrid.cli.pipe import guard_output, raise_lost_output
+from hybrid.cli.console import guard_output, raise_lost_output
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -118,8 +114,8 @@ def static(
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
         asked = load(console, scene, settings)
+        from hybrid.cli.lines_tables import check_holding, show_holding
         from hybrid.cli.progress_line import span
-        from hybrid.cli.stiffness_tables import check_holding, show_holding
 
         check_holding(asked, stiffness, offsets, reach, heading)
         target = console.will_write(output or Path(f"{scene.stem}.static.h5"))
@@ -343,7 +339,7 @@ def _show_equilibrium(console: Console, result: Result) -> tuple[str, dict[str, 
 def _draw(result: Result, picture: Path | None) -> None:
     """Draw a result; picture: where to, None: nowhere."""
     if picture is not None:
-        from hybrid.view.matplotlib_import import import_matplotlib
+        from hybrid.view.save import import_matplotlib
 
         import_matplotlib()
         hybrid.plot(result, picture)

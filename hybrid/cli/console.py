@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -9,16 +10,15 @@ import shutil
 import stat
 import sys
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import cached_property
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import hybrid
-from hybrid.cli.grid import Grid, Trimmed
-from hybrid.cli.pipe import reader_has_gone
 from hybrid.cli.progress_line import LINE_EVERY, ProgressLine, span
 from hybrid.errors import EXPECTED, is_of_the_run, weight_of_event
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from hybrid.store.records import Event
     from hybrid.studies.dispatch import StudyRunning
     from hybrid.studies.runs import StudyProgress
+
 
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log
 BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a study: below 1 % of what its runs cost
@@ -298,3 +299,109 @@ def _stamp(file: Path) -> tuple[int, int] | None:
     except OSError:
         return None
     return None if stat.S_ISDIR(found.st_mode) else (found.st_ino, found.st_mtime_ns)
+
+
+# Rows of a few words in columns: as text where they fit, by rich where they have to be wrapped.
+
+BETWEEN = 2  # blanks between columns
+
+
+class Trimmed:
+    """What rich prints, without blanks at the ends of lines: rich fills every cell up to the width of its column."""
+
+    def __init__(self, content: Any) -> None:
+        self.content = content
+
+    def __rich_console__(self, console: Any, options: Any) -> Iterator[Any]:
+        from rich.segment import Segment
+
+        for line in console.render_lines(self.content, options, pad=False):
+            while line and not line[-1].text.strip():
+                line.pop()
+            if line:
+                line[-1] = Segment(line[-1].text.rstrip(), line[-1].style)
+            yield from (*line, Segment.line())
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Rows, whose cells may have several lines, and a line below them."""
+
+    rows: Sequence[Sequence[str]]
+    below: str = ""
+
+    def text(self) -> str:
+        lines = [line for row in self.rows for line in zip_longest(*(x.split("\n") for x in row), fillvalue="")]
+        widths = [max(map(len, column)) for column in zip_longest(*lines, fillvalue="")]
+        out = [(" " * BETWEEN).join(map(str.ljust, line, widths)).rstrip() for line in lines]
+        return "\n".join([*out, *([self.below] if self.below else [])])
+
+    def table(self) -> Any:
+        """For rich."""
+        from rich.console import Group
+        from rich.table import Table
+
+        table = Table.grid(padding=(0, BETWEEN))
+        for row in self.rows:
+            table.add_row(*row)
+        return Group(table, *([self.below] if self.below else []))
+
+
+# The output and error streams where they are no terminal, as in `hybrid schema | head`, `hybrid schema > file`.
+
+OUTPUT = "the output"  # name of the stream, for messages
+
+
+class _Stream(io.FileIO):
+    """A stream to a pipe or file: what cannot be written is dropped, and a computation goes on.
+
+    What nobody reads any more, as behind `| head`, is no error; that a disk is full is one, at the end of the command.
+    """
+
+    dropped = False  # as nobody reads it
+    error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        try:
+            return super().write(data) or 0
+        except OSError as error:
+            self.dropped = isinstance(error, BrokenPipeError)
+            self.error = None if self.dropped else OSError(error.errno, error.strerror, OUTPUT)
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+            return memoryview(data).nbytes
+
+
+def guard_output() -> None:
+    """Let a reader that has gone end no command, cause no error message and change no exit code."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        try:
+            piped = not os.isatty(stream.fileno())
+        except (OSError, ValueError, AttributeError):  # a stream without a file, as in tests; none under pythonw
+            continue
+        if piped and isinstance(stream, io.TextIOWrapper):
+            raw = _Stream(stream.fileno(), "w", closefd=False)
+            to = io.BufferedWriter(raw)
+            setattr(
+                sys, name, io.TextIOWrapper(to, stream.encoding, stream.errors, line_buffering=stream.line_buffering)
+            )
+
+
+def reader_has_gone() -> bool:
+    """Whether output was dropped because its reader has closed the pipe."""
+    stream = _output_stream()
+    return stream is not None and stream.dropped
+
+
+def raise_lost_output() -> None:
+    """Raise, once, that output could not be written."""
+    sys.stdout.flush()
+    stream = _output_stream()
+    if stream is not None and (error := stream.error) is not None:
+        stream.error = None
+        raise error
+
+
+def _output_stream() -> _Stream | None:
+    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    return raw if isinstance(raw, _Stream) else None

@@ -128,7 +128,7 @@ def _refuse_alone(curve: str | None, strength: float | None, section: Any, moore
 
 def _fatigue(result: Result, curve: str, strength: float | None, section: Any, times: Any, at: Any) -> dict[str, Any]:
     """Damage and life where the damage is largest, with what errors leave of it, and at the places that are asked."""
-    from hybrid.store.fatigue_errors import life_within
+    from hybrid.store.statistics_table import life_within
 
     s, damage = result.damage(curve, strength=strength, section=section, times=times, at=at)
     facts = _fatigue_facts(result, s, damage, times, section is not None)

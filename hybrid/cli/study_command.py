@@ -86,8 +86,7 @@ def study(
 def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path | None) -> None:
     """Ranges of what was kept, reasons of what failed, and where it is."""
     from hybrid.cli.progress_line import span
-    from hybrid.store.study_accuracy import unmet_accuracy
-    from hybrid.store.study_file import DONE, FAILED, counts_of
+    from hybrid.store.study_file import DONE, FAILED, counts_of, unmet_accuracy
 
     counts = counts_of(found["status"].values)
     done = found.isel(case=found["status"].values == DONE)

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybrid.cli.grid import Grid
+from hybrid.cli.console import Grid
 from hybrid.errors import OMITTED, ZONE_EVENTS
 
 ANCHORED = 1.0  # m
@@ -56,7 +56,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
     from hybrid.store.envelope import largest_contact
     from hybrid.store.records import not_converged_in
     from hybrid.store.verdicts import section_limits
-    from hybrid.view.worst import worst
+    from hybrid.view.along import worst
 
     found: dict[str, Any] = {}
     for key, low in (("tension_max", False), ("tension_min", True)):

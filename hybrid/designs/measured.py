@@ -17,7 +17,7 @@ from hybrid.outputs.probes import PROBES
 from hybrid.scene.base import Finding
 from hybrid.scene.design import Design
 from hybrid.scene.task_file import TaskFile
-from hybrid.studies.csv_table import Table, read_table
+from hybrid.studies.cases import Table, read_table
 
 COORDINATES = {"x": "position.x", "y": "position.y", "z": "position.z"}
 OF_ROW = ("t", "s", "line", "case")

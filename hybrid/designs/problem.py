@@ -22,7 +22,7 @@ from hybrid.scene.base import Finding, Place
 from hybrid.scene.design import Design, OfEquilibrium, Unknown
 from hybrid.scene.read import as_scene, read_text, scene_text
 from hybrid.scene.task_file import TaskFile
-from hybrid.studies.expressions import evaluated
+from hybrid.studies.cases import evaluated
 
 # Part of a variable of an expression by which it is differentiated.
 PART = 1e-6

@@ -25,7 +25,7 @@ from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.simulation.network_run import Recording, run_system
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import kept_resolution, resolution_from
-from hybrid.store.array_recorder import MemoryTarget
+from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.reader import Result, open_result, written_result

@@ -25,7 +25,7 @@ from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.study import Kept
-from hybrid.store.lock import locked
+from hybrid.store.hdf5_file import locked
 from hybrid.store.records import ALIASES
 from hybrid.store.study_file import StudyFile
 from hybrid.studies.cases import digest_of, scene_of

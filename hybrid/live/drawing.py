@@ -11,11 +11,11 @@ import numpy as np
 from hybrid.store.reader import Result
 from hybrid.view.along import along
 from hybrid.view.decimate import even
+from hybrid.view.figure import BED, BODY, INK, colour_of
 from hybrid.view.lines import LINE_COLOURS, AllLines, arms_of, bodies_of, points_of
 from hybrid.view.obstacles import rings
 from hybrid.view.projections import bed_heights, whole_zones
 from hybrid.view.scenery import box_and_planes
-from hybrid.view.style import BED, BODY, INK, colour_of
 from hybrid.view.summary import facts_of
 
 DIGITS = 7  # of the largest number of a curve: more than a screen shows apart

@@ -18,7 +18,7 @@ from hybrid.scene.read import located_in, read_text, scene_text
 from hybrid.simulation.case_at_rest import CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.network_run import static_system
-from hybrid.store.array_recorder import MemoryTarget
+from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.reader import Result, written_result
 
 if TYPE_CHECKING:

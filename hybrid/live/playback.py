@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hybrid.live import drawing
-from hybrid.store.lock import is_held
+from hybrid.store.hdf5_file import is_held
 from hybrid.store.reader import Result, open_result
 
 # Frames that a page holds, points along a line in each, and lines from which on they are fewer.

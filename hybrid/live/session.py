@@ -11,15 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from hybrid.errors import SceneError
-from hybrid.live.document import Document, Refused, Stamp, stamp_of
-from hybrid.live.examples import example_text, examples
-from hybrid.live.named_files import named_files
-from hybrid.live.new_scenes import new_scene, questions
+from hybrid.live.document import Document, Refused, Stamp, named_files, stamp_of
+from hybrid.live.new_scenes import example_text, examples, new_scene, questions
 from hybrid.live.playback import Playback
-from hybrid.live.runs import Run
-from hybrid.live.workers import Workers
-from hybrid.store.hdf5_file import is_result
-from hybrid.store.lock import is_held
+from hybrid.live.workers import Run, Workers
+from hybrid.store.hdf5_file import is_held, is_result
 
 # s between two looks at the scene file, and at a result; s after which a file that is not there is gone, and not about
 # to be replaced by an editor that saves.

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -123,3 +125,100 @@ class Workers:
     async def stop(self) -> None:
         """End both."""
         await asyncio.gather(self._at_work.stop(), self._spare.stop())
+
+
+# The motion of a scene in a process of its own: `hybrid run --json`, its progress, and how it is stopped.
+
+CALL = "from hybrid.cli.commands import main; main(sys.argv[1:])"
+LONGEST_LINE = 16_000_000
+INSIST = 2.0  # s after which a run that has computed nothing yet is asked again to stop: it may be compiling
+
+
+class Run:
+    """One run; `state` is what the page shows of it."""
+
+    def __init__(self, scene: Path, target: Path, changed: Callable[[], None]) -> None:
+        """changed: called when `state` has changed."""
+        self.scene, self.target, self._changed = scene, target, changed
+        self.state: dict[str, Any] = {"running": True, "file": target.name, "text": "starting", "fraction": 0.0}
+        self._child: asyncio.subprocess.Process | None = None
+        self._stopped = False
+
+    async def follow(self) -> None:
+        """Start it, and follow it to its end."""
+        new_group = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)  # of Windows: signals are for a group there
+        asked = "run", _argument(self.scene), "-o", _argument(self.target), "--json"
+        self._child = child = await asyncio.create_subprocess_exec(
+            *own_process(CALL), *asked, cwd=self.scene.parent,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, limit=LONGEST_LINE,
+            start_new_session=True, creationflags=new_group,
+        )  # fmt: skip
+        assert child.stdout is not None
+        if self._stopped:
+            self._ask_to_stop()  # it was asked for while the process was being made
+        with suppress(ValueError):
+            while line := await child.stdout.readline():
+                with suppress(json.JSONDecodeError):
+                    self._hear(json.loads(line))
+        await child.wait()
+        self.state["running"] = False
+        if "ended" not in self.state and self._stopped:
+            t = self.state.get("t")
+            text = "stopped before it began" if t is None else f"ended at once, after t = {t:.4g} s"
+            self.state |= {"ended": "interrupted", "text": text}
+        elif "ended" not in self.state:
+            self.state |= {"ended": "failed", "text": f"the run ended with exit code {child.returncode}"}
+        self._changed()
+
+    def stop(self) -> None:
+        """Ask it to stop: its file is complete until then.  A second time ends it at once."""
+        if self._stopped and self._child is not None:
+            with suppress(ProcessLookupError):
+                self._child.kill()
+        elif not self._stopped:
+            self._stopped = True
+            self._ask_to_stop()
+        self.state["text"] = "stopping"
+        self._changed()
+
+    def _ask_to_stop(self) -> None:
+        """By SIGTERM: SIGINT is ignored by what `hybrid view &` starts, until a run hears it by itself."""
+        child = self._child
+        if child is None or child.returncode is not None:
+            return
+        with suppress(ProcessLookupError):
+            if sys.platform == "win32":
+                child.send_signal(signal.CTRL_BREAK_EVENT)
+            else:
+                child.send_signal(signal.SIGTERM)
+        if "t" not in self.state:
+            asyncio.get_running_loop().call_later(INSIST, self._ask_to_stop)
+
+    def _hear(self, event: dict[str, Any]) -> None:
+        """Take a line of the run."""
+        kind = event.get("event")
+        if kind == "compiling" and not self._stopped:
+            self.state["text"] = "compiling the kernels for this machine (first use only)"
+        elif kind == "progress":
+            self.state |= {"fraction": event["fraction"], "t": event["t"], "duration": event["duration"]}
+            several = f"run {event['run']} of {event['runs']}, {event['name']}: " if event["runs"] > 1 else ""
+            left = event["seconds_left"]
+            rest = f", {left:.2g} s left" if left is not None else ""
+            if not self._stopped:
+                self.state["text"] = f"{several}t = {event['t']:.4g} of {event['duration']:g} s{rest}"
+        elif kind == "error":
+            self.state |= {"ended": "failed", "text": event["message"]}
+        elif kind == "done":
+            t = event.get("t")
+            texts = {"complete": "complete", "interrupted": "stopped" + (f" at t = {t:.4g} s" if t is not None else "")}
+            status = str(event.get("status"))
+            self.state |= {"ended": status, "text": texts.get(status, status)}
+            self.state["fraction"] = 1.0 if status == "complete" else self.state["fraction"]
+        else:
+            return
+        self._changed()
+
+
+def _argument(file: Path) -> str:
+    """The name of a file on a command line in its folder, where one that begins with - would be an option."""
+    return f"./{file.name}" if file.name.startswith("-") else file.name

@@ -16,8 +16,8 @@ from hybrid.kernels.junctions.bodies import FRAME, MASS, V
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.eigen import Eigen, lowest_modes
 from hybrid.linear.matrices import LinearLine, LinearNetwork, linear_network
-from hybrid.linear.rest import Rest, rest_of
-from hybrid.modal.touching_validity import name_of, obstacle_of
+from hybrid.linear.touching import Rest, rest_of
+from hybrid.modal.validity import name_of, obstacle_of
 from hybrid.model.payout import payout_of
 from hybrid.scene.base import Table
 from hybrid.scene.motion_tables import Harmonic

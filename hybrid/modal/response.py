@@ -16,24 +16,23 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from hybrid.accuracy.api import run
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, PLACE, V
 from hybrid.kernels.state.state import Floats
-from hybrid.linear.complex_solver import ComplexSolver
 from hybrid.linear.excitation import frequencies_of, refuse_motions
 from hybrid.linear.loaded_line import LoadedLine
 from hybrid.linear.loaded_members import LoadedMembers, stiffness_by_water, turning_doubts
-from hybrid.linear.matrices import linear_network
+from hybrid.linear.matrices import ComplexSolver, linear_network
 from hybrid.linear.response_results import LineResponse, Response
-from hybrid.linear.rest import Rest
+from hybrid.linear.touching import Rest
 from hybrid.modal.api import equilibrium_of, of_first_length
-from hybrid.modal.check import compared
 from hybrid.modal.left_out import left_out
-from hybrid.modal.touching_validity import closing_doubts, name_of, touching_doubts
-from hybrid.modal.validity import doubts_of
+from hybrid.modal.validity import closing_doubts, doubts_of, name_of, touching_doubts
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.root import Scene
 
 # Rounds of the linear drag, and the relative change of its largest part at which they end.
 ROUNDS, SETTLED, RELAXED = 30, 2e-3, 0.8
@@ -217,3 +216,40 @@ class _Linear:
             yield from (f"not valid: {text}" for text in turning_doubts(name, q))
         for members in self.members.values():
             yield from (f"not valid: {text}" for text in members.doubts())
+
+
+# A response by frequency held against a run in time of the same scene.
+
+# Part of the run that is left out, in which the motion begins; outputs to the shortest period that counts.
+BEGINS, PER_PERIOD = 0.25, 12
+# Steps of a scene that names none, of that period.
+STEPS = 60
+CHECKED = ("tension", "curvature")
+
+
+def compared(asked: Scene, lines: Mapping[str, LineResponse], duration: float) -> dict[str, tuple[float, float]]:
+    """Standard deviations where each quantity varies most, by frequency and in a run of `duration` (s)."""
+    if not 0.0 < duration < np.inf:
+        raise SceneError([Complaint("check", f"{duration:g}", "a time > 0, in s", "--check 600")])
+    periods = [float(np.median(x.period("tension")[x.period("tension") > 0.0])) for x in lines.values()]
+    period = min(periods)
+    data: dict[str, Any] = asked.model_dump(mode="json", exclude_none=True)
+    time = asked.time
+    step = time.step if time is not None and time.step is not None else period / STEPS
+    data["time"] = {"duration": duration / (1.0 - BEGINS), "step": step}
+    data["output"] = {"every": period / PER_PERIOD}
+    data.pop("accuracy", None)
+    result: Any = run(as_scene(data))
+    found = {}
+    for name, line in lines.items():
+        one = result.lines[name] if result.lines else result
+        late = one.times > BEGINS * duration / (1.0 - BEGINS)
+        for what in CHECKED:
+            deviation = line.deviation(what)
+            places = line.middle if what == "tension" else line.s
+            at = int(deviation.argmax())
+            column = int(np.abs(one.s - places[at]).argmin())
+            there = float(np.asarray(getattr(one, what))[late][:, column].std())
+            here = float(np.interp(one.s[column], places, deviation))
+            found[f"{name} {what}" if len(lines) > 1 else what] = (here, there)
+    return found

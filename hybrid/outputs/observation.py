@@ -32,12 +32,10 @@ from hybrid.kernels.state.report import (
     STRETCH_ENERGY,
 )
 from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line
-from hybrid.outputs.end_layers import EndLayer, between_nodes
-from hybrid.outputs.observed_states import ObservedStates
+from hybrid.outputs.observed_states import ObservedStates, across, cross, dot, size
 from hybrid.outputs.output_grid import ends_of, means_beside, means_on_line
-from hybrid.outputs.strains import part_without_spring, strains
+from hybrid.outputs.strains import EndLayer, between_nodes, part_without_spring, strains
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
-from hybrid.outputs.vectors import across, cross, dot, size
 from hybrid.solve.bending_corrector import Shift
 
 

@@ -19,6 +19,7 @@ from hybrid.model.output_points import NEAR, OutputPoints
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
 from hybrid.outputs.observation import Observation, Probe, bends_by_load
+from hybrid.outputs.observed_states import size
 from hybrid.outputs.obstacle_forces import (
     obstacle_fields,
     obstacle_force_fields,
@@ -27,7 +28,6 @@ from hybrid.outputs.obstacle_forces import (
 )
 from hybrid.outputs.output_grid import NO_HINGES, Grid, VaryingGrid
 from hybrid.outputs.quantities import Quantities
-from hybrid.outputs.vectors import size
 from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.stepper import POWERS
 from hybrid.store.format import Field

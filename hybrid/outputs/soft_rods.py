@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch.soft_rods import EI, END, GJ, LINE, SLACK, WHOLE
-from hybrid.outputs.observed_states import ObservedStates
-from hybrid.outputs.vectors import cross, directions_of
+from hybrid.outputs.observed_states import ObservedStates, cross, directions_of
 
 FEW = 4  # outputs
 Integers = NDArray[np.int64]

@@ -69,17 +69,15 @@ from hybrid.simulation.run_sample import (
     usual_cells,
 )
 from hybrid.simulation.run_zones import Start
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
-from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.array_contents import ArrayRecorder, MemoryTarget, Target
+from hybrid.store.copying import GROUP
 from hybrid.store.envelope import GROUP as ENVELOPE
 from hybrid.store.hdf5_file import open_file, opened
 from hybrid.store.limits import EXTREMES, extremes_about
-from hybrid.store.lines import GROUP
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE, THERE
-from hybrid.store.stored_array import StoredArray
-from hybrid.store.stored_rows import RowsRecorder, rows_path
+from hybrid.store.stored_rows import ComparisonRecorder, RowsRecorder, StoredArray, rows_path
 from hybrid.store.whole_file import LateFile
 from hybrid.store.writer import Recorder, WriteMode
 

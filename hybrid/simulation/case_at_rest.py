@@ -11,8 +11,7 @@ import numpy as np
 from hybrid.kernels.state.forces import SEABED
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.network import NetworkResolution
-from hybrid.outputs.edge_errors import edge_errors
-from hybrid.outputs.layer_errors import layer_errors
+from hybrid.outputs.edge_errors import edge_errors, layer_errors
 from hybrid.scene.root import Scene
 from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
@@ -27,7 +26,7 @@ from hybrid.simulation.run_sample import (
     catenary_share,
     compared_cells,
 )
-from hybrid.store.array_recorder import Target
+from hybrid.store.array_contents import Target
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import ERROR_ESTIMATE
 from hybrid.store.whole_file import LateFile

@@ -65,8 +65,8 @@ from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.run import batch_of_rows, no_extremes
 from hybrid.solve.self_contact import SelfContact
-from hybrid.store.array_recorder import ArrayRecorder
-from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.array_contents import ArrayRecorder
+from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from hybrid.simulation.pair_forces import fields_of_pairs
 from hybrid.simulation.result_file import STEP_FIELDS
 from hybrid.simulation.run_points import fields_of
 from hybrid.simulation.run_quantities import RunQuantities
+from hybrid.store.copying import GROUP
 from hybrid.store.format import Field
-from hybrid.store.lines import GROUP
 
 
 class Listed(NamedTuple):

@@ -77,11 +77,11 @@ from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.run import MOST_SAMPLED, ROWS, Tried
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.store.array_recorder import Target
+from hybrid.store.array_contents import Target
 from hybrid.store.checkpoint import read_checkpoint
-from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.format import Text
 from hybrid.store.hdf5_file import opened
-from hybrid.store.header import Text
+from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.probes import Observer
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import Diagnostics, Stop
-from hybrid.store.array_recorder import ArrayRecorder
-from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.array_contents import ArrayRecorder
+from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
 
 # Nodes of the outputs that are put aside, at most; cells of a line whose outputs are looked at together, at least.

@@ -40,11 +40,10 @@ from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.envelope import Envelope
 from hybrid.solve.statics import Equilibrium
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
+from hybrid.store.array_contents import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.capacity import CORNERS
 from hybrid.store.code_checks import ROWS
-from hybrid.store.format import Field
-from hybrid.store.header import Header, Text
+from hybrid.store.format import Field, Header, Text
 from hybrid.store.recorder import BaseRecorder
 from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 

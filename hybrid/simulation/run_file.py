@@ -35,12 +35,11 @@ from hybrid.simulation.run_points import Rotations, Sampled, fields_of, gauges_o
 from hybrid.simulation.run_quantities import RunQuantities
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
+from hybrid.store.array_contents import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import Checkpoint
-from hybrid.store.comparison_recorder import ComparisonRecorder
-from hybrid.store.format import Field
-from hybrid.store.header import Header, Text, made
+from hybrid.store.format import Field, Header, Text, made
 from hybrid.store.records import PENDING, RODS_AT_START
+from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 
 AnyRecorder = Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder

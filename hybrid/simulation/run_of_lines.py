@@ -27,8 +27,8 @@ from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.store.array_recorder import ArrayRecorder
-from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.array_contents import ArrayRecorder
+from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
 
 

@@ -21,8 +21,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched, pack
 from hybrid.store.records import Zone as ZoneRow
-from hybrid.store.stored_array import StoredArray
-from hybrid.store.stored_rows import StoredRows, rows_from, rows_path
+from hybrid.store.stored_rows import StoredArray, StoredRows, rows_from, rows_path
 
 # Outputs by which runs are compared; those that a run does not have are skipped.
 RIGHT = {f"right/{name}": f"right_{name}" for name in SIDED_ERRORS}  # and under which names their errors are reported

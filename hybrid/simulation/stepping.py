@@ -35,9 +35,8 @@ from hybrid.simulation.stepped import SLIVER, end_of_step, in_space, iterations_
 from hybrid.simulation.stepped_points import SteppedPoints
 from hybrid.solve.joined import LineFailed
 from hybrid.solve.network_steps import ROWS_OUTSIDE
-from hybrid.store.array_recorder import MemoryTarget
-from hybrid.store.hdf5_file import check_target
-from hybrid.store.lock import locked
+from hybrid.store.array_contents import MemoryTarget
+from hybrid.store.hdf5_file import check_target, locked
 from hybrid.store.reader import Result, open_result, written_result
 
 # s of the wall, after which the time of the processor is read again: to read it may take as long as ten steps.

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid.errors import ResultError, optional_package
-from hybrid.statistics.spectrum import Spectrum
+from hybrid.statistics.moments import Spectrum
 
 Floats = NDArray[np.float64]
 

@@ -19,9 +19,9 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.store.copying import GROUP, of_all
 from hybrid.store.format import Field, check_column, plain_text
 from hybrid.store.integrity import stored
-from hybrid.store.lines import GROUP, of_all
 from hybrid.store.named_arrays import DIGEST, Tree, matched, pack, unpack
 
 # What was found before the run (the error controller's runs), beside the two slots.

@@ -10,10 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 from h5py import h5a, h5ds, h5g, h5o, h5s
 
+from hybrid.store.copying import GROUP
 from hybrid.store.format import plain_text
 from hybrid.store.hdf5_file import check_format, open_file
 from hybrid.store.integrity import readable
-from hybrid.store.lines import GROUP
 from hybrid.store.records import OLD_NAMES
 
 TEXTS = ("scene", "changes")

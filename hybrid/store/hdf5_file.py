@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+from filelock import FileLock, Timeout
 from h5py import h5f, h5p
 
-from hybrid.errors import ResultError
+from hybrid.errors import ResultError, ResultHeld
 from hybrid.store.format import CACHE, FORMAT, FORMAT_VERSION, plain_text
 from hybrid.store.integrity import being_written, is_signed, unmarked
-from hybrid.store.lock import is_held
 
 LIBVER = ("v110", "v110")
 # Places for chunks in the cache of a dataset, which is written at its end: HDF5 2.0 takes 8191, 64 kB a dataset.
@@ -244,7 +244,7 @@ def give_up(file: h5py.File) -> None:
 
 
 def beside(path: Path) -> Path:
-    """Where a file is made before it takes its place; what a killed process has left there, store.lock removes."""
+    """Where a file is made before it takes its place; what a killed process has left there, `locked` removes."""
     return path.with_name(f".{path.name}.{os.getpid()}.new")
 
 
@@ -252,3 +252,74 @@ def unwritable(path: Path | None, error: Exception, advice: str = "") -> ResultE
     """What to say when a file cannot be written."""
     advice = advice or "a folder you may write to, with free space; close programs that hold the file"
     return ResultError(f"{path or 'the result'} cannot be written\n    detail:   {error}\n    try:      {advice}")
+
+
+# The lock on a result file: one process at a time writes it.
+
+# s: whoever asks `is_held` holds a lock for some microseconds.
+_PATIENCE = 0.2
+_OURS: set[Path] = set()  # results that this process holds
+
+
+def is_held(path: Path) -> bool:
+    """Whether another process holds a result for writing; a lock that a killed one has left is removed."""
+    if path in _OURS or not _beside(path).exists():
+        return False
+    try:
+        with FileLock(_beside(path), timeout=0):
+            with suppress(OSError):  # Windows keeps what is open
+                _beside(path).unlink(missing_ok=True)  # it is made anew where the other process has just ended
+            return False
+    except (Timeout, OSError):
+        return True
+
+
+@contextmanager
+def locked(path: Path | None) -> Iterator[None]:
+    """Hold a result for writing, against other processes, until the end; ResultError if one holds it."""
+    if path is None:
+        yield
+        return
+    beside = _beside(path)
+    lock = FileLock(beside, timeout=_PATIENCE)
+    try:
+        lock.acquire()
+    except Timeout:
+        if not beside.exists():  # nobody holds it: it cannot be made there
+            raise ResultError(f"{path} cannot be written\n    try:      a folder you may write to") from None
+        advice = "another name with -o, or wait until it has ended"
+        raise ResultHeld(f"{path} is being written by another process\n    try:      {advice}") from None
+    except OSError as error:
+        advice = "a folder you may write to, with free space"
+        raise ResultError(f"{path} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
+    try:
+        _remove_left(path)
+        _OURS.add(path)
+        yield
+    finally:
+        _OURS.discard(path)
+        beside.unlink(missing_ok=True)
+        lock.release()
+
+
+def _remove_left(path: Path) -> None:
+    """Remove what killed processes have left: beside a result (hdf5_file.beside), and locks of others in its folder."""
+    begin, names = f".{path.name}.", set(os.listdir(path.parent))
+    for name in names:
+        if name.startswith(begin) and name.endswith(".new") and name[len(begin) : -4].isdigit():
+            path.with_name(name).unlink(missing_ok=True)
+        of = name[1:-5]
+        ours = name.startswith(".") and name.endswith(".lock") and of != path.name
+        if ours and (of in names or of.endswith(".h5")) and _is_empty(path.with_name(name)):
+            is_held(path.with_name(of))  # which removes it, unless it is held
+
+
+def _is_empty(path: Path) -> bool:
+    try:
+        return path.stat().st_size == 0
+    except OSError:
+        return False
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.name}.lock")

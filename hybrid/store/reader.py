@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.statistics import extremes, fatigue, moments, spectrum
-from hybrid.store.array_recorder import MemoryTarget
+from hybrid.statistics import extremes, fatigue, moments
+from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.capacity import mooring_use
 from hybrid.store.envelope import Judged
+from hybrid.store.hdf5_file import is_held
 from hybrid.store.histories import (
     FIBRES,
     Section,
@@ -31,7 +32,6 @@ from hybrid.store.histories import (
     summary_of,
     usual_names,
 )
-from hybrid.store.lock import is_held
 from hybrid.store.partners import Pressed, contacts_of
 from hybrid.store.stored_result import StoredResult
 from hybrid.store.verdicts import Verdicts, section_limits, verdicts_of
@@ -141,10 +141,10 @@ class Result(StoredResult):
 
     def spectrum(
         self, name: str, *, at: Any = None, times: Window | None = None, segment: float | None = None
-    ) -> spectrum.Spectrum:
+    ) -> moments.Spectrum:
         """The spectrum of a history by Welch's method; segment: s, None: an eighth of the record."""
         history = history_of(self, name, times, at)
-        return spectrum.welch(history.t, history.values, segment)
+        return moments.welch(history.t, history.values, segment)
 
     def damage(
         self, curve: str | Mapping[str, Any] | fatigue.Curve, *, strength: float | None = None,
@@ -199,7 +199,7 @@ class Result(StoredResult):
     def _repr_html_(self) -> str:
         """What a notebook shows; of a result that cannot be drawn, what a terminal shows."""
         try:
-            return str(import_module("hybrid.view.notebook_card").card(self))  # by name: the store imports no view
+            return str(import_module("hybrid.view.notebook").card(self))  # by name: the store imports no view
         except Exception:  # a cell must never fail because its result is closed, empty or odd
             try:
                 return f"<pre>{html.escape(repr(self))}</pre>"

@@ -38,10 +38,10 @@ from typing import Any, Self
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.array_recorder import MemoryTarget
+from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.contents import Contents, FileContents
+from hybrid.store.copying import Lines
 from hybrid.store.integrity import readable
-from hybrid.store.lines import Lines
 from hybrid.store.records import (
     ALIASES,
     FINER_RESULT,

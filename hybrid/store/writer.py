@@ -30,12 +30,14 @@ from h5py import h5d
 from hybrid.store.amend import AFTERWARDS, AMENDED
 from hybrid.store.array_contents import HeldValues
 from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, check_tables, create_slots, write_before, write_slot
-from hybrid.store.copying import copied, names_in
+from hybrid.store.copying import GROUP, add_parts, copied, in_turn, names_in, of_all, of_part
 from hybrid.store.format import (
     BLOCK,
     Field,
+    Header,
     add_fixed,
     check_names,
+    made,
     plain_text,
     set_status,
     tables_of,
@@ -54,15 +56,12 @@ from hybrid.store.hdf5_file import (
     in_memory,
     unwritable,
 )
-from hybrid.store.header import Header, made
 from hybrid.store.integrity import sign
-from hybrid.store.lines import GROUP, add_parts, in_turn, of_all, of_part
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.recorder import STATUS, BaseRecorder, pause
 from hybrid.store.records import PENDING
 from hybrid.store.table import Table
-from hybrid.store.template import template
-from hybrid.store.whole_file import LateFile
+from hybrid.store.whole_file import LateFile, template
 
 # Outputs are held back at most so many times as long as writing takes: a reader hardly notices, a kill loses no more,
 # and a run that saves a thousand times a second spends 2 % of its time here instead of half.

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 import math
 import re
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from itertools import pairwise, product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import Complaint, SceneError
+from hybrid.errors import Complaint, SceneError, optional_package
 from hybrid.scene.base import places_of_files
 from hybrid.scene.read import as_scene, read_text, text_of
 from hybrid.scene.root import Scene
 from hybrid.scene.study import MOST_CASES, TAKEN, Study
-from hybrid.studies.csv_table import read_table
-from hybrid.studies.expressions import evaluated
 from hybrid.studies.sensitivity import DESIGNS, design
 
 Row = dict[str, Any]
@@ -232,3 +232,60 @@ def _set(data: Any, path: str, value: Any) -> None:
             data[part] = {} if isinstance(after, str) else []
         data = data[part]
     data[parts[-1]] = value
+
+
+# Tables in CSV files: a header and rows, with their lines in the file.
+
+
+class Table(NamedTuple):
+    """Names of columns; rows as numbers of lines, counted from 1, and texts of cells."""
+
+    header: list[str]
+    rows: list[tuple[int, list[str]]]
+
+
+def read_table(file: str, where: str) -> Table:
+    """The table of a file, without lines that are empty or begin with #; where: the key that names it.
+
+    SceneError: no header or no row, columns without names, rows of another length.
+    """
+    lines = text_of(file).splitlines()
+    numbered = [(i + 1, line) for i, line in enumerate(lines) if line.strip() and not line.startswith("#")]
+    if len(numbered) < 2:
+        raise SceneError([Complaint(where, file, "a header and one row or more")], file)
+    header = [x.strip() for x in next(csv.reader([numbered[0][1]]))]
+    if len(set(header)) < len(header) or not all(header):
+        expected = "a name for each column"
+        raise SceneError([Complaint(where, ",".join(header), expected, line=numbered[0][0])], file)
+    rows = []
+    for line, text in numbered[1:]:
+        cells = [x.strip() for x in next(csv.reader([text]))]
+        if len(cells) != len(header):
+            expected = f"{len(header)}, one for each column"
+            raise SceneError([Complaint(where, f"{len(cells)} values", expected, line=line)], file)
+        rows.append((line, cells))
+    return Table(header, rows)
+
+
+# Arithmetic that users write: conditions of a study, columns derived from others, what a design minimises.
+
+
+def evaluated(where: str, text: str, rows: Sequence[Mapping[str, Any]]) -> list[Any]:
+    """The value of an expression for each row; SceneError for what is none, or a name that is not known."""
+    package = optional_package("simpleeval", "an expression", "studies")
+    functions = {name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "radians", "pi")}
+    pi = functions.pop("pi")
+    functions |= {"abs": abs, "min": min, "max": max, "round": round}
+    evaluator = package.SimpleEval(functions=functions)
+    try:
+        found = []
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # an assignment, m = 5 for m == 5, is only warned of
+            tree = evaluator.parse(text)
+            for row in rows:
+                evaluator.names = {"pi": pi, **row}
+                found.append(evaluator.eval(text, tree))
+        return found
+    except Exception as error:
+        expected = f"arithmetic and comparisons of {', '.join(rows[0])}; {error}"
+        raise SceneError([Complaint(where, text, expected)]) from None

@@ -12,10 +12,10 @@ from hybrid.errors import HybridError, ResultError
 from hybrid.scene.study import LIMIT_OF, Kept
 from hybrid.statistics import moments
 from hybrid.store.envelope import farthest
-from hybrid.store.fatigue_errors import too_far_apart
 from hybrid.store.histories import History, extreme_of, history_of, lies_along
 from hybrid.store.limits import at_every_step
 from hybrid.store.reader import Result
+from hybrid.store.statistics_table import too_far_apart
 from hybrid.store.verdicts import section_limits
 
 Floats = np.ndarray

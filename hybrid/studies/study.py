@@ -28,7 +28,7 @@ from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.plan import plan
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.study import LIMIT_OF, Kept, Study, read_study, study_from
-from hybrid.store.lock import locked
+from hybrid.store.hdf5_file import locked
 from hybrid.store.records import ALIASES
 from hybrid.store.study_file import OPEN, OWN, Column, StudyFile, open_study
 from hybrid.studies.cases import Cases, cases_of, digest_of, scene_of

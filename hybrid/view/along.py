@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.store.envelope import GROUP, SCALE, has_envelope
+from hybrid.store.envelope import GROUP, SCALE, extreme, farthest, has_envelope
+from hybrid.store.hockling import pop_out
 from hybrid.store.reader import Result
+from hybrid.store.verdicts import quantity_limits, section_limits
 
 AXES = ("x", "y", "z")
 
@@ -95,3 +97,109 @@ def along(result: Result, name: str) -> Along:
         s, values = result.both_sides(name)
         values = np.linalg.norm(values, axis=-1) if result.dims(name)[-1] == "xyz" else values
     return Along(s, values, np.searchsorted(result.s, s))
+
+
+# The loop that the torque of a result would trap.
+
+# Of the largest torque: places with so much of it are judged, for a torque is nearly the same along a cable.
+NEARLY = 0.99
+
+
+def trapped_loop(result: Result, found: Along, torque: np.ndarray) -> dict[str, float] | None:
+    """The loop that the largest torque (nt, n) N m would trap, as it pops out: tension (N), bend radius (m), and that
+
+    over the one allowed, where it is smallest.  None: no diameter is known, or no loop is trapped.
+    """
+    diameter, stiffness = found.of(result, "diameter"), found.of(result, "bending_stiffness")
+    if diameter is None or stiffness is None:
+        return None
+    limit = found.of(result, "min_bend_radius")
+    allowed = np.full(diameter.shape, np.nan) if limit is None else limit
+    most = np.abs(torque).max(axis=0)
+    best: dict[str, float] | None = None
+    for k in np.flatnonzero((most >= NEARLY * most.max()) & (diameter > 0.0)):
+        loop = pop_out(float(most[k]), float(stiffness[k]), float(diameter[k]))
+        if loop is None:
+            continue
+        margin = loop.radius / float(allowed[k])
+        if best is None or margin < best.get("kink_margin", np.inf):
+            best = {"pop_out_tension": loop.tension, "pop_out_radius": loop.radius}
+            if np.isfinite(margin):
+                best["kink_margin"] = margin
+    return best
+
+
+def held_loop(result: Result, found: Along, torque: np.ndarray, tension: np.ndarray) -> dict[str, float] | None:
+    """Of the outputs (nt,) at which the line touches itself, that at which a loop is nearest to being pulled open.
+
+    torque, tension: (nt, n) N m, N.  Returns its time (s), and over the largest tension there, the tension at which a
+    loop of the torque of that output pops out; None: no contact is computed or found, or no loop is trapped.
+    """
+    diameter, stiffness = found.of(result, "diameter"), found.of(result, "bending_stiffness")
+    if diameter is None or stiffness is None or "energy/self_contact" not in result:
+        return None
+    best: dict[str, float] | None = None
+    for k in np.flatnonzero(np.asarray(result["energy/self_contact"]) > 0.0):
+        i = int(np.abs(torque[k]).argmax())
+        loop = pop_out(float(torque[k, i]), float(stiffness[i]), float(diameter[i])) if diameter[i] > 0.0 else None
+        most = float(tension[k].max())
+        if loop is None or not most > 0.0:
+            continue
+        margin = loop.tension / most
+        if best is None or margin < best["pop_out_margin"]:
+            best = {"pop_out_margin": margin, "pop_out_time": float(result.times[k])}
+    return best
+
+
+# Where a result is at its worst: lowest and highest values, and how near it came to the limits of its sections.
+#
+# Of the envelope, which knows every accepted step and every node, and of the outputs, which know what is between nodes;
+# of the outputs alone where a file has no envelope, as of 0.6.
+
+
+class Worst(NamedTuple):
+    """A value at s (m) and t (s), and the output and place of `along` nearest to it.
+
+    side: -1 or 1, on the left or on the right of a place with two values, else 0; over: as of `Extreme`.
+    """
+
+    value: float
+    s: float
+    t: float
+    output: int
+    place: int
+    side: int
+    over: tuple[float, float] | None = None
+
+
+def worst(result: Result, name: str, lowest: bool = False) -> Worst:
+    """The highest value of a quantity over time and the line, or the lowest one."""
+    best = farthest(result, name, "min" if lowest else "max")
+    assert best is not None, f"the result has no {name}"
+    output = int(np.abs(result.times - best.t).argmin())
+    s = along(result, name).s
+    near = np.flatnonzero(np.abs(s - best.s) == np.abs(s - best.s).min())
+    return Worst(best.value, best.s, best.t, output, int(near[-1 if best.side > 0 else 0]), best.side, best.over)
+
+
+def is_without_moment(result: Result) -> bool:
+    """Whether no output has a rod and no step a bending moment: catenaries have none, and 0 is not that of the line."""
+    found = extreme(result, "bending_moment", "max")
+    rods = any(zone.kind != "catenary" for zones in result.zones for zone in zones)
+    return found is not None and found.value == 0.0 and not rods
+
+
+def worst_first(result: Result) -> list[str]:
+    """Names of lines: broken limits first, then by the part of a limit that is used, then by the largest tension."""
+
+    def rank(name: str) -> tuple[bool, float, float]:
+        line = result.lines[name]
+        sections, held = section_limits(line), quantity_limits(line)
+        parts = [x.used or 0.0 for x in sections]
+        parts += [x.value / x.allowed for x in held if x.limit != "smallest" and x.allowed > 0.0]
+        broken = any(x.broken for x in sections) or any(x.broken for x in held)
+        most = extreme(line, "tension", "max")
+        largest = most.value if most is not None else float(np.max(line.tension, initial=0.0))
+        return broken, float(np.nanmax([0.0, *parts])), largest
+
+    return sorted(result.lines, key=rank, reverse=True)

@@ -17,13 +17,11 @@ from hybrid.errors import ResultError, command_for
 from hybrid.store.reader import Result
 from hybrid.view.along import along
 from hybrid.view.decimate import even
-from hybrid.view.figure import Band, Item, Line, Panel
-from hybrid.view.headed_page import page_of
-from hybrid.view.panels import cable, framed, profiles, sea
+from hybrid.view.figure import Band, Item, Line, Panel, colour_of, prefix, short
+from hybrid.view.panels import cable, framed, page_of, profiles, sea
 from hybrid.view.projections import View, aspect_of, pieces_of, views_of
 from hybrid.view.save import COMMENT, check_target, write_file
 from hybrid.view.scenery import speed_of
-from hybrid.view.style import colour_of, prefix, short
 
 FORMATS = (".mp4", ".gif")
 # A film of 12 to 30 s shows a motion without tiring; at most so many frames are drawn for it, and a gif, which stores

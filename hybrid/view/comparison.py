@@ -15,17 +15,14 @@ from hybrid.store.envelope import BROKEN, NOT_VERIFIED
 from hybrid.store.reader import Result
 from hybrid.store.verdicts import section_limits
 from hybrid.view import report_parts as parts
-from hybrid.view.along import along
+from hybrid.view.along import along, worst
 from hybrid.view.decimate import Store, script_json
-from hybrid.view.figure import Axis, Item, Line, Panel
-from hybrid.view.headed_page import refuse_several
-from hybrid.view.panels import RANGES
+from hybrid.view.figure import ZERO, Axis, Item, Line, Panel, prefix, short, title_of
+from hybrid.view.panels import RANGES, refuse_several
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.projections import views_of
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
-from hybrid.view.style import ZERO, prefix, short, title_of
 from hybrid.view.summary import amount, length_of
-from hybrid.view.worst import worst
 from hybrid.view.zones import warnings_of
 
 Curve = tuple[np.ndarray, np.ndarray]

@@ -9,10 +9,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.view.figure import Axis, Item, Line, Marks, Page, Panel, Rule
-from hybrid.view.mode_shapes import oblique_view
+from hybrid.view.figure import BED, GREY, Axis, Item, Line, Marks, Page, Panel, Rule, colour_of, short
+from hybrid.view.modes_page import oblique_view
 from hybrid.view.save import save_figure
-from hybrid.view.style import BED, GREY, colour_of, short
 
 COLUMNS, WIDE, HIGH = 2, 4.0, 2.9  # panels beside each other, and the size of one in inches
 # Of its widest extent in plan: lines that are no wider across are drawn in one upright plane.

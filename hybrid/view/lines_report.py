@@ -11,8 +11,9 @@ from hybrid.store.envelope import extreme
 from hybrid.store.partners import partner_of
 from hybrid.store.reader import Result
 from hybrid.view import report_parts as parts
+from hybrid.view.along import is_without_moment
 from hybrid.view.decimate import Kept, Store, even, kept
-from hybrid.view.figure import Panel
+from hybrid.view.figure import BODY, INK, Panel, prefix, short
 from hybrid.view.lines import (
     AllLines,
     arms_of,
@@ -29,12 +30,9 @@ from hybrid.view.lines import (
     views_of_lines,
 )
 from hybrid.view.panels import ranges
-from hybrid.view.plotly_backend import colour_scale
+from hybrid.view.plotly_backend import colour_scale, draw
 from hybrid.view.scenery import box_and_planes, speed_of
-from hybrid.view.style import BODY, INK, prefix, short
 from hybrid.view.summary import Fact, amount, facts_of, limits_of_lines
-from hybrid.view.svg_backend import draw
-from hybrid.view.worst import is_without_moment
 from hybrid.view.zones import COLOURS
 
 # Numbers of the moving picture, all lines together: frames times points, as of one cable.

@@ -21,9 +21,27 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from hybrid.view.decimate import Stretches, stretches_of
-from hybrid.view.figure import Area, Band, Box, Item, Line, Map, Marks, Page, Panel, Rule, Text, changes_sign
+from hybrid.view.figure import (
+    ALARM,
+    GREY,
+    INK,
+    NORMAL,
+    SMALL,
+    Area,
+    Band,
+    Box,
+    Item,
+    Line,
+    Map,
+    Marks,
+    Page,
+    Panel,
+    Rule,
+    Text,
+    changes_sign,
+    short,
+)
 from hybrid.view.save import DPI
-from hybrid.view.style import ALARM, GREY, INK, NORMAL, SMALL, short
 
 _DASHES: dict[str, Any] = {"": "-", "dash": (0, (4, 1.5)), "dot": ":"}
 _ENTRIES = 8  # of a legend, in a row

@@ -13,10 +13,9 @@ import numpy as np
 
 from hybrid.store.reader import Result
 from hybrid.store.records import error_words
-from hybrid.view.figure import Map, Page, Panel
-from hybrid.view.headed_page import page_of, refuse_several
+from hybrid.view.figure import Map, Page, Panel, distinct_texts, short
 from hybrid.view.panels import history as over_time
-from hybrid.view.panels import profiles, shape, touchdown
+from hybrid.view.panels import page_of, profiles, refuse_several, shape, touchdown
 from hybrid.view.projections import (
     Numbers,
     aspect_of,
@@ -28,7 +27,6 @@ from hybrid.view.projections import (
     whole_zones,
 )
 from hybrid.view.save import save_figure
-from hybrid.view.style import distinct_texts, short
 from hybrid.view.zones import counted, share_of_rod, why_rods, zone_map
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from hybrid.errors import ResultError
 from hybrid.store.obstacle_surfaces import MESH, PLANE, obstacles_at, surface_rings
 from hybrid.store.reader import Result
 from hybrid.store.records import Zone
-from hybrid.view.style import short
+from hybrid.view.figure import short
 
 Numbers = Sequence[float] | np.ndarray
 STILL = 1e-6  # of the cable's extent: motion and deflection below this are round-off

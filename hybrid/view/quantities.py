@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.statistics.spectrum import welch
+from hybrid.statistics.moments import welch
 from hybrid.store.histories import History, history_of, lies_along
 from hybrid.store.reader import Result
 from hybrid.view.along import AXES, along, extent
-from hybrid.view.figure import Axis, Band, Item, Line, Panel
-from hybrid.view.headed_page import refuse_several
-from hybrid.view.panels import energy, profiles, shape
-from hybrid.view.style import ALARM, GREY, POINT_COLOURS, prefix, short, title_of
+from hybrid.view.figure import ALARM, GREY, POINT_COLOURS, Axis, Band, Item, Line, Panel, prefix, short, title_of
+from hybrid.view.panels import energy, profiles, refuse_several, shape
 from hybrid.view.zones import zone_map
 
 if TYPE_CHECKING:

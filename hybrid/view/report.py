@@ -16,10 +16,10 @@ import numpy as np
 from hybrid.store.limits import capacity_of, code_of
 from hybrid.store.reader import Result
 from hybrid.view.decimate import MOST_ON_CURVE, Kept, Store, kept, script_json
-from hybrid.view.figure import Panel
+from hybrid.view.figure import Panel, short
 from hybrid.view.lines_report import ReportOfLines
 from hybrid.view.modes_page import PagedModes, section
-from hybrid.view.notebook_card import picture
+from hybrid.view.notebook import picture
 from hybrid.view.panels import end_forces, energy, energy_parts, history, ranges, touchdown
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.projections import free_edges, history_points
@@ -39,7 +39,6 @@ from hybrid.view.report_parts import (
 )
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 from hybrid.view.scenery import scenery
-from hybrid.view.style import short
 from hybrid.view.summary import amount, facts_of, length_of
 from hybrid.view.zones import shares, zone_map
 

@@ -15,8 +15,7 @@ from hybrid.store.reader import Result
 from hybrid.store.records import RODS_AT_START
 from hybrid.store.statistics_table import rows_of
 from hybrid.view.decimate import Store
-from hybrid.view.figure import Map, Panel
-from hybrid.view.style import prefix, short
+from hybrid.view.figure import Map, Panel, prefix, short
 from hybrid.view.summary import CAUSES, Fact, amount, attention
 from hybrid.view.svg_graph import draw_graph
 from hybrid.view.zones import event_rows

@@ -13,10 +13,10 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
 from hybrid.view.decimate import Kept, Store, even
+from hybrid.view.figure import short
 from hybrid.view.lines import AllLines
 from hybrid.view.lines_report import scenery as lines_scenery
 from hybrid.view.scenery import scenery
-from hybrid.view.style import short
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.store.study_accuracy import unmet_accuracy
-from hybrid.store.study_file import DONE, FAILED, OPEN, counts_of, open_study
+from hybrid.store.study_file import DONE, FAILED, OPEN, counts_of, open_study, unmet_accuracy
 from hybrid.view.report_parts import footer, packed, page_file, page_of, plotly_script
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 

@@ -20,11 +20,9 @@ from hybrid.store.partners import ITSELF, partner_of
 from hybrid.store.reader import Result
 from hybrid.store.records import UNKNOWN, not_converged_in
 from hybrid.store.verdicts import accuracy_text, asked_accuracy, doubt_of, quantity_limits, section_limits
-from hybrid.view.along import Along, along
-from hybrid.view.loops import held_loop, trapped_loop
+from hybrid.view.along import Along, Worst, along, held_loop, trapped_loop, worst
+from hybrid.view.figure import NEWS, ZERO, prefix, short
 from hybrid.view.projections import STILL, free_edges
-from hybrid.view.style import NEWS, ZERO, prefix, short
-from hybrid.view.worst import Worst, worst
 from hybrid.view.zones import warnings_of
 
 HOCKLING = (

@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.view.decimate import outline
-from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule, Text
-from hybrid.view.style import GREY, INK, SMALL
+from hybrid.view.figure import GREY, INK, SMALL, Area, Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule, Text
 
 # px; type is readable where a page shows it half as wide as a screen, on a phone and in a column of A4.
 WIDTH, HEIGHT = 440.0, 264.0

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.store.tradeoff_table import OURS, Row, TradeTable
-from hybrid.view.figure import Axis, Box, Item, Line, Marks, Page, Panel, Rule, Text
+from hybrid.view.figure import GREY, INK, KIND_COLOURS, SMALL, Axis, Box, Item, Line, Marks, Page, Panel, Rule, Text
 from hybrid.view.save import save_figure
-from hybrid.view.style import GREY, INK, KIND_COLOURS, SMALL
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

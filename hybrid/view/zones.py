@@ -20,9 +20,24 @@ from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, weight_of_event
 from hybrid.store.reader import Result
 from hybrid.store.records import RODS_AT_START, Event, Zone
 from hybrid.view.decimate import Kept, even
-from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Text
+from hybrid.view.figure import (
+    ALARM,
+    INK,
+    NEWS,
+    Axis,
+    Band,
+    Box,
+    Item,
+    Line,
+    Map,
+    Marks,
+    Panel,
+    Text,
+    colour_of,
+    prefix,
+    short,
+)
 from hybrid.view.projections import STILL, free_edges, whole_zones
-from hybrid.view.style import ALARM, INK, NEWS, colour_of, prefix, short
 
 # What is shown of each kind, and its colours: shades of the orange and the blue that the kinds have on other pages.
 # Lightness falls evenly (in OKLab, 0.93 to 0.32), and none of one kind is near any of the other to colour-blind eyes.

@@ -6,8 +6,7 @@ from rich.table import Table
 
 import hybrid
 from hybrid.cli import response_command
-from hybrid.cli.console import Console
-from hybrid.cli.grid import Grid
+from hybrid.cli.console import Console, Grid
 from hybrid.cli.tables import _largest_moment
 from hybrid.linear.response_results import ADDED, LineResponse, Response
 

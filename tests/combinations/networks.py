@@ -24,7 +24,7 @@ from hybrid.simulation.network_run import NetworkRun, Recording
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_file import Cable
-from hybrid.store.array_recorder import Target
+from hybrid.store.array_contents import Target
 from hybrid.store.reader import open_result
 from hybrid.store.writer import WriteMode
 

@@ -19,8 +19,7 @@ import hybrid
 from hybrid.cli.commands import main
 from hybrid.errors import ResultError
 from hybrid.exports.api import SUFFIXES, export
-from hybrid.store.format import Field
-from hybrid.store.header import Header
+from hybrid.store.format import Field, Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
 

@@ -17,7 +17,7 @@ from viewed import SCENE, Page, served
 import hybrid
 from hybrid.live import playback as playing
 from hybrid.live.playback import Playback
-from hybrid.live.runs import Run
+from hybrid.live.workers import Run
 
 
 @pytest.mark.long

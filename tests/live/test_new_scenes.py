@@ -9,8 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.live.document import Refused
-from hybrid.live.examples import example_text, examples
-from hybrid.live.new_scenes import KINDS, new_scene
+from hybrid.live.new_scenes import KINDS, example_text, examples, new_scene
 from hybrid.live.pictures import picture_of
 
 

@@ -21,8 +21,7 @@ from viewed import LINES, SCENE, Page, exchange, random_edit, served
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from hybrid.cli.commands import main
-from hybrid.live.document import Document
-from hybrid.live.named_files import MOST_FILES, named_files
+from hybrid.live.document import MOST_FILES, Document, named_files
 from hybrid.live.pictures import picture_of
 from hybrid.live.server import LARGEST_MESSAGE, Guard, listen, make_app
 from hybrid.live.session import Session

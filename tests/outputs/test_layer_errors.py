@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import solve_banded
 
 import hybrid
-from hybrid.outputs.layer_errors import layer_missed, shown_at_clamp
+from hybrid.outputs.edge_errors import layer_missed, shown_at_clamp
 
 
 @pytest.mark.parametrize("fade", [0.01, 0.3, 3.0, 100.0])

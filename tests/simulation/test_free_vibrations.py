@@ -9,7 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.accuracy import free_vibrations as f
-from hybrid.linear.rest import rest_of
+from hybrid.linear.touching import rest_of
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import as_scene

@@ -27,8 +27,8 @@ from hybrid.simulation.case_at_rest import CaseAtRest
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
 from hybrid.store import whole_file, writer
 from hybrid.store.whole_file import LateFile
-from hybrid.view.headed_page import page_of
-from hybrid.view.notebook_card import card
+from hybrid.view.notebook import card
+from hybrid.view.panels import page_of
 from hybrid.view.summary import facts_of
 
 ERRORS, FINER = "its errors are not estimated yet", "the finer result that its accuracy asks for is not computed yet"

@@ -18,7 +18,7 @@ from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.short_form import network_of
 from hybrid.simulation import case, initial_zones, restore, run_zones
 from hybrid.simulation.progress import ESTIMATION, RESULT
-from hybrid.store import checkpoint, lock
+from hybrid.store import checkpoint, hdf5_file
 from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import pack, unpack
@@ -233,7 +233,7 @@ def test_two_processes_on_one_file(tmp_path, monkeypatch):
     script = f"""
         import time
         from pathlib import Path
-        from hybrid.store.lock import locked
+        from hybrid.store.hdf5_file import locked
         with locked(Path({str(path)!r})):
             print("held", flush=True)
             time.sleep(60)
@@ -290,7 +290,7 @@ def test_a_folder_that_is_read_only(tmp_path, monkeypatch):
     def refused(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(lock.FileLock, "acquire", refused)
+    monkeypatch.setattr(hdf5_file.FileLock, "acquire", refused)
     with pytest.raises(
         hybrid.ResultError, match=r"(?s)cannot be written.*Permission denied.*a folder you may write to"
     ):

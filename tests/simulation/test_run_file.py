@@ -18,7 +18,7 @@ from hybrid.simulation.case_at_rest import CaseAtRest
 from hybrid.simulation.network_run import NetworkRun, Recording
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_file import Cable
-from hybrid.store.array_recorder import MemoryTarget
+from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.reader import open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE
 from hybrid.store.writer import WriteMode

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from hybrid.errors import ResultError
-from hybrid.statistics import extremes, fatigue, moments, spectrum
+from hybrid.statistics import extremes, fatigue, moments
 
 # A Gaussian process of many components with random phases: JONSWAP-like, significant value 4, peak period 10 s.
 DT, HOUR = 0.25, 3600.0
@@ -100,7 +100,7 @@ def test_significant_height_of_a_jonswap_record() -> None:
     """Within 2 %: an hour of one record, and four deviations; and Tz of its spectrum."""
     t, x = record(3.0 * HOUR, 3)
     assert 4.0 * moments.summary(t, x).standard_deviation == pytest.approx(4.0, rel=0.02)
-    found = spectrum.welch(t, x)
+    found = moments.welch(t, x)
     assert found.significant == pytest.approx(4.0, rel=0.02)
     assert found.peak_period == pytest.approx(10.0, rel=0.1)
     assert found.crossing_period == pytest.approx(math.sqrt(exact_moment(0) / exact_moment(2)), rel=0.02)
@@ -110,7 +110,7 @@ def test_significant_height_of_a_jonswap_record() -> None:
 
 def test_spectrum_is_that_of_the_process() -> None:
     """The mean of many records, against the density they were made of, where it is not small."""
-    found = [spectrum.welch(*record(HOUR, seed), segment=400.0) for seed in range(40)]
+    found = [moments.welch(*record(HOUR, seed), segment=400.0) for seed in range(40)]
     f, S = found[0].f, np.mean([x.S for x in found], axis=0)
     main = density(f) > 0.2 * density(f).max()
     assert S[main] == pytest.approx(density(f)[main], rel=0.15)
@@ -120,7 +120,7 @@ def test_spectrum_of_uneven_times_is_that_of_even_ones() -> None:
     t, x = record(1800.0, 4)
     keep = np.sort(np.random.default_rng(5).permutation(t.size)[: int(0.98 * t.size)])
     keep = np.unique(np.concatenate([[0, t.size - 1], keep]))
-    assert spectrum.welch(t[keep], x[keep]).significant == pytest.approx(spectrum.welch(t, x).significant, rel=0.02)
+    assert moments.welch(t[keep], x[keep]).significant == pytest.approx(moments.welch(t, x).significant, rel=0.02)
 
 
 def test_l_moments_are_those_of_the_laws() -> None:
@@ -267,7 +267,7 @@ def test_damage_of_a_gaussian_process() -> None:
     """Dirlik within 5 % where it holds (this broad record), narrow-band above it, both of the exact spectrum."""
     curve = fatigue.curve_of({"kind": "S-N", "log_a": 12.0, "m": 3.0})
     f = np.linspace(0.0, 0.6, 60001)
-    exact = spectrum.Spectrum(f, 30.0**2 * density(f), f[1])
+    exact = moments.Spectrum(f, 30.0**2 * density(f), f[1])
     counted = np.mean([fatigue.damage(30.0 * record(HOUR, 50 + k)[1], curve) for k in range(12)])
     assert fatigue.dirlik_damage(exact, curve, HOUR) == pytest.approx(counted, rel=0.05)
     assert counted < fatigue.narrow_band_damage(exact, curve, HOUR) < 1.4 * counted
@@ -282,7 +282,7 @@ def test_damage_of_a_gaussian_process_over_two_slopes(stress: float) -> None:
     """
     curve = fatigue.curves()["D air"]
     f = np.linspace(0.0, 0.6, 60001)
-    exact = spectrum.Spectrum(f, stress**2 * density(f), f[1])
+    exact = moments.Spectrum(f, stress**2 * density(f), f[1])
     counted = np.mean([fatigue.damage(stress * record(HOUR, 50 + k)[1], curve) for k in range(12)])
     assert fatigue.dirlik_damage(exact, curve, HOUR) == pytest.approx(counted, rel=0.07)
     z, dz = np.linspace(1e-4, 12.0, 400_001, retstep=True)
@@ -290,7 +290,7 @@ def test_damage_of_a_gaussian_process_over_two_slopes(stress: float) -> None:
     mean = float((z * np.exp(-0.5 * z**2) / curve.cycles(ranges)).sum() * dz)
     rate = HOUR * np.sqrt(exact.moment(2) / m0)
     assert fatigue.narrow_band_damage(exact, curve, HOUR) == pytest.approx(rate * mean, rel=1e-4)
-    one = spectrum.Spectrum(np.array([0.1, 0.2]), np.array([stress**2, 0.0]), 0.1)  # all power at one frequency
+    one = moments.Spectrum(np.array([0.1, 0.2]), np.array([stress**2, 0.0]), 0.1)  # all power at one frequency
     with np.errstate(divide="ignore", invalid="ignore"):
         assert fatigue.dirlik_damage(one, curve, HOUR) == fatigue.narrow_band_damage(one, curve, HOUR) > 0.0
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.store.array_recorder import ArrayContents, ArrayRecorder, MemoryTarget
-from hybrid.store.format import Field
-from hybrid.store.header import Header
+from hybrid.store.array_contents import ArrayContents, ArrayRecorder, MemoryTarget
+from hybrid.store.format import Field, Header
 from hybrid.store.reader import Result, written_result
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

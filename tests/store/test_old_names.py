@@ -8,8 +8,7 @@ import h5py
 import numpy as np
 
 import hybrid
-from hybrid.store.format import Field
-from hybrid.store.header import Header
+from hybrid.store.format import Field, Header
 from hybrid.store.records import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
 from hybrid.store.writer import Recorder
 

@@ -12,9 +12,9 @@ import pytest
 import hybrid
 from hybrid.simulation import network_run
 from hybrid.simulation.line_result import LineResult
-from hybrid.store import array_recorder, writer
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget
-from hybrid.store.header import Header
+from hybrid.store import array_contents, writer
+from hybrid.store.array_contents import ArrayRecorder, MemoryTarget
+from hybrid.store.format import Header
 
 GIVEN = Header(np.zeros(1), (), (), {})
 
@@ -32,7 +32,7 @@ def recorder(request: pytest.FixtureRequest, tmp_path: Path, now: list[float]) -
 def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """A clock that stands still, s."""
     time = [100.0]
-    for module in (array_recorder, writer):
+    for module in (array_contents, writer):
         monkeypatch.setattr(module, "monotonic", lambda: time[0])
     return time
 
@@ -69,7 +69,7 @@ def test_outputs_of_lines_are_made_together(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(LineResult, "write_down", counted)
     found = []
     for pause in (0.0, 100.0):
-        monkeypatch.setattr(array_recorder, "pause", lambda _, pause=pause: pause)
+        monkeypatch.setattr(array_contents, "pause", lambda _, pause=pause: pause)
         calls.clear()
         with hybrid.run(scene) as result:
             found.append(

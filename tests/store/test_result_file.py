@@ -19,9 +19,8 @@ import hybrid
 from hybrid.errors import ResultError
 from hybrid.exports.api import export
 from hybrid.store.envelope import stored_window
-from hybrid.store.format import Field
+from hybrid.store.format import Field, Header
 from hybrid.store.hdf5_file import SLOTS, created, hold_metadata, in_memory
-from hybrid.store.header import Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.records import Event, Zone
 from hybrid.store.selection import MARK
@@ -216,7 +215,7 @@ WRITER = """
 import os, sys
 from pathlib import Path
 sys.path[:0] = [{root!r}, {here!r}]
-from hybrid.store.lock import locked
+from hybrid.store.hdf5_file import locked
 from test_result_file import recorder, values, ONE, TWO
 with locked(Path({path!r})):
     r = recorder({path!r})

@@ -8,9 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
-from hybrid.store import template as store
-from hybrid.store.format import Field
-from hybrid.store.header import Header
+from hybrid.store import whole_file as store
+from hybrid.store.format import Field, Header
 from hybrid.store.reader import open_result
 from hybrid.store.writer import Recorder
 
@@ -60,7 +59,7 @@ def test_a_template_that_was_kept_is_used_and_gives_the_same_file(
     def refused(*_: object) -> bytes:
         raise AssertionError("made anew")
 
-    monkeypatch.setattr(store, "_made", refused)
+    monkeypatch.setattr(store, "_new_template", refused)
     write(kept.parent, tmp_path / "second.h5")
     assert content(tmp_path / "second.h5") == content(tmp_path / "first.h5")
     write(kept.parent, tmp_path / "longer.h5", length=3.0)  # values are no part of it

@@ -10,12 +10,10 @@ import pytest
 from hybrid.cli.console import Console
 from hybrid.cli.study_command import _show
 from hybrid.scene.study import study_from
-from hybrid.store.study_accuracy import unmet_accuracy
-from hybrid.store.study_file import open_study
+from hybrid.store.study_file import open_study, unmet_accuracy
 from hybrid.studies.cases import cases_of
-from hybrid.studies.outcomes import write_outcomes
 from hybrid.studies.study import _created
-from hybrid.studies.workers import Job, compute_batch
+from hybrid.studies.workers import Job, compute_batch, write_outcomes
 from hybrid.view.study_report import html
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")

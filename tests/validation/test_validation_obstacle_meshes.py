@@ -13,8 +13,7 @@ from hybrid.errors import ResultError
 from hybrid.kernels.laws.obstacles import distances
 from hybrid.model.build import build
 from hybrid.view.figure import Area
-from hybrid.view.mesh_edges import closed_way
-from hybrid.view.obstacles import obstacles_at, outlines, rings, surfaces
+from hybrid.view.obstacles import closed_way, obstacles_at, outlines, rings, surfaces
 from hybrid.view.projections import view_named
 from tests.meshes import box, prism, sphere, text_stl
 from tests.validation.obstacle_scenes import DRUM, Tables, capstan, half_turn, over_pipe

@@ -13,7 +13,7 @@ from reported import reported
 
 from hybrid.errors import ResultError
 from hybrid.view import animation as film
-from hybrid.view.style import KIND_COLOURS
+from hybrid.view.figure import KIND_COLOURS
 
 
 def test_a_gif_moves_at_the_pace_that_is_said(tmp_path: Path) -> None:

@@ -18,8 +18,7 @@ from hybrid.view import panels, zones
 from hybrid.view.decimate import Store, kept
 from hybrid.view.figure import Area, Axis, Band, Line, Panel, Text
 from hybrid.view.matplotlib_backend import draw_panel, new_axes
-from hybrid.view.plotly_backend import figure_of
-from hybrid.view.svg_backend import draw
+from hybrid.view.plotly_backend import draw, figure_of
 from hybrid.view.svg_graph import draw_graph
 
 EVENTS = [(5.5, 40.0, 60.0, "split", "bend <b>1.05</b> > 1"), (7.0, 0.0, 100.0, "snap", "a blow")]

@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 import pytest
 from reported import reported
 
-from hybrid.view.notebook_card import picture
-from hybrid.view.style import KIND_COLOURS
+from hybrid.view.figure import KIND_COLOURS
+from hybrid.view.notebook import picture
 
 
 def test_a_result_shows_itself_with_facts_and_a_picture() -> None:
@@ -45,7 +45,7 @@ def test_it_never_raises(asked: dict) -> None:
 def test_a_closed_result_shows_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
     result = reported(title="<b>odd</b>")
     result.close()
-    monkeypatch.setattr("hybrid.view.notebook_card.card", lambda result: 1 / 0)
+    monkeypatch.setattr("hybrid.view.notebook.card", lambda result: 1 / 0)
     assert result._repr_html_().startswith("<pre>") and "<b>" not in result._repr_html_()
     monkeypatch.setattr(type(result), "__repr__", lambda self: str(1 / 0))
     assert "can no longer be read" in result._repr_html_()

@@ -10,8 +10,8 @@ from reported import reported
 
 from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.store.reader import Result
+from hybrid.view.figure import NEWS
 from hybrid.view.panels import error_of
-from hybrid.view.style import NEWS
 from hybrid.view.summary import Fact, amount, attention, facts_of
 
 

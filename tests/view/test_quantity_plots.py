@@ -12,7 +12,7 @@ from reported import reported
 import hybrid
 from hybrid.cli.commands import main
 from hybrid.errors import ResultError
-from hybrid.view.style import short
+from hybrid.view.figure import short
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "01_hanging_chain.yaml"
 

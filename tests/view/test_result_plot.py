@@ -17,14 +17,13 @@ from matplotlib.figure import Figure
 
 import hybrid
 from hybrid.errors import ResultError
-from hybrid.store.format import Field
-from hybrid.store.header import Header
+from hybrid.store.format import Field, Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
+from hybrid.view import figure as look
 from hybrid.view import panels
 from hybrid.view import plots as plot
 from hybrid.view import projections as views
-from hybrid.view import style as look
 from hybrid.view.decimate import stretches_of
 from hybrid.view.figure import Axis, Line, Panel
 from hybrid.view.matplotlib_backend import draw_panel, new_axes

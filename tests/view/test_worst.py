@@ -10,9 +10,8 @@ import pytest
 import hybrid
 from hybrid.cli.tables import extremes_facts, extremes_rows
 from hybrid.store.reader import Result
-from hybrid.view.figure import Band
+from hybrid.view.figure import Band, prefix
 from hybrid.view.panels import profiles
-from hybrid.view.style import prefix
 from hybrid.view.summary import Fact, attention, facts_of
 
 TETHER = """

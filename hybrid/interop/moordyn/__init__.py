@@ -23,8 +23,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.all_lines import scene_of_lines
 from hybrid.interop.moordyn.cables import Cable, cables
 from hybrid.interop.moordyn.deck import Deck, read_deck
-from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, in_order, note
-from hybrid.interop.moordyn.rows import Source, read_source
+from hybrid.interop.moordyn.rows import LEFT_OUT, NOT_NEEDED, TAKEN, Note, Source, in_order, note, read_source
 from hybrid.interop.moordyn.scenes import ImportedScene, scene_of
 from hybrid.interop.moordyn.writer import WRITTEN, Computed, WrittenDeck, deck_of
 

@@ -24,8 +24,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.bodies import body_table
 from hybrid.interop.moordyn.cables import chain_of, end_of, held_loads, next_line
 from hybrid.interop.moordyn.deck import Body, Deck, Line, Point
-from hybrid.interop.moordyn.notes import TAKEN, Note, in_order, note
-from hybrid.interop.moordyn.rows import Row, number, show
+from hybrid.interop.moordyn.rows import TAKEN, Note, Row, in_order, note, number, show
 from hybrid.interop.moordyn.scenes import ImportedScene
 from hybrid.interop.moordyn.tables import NEAR, Tables, flow, lines_of
 from hybrid.interop.moordyn.types import LineType

@@ -17,8 +17,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hybrid.interop.moordyn.deck import Body, Point, Triple
-from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, note
-from hybrid.interop.moordyn.rows import number
+from hybrid.interop.moordyn.rows import LEFT_OUT, TAKEN, Note, note, number
 
 Matrix = tuple[Triple, Triple, Triple]
 DAMP = "give `damping`, about its mean motion"

@@ -11,7 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from hybrid.interop.moordyn.deck import Body, Deck, Line, Point, Rod, Triple
-from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, note
+from hybrid.interop.moordyn.rows import LEFT_OUT, TAKEN, Note, note
 
 _TURBINE = (
     "the place of the turbine stands in the file of FAST.Farm, not in the deck",

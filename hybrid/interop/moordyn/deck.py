@@ -11,10 +11,21 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from hybrid.interop.moordyn.notes import NOT_NEEDED, TAKEN, Note, note
 from hybrid.interop.moordyn.options import Options, read_options
-from hybrid.interop.moordyn.rows import TITLES, Row, Section, Source, check_names, number, simple
-from hybrid.interop.moordyn.syrope import OTHER, Past, pasts_of, tables_of
+from hybrid.interop.moordyn.rows import (
+    NOT_NEEDED,
+    TAKEN,
+    TITLES,
+    Note,
+    Row,
+    Section,
+    Source,
+    check_names,
+    note,
+    number,
+    simple,
+)
+from hybrid.interop.moordyn.stretch import OTHER, Past, pasts_of, tables_of
 from hybrid.interop.moordyn.types import LineType, line_type
 from hybrid.scene.suggestions import did_you_mean
 

@@ -13,8 +13,7 @@ from typing import Any
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.cables import Cable, End
 from hybrid.interop.moordyn.deck import Deck, Point
-from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, in_order, note
-from hybrid.interop.moordyn.rows import show
+from hybrid.interop.moordyn.rows import LEFT_OUT, TAKEN, Note, in_order, note, show
 from hybrid.interop.moordyn.tables import Tables, flow, lines_of
 from hybrid.scene.read import parse_scene
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, note
-from hybrid.interop.moordyn.rows import Row, Section, Source, check_names, simple
+from hybrid.interop.moordyn.rows import LEFT_OUT, TAKEN, Note, Row, Section, Source, check_names, note, simple
 from hybrid.interop.moordyn.stretch import Stretch, is_word, stretch_of
 from hybrid.scene.cable import DENSITIES, SECTION_DENSITIES
 
