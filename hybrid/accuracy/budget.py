@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hybrid.accuracy.refinement import times_the_cost
+from hybrid.model.model_costs import COST_STEP
 from hybrid.model.resolution import Resolution
-from hybrid.model.run_time import COST_STEP
 from hybrid.simulation.run_sample import RunSample
 
 # s of processor time of a cell in a step, and of an output and one of its points (bench/test_bench_plan.py).

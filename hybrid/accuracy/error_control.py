@@ -25,8 +25,8 @@ from hybrid.accuracy.model_errors import Comparable, model_errors_of, with_model
 from hybrid.accuracy.refinement import COSTLY_ACCURACY, costly
 from hybrid.errors import ComputationError
 from hybrid.model.network import NetworkResolution
-from hybrid.model.output_points import OutputPoints
 from hybrid.model.resolution import Resolution
+from hybrid.model.sections import OutputPoints
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import RunSample, Samples, restored_notes

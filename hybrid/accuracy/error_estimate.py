@@ -43,7 +43,7 @@ from hybrid.accuracy.error_order import (
 from hybrid.accuracy.errors_by_cause import Block, Errors
 from hybrid.accuracy.snap_scatter import Between
 from hybrid.accuracy.step_ratios import usual_ratio
-from hybrid.model.bending_reference import NO_DOUBT
+from hybrid.model.material import NO_DOUBT
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.run_sample import (

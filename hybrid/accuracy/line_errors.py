@@ -42,7 +42,6 @@ from hybrid.accuracy.refinement import (
 from hybrid.accuracy.snap_scatter import errors_between, finer_between, snap_excess
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.model_costs import NAMED, WORDS, ModelChoice
-from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
     IRREGULAR_REFINEMENTS,
@@ -51,6 +50,7 @@ from hybrid.model.resolution import (
     RequestedAccuracy,
     Resolution,
 )
+from hybrid.model.sections import OutputPoints
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.bounded_model_errors import doubtful
 from hybrid.simulation.run_sample import (

@@ -11,12 +11,13 @@ from dataclasses import replace
 from math import ceil, isinf
 
 from hybrid.model.build import Model
-from hybrid.model.mesh_grading import Grading
+from hybrid.model.mesh import Grading
 from hybrid.model.model_costs import (
     REST,
     ModelChoice,
     cheapest,
     costs,
+    foretold_steps,
     no_catenary,
     ratios,
     reasons,
@@ -25,7 +26,6 @@ from hybrid.model.model_costs import (
 )
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution, model_is_free, wants_survey
-from hybrid.model.run_time import foretold_steps
 from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.initial_zones import HOLD

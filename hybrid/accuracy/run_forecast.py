@@ -23,11 +23,10 @@ from hybrid.kernels.state.state import State
 from hybrid.model import plan as tables
 from hybrid.model.build import Model, build
 from hybrid.model.contents import with_accuracy
-from hybrid.model.model_costs import NAMED, ModelChoice, with_model
+from hybrid.model.model_costs import COST_STEP, NAMED, ModelChoice, with_model
 from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import NetworkPlan, Plan, count_steps
 from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
-from hybrid.model.run_time import COST_STEP
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import LINE

@@ -6,8 +6,7 @@ import numpy as np
 
 from hybrid.adapt.manager import OF_BASE, DomainManager
 from hybrid.kernels.mesh.zone_step import blank_zones
-from hybrid.model.layout import Layout, on_other_parts
-from hybrid.model.line_on_base import LineOnBase
+from hybrid.model.layout import Layout, LineOnBase, on_other_parts
 
 # Arrays of `Zones` that have no base cells; of base cells; of cells.
 OF_LINE = ("clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits")

@@ -26,8 +26,7 @@ from hybrid.kernels.mesh.criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.mesh.stiffness_ramp import shares
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
-from hybrid.model.layout import Layout, edges
-from hybrid.model.line_on_base import LineOnBase
+from hybrid.model.layout import Layout, LineOnBase, edges
 from hybrid.model.material import Material, tension_floor
 
 # Rod on either side of cells above a threshold, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension

@@ -31,7 +31,7 @@ from pythonfmu3 import (
 from hybrid.couple.fmu_export import INTERFACE, SCENE
 from hybrid.errors import ComputationError, HybridError
 from hybrid.kernels.state.state import Floats
-from hybrid.model.driven_end import rotation
+from hybrid.model.ends import rotation
 from hybrid.simulation.stepping import Simulation
 
 UNITS = (

@@ -16,8 +16,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.touching import stiffness_between
-from hybrid.model.scales import tension_scale
-from hybrid.model.sections import merged_sections
+from hybrid.model.sections import merged_sections, tension_scale
 from hybrid.simulation.lines_contact import strand_in
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver

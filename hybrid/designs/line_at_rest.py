@@ -23,7 +23,7 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, ba
 from hybrid.linear.matrices import ANCHOR, rotation
 from hybrid.linear.memory import settle_layers
 from hybrid.model.build import Model
-from hybrid.model.output_points import jump_points, output_points
+from hybrid.model.sections import jump_points, output_points
 from hybrid.outputs.probes import PROBES, Observer
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.line_result import WANTED, observer_of

@@ -32,8 +32,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.linear.matrices import linear_network
 from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model, places_of
-from hybrid.model.nearby import nearby, same_nodes
-from hybrid.model.nearby_clamped import nearby_clamped, seats_know_no_shape, shaped_anew
+from hybrid.model.nearby import nearby, nearby_clamped, same_nodes, seats_know_no_shape, shaped_anew
 from hybrid.model.network import NetworkModel, NetworkResolution, with_surfaces
 from hybrid.scene.analysis import Output
 from hybrid.scene.base import dotted

@@ -16,8 +16,8 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.build import places_of
 from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.network import NetworkResolution, build_system
-from hybrid.model.output_points import NEAR
 from hybrid.model.resolution import Resolution, accuracy_of, first_resolution
+from hybrid.model.sections import NEAR
 from hybrid.scene.network_scene import Network
 from hybrid.scene.read import read_text, scene_text
 from hybrid.scene.root import Scene

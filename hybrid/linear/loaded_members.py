@@ -22,7 +22,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.linear.drag import axes_across, of_cylinders, phases_of
 from hybrid.linear.excitation import SAME, water_of_wave
 from hybrid.linear.matrices import SHIFT, TURN, rotation
-from hybrid.model.members import Members
+from hybrid.model.bodies import Members
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
 

@@ -20,25 +20,24 @@ from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.model.catenary_guess import Hanging
 from hybrid.model.contents import Entry, contents_of, followed
 from hybrid.model.ends import EndConditions
-from hybrid.model.first_state import first_state, other_state
 from hybrid.model.initial_shape import (
     corners,
+    first_state,
     from_joint,
     hung,
+    other_state,
     spare_shapes,
 )
-from hybrid.model.layout import Layout, of_rods
+from hybrid.model.layout import Layout, LineOnBase, of_rods
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on
-from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import STIFFENER_CELLS, Material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, divided, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.obstacles import kind_of, least_cells, obstacle_bits
 from hybrid.model.payout import PayoutPlan, cable_of, payout_of, payout_plan, shorter_behind_clamp
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
-from hybrid.model.scales import tension_scale
 from hybrid.model.sea import Surroundings, bed_bits, surroundings
-from hybrid.model.sections import merged_sections, stiffeners_of
+from hybrid.model.sections import merged_sections, stiffeners_of, tension_scale
 from hybrid.model.self_reach import contact_bits
 from hybrid.scene.motion_checks import prescribed_twist
 from hybrid.scene.schema import (

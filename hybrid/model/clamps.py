@@ -11,7 +11,7 @@ from hybrid.kernels.junctions.carried_frames import SEAT, TURNS, WITH_BODY
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director, transported
-from hybrid.model.line_on_base import LineOnBase
+from hybrid.model.layout import LineOnBase
 from hybrid.scene.ends import Triple
 from hybrid.scene.network_scene import Network
 

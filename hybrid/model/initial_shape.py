@@ -8,19 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybrid.errors import SceneError
+from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.laws.drag_law import body, half_cell, split
 from hybrid.kernels.laws.obstacles import distances
 from hybrid.kernels.state.forces import BODIES, DRAG, FLOW, OBSTACLES, SURFACE
-from hybrid.kernels.state.state import Floats, Line, Sea, State
+from hybrid.kernels.state.state import Floats, Line, Sea, State, state_for
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_director, transported
 from hybrid.model.material import Material
-from hybrid.model.scales import net_weight
 from hybrid.model.sea import Surroundings
-from hybrid.model.sections import swivels
+from hybrid.model.sections import net_weight, swivels
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.schema import Body, Equilibrium, LineScene, Points, RodZone, Straight, ZonesModel
+from hybrid.scene.schema import Body, Equilibrium, Free, LineScene, Points, RodZone, Straight, ZonesModel
 from hybrid.scene.sea import Seabed
 
 # A line that is longer than taut by less than this part of its length is not called slack.
@@ -427,3 +426,163 @@ def end_conditions(
     times = [x.time if x is not None and x.time is not None else np.inf for x in when]
     forces = [x.tension if x is not None and x.tension is not None else np.inf for x in when]
     return EndConditions(held, position, frame, loads, motions, (times, forces))
+
+
+# Why a scene may have no equilibrium, or none that a flexible line can hold: for messages of a failed search.
+
+
+def end_laid_anywhere(scene: LineScene) -> str:
+    """The end that lies on a level bed in any direction as well, because nothing in the scene says which; "": none."""
+    bed, fluid, initial, ends = scene.environment.seabed, scene.environment.fluid, scene.initial, scene.ends
+    said = not isinstance(initial, Equilibrium) or initial.points is not None or initial.direction is not None
+    if bed is None or not bed.is_level or said or len(ends.held()) != 1 or (fluid is not None and fluid.flows()):
+        return ""
+    (held,) = ends.held()
+    other = "end" if held == "start" else "start"
+    tangent = ends.named()[held].held_tangent
+    pulled = any(any(x.value[:2]) for x in ends.named()[other].loads if x.what == "force")
+    return "" if pulled or (tangent is not None and any(tangent[:2])) else other
+
+
+def reasons_against(scene: LineScene, rod_ends: tuple[bool, bool], flexible: float = 0.0) -> list[str]:
+    """Reasons against an equilibrium of the scene, in sentences; empty when nothing is known.
+
+    rod_ends: whether the line begins and ends with a rod.  flexible: its longest cell of a catenary, m.
+    """
+    found = []
+    bed, held = scene.environment.seabed, scene.ends.held()
+    weight = net_weight(scene)
+    if bed is not None and weight > 0.0 and len(held) == 2:
+        (xa, ya, za), (xb, yb, zb) = held["start"], held["end"]
+        # the longest way that can be taut: straight up from the bed, and along it
+        heights = [z - bed.height(x, y) for x, y, z in (held["start"], held["end"])]
+        along = math.dist((xa, ya, za - heights[0]), (xb, yb, zb - heights[1]))
+        over = scene.length - along - sum(max(h, 0.0) for h in heights)
+        if over > HARDLY * scene.length:
+            found.append(
+                f"the cable is {over:.4g} m longer than from end to end along the seabed and straight up: "
+                f"that much lies slack on it, where only bending and friction give it a shape"
+            )
+    if bed is not None and weight > 0.0:
+        for name, end, rod in zip(("start", "end"), (scene.ends.start, scene.ends.end), rod_ends, strict=True):
+            x, y, z = next(iter(held.values()), (0.0, 0.0, 0.0))
+            reaches = z - bed.height(x, y) < scene.length
+            if reaches and not rod and isinstance(end, Free) and end.force is None and held and not bed.friction:
+                found.append(
+                    f"the {name} lies free on a seabed without friction: nothing keeps the cable there taut, "
+                    f"and a flexible line without tension has no shape: make it a rod there"
+                )
+    fluid = scene.environment.fluid
+    still = fluid is None or not fluid.flows()
+    if bed is not None and bed.is_level and len(held) == 1 and still and not all(rod_ends):
+        forces = [x for end in scene.ends.both for x in end.loads if x.what == "force"]
+        if not any(any(x.value[:2]) for x in forces):
+            found.append(
+                "nothing pulls the line along the seabed: what lies there has no tension, and a flexible line without "
+                "tension has no shape: make it a rod there, or give a current"
+            )
+    if bed is not None and not held and not all(rod_ends):
+        found.append("nothing holds the cable: on the bed it has no tension, and a flexible line then has no shape")
+    if bed is not None and not held and bed.slope is not None:
+        slope = math.hypot(*bed.slope)
+        least = min(bed.friction.axial, bed.friction.lateral) if bed.friction else 0.0
+        if slope > least:
+            found.append(
+                f"the seabed slopes by {math.degrees(math.atan(slope)):.3g} deg and friction holds up to "
+                f"{math.degrees(math.atan(least)):.3g} deg: nothing else keeps the cable from sliding"
+            )
+    if weight and bed is None and len(held) == 2:
+        across = math.dist(held["start"][:2], held["end"][:2])
+        if across < flexible:
+            found.append(
+                f"the ends are {across:.3g} m apart across gravity, and cells of the catenary {flexible:.3g} m long: "
+                f"it folds within a cell, where it has no tension; a rod (bending_stiffness) rounds the fold, and more "
+                f"cells or some axial_stiffness may help"
+            )
+    if not weight and not any(isinstance(x, Body) for x in (scene.ends.start, scene.ends.end)) and len(held) == 2:
+        apart = math.dist(held["start"], held["end"])
+        if scene.length > apart * (1.0 + HARDLY):
+            found.append(
+                f"the cable has no weight in its surroundings and is {scene.length - apart:.4g} m longer than its "
+                f"span: nothing tautens it"
+            )
+    return found
+
+
+# The state that a computation begins with: from the first shape of a scene, or one that was found otherwise.
+
+HUNG = "an elastic catenary under all loads"  # a first shape that has the tensions of an equilibrium, but for bending
+SHARPEST_START = np.radians(150.0)
+
+
+def first_state(
+    scene: LineScene, line: Line, cable: Material, sea: Surroundings, scale: float, shape: Hanging | None
+) -> tuple[State, str, EndConditions]:
+    """The state that a computation begins with, the name of its shape, and the ends; scale: N, its tensions where
+
+    nothing is known of them; shape: an elastic catenary, None: the first nodes of the scene.
+    """
+    start = state_for(line)
+    if shape is not None:
+        shape_name = HUNG
+        start.r[:], start.T[:] = shape
+    else:
+        start.r[:], shape_name = initial_nodes(scene, line.s)
+        start.T[:] = scale
+    start.e[:] = np.diff(start.r, axis=0)
+    if isinstance(scene.initial, Points):
+        _exact_lengths(start, line.h, line.ck == 0.0, scene)
+        _refuse_folds(start.e, line.s, line.spin == 1)
+    if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
+        start.e[:] = line.h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
+        start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
+    directors, chords = _put_frames(scene, start, line, cable), start.e[[0, -1]]
+    ends = end_conditions(scene, directors, chords / np.linalg.norm(chords, axis=1)[:, None], sea)
+    if isinstance(scene.initial, Equilibrium):  # what is not at rest begins without tension
+        twist_by_tension(line, cable, start)
+    return start, shape_name, ends
+
+
+def other_state(scene: LineScene, r: Floats, line: Line, cable: Material, scale: float) -> State:
+    """Another shape to find the equilibrium from: nodes r (N+1, 3) m, tensions of the scale (N)."""
+    spare = state_for(line)
+    spare.r[:], spare.T[:] = r, scale
+    spare.e[:] = np.diff(r, axis=0)
+    _put_frames(scene, spare, line, cable)
+    if isinstance(scene.initial, Equilibrium):
+        twist_by_tension(line, cable, spare)
+    return spare
+
+
+def _put_frames(scene: LineScene, state: State, line: Line, cable: Material) -> tuple[Floats, Floats]:
+    """Give a state the directors and turns that its chords make; the directors at both ends."""
+    directors, state.turn[:, 0] = frames(scene, state.e, line, cable)
+    state.a1[:] = directors[1:-1]
+    return directors[0], directors[-1]
+
+
+def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: LineScene) -> None:
+    """Give inextensible cells exactly their length: points carry round-off, which would be an impact at the first step.
+
+    The gap this leaves at a held end is closed by small shifts of all chords, until both are met.
+    """
+    to = scene.ends.end.held_position if scene.ends.start.held_position else None
+    for _ in range(50 if to else 1):
+        if to:
+            gap = np.array(to, float) - start.r[0] - start.e.sum(axis=0)
+            start.e[:] += gap * (h / h.sum())[:, None]
+        lengths = np.linalg.norm(start.e, axis=1)
+        start.e[stiff] *= (h / lengths)[stiff, None]
+    start.r[1:] = start.r[0] + np.cumsum(start.e, axis=0)
+
+
+def _refuse_folds(chords: Floats, s: Floats, rod: np.ndarray) -> None:
+    """A rod cannot start folded back onto itself: its bend has no direction there."""
+    d = chords / np.linalg.norm(chords, axis=1)[:, None]
+    cosine = np.einsum("ij,ij->i", d[:-1], d[1:])
+    folded = np.flatnonzero((cosine < np.cos(SHARPEST_START)) & rod[:-1] & rod[1:])
+    if folded.size:
+        angle = np.degrees(np.arccos(cosine[folded[0]]))
+        given = f"a corner of {angle:.0f} deg at s = {s[folded[0] + 1]:g} m in a rod zone"
+        fix = "round it with a few points, or make the zone a catenary if it stays taut"
+        raise SceneError([Complaint("initial.points", given, "corners below 150 deg, because a rod bends", fix)])

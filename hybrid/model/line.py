@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.axial_law import SHIFT, follow_law
 from hybrid.kernels.laws.axial_law_with_torque import follow_law_with_torque
+from hybrid.kernels.laws.bending_law import (
+    ENERGY,
+    FIRST_A,
+    FIRST_B,
+    GIVE,
+    HALF_A,
+    HALF_B,
+    LAST_A,
+    LAST_B,
+)
+from hybrid.kernels.laws.bending_slip import EACH, follow_slip
+from hybrid.kernels.laws.element import NO_SPRING
 from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
@@ -24,6 +38,7 @@ from hybrid.kernels.state.forces import (
 )
 from hybrid.kernels.state.state import (
     NO_ADDRESS,
+    NO_BEND_LAW,
     NO_LAW,
     NO_PLANE,
     NO_TABLE,
@@ -33,12 +48,12 @@ from hybrid.kernels.state.state import (
     Floats,
     Line,
     blank_line,
+    no_ends,
     no_work,
     state_for,
 )
-from hybrid.model.bending_slip import with_slip
-from hybrid.model.bending_tables import bend_law
-from hybrid.model.material import Material
+from hybrid.model.material import Material, elastic_layer
+from hybrid.scene.stretch import Curve, Layer, slopes
 
 # What inertia the sections of rods have.
 NO_INERTIA, ABOUT_CHORDS, WITH_SECTIONS = range(3)
@@ -227,3 +242,101 @@ def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Fl
     follow = follow_law_with_torque if material.tension_torque.size else follow_law
     address = follow.address(blank, state, state, no_work(), 0.0, 0.0)
     return law, table, np.array([address], np.int64)
+
+
+# Layers that slip on each other as a line bends: of the elements of a line on its cells.
+
+
+def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
+    """The line, whose cells are of pieces `of` (N,) of a material with layers, with these.
+
+    An element between layers of two kinds has one curvature, and of each as much as its half of the length.  So it is
+    between a table of moment over curvature and two bending stiffnesses.
+    """
+    layers = material.layers
+    number = [layers.index(x) for x in layers]
+    kind = np.array(number)[of]
+    rows = []
+    for i, has_element in enumerate(line.element):
+        sides = [c for c in (i - 1, i) if 0 <= c < line.h.size] if has_element else []
+        length = sum(0.5 * line.h[c] for c in sides)
+        parts = {kind[c]: sum(0.5 * line.h[k] for k in sides if kind[k] == kind[c]) / length for c in sides}
+        rows.append([x * part for k, part in parts.items() for layer in layers[k] for x in layer])
+        if len(sides) == 2 and material.meet(*of[sides]):
+            part = [0.5 * line.h[c] / line.hn[i] for c in sides]
+            line.kb[i, :2] = sum(x * material.B[of[c], :2] for x, c in zip(part, sides, strict=True)) / line.hn[i]
+            for x, c in zip(part, sides, strict=True):
+                rows[-1] += [x * number for layer in _of_table(material, int(of[c])) for number in layer]
+    widths = [EACH, *map(len, rows)]
+    for k, spring in enumerate(material.springs):
+        if spring < np.inf:  # as many columns when the clamp is let go
+            widths.append(sum(map(len, layers[of[-k]])) + EACH)
+        if rows[-k] and spring < np.inf:
+            rows[-k] += [0.0, give_of(spring, float(material.B[of[-k], :2].max()) / (0.5 * line.h[-k])), 0.0, 0.0]
+    law = np.zeros((line.s.size, max(widths)))
+    for i, row in enumerate(rows):
+        law[i, : len(row)] = row
+    found = line._replace(slip_law=law, slip_now=np.zeros_like(law))
+    blank = blank_line(1)._replace(slip_law=law[:2].copy(), slip_now=law[:2].copy())
+    state = state_for(blank)
+    address = follow_slip.address(blank, no_ends(), state, state, no_work(), 0)
+    return found._replace(slip_at=np.array([address], np.int64))
+
+
+def give_of(spring: float, half: float) -> float:
+    """How an angular spring (N m/rad) at a clamp turns, rad per N m; half: N m/rad, of half a cell there."""
+    return 1.0 / max(spring, NO_SPRING * half)
+
+
+def _of_table(material: Material, piece: int) -> list[Layer]:
+    """Elastic layers that a table of moment over curvature is beside its first piece; none without one."""
+    table = (material.bends or {piece: None})[piece]
+    if table is None:
+        return []
+    more = np.diff(slopes(table))
+    return [elastic_layer(x, float(K)) for (x, _), K in zip(table[1:-1], more, strict=True) if K != 0.0]
+
+
+# Tables of moment over curvature: of sections, of what stiffens them, and of the elements of a line on its cells.
+
+
+def bend_law(material: Material, line: Line, of: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """`bend_law` and `bend_table` of a line whose cells are of pieces `of` (N,) of a material."""
+    if material.bends is None:
+        return NO_BEND_LAW, NO_TABLE
+    known: dict[Curve, int] = {}
+    number = np.array([known.setdefault(x, len(known)) for x in _each_piece(material)])[of]
+    begins = np.cumsum([0, *map(len, known)])
+    n, half = line.h.size, 0.5 * line.h
+    law = np.zeros((n + 1, NO_BEND_LAW.shape[1]))
+    for cells, first, last, length, nodes in (
+        (number, FIRST_A, LAST_A, HALF_A, slice(1, n + 1)), (number, FIRST_B, LAST_B, HALF_B, slice(0, n)),
+    ):  # fmt: skip
+        law[nodes, first], law[nodes, last], law[nodes, length] = begins[cells], begins[cells + 1], half
+    same = np.concatenate([[False], number[1:] == number[:-1], [False]])
+    law[same, HALF_A] += law[same, HALF_B]
+    law[same, FIRST_B : HALF_B + 1] = 0.0
+    plain = np.array([x is None for x in material.bends])[of]
+    without = np.concatenate([[True], plain]) & np.concatenate([plain, [True]])
+    mixed = np.array([False, *(material.meet(a, b) for a, b in pairwise(of)), False])
+    law[without | mixed | (line.element == 0)] = 0.0
+    for k, spring in enumerate(material.springs):
+        if law[-k, LAST_A] + law[-k, LAST_B] > 0.0 and spring < np.inf:
+            stiffness = float(material.B[of[-k], :2].mean()) / half[-k]
+            law[-k, GIVE] = 1.0 / max(spring, NO_SPRING * stiffness)
+    return law, np.concatenate([_with_energy(x) for x in known])
+
+
+def _each_piece(material: Material) -> list[Curve]:
+    """Tables of all pieces, of one without a table a straight line."""
+    assert material.bends is not None
+    stiff = material.mean_initial_bending
+    return [x or ((0.0, 0.0), (1.0, float(B))) for x, B in zip(material.bends, stiff, strict=True)]
+
+
+def _with_energy(rows: Curve) -> Floats:
+    """Rows of `Line.bend_table`: curvature, moment, energy per length."""
+    x, M = np.array(rows, float).T
+    out = np.column_stack([x, M, np.zeros(x.size)])
+    out[1:, ENERGY] = np.cumsum(0.5 * np.diff(x) * (M[1:] + M[:-1]))
+    return out

@@ -28,11 +28,10 @@ from hybrid.model.clamps import (
 )
 from hybrid.model.contents import IDLE, Entry, obstacle_entries
 from hybrid.model.ends import EndConditions, EndLoad
-from hybrid.model.first_state import first_state
-from hybrid.model.initial_shape import dead_loads, hung
+from hybrid.model.initial_shape import dead_loads, first_state, hung
 from hybrid.model.lines_contact import MEETS, Touching, beside_others, that_may_meet, touching_of
 from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
-from hybrid.model.payout_law import said_of_line
+from hybrid.model.payout import said_of_line
 from hybrid.model.plane import WHAT
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings

@@ -15,16 +15,13 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model, build
 from hybrid.model.contents import Entry, with_accuracy
-from hybrid.model.first_state import HUNG
-from hybrid.model.initial_shape import hung
+from hybrid.model.initial_shape import HUNG, hung
 from hybrid.model.lines_contact import MEETS, that_may_meet
 from hybrid.model.material import material
 from hybrid.model.mesh import Zone
-from hybrid.model.model_costs import structural, with_model
-from hybrid.model.payout import PayoutForecast
-from hybrid.model.payout_law import said_of_line
+from hybrid.model.model_costs import foretold_steps, processor_time, structural, with_model
+from hybrid.model.payout import PayoutForecast, said_of_line
 from hybrid.model.resolution import first_resolution, model_is_free, predicted_runs
-from hybrid.model.run_time import foretold_steps, processor_time
 from hybrid.model.sections import limits_along, outer_diameter
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import accumulate
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import accumulate, pairwise
+from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.kernels.state.state import Floats, Line
+from hybrid.scene.motion_tables import SHIFTS
 from hybrid.scene.schema import (
     BendRestrictor,
     BendStiffener,
@@ -16,9 +19,12 @@ from hybrid.scene.schema import (
     Float,
     LineScene,
     Modules,
+    RodZone,
     Section,
     Spread,
+    Straight,
     Swivel,
+    ZonesModel,
 )
 
 # Limits that a section may have and that only reports ask for: unit, what it is, the stricter one of two.
@@ -179,3 +185,130 @@ def section_changes(scene: LineScene) -> tuple[float, ...]:
         if near < edge < scene.length - near and all(abs(edge - s) > near for s in found):
             found.append(edge)
     return tuple(sorted(found))
+
+
+# Where along the cable results are written, and where quantities may have two values.
+
+# Part of the length below which two places are one.
+NEAR = 1e-9
+
+
+class OutputPoints(NamedTuple):
+    """Arc lengths, m, of a result: s (ns,), its output points, and jumps, those of them where a value may be two."""
+
+    s: Floats
+    jumps: Floats
+
+
+def output_points(scene: LineScene, longest: float | None = None, at_start: bool = False) -> OutputPoints:
+    """The points that `output.points` asks for, those of the history, and all jumps.
+
+    longest: m, of a line that is paid out, how much may be out, and at_start: whether at its start, where s is then
+    negative; its points are in material.
+    Of points that round-off alone tells apart there is one: a jump before one of the history, that before another.
+    """
+    asked, length, jumps = scene.output.points, scene.length, jump_points(scene)
+    ends = (length - (longest or length), length) if at_start else (0.0, longest or length)
+    usual = np.linspace(*ends, asked) if isinstance(asked, int) else np.array(asked, float)
+    followed = (x for x in scene.output.history or () if all(abs(x - at) > NEAR * length for at in jumps))
+    more = [*jumps, *distinct(followed, length)]
+    if more:
+        near = np.abs(usual[:, None] - np.array(more)).min(axis=1) <= NEAR * length
+        usual = np.unique(np.concatenate([usual[~near], more]))
+    return OutputPoints(usual, np.array(jumps, float))
+
+
+def jump_points(scene: LineScene) -> tuple[float, ...]:
+    """Arc lengths (m) inside the cable where quantities may have two values, one on each side.
+
+    Point loads, changes of section, ends of modules and stiffeners, joints of rod and catenary in zones that stay where
+    they are.
+    """
+    found = [*section_changes(scene)]
+    for item in scene.cable.attachments:
+        found += list(item.range) if isinstance(item, Spread) else [item.at]
+    if isinstance(scene.model, ZonesModel):
+        zones = scene.model.zones
+        ends = accumulate(next(iter(zone.model_dump().values())) for zone in zones)
+        neighbours = pairwise(isinstance(zone, RodZone) for zone in zones)
+        found += [end for end, (left, right) in zip(ends, neighbours, strict=False) if left != right]
+    return tuple(distinct(found, scene.length))
+
+
+def distinct(places: Iterable[float], length: float) -> list[float]:
+    """Places (m) inside a cable of that length (m) in order, one of those that round-off alone tells apart."""
+    out: list[float] = []
+    for x in sorted(places):
+        if x - (out[-1] if out else 0.0) > NEAR * length and length - x > NEAR * length:
+            out.append(float(x))
+    return out
+
+
+# Sizes of a whole scene: its weight in its surroundings, what it presses on its bed with, a tension typical of it.
+
+
+def pressing(scene: LineScene) -> float:
+    """The least weight per length (N/m) that a cable of the scene puts on its bed; its dry weight if it would float."""
+    heavy = [w for w in (weight(x, scene) for x in scene.cable.sections) if w > 0.0]
+    dry = [x.mass * (scene.environment.gravity or 1.0) for x in scene.cable.sections]
+    return min(heavy or dry)
+
+
+def net_weight(scene: LineScene) -> float:
+    """Weight of the whole line with its attachments in its surroundings, N, positive downwards."""
+    return sum(weight(x, scene) * x.length for x in scene.cable.sections) + sum(attached_weights(scene))
+
+
+def tension_scale(scene: LineScene, sections: Sequence[Section], bending: bool, fastest: float = 0.0) -> float:
+    """A tension typical of the scene, N: the largest that weight, loads, bending, drag, motion or speed can ask for.
+
+    bending: whether bending counts, as it does where there is a rod; fastest: the current's highest speed, m/s.
+    """
+    length = scene.length
+    mass = sum(s.mass * s.length for s in sections)
+    candidates = [
+        sum(abs(weight(s, scene)) * s.length for s in sections) + sum(abs(x) for x in attached_weights(scene))
+    ]
+    if bending:
+        candidates += [max(bending_stiffness(s)) / length**2 for s in sections]
+    fluid = scene.environment.fluid
+    if fluid and fastest:
+        candidates += [
+            0.5 * fluid.density * s.diameter * s.drag.normal * fastest**2 * s.length
+            for s in sections
+            if s.drag and s.diameter
+        ]
+        candidates += [0.5 * fluid.density * x.drag_area * fastest**2 for _, x in attachments_at(scene)]
+    for end in scene.ends.both:
+        for load in end.loads:
+            candidates.append(float(np.abs(load.values).max()) / (length if load.what == "moment" else 1.0))
+        motion = end.prescribed_motion
+        if motion is not None:
+            candidates += [
+                mass * abs(x.amplitude) * (2 * np.pi / x.period) ** 2
+                for name, parts in motion.harmonics().items()
+                if name in SHIFTS
+                for x in parts
+            ]
+    first, last = (end.held_position for end in scene.ends.both)
+    if first and last and all(s.stiffness for s in sections):
+        free = length / sum(s.length / s.stiffness for s in sections if s.stiffness)  # N per unit strain
+        candidates.append(free * max(0.0, float(np.linalg.norm(np.subtract(last, first))) / length - 1.0))
+    velocity = scene.initial.velocity if isinstance(scene.initial, Straight) else None
+    if velocity:
+        candidates.append(mass / length * float(np.dot(velocity, velocity)))
+    scale = max(candidates)
+    if scale > 0.0:
+        return scale
+    return mass / length * (length / scene.time.duration) ** 2 if scene.time else 1.0
+
+
+def wave_step(line: Line, scale: float) -> float:
+    """The shortest time, s, in which a wave passes a catenary cell, 0 without catenaries: of tension, or, where a cell
+
+    does not stretch, across the line under the tension `scale`, N.
+    """
+    cells = line.spin == 0
+    mass = 0.5 * (line.mass[:-1] + line.mass[1:] - line.point_mass[:-1] - line.point_mass[1:])
+    soft = np.where(line.ck > 0.0, line.ck, 1.0 / scale)
+    return float(np.sqrt((soft * mass * line.h)[cells].min())) if cells.any() else 0.0

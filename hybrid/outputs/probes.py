@@ -15,7 +15,7 @@ from hybrid.kernels.march.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twis
 from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea, remembers
 from hybrid.model.mesh import Zone
-from hybrid.model.output_points import NEAR, OutputPoints
+from hybrid.model.sections import NEAR, OutputPoints
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
 from hybrid.outputs.observation import Observation, Probe, bends_by_load

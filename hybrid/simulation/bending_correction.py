@@ -9,8 +9,8 @@ import numpy as np
 
 from hybrid.kernels.state.state import Batch, Ends, Floats, State
 from hybrid.kernels.watch.bending_error import COMPLIANCE, FREE_TURN, GIVEN, TURN
-from hybrid.model.bending_reference import HALF_WRONG, NO_DOUBT, full_bending
 from hybrid.model.build import Model
+from hybrid.model.material import HALF_WRONG, NO_DOUBT, full_bending
 from hybrid.model.mesh import Zone
 from hybrid.solve.bending_corrector import Corrector, Shift
 

@@ -16,11 +16,10 @@ import numpy as np
 from hybrid.adapt.user_criterion import UserCriterion, of_line
 from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats, State
-from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model
+from hybrid.model.material import NO_DOUBT
 from hybrid.model.model_costs import with_model, with_models
 from hybrid.model.network import NetworkResolution, build_system
-from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.resolution import (
     Reach,
@@ -32,6 +31,7 @@ from hybrid.model.resolution import (
     wants_errors,
     wants_survey,
 )
+from hybrid.model.sections import OutputPoints, output_points
 from hybrid.model.self_reach import self_reach, system_without_contact, without_contact
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.scene.read import scene_text

@@ -13,8 +13,8 @@ from hybrid.kernels.machine.binding import Packed, Room, Table
 from hybrid.kernels.run.entry import workspace
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats, Sea, no_sea
+from hybrid.model.layout import kinds_of
 from hybrid.model.line import lines
-from hybrid.model.line_on_base import kinds_of
 
 OF_SEA = ("flow", "axis", "slip", "slid", "bed")  # what it has of nodes
 REST_OF_SEA = tuple(name for name in Sea._fields if name not in OF_SEA)

@@ -39,7 +39,7 @@ from hybrid.kernels.state.report import BEND, TWIST_NODE
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model
-from hybrid.model.first_state import HUNG
+from hybrid.model.initial_shape import HUNG
 from hybrid.model.obstacles import CELLS_PER_RADIUS
 from hybrid.model.plane import as_kept
 from hybrid.outputs.joined_lines import JoinedObservation, Output

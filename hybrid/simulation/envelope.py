@@ -22,10 +22,9 @@ from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch.carried_extremes import Watched, pass_on
 from hybrid.kernels.watch.extremes import fold_extremes
 from hybrid.model.build import Model
-from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene
 from hybrid.model.plane import as_begun
-from hybrid.model.sections import SECTION_LIMITS, limits_along, modules_of, section_changes
+from hybrid.model.sections import NEAR, SECTION_LIMITS, limits_along, modules_of, section_changes
 from hybrid.model.self_reach import no_contact
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.section_use import Pipes

@@ -15,9 +15,7 @@ from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, OBSTACLES, PLANAR, 
 from hybrid.kernels.state.state import Line, State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
-from hybrid.model.equilibrium_hints import reasons_against
-from hybrid.model.first_state import HUNG
-from hybrid.model.initial_shape import GIVEN
+from hybrid.model.initial_shape import GIVEN, HUNG, reasons_against
 from hybrid.model.plane import leaves_plane, planar, untwist
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import LineScene

@@ -14,7 +14,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
-from hybrid.model.driven_end import DrivenEnd, contradictions
+from hybrid.model.ends import DrivenEnd, contradictions
 from hybrid.simulation.diagnostics import stretch_text
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.solve.run import Tried

@@ -21,7 +21,7 @@ from hybrid.kernels.state.state import Ends, Line, State
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import FEWER, picked
 from hybrid.model.layout import edges
-from hybrid.model.payout_law import fastest
+from hybrid.model.payout import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.accuracy import ROUGHEST
 from hybrid.scene.motion_checks import longest_period

@@ -19,8 +19,7 @@ import numpy as np
 from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model, twist_rate
-from hybrid.model.mesh import DEFAULT_CELLS
-from hybrid.model.mesh_grading import GROWTH, SAMPLES, Grading, layers
+from hybrid.model.mesh import DEFAULT_CELLS, GROWTH, SAMPLES, Grading, layers
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free, shows_bends, wants_survey

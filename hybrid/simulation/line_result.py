@@ -38,11 +38,9 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_o
 from hybrid.kernels.watch.bending_error import sampled_size as error_size
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
-from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.plane import as_begun, planar
 from hybrid.model.resolution import follows_curvature, wants_errors
-from hybrid.model.scales import wave_step
-from hybrid.model.sections import section_changes
+from hybrid.model.sections import OutputPoints, output_points, section_changes, wave_step
 from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Features, Observer, Recorded

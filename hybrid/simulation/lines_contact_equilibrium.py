@@ -13,8 +13,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.first_state import HUNG, first_state
-from hybrid.model.initial_shape import GIVEN, hung
+from hybrid.model.initial_shape import GIVEN, HUNG, first_state, hung
 from hybrid.model.lines_contact import touching_among
 from hybrid.model.network import NetworkModel
 from hybrid.scene.network_scene import Network

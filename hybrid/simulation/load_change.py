@@ -8,8 +8,8 @@ from dataclasses import replace
 from hybrid.kernels.junctions.bodies import DONE, SPRING
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.model.build import Model
+from hybrid.model.failure import unclamped, without_hold
 from hybrid.model.network import NetworkModel, build_system
-from hybrid.model.release import unclamped, without_hold
 from hybrid.model.self_reach import touching
 from hybrid.scene.network_scene import Network
 from hybrid.simulation.run_of_lines import RunOfLines

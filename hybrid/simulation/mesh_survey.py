@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
-from hybrid.model.mesh_grading import AT_PLACE, LAYER, SAMPLES, Grading, grading, layers
+from hybrid.model.mesh import AT_PLACE, LAYER, SAMPLES, Grading, grading, layers
 from hybrid.model.model_costs import Demand
 from hybrid.model.resolution import (
     Reach,

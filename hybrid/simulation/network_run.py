@@ -26,8 +26,8 @@ from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
 from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
-from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on, output_times
+from hybrid.model.sections import OutputPoints
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.network_scene import Network
 from hybrid.scene.plane import OUT

@@ -31,11 +31,9 @@ from hybrid.kernels.state.forces import FRICTION, STIFFNESS_DAMPING, TOUCHES
 from hybrid.kernels.state.report import LENGTH_OUT, PAYOUT_RATE
 from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, slip_size, state_for
 from hybrid.model.build import Model
-from hybrid.model.layout import Layout, on_other_parts
-from hybrid.model.line_on_base import LineOnBase
+from hybrid.model.layout import Layout, LineOnBase, on_other_parts
 from hybrid.model.mesh import Zone
-from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, payout_of, winch_at
-from hybrid.model.payout_law import fastest, length_at, lengths_at
+from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, length_at, lengths_at, payout_of, winch_at
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer

@@ -16,8 +16,8 @@ from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.build import Model
 from hybrid.model.ends import EndConditions
 from hybrid.model.lines_contact import passing_each_other
-from hybrid.model.output_points import OutputPoints
 from hybrid.model.payout import longest_out, winch_side
+from hybrid.model.sections import OutputPoints
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.base import dotted
 from hybrid.scene.read import as_scene, read_text, scene_text

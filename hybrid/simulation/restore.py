@@ -22,10 +22,9 @@ import numpy as np
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.machine.cache import compiler_hash
-from hybrid.model.mesh import MOST_CELLS
-from hybrid.model.mesh_grading import Grading
-from hybrid.model.output_points import OutputPoints
+from hybrid.model.mesh import MOST_CELLS, Grading
 from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.model.sections import OutputPoints
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.old_checkpoints import is_of_cable
 from hybrid.store.checkpoint import Checkpoint, read_checkpoint

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hybrid.kernels.state.state import Floats
-from hybrid.model.resolution import OF_VIBRATION
-from hybrid.model.start_vibration import Vibration, start_vibrations, strain_travel
+from hybrid.model.resolution import OF_VIBRATION, Vibration, start_vibrations, strain_travel
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.reader import Result

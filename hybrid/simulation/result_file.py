@@ -33,9 +33,8 @@ from hybrid.kernels.state.obstacle_rows import (
 )
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.build import Model
-from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene
-from hybrid.model.sections import SECTION_LIMITS, limits_along, outer_diameter, weakest_bending
+from hybrid.model.sections import NEAR, SECTION_LIMITS, limits_along, outer_diameter, weakest_bending
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.envelope import Envelope

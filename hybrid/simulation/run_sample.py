@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model
+from hybrid.model.material import NO_DOUBT
 from hybrid.model.mesh import Zone
-from hybrid.model.output_points import OutputPoints
 from hybrid.model.resolution import Reach, Resolution, first_resolution
+from hybrid.model.sections import OutputPoints
 from hybrid.outputs.probes import SIDED_ERRORS
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.restore import resolution_from, resolution_tree

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.kernels.state.state import Floats
-from hybrid.model.driven_end import DrivenEnd
+from hybrid.model.ends import DrivenEnd
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.network_run import NetworkRun

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.kernels.state.obstacle_rows import SEEN_FORCE, SEEN_MOMENT, SEEN_TURN
 from hybrid.kernels.state.state import Floats, State, obstacles_now
-from hybrid.model.driven_end import STILL, DrivenEnd, rotation_vector
+from hybrid.model.ends import STILL, DrivenEnd, rotation_vector
 from hybrid.model.sea import Surroundings
 from hybrid.simulation.stepped import Triple, numbers, one_thread, triple
 

@@ -18,8 +18,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.model.build import LEAST_WEIGHT, Model
-from hybrid.model.equilibrium_hints import end_laid_anywhere
-from hybrid.model.initial_shape import dead_loads
+from hybrid.model.initial_shape import dead_loads, end_laid_anywhere
 from hybrid.model.material import Material
 from hybrid.outputs.observation import Observation
 from hybrid.scene.schema import LineScene

@@ -16,8 +16,7 @@ from hybrid.errors import ComputationError
 from hybrid.kernels.state.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.driven_end import STILL, DrivenEnd, rotation_vector
-from hybrid.model.ends import EndConditions
+from hybrid.model.ends import STILL, DrivenEnd, EndConditions, rotation_vector
 from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.model.sea import Surroundings

@@ -16,7 +16,7 @@ import numpy as np
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
-from hybrid.model.driven_end import DrivenEnd, contradictions
+from hybrid.model.ends import DrivenEnd, contradictions
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.network_scene import Network

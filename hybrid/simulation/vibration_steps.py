@@ -12,8 +12,7 @@ import numpy as np
 
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats
-from hybrid.model.resolution import Resolution
-from hybrid.model.start_vibration import start_vibrations
+from hybrid.model.resolution import Resolution, start_vibrations
 from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import LineScene
 from hybrid.store.named_arrays import matched

@@ -17,8 +17,8 @@ from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import no_sea
 from hybrid.kernels.watch.bending_error import FINITE, FURTHEST, History, right_hand_side
 from hybrid.kernels.watch.neglected_moments import Bending, neglected_moments, tabulate_chords
-from hybrid.model.bending_reference import full_bending
 from hybrid.model.build import build
+from hybrid.model.material import full_bending
 from hybrid.model.mesh import Zone
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.equilibrium import equilibrium_of

@@ -34,7 +34,7 @@ from hybrid.kernels.state.forces import (
 )
 from hybrid.kernels.state.obstacle_rows import BEGAN, CARRIED, EACH, ENDED, PLACE, SPEED, SWEEP, TURNING
 from hybrid.kernels.state.state import NO_CARRIED, NO_GRIP, NO_MOVES, NO_ROOM, Ends, Line, Sea, blank_state
-from hybrid.model.facets import surface_of
+from hybrid.model.obstacles import surface_of
 from hybrid.scene.mesh_file import Mesh
 
 N = 7

@@ -22,8 +22,7 @@ from hybrid.kernels.laws.seabed import contact
 from hybrid.kernels.laws.water import FADED, SAME_WETNESS, wave_kinematics
 from hybrid.kernels.state.state import LANES, no_sea, with_waves
 from hybrid.kernels.watch.wave_slopes import PHASES, SLOPES, wave_slopes, waves_beside
-from hybrid.model.sea import Surroundings, components, current_table, surroundings
-from hybrid.model.spectra import HIGHEST, LOWEST, jonswap
+from hybrid.model.sea import HIGHEST, LOWEST, Surroundings, components, current_table, jonswap, surroundings
 from hybrid.scene.measured_spectrum import FINE, shares
 from hybrid.scene.spectra import JonswapWaves
 from hybrid.scene.stream_function import steady_wave

@@ -17,10 +17,10 @@ import hybrid
 import hybrid.model.payout
 from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Line
 from hybrid.model.build import Model, build
+from hybrid.model.failure import without_hold
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.plane import in_space, planar
-from hybrid.model.release import without_hold
 from tests.inside import OnlyLine
 
 ROUND = 1e-12

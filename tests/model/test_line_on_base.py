@@ -10,8 +10,8 @@ import pytest
 import hybrid
 from hybrid.kernels.state.forces import FRICTION, SEABED
 from hybrid.model.build import build
+from hybrid.model.failure import without_hold
 from hybrid.model.line import NO_INERTIA, line_on
-from hybrid.model.release import without_hold
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROUND = 4e-16  # a product and a sum may be one operation

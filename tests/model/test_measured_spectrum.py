@@ -7,8 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 import hybrid
-from hybrid.model.sea import components
-from hybrid.model.spectra import jonswap
+from hybrid.model.sea import components, jonswap
 from hybrid.scene.waves import MeasuredWaves
 
 F = np.linspace(0.04, 0.4, 73)  # Hz

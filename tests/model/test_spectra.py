@@ -12,8 +12,15 @@ from scipy.special import gamma as Gamma
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.model.sea import components, surroundings
-from hybrid.model.spectra import directions, jonswap, ochi_hubble, torsethaugen, torsethaugen_parts
+from hybrid.model.sea import (
+    components,
+    directions,
+    jonswap,
+    ochi_hubble,
+    surroundings,
+    torsethaugen,
+    torsethaugen_parts,
+)
 from hybrid.scene.spectra import (
     CROSSINGS,
     JonswapWaves,

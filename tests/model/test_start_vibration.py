@@ -10,8 +10,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 import hybrid
-from hybrid.model.resolution import first_resolution
-from hybrid.model.start_vibration import longest_period, start_vibrations
+from hybrid.model.resolution import first_resolution, longest_period, start_vibrations
 
 LENGTH, EA, MASS = 12.0, 1e5, 2.0
 PERIOD = 4.0 * LENGTH * (MASS / EA) ** 0.5

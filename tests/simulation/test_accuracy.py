@@ -24,7 +24,7 @@ from hybrid.cli.console import Console
 from hybrid.cli.tables import errors_facts, errors_table, extremes_facts, extremes_table
 from hybrid.errors import SceneError
 from hybrid.model.build import build
-from hybrid.model.mesh_grading import GROWTH, SAMPLES, grading, layers
+from hybrid.model.mesh import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
 from hybrid.scene.short_form import LINE

@@ -13,8 +13,8 @@ import hybrid
 from hybrid.accuracy.error_statistics import STATISTICS, WINDOWS, StatisticEstimate, snaps, statistics_of
 from hybrid.accuracy.refinement import Free
 from hybrid.accuracy.snap_scatter import snap_excess, snap_times
-from hybrid.model.output_points import output_points
 from hybrid.model.resolution import RequestedAccuracy, Resolution
+from hybrid.model.sections import output_points
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.named_arrays import pack, unpack
 

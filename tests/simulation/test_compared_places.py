@@ -12,7 +12,7 @@ from test_late_file import described
 from test_result_first import asked, rough, stopped_in  # noqa: F401
 
 import hybrid
-from hybrid.model.output_points import OutputPoints
+from hybrid.model.sections import OutputPoints
 from hybrid.scene.short_form import LINE
 from hybrid.simulation import run_sample
 from hybrid.simulation.case import Case

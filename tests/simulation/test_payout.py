@@ -13,7 +13,7 @@ import hybrid
 import hybrid.model.payout
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import SceneError
-from hybrid.model.payout_law import law_of, length_at
+from hybrid.model.payout import law_of, length_at
 from hybrid.scene.payout import Payout
 from hybrid.simulation import line_result
 from hybrid.simulation.line_result import LineResult

@@ -11,7 +11,7 @@ from test_payout import G, clamped, hanging, sagging
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.model.payout_law import lengths_at
+from hybrid.model.payout import lengths_at
 
 FINE = 0.005  # s
 

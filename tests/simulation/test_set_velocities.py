@@ -14,7 +14,7 @@ from test_system_saving import STEP, VESSEL, scene
 import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.state.state import no_moves
-from hybrid.model.driven_end import DrivenEnd
+from hybrid.model.ends import DrivenEnd
 
 Said = Callable[[np.ndarray], Any]
 

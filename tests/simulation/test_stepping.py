@@ -13,7 +13,7 @@ import hybrid
 from hybrid.kernels.laws.end_motion import driven_frame, driven_position
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.state.state import no_moves
-from hybrid.model.driven_end import PATH, DrivenEnd, rotation, rotation_vector
+from hybrid.model.ends import PATH, DrivenEnd, rotation, rotation_vector
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PINNED = "ends.end={kind: pinned, position: [205, 0, 0]}"

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hybrid.model.build import build
-from hybrid.model.output_points import output_points
+from hybrid.model.sections import output_points
 from hybrid.scene.ends import Pinned
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.motion_checks import shortest_period

@@ -171,7 +171,7 @@ def copy_state(state, out):
 
 @inner
 def wave_step(line, scale):
-    """As hybrid.model.scales has it."""
+    """As hybrid.model.sections has it."""
     least, any_cell = math.inf, False
     for c in range(line.h.shape[0]):
         if not line.spin[c]:
