@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.errors import ComputationError
+from hybrid.scene.read import as_scene
 from hybrid.scene.short_form import LINE, network_of
-from tests.combinations.networks import both, both_files, differences, events_differ, exact_scene, files_differ
+from hybrid.store.reader import open_result
+from tests.combinations.networks import both, differences, events_differ
 from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, S, scene_of
 from tests.problems import tables_with
+from tests.said import line_of
 
 FREE = {"kind": "free", "force": [40, 3, 30]}
 GUIDED = {"kind": "guided", "tangent": [1, 0.1, 0.2], "normal": [0, 1, 0], "force": [60, 3, 30]}
@@ -60,34 +64,6 @@ def test_a_cable_is_a_network_of_one_line(name: str) -> None:
     assert events_differ(cable, network) == []
 
 
-ENDS = {"force": {"kind": "horizontal_force", "end": "start"}, "angle": {"kind": "declination", "end": "end"}}
-GAUGES = [[0.0, 0.0], [5.0, 2.0]]
-# Each of another kind of dataset, attribute or event.
-FILES: dict[str, dict[str, Any]] = {
-    "rod": {"title": "a rod", "output.history": [5.0], START: CLAMP},
-    "catenary": {"model": "catenary"},
-    "zones": SCENES["zones that move"],
-    "seabed": FEATURES["seabed"][0],
-    "payout": FEATURES["payout"][0],
-    "payout in a plane": FEATURES["payout"][0],
-    "rod in a plane": {START: CLAMP},
-    "waves": FEATURES["waves"][0] | {"output.elevation": GAUGES},
-    "quantities": FEATURES["seabed"][0]
-    | {"output.quantities": ENDS | {"over": {"kind": "clearance", "point": [5, 0, 0]}}},
-    "let go": FEATURES["release"][0],
-    "pipe": {S + "pipe": {"wall": 0.002}} | STIFF,
-    "clumps and sections": FEATURES["clump"][0],
-    "obstacle": FEATURES["obstacle"][0],
-    "contact": FEATURES["contact"][0],
-}
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_the_file_is_that_of_a_cable(name: str, tmp_path: Path) -> None:
-    scene = exact_scene(tables_with(scene_of(), FILES[name]), 2 if "in a plane" in name else 3)
-    assert files_differ(*both_files(scene, tmp_path)) == []
-
-
 def test_at_rest() -> None:
     cable, network = both(tables_with(scene_of("seabed"), {END: GUIDED, "time": None}), rest=True)
     assert [str(x) for x in differences(cable, network)] == []
@@ -121,3 +97,14 @@ def test_a_winch_at_rest_holds_its_line() -> None:
     cable = hybrid.static(tables)
     np.testing.assert_allclose(network.tension, cable.tension, rtol=1e-9)
     assert network.tension.max() > 100.0
+
+
+@pytest.mark.parametrize("network", [False, True])
+def test_a_start_from_which_no_step_leads_on_is_in_the_file(network: bool, tmp_path: Path) -> None:
+    scene = as_scene(scene_of("obstacle") | {"dimension": 2})
+    with pytest.raises(ComputationError, match="leaves the plane"):
+        hybrid.run(network_of(scene) if network else scene, tmp_path / "run.h5")
+    with open_result(tmp_path / "run.h5") as result:
+        assert result.status == "failed"
+        assert result.times.tolist() == [0.0]
+        assert np.isfinite(line_of(result)["tension"]).all()
