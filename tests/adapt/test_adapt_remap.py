@@ -260,7 +260,7 @@ def test_a_rod_that_grows_has_no_kink_where_it_grows(name):
     assert (order(worst) > 0.7).all() and (order(worst) < 2.3).all()
 
 
-def test_kinks_stay_sharp():
+def test_unresolved_stay_sharp():
     """A clump hangs in the middle: a corner of 60 deg stays one, and the arms bend as they did, not more.
 
     Without knowing of the corner, a cubic would round it over two base cells and overshoot beyond.

@@ -1,6 +1,6 @@
 """A hundred wrong uses of each interface beside Simulation: an error in words, no crash, and it goes on unchanged.
 
-`tests/simulation/test_stepping_wrong_uses.py` has those of `hybrid.Simulation`.
+`tests/simulation/test_stepping.py` has those of `hybrid.Simulation`.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from extreme import X, Z, clamped, free, pinned, scene
+from every import CASES, FAMILIES, PAGE, listed, page, parameters, read
+from extreme import MODELS, X, Z, clamped, free, pinned, scene
 from rods import rod
 
 import hybrid
@@ -128,3 +129,32 @@ def test_a_coarse_polygon_is_no_catenary():
     line = {"length": 10.0, "mass": 1.0}
     assert "unresolved bend" in kinds(solved(scene(line, pinned(), pinned(9.5 * X), "catenary", 2, 9.81)))
     assert not solved(scene(line, pinned(), pinned(9.5 * X), "catenary", 10, 9.81)).events
+
+
+# --- the page ---
+
+
+def test_the_page_lists_every_case(pytestconfig):
+    if pytestconfig.getoption("--write-extremes"):
+        return
+    assert set(listed()) == {case.key for case in CASES}, "run: pytest tests/extremes -m 'not bench' --write-extremes"
+    text = PAGE.read_text(encoding="utf-8")
+    assert f"{len(CASES)} cases" in text and text == page(read()), "the page is that of its table"
+    assert "wrong" not in listed().values()
+
+
+def test_cases_are_many_and_different():
+    assert len(CASES) >= 300
+    assert len({case.key for case in CASES}) == len(CASES)
+    for model in MODELS:
+        assert sum(case.model == model for case in CASES) >= 50, model
+    assert len(FAMILIES) >= 15
+
+
+# --- the cases ---
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("case", parameters(CASES))
+def test_extremes(case, assert_honest):
+    assert_honest(case)

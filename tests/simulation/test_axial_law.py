@@ -18,6 +18,7 @@ from bits import resumed
 from scipy.integrate import quad, solve_ivp
 
 import hybrid
+from hybrid.errors import SceneError
 from hybrid.model.build import build
 from hybrid.solve.stability import is_stable
 from tests.inside import OnlyLine
@@ -145,11 +146,11 @@ def test_a_hanging_rope_has_the_length_of_its_table() -> None:
     assert found.position[-1, -1, 2] == pytest.approx(-100 - longer, abs=2e-5)
 
 
-def two_lines(section: dict[str, Any], cut: bool) -> dict[str, Any]:
+def two_lines(section: dict[str, Any], cut: bool, heave: float = 0.3) -> dict[str, Any]:
     """A rope from an anchor to a vessel that heaves, in one piece or in two."""
     points: dict[str, Any] = {
         "anchor": {"position": [0, 0, -60]},
-        "vessel": {"position": [40, 0, 0], "motion": {"heave": {"amplitude": 0.3, "period": 6}, "ramp": 3}},
+        "vessel": {"position": [40, 0, 0], "motion": {"heave": {"amplitude": heave, "period": 6}, "ramp": 3}},
     }
     rope = {"mass": 4.0, "diameter": 0.08, "drag": {"normal": 1.2}} | section
     lines = {"rope": {"start": "anchor", "end": "vessel", "sections": [rope | {"length": 70}], "mesh": {"cells": 40}}}
@@ -175,7 +176,12 @@ SOFT = {"tension_strain": [[0, 0], [0.01, 800], [0.03, 6000], [0.2, 9e4]]}
     ids=["table", "rope"],
 )
 def test_a_rope_that_is_cut_is_the_same_rope(section: dict[str, Any]) -> None:
-    one, two = hybrid.run(two_lines(section, False)), hybrid.run(two_lines(section, True))
+    assert_cut_is_whole(section)
+
+
+def assert_cut_is_whole(section: dict[str, Any], heave: float = 0.3) -> None:
+    """A rope moves as it does in two pieces that meet at a knot."""
+    one, two = (hybrid.run(two_lines(section, cut, heave)) for cut in (False, True))
     whole, lower = one.lines["rope"], two.lines["rope"]
     halfway = np.array([[np.interp(35.0, whole.s, x[:, k]) for k in range(3)] for x in whole.position])
     assert np.abs(halfway - lower.position[:, -1]).max() < 1e-7
@@ -328,3 +334,69 @@ def test_energy_balances_where_zones_move(which: str) -> None:
         assert np.abs(found["work/zones"]).max() > 0.5  # J
         assert off[-1] < 1.02 * np.abs(rods["work/scheme"]).max()
     assert off[1] < 0.3 * off[0]
+
+
+# --- creep ---
+
+EA, LENGTH, PER, LOADED = 1e6, 10.0, 0.002, 60.0
+CREEP = {"axial_stiffness": EA, "creep": {"per_decade": PER, "loaded": LOADED}}
+
+
+def rope(end: Any, step: float, over: float, **section: Any) -> dict[str, Any]:
+    return {
+        "environment": {"gravity": 0},
+        "cable": {"sections": [{"length": LENGTH, "mass": 1.0, "damping": 20.0} | CREEP | section]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10},
+        "time": {"duration": over, "step": step}, "output": {"every": 10.0, "points": 11},
+    }  # fmt: skip
+
+
+def crept(t: Any) -> Any:
+    return PER * np.log10(1.0 + t / LOADED)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_under_a_constant_pull_it_grows_with_the_logarithm_of_time(dimension: int) -> None:
+    """Strain F/EA + c log10(1 + t/t0), and the pull does its work: all of it is lost."""
+    pull = 2e4
+    found = hybrid.run(rope({"kind": "free", "force": [pull, 0, 0]}, 0.5, 600.0) | {"dimension": dimension})
+    strain = found.position[:, -1, 0] / LENGTH - 1.0
+    assert strain[0] == pytest.approx(pull / EA, rel=1e-9)
+    np.testing.assert_allclose(strain - strain[0], crept(found.t), atol=2e-6)  # it goes on, against mass and damping
+    lost, done = float(found["work/hysteresis"][-1]), pull * LENGTH * (strain[-1] - strain[0])
+    print(f"{-lost:.3f} J lost of {done:.3f} J done")
+    assert lost == pytest.approx(-pull * LENGTH * crept(600.0), rel=1e-3)
+    assert lost == pytest.approx(-done, rel=5e-3)
+
+
+def test_between_two_ends_it_relaxes() -> None:
+    """EA (strain - c log10(1 + t/t0)): tension falls by a straight line over the logarithm of time."""
+    held = {"kind": "pinned", "position": [LENGTH * 1.02, 0, 0]}
+    found = hybrid.run(rope(held, 1.0, 600.0))
+    np.testing.assert_allclose(found.tension[:, 5], EA * (0.02 - crept(found.t)), rtol=1e-5)
+    stored = found["energy/stretch"]
+    assert float(found["work/hysteresis"][-1]) == pytest.approx(float(stored[-1] - stored[0]), rel=1e-3)
+    assert abs(float(found["work/scheme"][-1])) < 1e-3 * abs(float(stored[-1] - stored[0]))
+
+
+def test_a_table_and_a_dynamic_stiffness_creep_as_well() -> None:
+    held = {"kind": "pinned", "position": [LENGTH * 1.02, 0, 0]}
+    table = {"axial_stiffness": None, "tension_strain": [[0, 0], [0.015, 1.2e4], [0.05, 6e4]]}
+    for law in (table, {"dynamic_stiffness": {"constant": 3e6, "relaxation_time": 5.0}}):
+        given = {k: x for k, x in (CREEP | law).items() if x is not None}
+        tables = rope(held, 1.0, 600.0)
+        tables["cable"]["sections"][0] = {"length": LENGTH, "mass": 1.0, "damping": 20.0} | given
+        found = hybrid.run(tables)
+        left = 0.02 - crept(600.0)
+        rest = np.interp(left, *np.array(table["tension_strain"], float).T) if law is table else EA * left
+        assert found.tension[-1, 5] == pytest.approx(rest, rel=1e-3)
+
+
+def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
+    resumed(rope({"kind": "free", "force": [2e4, 0, 0]}, 0.5, 60.0), tmp_path, 30.0)
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(SceneError, match="does not stretch does not creep"):
+        hybrid.validate_scene({"cable": {"sections": [{"length": 1.0, "mass": 1.0, "creep": CREEP["creep"]}]}})

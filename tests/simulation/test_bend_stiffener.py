@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 from functools import cache
-from math import asin, cos, pi, radians, sin
+from math import asin, cos, pi, sin
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from test_moment_tables import ANGLE, LENGTH, PULL
+from test_moment_tables import taut as with_law
 
 import hybrid
 from hybrid.errors import SceneError
 
-PULL, ANGLE, EI, LENGTH = 5e4, radians(20.0), 1e4, 8.0
+EI = 1e4  # N m2
 CONE = {"kind": "bend_stiffener", "range": [0, 3], "diameters": [0.3, 0.15], "bore": 0.12, "modulus": 2.5e8}
 
 
 def taut(cells: int, *attached: dict[str, Any], length: float = LENGTH, **tables: Any) -> dict[str, Any]:
-    """A line that is clamped at 20 degrees to its pull, without weight."""
-    return {
-        "environment": {"gravity": 0},
-        "cable": {
-            "sections": [{"length": length, "mass": 1, "bending_stiffness": EI}], "attachments": list(attached),
-        },
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
-            "end": {"kind": "free", "force": [PULL * cos(ANGLE), 0, PULL * sin(ANGLE)]},
-        },
-        "initial": "equilibrium", "model": "rod", "contact": {"self": False}, "mesh": {"cells": cells},
-    } | tables  # fmt: skip
+    return with_law(cells, {"length": length, "bending_stiffness": EI}, None, *attached, **tables)
 
 
 def stiffness(s: float) -> float:

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-from math import cos, radians, sin, sqrt
+from math import cos, sin, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from bits import resumed
+from test_moment_tables import ANGLE
+from test_moment_tables import taut as with_law
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
 
-ANGLE, LENGTH, EI, GROWS = radians(20.0), 8.0, 1e4, 0.3  # rad, m, N m2, m2
+EI, GROWS = 1e4, 0.3  # N m2, m2
 BEGIN, END = 5e4, 2e4  # N
 
 
 def taut(cells: int, pull: Any, dimension: int | None = None, **section: Any) -> dict[str, Any]:
-    """A line without weight that is clamped at 20 degrees to its pull."""
-    law = {"length": LENGTH, "mass": 1.0, "bending_stiffness": EI, "stiffness_per_tension": GROWS} | section
+    law = {"bending_stiffness": EI, "stiffness_per_tension": GROWS} | section
     force = {"history": pull} if isinstance(pull, list) else [pull * cos(ANGLE), 0, pull * sin(ANGLE)]
-    return {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [{k: x for k, x in law.items() if x}]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
-            "end": {"kind": "free", "force": force},
-        },
-        "initial": "equilibrium", "model": "rod", "contact": {"self": False}, "mesh": {"cells": cells},
-    } | ({"dimension": dimension} if dimension else {})  # fmt: skip
+    more = {"dimension": dimension} if dimension else {}
+    return with_law(cells, {k: x for k, x in law.items() if x}, force, **more)
 
 
 def of_clamp(pull: float, grows: float = GROWS) -> float:

@@ -10,6 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.store.reader import Result
+from tests.said import both_ways, line_of, said
 
 DEFECT = Path(__file__).parents[1] / "data" / "defects" / "false_within.yaml"
 PIN, FAR = {"kind": "pinned", "position": [0, 0, 0]}, {"kind": "pinned", "position": [100, 0, 0]}
@@ -74,65 +75,44 @@ def test_a_mesh_that_shows_all_bends_stays() -> None:
         assert np.array_equal(usual["curvature"], equal["curvature"])
 
 
-def test_runs_resumed_and_stepped_from_outside_have_the_same_cells(tmp_path: Path) -> None:
+@both_ways
+def test_runs_resumed_and_stepped_from_outside_have_the_same_cells(network: bool, tmp_path: Path) -> None:
     heave = {"motion": {"heave": {"amplitude": 0.5, "period": 4}, "ramp": 4}}
-    asked = scene({"sections": [section(200, 500)]}, CLAMP, FAR | heave)
-    whole = hybrid.run(asked | {"time": {"duration": 0.8, "step": 0.1}}, tmp_path / "whole.h5")
-    assert 100 < whole.attributes["cells"] < 115
-    hybrid.run(asked, tmp_path / "half.h5").close()
+    cable = scene({"sections": [section(200, 500)]}, CLAMP, FAR | heave)
+    made = said(cable | {"time": {"duration": 0.8, "step": 0.1}}, network)
+    whole = hybrid.run(made, tmp_path / "whole.h5")
+    assert 100 < line_of(whole)["mesh/s"].size - 1 < 115
+    hybrid.run(said(cable, network), tmp_path / "half.h5").close()
     longer = hybrid.resume(tmp_path / "half.h5", until=0.8)
-    with hybrid.Simulation(asked | {"time": {"duration": 0.8, "step": 0.1}}, tmp_path / "stepped.h5") as stepped:
+    with hybrid.Simulation(made, tmp_path / "stepped.h5") as stepped:
         while stepped.t < 0.8 - 1e-9:
             stepped.step()
     outside = hybrid.open(tmp_path / "stepped.h5")
     for other in (longer, outside):
-        assert np.array_equal(other["mesh/s"], whole["mesh/s"])
-        assert np.allclose(other["curvature"][-1], whole["curvature"][-1], rtol=1e-9, atol=1e-12)
+        assert np.array_equal(line_of(other)["mesh/s"], line_of(whole)["mesh/s"])
+        curvature = line_of(whole)["curvature"][-1]
+        assert np.allclose(line_of(other)["curvature"][-1], curvature, rtol=1e-9, atol=1e-12)
 
 
-def as_lines(asked: dict[str, Any]) -> dict[str, Any]:
-    """The same as a network of one line."""
-    ends, points, held = asked["ends"], {}, {}
-    for key in ("start", "end"):
-        points[key] = {k: x for k, x in ends[key].items() if k in ("position", "motion")}
-        held |= {key: {"tangent": ends[key]["tangent"]}} if "tangent" in ends[key] else {}
-    line = asked["cable"] | {"start": "start", "end": "end", "connections": held}
-    line |= {"model": asked["model"]} if "model" in asked else {}
-    return {k: asked[k] for k in ("environment", "time", "output") if k in asked} | {
-        "points": points, "lines": {"one": line},
-    }  # fmt: skip
+@both_ways
+def test_what_is_stepped_has_the_cells_to_a_layer_of_its_rest(network: bool) -> None:
+    """It knows no motion to come; 100 equal cells would be half as many."""
+    layers = {"resolution": {"cells_per_layer": 6}}
+    made = said(scene({"sections": [section(200, 500)]}, CLAMP) | layers, network)
+    rest = line_of(hybrid.static(made))
+    fade = np.sqrt(500 / rest.tension[0, 0])
+    assert 6 < fade / np.diff(rest["mesh/s"])[0] < 15
+    with hybrid.Simulation(made) as stepped:
+        stepped.advance(0.2)
+        s = line_of(stepped.result())["mesh/s"]
+    assert np.abs(s - rest["mesh/s"]).max() < 1e-9 * 200
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_a_line_of_a_network_has_the_cells_of_a_cable(name: str) -> None:
-    """Its smallest bend radius is the same; of 100 equal cells it is 9 % and more too large."""
-    asked = SCENES[name][0]
-    cable, line = hybrid.static(asked), hybrid.static(as_lines(asked)).lines["one"]
-    assert line["mesh/s"] == pytest.approx(cable["mesh/s"], abs=1e-6)
-    assert sharpest(line) == pytest.approx(sharpest(cable), rel=1e-5)
-
-
-def test_a_network_that_moves_is_resumed_or_stepped_has_such_cells(tmp_path: Path) -> None:
-    heave = {"motion": {"heave": {"amplitude": 0.5, "period": 4}, "ramp": 4}}
-    asked = scene({"sections": [section(200, 500)]}, CLAMP, FAR | heave)
-    cable = hybrid.run(asked)
-    whole = hybrid.run(as_lines(asked), tmp_path / "whole.h5").lines["one"]
-    hybrid.run(as_lines(asked | {"time": {"duration": 0.2, "step": 0.1}}), tmp_path / "half.h5").close()
-    longer = hybrid.resume(tmp_path / "half.h5", until=0.4).lines["one"]
-    with hybrid.Simulation(as_lines(asked), tmp_path / "stepped.h5") as stepped:
-        while stepped.t < 0.4 - 1e-9:
-            stepped.step()
-    outside = hybrid.open(tmp_path / "stepped.h5").lines["one"]
-    for line in (whole, longer, outside):
-        assert line["mesh/s"] == pytest.approx(cable["mesh/s"], abs=1e-6)
-        assert np.allclose(line["curvature"][-1], cable["curvature"][-1], rtol=1e-5, atol=1e-9)
-
-
-@pytest.mark.parametrize("several", [False, True])
-def test_errors_of_fixed_steps_are_those_of_such_cells(several: bool) -> None:
+@both_ways
+def test_errors_of_fixed_steps_are_those_of_such_cells(network: bool) -> None:
     """The curvature at the clamp, with its error: that of a fine mesh."""
     asked = SCENES["clamp"][0] | {"output": {"errors": True}}
-    result = hybrid.run(as_lines(asked)).lines["one"] if several else hybrid.static(asked)
+    result = line_of(hybrid.run(said(asked, True)) if network else hybrid.static(asked))
     true = 1.0 / sharpest(hybrid.static(SCENES["clamp"][0] | fine(200.0, 0.0, [])))
     off = abs(float(result["curvature"][0, 0]) - true)
     assert 0.3 * off < float(result["errors/total/curvature"][0, 0]) < 6.0 * off + 1e-3 * true
@@ -175,70 +155,30 @@ def test_zones_that_move_have_the_mesh_of_rods() -> None:
         assert any(zone.kind == "catenary" for zone in moving.zones[-1])
 
 
-@pytest.mark.long
-def test_layers_of_a_line_of_several_have_the_cells_of_the_cable(tmp_path: Path) -> None:
-    """As many to sqrt(EI/T) beside its clamp, by a coarse run of the system; at rest, in motion, resumed to the bit."""
-    section = {"length": 100, "mass": 5, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 300,
-               "drag": {"normal": 1.2}}  # fmt: skip
-    end = {"position": [80, 0, 10], "motion": {"heave": {"amplitude": 0.5, "period": 6}, "ramp": 6}}
-    held = {"tangent": [1, 0, 0], "normal": [0, 1, 0]}
-    common = {"environment": {"fluid": {"density": 1025}}, "time": {"duration": 2.0, "step": 0.125}}
-    line = {"model": "rod", "resolution": {"cells_per_layer": 6}}
-    start = {"kind": "clamped", "position": [0, 0, 0]} | held
-    cable = common | line | {
-        "cable": {"sections": [section]}, "ends": {"start": start, "end": {"kind": "pinned"} | end},
-        "initial": "equilibrium", "output": {"every": 0.5, "exact": True},
-    }  # fmt: skip
-    lines = {"riser": line | {"start": "a", "end": "b", "connections": {"start": held}, "sections": [section]}}
-    system = common | {"points": {"a": {"position": [0, 0, 0]}, "b": end}, "lines": lines, "output": {"every": 0.5}}
-    for compute in (hybrid.static, hybrid.run):
-        one, several = compute(cable), compute(system).lines["riser"]
-        assert np.abs(several["mesh/s"] - one["mesh/s"]).max() < 1e-9 * 100
-        assert np.abs(several.position - one.position).max() < 1e-9 * 100
-    fade = np.sqrt(300 / one.tension[:, 0].mean())
-    assert 6 < fade / np.diff(one["mesh/s"])[0] < 15  # 100 equal cells would be 0.5
-    hybrid.run(system, tmp_path / "whole.h5").close()
-    short = {"time": {"duration": 1.0, "step": 0.125}}
-    hybrid.run(system | short, tmp_path / "part.h5").close()
-    hybrid.resume(tmp_path / "part.h5", until=2.0).close()
-    with hybrid.open(tmp_path / "part.h5") as part:
-        assert part.lines["riser"].times[-1] == 2.0 and part.status == "complete"
-    at_rest = hybrid.static(cable)
-    with hybrid.Simulation(cable) as one, hybrid.Simulation(system) as several:  # which know no motion to come
-        for stepped in (one, several):
-            stepped.advance(0.25)
-        s, r = one.state.s, one.state.position
-        assert np.abs(s - at_rest["mesh/s"]).max() < 1e-9 * 100
-        there = several.line("riser")
-        assert np.abs(there.s - s).max() < 1e-9 * 100 and np.abs(there.position - r).max() < 1e-9 * 100
-
-
 # ---- a slack bend that is shorter than the cells of a loose accuracy -------------------------------
 
 
-def s_tether(several: bool, accuracy: str, duration: float = 20.0) -> Any:
+def s_tether(network: bool, accuracy: str, duration: float = 20.0) -> Any:
     """3000 m that bend within 1.9 m where the heavy half hands over to the light one."""
     found = hybrid.load_scene(DEFECT.with_name("long_s_tether.yaml"), [f"time.duration={duration}"])
     data = found.model_dump(mode="json", exclude_none=True, exclude_unset=True) | {"accuracy": accuracy}
     data["output"] = {"every": 1.0, "points": 301}
-    return as_lines(data) | {"accuracy": accuracy} if several else data
+    return said(data, network)
 
 
-@pytest.mark.parametrize("several", [False, True])
-def test_a_loose_accuracy_shows_a_slack_bend_at_rest(several: bool) -> None:
+@both_ways
+def test_a_loose_accuracy_shows_a_slack_bend_at_rest(network: bool) -> None:
     """10 % was refused: the first cells were of 60 m, and the only equilibrium that was found on them buckles."""
-    result = hybrid.static(s_tether(several, "10%"))
-    line = result.lines["one"] if several else result
+    line = line_of(hybrid.static(s_tether(network, "10%")))
     assert sharpest(line) == pytest.approx(1.742, rel=0.05)
     assert {x.verdict for x in line.verdicts().accuracy} == {"met"} and line.attributes["cells"] < 150
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("several", [False, True])
-def test_a_loose_accuracy_of_a_slack_bend_is_cheap_and_not_wrong(several: bool) -> None:
+@both_ways
+def test_a_loose_accuracy_of_a_slack_bend_is_cheap_and_not_wrong(network: bool) -> None:
     """At 5 % it was 62 m off, without an error figure."""
-    found = [hybrid.run(s_tether(several, x, 60.0)) for x in ("1%", "5%", "10%")]
-    fine, *loose = [x.lines["one"] for x in found] if several else found
+    fine, *loose = (line_of(hybrid.run(s_tether(network, x, 60.0))) for x in ("1%", "5%", "10%"))
     for line, part in zip(loose, (0.05, 0.1), strict=True):
         off = np.linalg.norm(line.position - fine.position, axis=-1).max()
         assert off < line.attributes["error_total_position"] + fine.attributes["error_total_position"] < part * 60.0
@@ -247,9 +187,8 @@ def test_a_loose_accuracy_of_a_slack_bend_is_cheap_and_not_wrong(several: bool) 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("several", [False, True])
-def test_tension_that_changes_by_little_is_no_doubt_where_nothing_holds_the_line(several: bool) -> None:
+@both_ways
+def test_tension_that_changes_by_little_is_no_doubt_where_nothing_holds_the_line(network: bool) -> None:
     """By 0.3 % of the largest (root mean square), twice; of a line on a bed with friction that is a doubt."""
-    found = hybrid.run(s_tether(several, "5%", 120.0))
-    line = found.lines["one"] if several else found
+    line = line_of(hybrid.run(s_tether(network, "5%", 120.0)))
     assert {x.verdict for x in line.verdicts().accuracy} == {"met"}

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from test_lone_lines import BALL, SPANS, scene
-from test_plane import deep_beam, planes, swinging
-from test_plane_again import storm
+from test_plane import deep_beam, planes, storm, swinging
 from test_system_contact import HOSE
 
 import hybrid

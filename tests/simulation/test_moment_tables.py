@@ -23,19 +23,25 @@ TABLES: dict[str, list[list[float]]] = {
 }
 
 
-def taut(cells: int, table: list[list[float]] | None, *attached: dict[str, Any], **tables: Any) -> dict[str, Any]:
+def taut(
+    cells: int, law: dict[str, Any], force: Any = None, *attached: dict[str, Any], **tables: Any
+) -> dict[str, Any]:
     """A line that is clamped at 20 degrees to its pull, without weight."""
-    law: dict[str, Any] = {"bending_stiffness": 1e4} if table is None else {"moment_curvature": table}
+    pull = [PULL * cos(ANGLE), 0, PULL * sin(ANGLE)] if force is None else force
     return {
         "environment": {"gravity": 0},
         "cable": {"sections": [{"length": LENGTH, "mass": 1} | law], "attachments": list(attached)},
         "ends": {
             "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
-            "end": {"kind": "free", "force": [PULL * cos(ANGLE), 0, PULL * sin(ANGLE)]},
+            "end": {"kind": "free", "force": pull},
         },
         "initial": "equilibrium", "model": "rod", "contact": {"self": False}, "mesh": {"cells": cells},
-        "output": {"points": 2},
     } | tables  # fmt: skip
+
+
+def by_table(cells: int, table: list[list[float]] | None, *attached: dict[str, Any], **tables: Any) -> dict[str, Any]:
+    law: dict[str, Any] = {"bending_stiffness": 1e4} if table is None else {"moment_curvature": table}
+    return taut(cells, law, None, *attached, **{"output": {"points": 2}} | tables)
 
 
 def moment_of(kappa: float, table: list[list[float]]) -> float:
@@ -88,7 +94,7 @@ def test_a_clamp_bends_by_its_table(name: str, dimension: int) -> None:
     """The line of cells to 1e-6, and with their square to the continuous line, whatever its table."""
     table, off = TABLES[name], []
     for cells in (80, 160):
-        found = hybrid.static(taut(cells, table, dimension=dimension))
+        found = hybrid.static(by_table(cells, table, dimension=dimension))
         kappa, moment = of_cells(cells, table)
         assert found.curvature[0, 0] == pytest.approx(kappa, rel=1e-6)
         assert found.bending_moment[0, 0] == pytest.approx(moment, rel=1e-6)
@@ -97,7 +103,7 @@ def test_a_clamp_bends_by_its_table(name: str, dimension: int) -> None:
 
 
 def test_a_straight_table_is_a_stiffness() -> None:
-    plain, law = (hybrid.static(taut(80, x)) for x in (None, TABLES["straight"]))
+    plain, law = (hybrid.static(by_table(80, x)) for x in (None, TABLES["straight"]))
     assert np.abs(law.position - plain.position).max() < 1e-9
     assert law["energy/bending"][0] == pytest.approx(plain["energy/bending"][0], rel=1e-9)
     assert law.envelope["curvature_max"] == pytest.approx(plain.envelope["curvature_max"], abs=1e-8)
@@ -107,7 +113,7 @@ def test_a_restrictor_is_the_table_of_what_it_locks() -> None:
     """Published check of the closed form: 0.3084327 1/m and 11432.71 N m where 1 MN m2 lock at 0.3 1/m."""
     locks = {"kind": "bend_restrictor", "range": [0, 8], "radius": 1 / 0.3, "locked_stiffness": 1e6 - 1e4}
     short = locks | {"range": [0, 1]}
-    table, whole, part = (hybrid.static(taut(640, *x)) for x in ((TABLES["locks"],), (None, locks), (None, short)))
+    table, whole, part = (hybrid.static(by_table(640, *x)) for x in ((TABLES["locks"],), (None, locks), (None, short)))
     assert of_clamp(TABLES["locks"]) == pytest.approx(0.3084327, abs=1e-7)
     assert whole.curvature[0, 0] == pytest.approx(0.3084327, rel=1e-5)
     assert whole.bending_moment[0, 0] == pytest.approx(11432.71, rel=1e-4)
@@ -122,7 +128,7 @@ def test_elements_between_tables_have_one_moment() -> None:
         {"length": 0.5, "mass": 1, "moment_curvature": TABLES["locks"]},
         {"length": 7.0, "mass": 1, "bending_stiffness": 1.2e4, "torsional_stiffness": 1e4},
     ]
-    scene = taut(160, None, output={"points": 33}) | {"cable": {"sections": sections}}
+    scene = by_table(160, None, output={"points": 33}) | {"cable": {"sections": sections}}
     found = hybrid.static(scene)
     beyond = hybrid.static(scene | {"dimension": 2})
     (s, moments), (_, bends) = found.both_sides("bending_moment"), found.both_sides("curvature")
@@ -147,7 +153,7 @@ def test_elements_between_tables_have_one_moment() -> None:
 @pytest.mark.parametrize("name", ["softens", "locks"])
 def test_a_spring_at_a_clamp_turns_and_the_line_bends_by_its_table(name: str, dimension: int) -> None:
     """One moment turns the spring and bends the line: curvature, its envelope, and the tangent that the tension is along."""
-    scene = taut(160, TABLES[name], dimension=dimension)
+    scene = by_table(160, TABLES[name], dimension=dimension)
     scene["ends"]["start"]["bend_stiffness"] = 2e4
     found = hybrid.static(scene)
     M = float(found.bending_moment[0, 0])
@@ -164,7 +170,7 @@ def test_an_unloaded_line_has_its_own_curvature_beside_a_spring() -> None:
         "length": LENGTH, "mass": 1, "bending_stiffness": 1e4, "torsional_stiffness": 1e4,
         "intrinsic_curvature": [0.05, 0, 0],
     }  # fmt: skip
-    scene = taut(40, None) | {"cable": {"sections": [section]}}
+    scene = by_table(40, None) | {"cable": {"sections": [section]}}
     scene["ends"] = {"start": scene["ends"]["start"] | {"bend_stiffness": 2e4}, "end": "free"}
     found = hybrid.static(scene)
     assert found.curvature[0] == pytest.approx([0.05] * 2, rel=1e-6)
@@ -248,14 +254,14 @@ def test_zones_that_move_bend_as_rods_do(model: Any) -> None:
 )
 def test_what_is_no_table_is_refused(given: dict[str, Any], expected: str) -> None:
     section = {"length": 8, "mass": 1, "bending_stiffness": 1e4} | given
-    scene = taut(40, None) | {"cable": {"sections": [{k: x for k, x in section.items() if x is not None}]}}
+    scene = by_table(40, None) | {"cable": {"sections": [{k: x for k, x in section.items() if x is not None}]}}
     with pytest.raises(SceneError, match=expected):
         hybrid.validate_scene(scene)
 
 
 def test_a_restrictor_needs_a_bending_stiffness() -> None:
     locks = {"kind": "bend_restrictor", "range": [0, 2], "radius": 3}
-    scene = taut(40, None, locks) | {"model": "catenary"}
+    scene = by_table(40, None, locks) | {"model": "catenary"}
     scene["cable"]["sections"] = [{"length": LENGTH, "mass": 1}]
     scene["ends"] = scene["ends"] | {"start": {"kind": "pinned", "position": [0, 0, 0]}}
     with pytest.raises(SceneError, match="what locks there bends until then"):

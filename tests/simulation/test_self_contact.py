@@ -91,9 +91,8 @@ def test_a_throw(seed: int, steps: float) -> None:
     assert np.abs(moved).max() < 1e-13 * mass.sum() * speed
 
 
-@pytest.mark.parametrize("seed", [17, 163])
-def test_free_flight_after_contact_gains_no_energy(seed: int) -> None:
-    """Throws of the bench that had 1.28 and 1.39 of their energy in free flight when only contact itself was damped."""
+def thrown(seed: int) -> tuple[hybrid.Simulation, OnlyLine, float, float]:
+    """A throw of the bench, its step and its duration, s."""
     random = np.random.default_rng(seed)
     width, speed = random.uniform(0.01, 0.04), float(np.exp(random.uniform(np.log(2.0), np.log(20.0))))
     steps, friction = random.uniform(1.0, 10.0), random.uniform(0.05, 0.8)
@@ -104,6 +103,13 @@ def test_free_flight_after_contact_gains_no_energy(seed: int) -> None:
     line.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(np.linspace(-1.0, 1.0, len(r)) / 0.15))
     line.state.v[:] += 0.05 * speed * random.normal(size=3)
     line.begin_again()
+    return simulation, line, step, duration
+
+
+@pytest.mark.parametrize("seed", [17, 163])
+def test_free_flight_after_contact_gains_no_energy(seed: int) -> None:
+    """Throws of the bench that had 1.28 and 1.39 of their energy in free flight when only contact itself was damped."""
+    simulation, line, step, duration = thrown(seed)
     first, most, near = energy(line), 0.0, 0
     while simulation.t < duration * (1.0 - 1e-9):
         simulation.advance(min(simulation.t + step, duration))
@@ -129,16 +135,7 @@ def test_steps_of_a_line_that_has_not_come_near_itself_are_not_judged_by_contact
 @pytest.mark.long
 def test_steps_that_would_create_energy_are_repeated() -> None:
     """A throw of the bench that stopped at 2.3 times its energy: steps of 5 ms, in which a strand could pass 9 diameters."""
-    random = np.random.default_rng(901)
-    width, speed = random.uniform(0.01, 0.04), float(np.exp(random.uniform(np.log(2.0), np.log(20.0))))
-    steps, friction = random.uniform(1.0, 10.0), random.uniform(0.05, 0.8)
-    r = hairpin(random.uniform(15.0, 90.0), 3.0 * width)
-    step, duration = steps * width / speed, 30.0 * width / speed * steps
-    simulation = flying(r, step, duration, width, friction=friction)
-    line = OnlyLine(simulation)
-    line.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(np.linspace(-1.0, 1.0, len(r)) / 0.15))
-    line.state.v[:] += 0.05 * speed * random.normal(size=3)
-    line.begin_again()
+    simulation, line, step, duration = thrown(901)
     first, most = energy(line), 0.0
     while simulation.t < duration * (1.0 - 1e-9):
         simulation.advance(min(simulation.t + step, duration))
@@ -256,16 +253,6 @@ def test_friction_holds_a_loop_and_its_work_is_booked() -> None:
     assert rough["work/scheme"].max() < 1e-3 * put_in
 
 
-@pytest.mark.long
-def test_it_resumes_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = hybrid.validate_scene(looped(contact={"self": True, "friction": 0.2}))
-    stopping = Stopping(monkeypatch)
-    with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
-        assert np.interp([6.5, 8.0], whole.times, whole["energy/self_contact"]).all()
-    assert went_on(scene, tmp_path / "run.h5", stopping, [650, 150]) == 2
-    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
-
-
 def closing(model: Any, **more: Any) -> dict[str, Any]:
     """A line hangs in a U; its ends approach until its legs touch."""
     section = {
@@ -305,12 +292,21 @@ def test_catenaries_that_come_near_themselves_become_rods() -> None:
 
 
 @pytest.mark.long
-def test_it_resumes_bit_for_bit_with_zones_that_move(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On 160 cells: with 100, rods everywhere and zones alike let go of each other before it is stopped at 5 s."""
-    scene, stopping = hybrid.validate_scene(closing("adaptive", mesh={"cells": 160})), Stopping(monkeypatch)
+@pytest.mark.parametrize(
+    ("scene", "touching", "stops"),
+    [  # on 160 cells: with 100, rods everywhere and zones alike let go of each other before it is stopped at 5 s
+        (looped(contact={"self": True, "friction": 0.2}), [6.5, 8.0], [650, 150]),
+        (closing("adaptive", mesh={"cells": 160}), [5.0, 5.2], [500, 20]),
+    ],
+    ids=["rod", "zones that move"],
+)
+def test_it_resumes_bit_for_bit(
+    scene: Any, touching: list[float], stops: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stopping = Stopping(monkeypatch)
     with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
-        assert np.interp([5.0, 5.2], whole.times, whole["energy/self_contact"]).all()
-    assert went_on(scene, tmp_path / "run.h5", stopping, [500, 20]) == 2
+        assert np.interp(touching, whole.times, whole["energy/self_contact"]).all()
+    assert went_on(scene, tmp_path / "run.h5", stopping, stops) == 2
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 

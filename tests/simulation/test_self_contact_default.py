@@ -84,22 +84,6 @@ def test_contact_that_begins_by_itself_is_told(led: hybrid.Result) -> None:
         assert ("whatever its ends do; its steps take 2 to 20 times as long" in lines) == told
 
 
-def test_contact_that_begins_at_a_line_of_several_is_told() -> None:
-    led = led_through()
-    line = {"start": "a", "end": "b", "sections": led["cable"]["sections"], "model": "rod", "mesh": {"cells": 40}}
-    points = {"a": led["ends"]["start"], "b": led["ends"]["end"]}
-    points = {name: {k: x for k, x in end.items() if k != "kind"} for name, end in points.items()}
-    scene = {
-        "points": points,
-        "lines": {"one": line},
-        "time": {"duration": 2.0, "step": 0.02},
-        "output": {"every": 0.5},
-    }
-    with hybrid.run(scene) as found:
-        events = [event for event in found.lines["one"].events if event.kind == "contact begins"]
-    assert events and events[0].t > 0.0 and "surfaces are" in events[0].text
-
-
 @pytest.mark.slow
 def test_it_resumes_bit_for_bit_before_contact_begins_and_in_it(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

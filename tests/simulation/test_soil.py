@@ -175,19 +175,6 @@ def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     resumed(pressed(bed, 8.0, 0.02, motion), tmp_path, 5.0)
 
 
-@pytest.mark.long
-def test_a_line_of_several_is_the_same_in_soil() -> None:
-    alone = pressed({"soil": SOIL}, 6.0, 0.02, {"heave": HEAVE}, dimension=3)
-    points = {name: {k: x for k, x in end.items() if k != "kind"} for name, end in alone["ends"].items()}
-    line = {"start": "start", "end": "end", "model": "rod", "mesh": alone["mesh"], "initial": alone["initial"],
-            "sections": alone["cable"]["sections"], "contact": {"self": False}}  # fmt: skip
-    system = {"environment": alone["environment"], "points": points, "lines": {"one": line},
-              "time": alone["time"], "output": alone["output"]}  # fmt: skip
-    one, other = hybrid.run(alone), hybrid.run(system).lines["one"]
-    np.testing.assert_allclose(other.contact, one.contact, atol=1e-6 * 1700.0)
-    assert float(other["work/contact"][-1]) == pytest.approx(float(one["work/contact"][-1]), rel=1e-6)
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [

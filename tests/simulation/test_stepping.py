@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import runpy
+import threading
+from collections.abc import Callable, Iterator
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,7 @@ from hybrid.kernels.laws.end_motion import driven_frame, driven_position
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.state.state import no_moves
 from hybrid.model.ends import PATH, DrivenEnd, rotation, rotation_vector
+from tests.said import both_ways, line_of, said
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PINNED = "ends.end={kind: pinned, position: [205, 0, 0]}"
@@ -350,3 +354,139 @@ def test_after_a_failed_step_it_asks_for_a_restore() -> None:
         simulation.restore(saved)
         driven(simulation, 2)
         assert simulation.t == pytest.approx(0.1)
+
+
+# --- contact with itself that begins ---
+
+WIDTH, LENGTH, END = 0.02, 4.0, 3.2
+HOSE = {
+    "length": LENGTH, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e5, "bending_stiffness": 0.005,
+    "torsional_stiffness": 0.004, "damping": {"mass": 0.5},
+}  # fmt: skip
+FAR = [0, 0, -LENGTH + 0.5 * WIDTH]
+SCENE = {
+    "cable": {"sections": [HOSE]}, "model": "rod", "mesh": {"cells": 80}, "initial": "equilibrium", "dimension": 3,
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": FAR}},
+    "time": {"duration": END, "step": 0.01}, "output": {"every": 0.1},
+}  # fmt: skip
+
+
+def place(t: float) -> np.ndarray:
+    """Up on an arc to the other end, and past the leg there, which it meets from t = 3 s on."""
+    x = min(t / 3.0, 1.0)
+    return np.array([0.6 * np.sin(np.pi * x) - 0.4 * max(t - 3.0, 0.0), 0.0, FAR[2] + 3.5 * x])
+
+
+def led_through(scene: dict[str, Any], back: bool) -> hybrid.Result:
+    """The end is led until the line touches itself; back: once it is taken back to 1 s from there."""
+    with hybrid.Simulation(scene) as lines:
+        to = (lambda x: lines.set_point("end", x)) if "points" in scene else (lambda x: lines.set_end("end", x))
+        for t in np.arange(1, 33) * 0.1:
+            to(place(t))
+            if back and t == pytest.approx(1.0):
+                before = lines.save()
+                for later in (1.0, 1.5, 2.0, 2.5, 3.0, END):
+                    to(place(later))
+                    lines.advance(later)
+                lines.restore(before)
+                to(place(t))
+            lines.advance(min(t, END))
+        return line_of(lines.result())
+
+
+@pytest.mark.long
+@both_ways
+def test_it_touches_itself_and_goes_back_before_that(network: bool) -> None:
+    """What is taken back takes its contact along: the same state, bit for bit, at the same time again."""
+    found = [led_through(said(SCENE, network), back) for back in (True, False)]
+    for line in found:
+        assert "line touches itself" in {event.kind for event in line.events}
+        assert float(line["self_distance/distance"]) > 0.75 * WIDTH
+    assert np.array_equal(found[0].position, found[1].position)
+
+
+# --- wrong uses: an error in words, and it goes on as if nothing had been asked ---
+
+TIMES = [None, "x", nan, inf, -1.0, 0.0, [], [1], {}, object(), True, 1e300, b"a", 1 + 2j, np.zeros(3), "1.0"]
+VECTORS = ["abc", nan, [1, 2], [1, 2, 3, 4], [1, nan, 3], [1, 2, "x"], {}, object(), np.zeros((3, 3)), [[1], [2], [3]],
+           [None] * 3, [inf, 0, 0], 1.0, [1j, 0, 0], [True, {}, 0]]  # fmt: skip
+FRAMES = ["x", nan, np.zeros((3, 3)), -np.eye(3), 2 * np.eye(3), np.full((3, 3), nan), np.eye(2), [1, 2, 3], object(),
+          np.diag([1, 1, -1]), {}]  # fmt: skip
+NO_ENDS = ["middle", 0, None, 1, "START", [], object(), b"end"]
+
+
+def simulation(cells: int = 10) -> hybrid.Simulation:
+    tables: dict[str, Any] = {
+        "cable": {"sections": [{"length": 10, "mass": 1, "axial_stiffness": 1e5, "bending_stiffness": 5}]},
+        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}, "end": "free"},
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells}, "time": {"duration": 2, "step": 0.05},
+    }  # fmt: skip
+    return hybrid.Simulation(tables)
+
+
+def uses(other: Any) -> Iterator[Callable[[hybrid.Simulation], Any]]:
+    """Wrong calls; other: what `save` of another Simulation has returned."""
+    place = [0.0, 0.0, 0.0]
+    for x in TIMES:
+        yield lambda s, x=x: s.advance(x)
+    for x in NO_ENDS:
+        yield lambda s, x=x: s.set_end(x, place)
+        yield lambda s, x=x: s.set_force(x, place)
+        yield lambda s, x=x: s.release(x)
+    for x in VECTORS:
+        yield lambda s, x=x: s.set_end("start", x)
+        yield lambda s, x=x: s.set_end("start", place, x)
+        yield lambda s, x=x: s.set_force("end", x)
+        yield lambda s, x=x: s.set_force("end", [9.0, 0.0, 0.0], x)
+    for x in FRAMES:
+        yield lambda s, x=x: s.set_end("start", place, frame=x)
+    for x in (None, 1, "x", {}, object(), other):
+        yield lambda s, x=x: s.restore(x)
+    yield lambda s: s.set_end("end", place)
+    yield lambda s: s.set_force("start", place)
+    yield lambda s: s.release("end")
+
+
+def test_wrong_uses_are_errors_in_words_and_change_nothing() -> None:
+    with simulation() as plain:
+        plain.advance(0.5)
+        expected = plain.state.position
+    with simulation(7) as other, simulation() as asked:
+        wrong = list(uses(other.save()))
+        assert len(wrong) > 100
+        asked.step()
+        for use in wrong:
+            with pytest.raises(ValueError, match=r"\w+.*\w+"):
+                use(asked)
+            assert asked.t == 0.05
+        asked.advance(0.5)
+        assert np.array_equal(asked.state.position, expected)
+
+
+def test_a_closed_simulation_says_so() -> None:
+    with simulation() as closed:
+        saved = closed.save()
+    for use in (closed.step, closed.save, lambda: closed.restore(saved), lambda: closed.advance(1.0),
+                lambda: closed.set_force("end", [0, 0, 1]), lambda: closed.release("start")):  # fmt: skip
+        with pytest.raises(ValueError, match="the simulation is over"):
+            use()
+    closed.close()
+
+
+def test_two_threads_in_one_simulation_are_told_apart() -> None:
+    with simulation(400) as cable:
+        before, refused = cable.t, []
+        busy = threading.Thread(target=lambda: cable.advance(2.0))
+        busy.start()
+        while busy.is_alive():
+            for use in (cable.save, lambda: cable.state, cable.forces, lambda: cable.advance(2.0)):
+                try:
+                    use()
+                except ValueError as error:
+                    refused.append(str(error))
+        busy.join()
+        assert before == 0.0 and cable.t == pytest.approx(2.0)
+        assert any("another thread" in text for text in refused)
+    with simulation(400) as alone:
+        alone.advance(2.0)
+        assert np.array_equal(alone.state.position, cable.state.position)

@@ -15,6 +15,7 @@ import pytest
 from bits import resumed
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
+from test_axial_law import assert_cut_is_whole, bar, two_lines
 
 import hybrid
 from tests.inside import OnlyLine
@@ -55,22 +56,6 @@ def at_rest(which: str, T: float, highest: float) -> float:
         return highest * ((1.0 - np.exp(k2 * x)) / (1.0 - np.exp(k2)) if which == "exponential" else x)
 
     return float(brentq(lambda strain: tension(strain) - T, slack, top, xtol=1e-15))
-
-
-def bar(section: dict[str, Any], history: list[list[float]], **tables: Any) -> dict[str, Any]:
-    """A bar of 10 m along x, under a force along it that changes."""
-    kind = tables.pop("model", "catenary")
-    stiff = {"bending_stiffness": 1.0} if kind == "rod" else {}
-    return {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [{"length": 10, "mass": 1e-4} | stiff | section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "free", "force": {"history": history}},
-        },
-        "initial": {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, 0]}, "model": kind,
-        "mesh": {"cells": 5}, "time": {"duration": history[-1][0], "step": 0.05}, "output": {"every": 0.5},
-    } | tables  # fmt: skip
 
 
 @pytest.mark.parametrize("which", SHAPES)
@@ -159,41 +144,20 @@ def test_energy_balances_and_nothing_is_gained(which: str) -> None:
     assert off[1] < 0.35 * off[0]
 
 
-def two_lines(cut: bool) -> dict[str, Any]:
-    """A rope from an anchor to a vessel that heaves and moves away, in one piece or in two."""
-    points: dict[str, Any] = {
-        "anchor": {"position": [0, 0, -60]},
-        "vessel": {"position": [40, 0, 0], "motion": {"heave": {"amplitude": 0.6, "period": 6}, "ramp": 3}},
-    }
-    tables = {"curve": [[x, 3 * T] for x, T in OWC], "highest_tension": 2700.0, **SHAPES["exponential"]}
-    fast = {"constant": 9e5, "per_tension": 15, "relaxation_time": 2}
-    section = {"mass": 4.0, "diameter": 0.08, "drag": {"normal": 1.2}, "syrope": tables, "dynamic_stiffness": fast}
-    lines = {
-        "rope": {"start": "anchor", "end": "vessel", "sections": [section | {"length": 70}], "mesh": {"cells": 40}}
-    }
-    if cut:
-        points["knot"] = {"initial_guess": [20, 0, -30]}
-        half = {"sections": [section | {"length": 35.0}], "mesh": {"cells": 20}}
-        lines = {"rope": {"start": "anchor", "end": "knot"} | half, "upper": {"start": "vessel", "end": "knot"} | half}
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.5, 0, 0]}}, "points": points, "lines": lines,
-        "time": {"duration": 6, "step": 0.05}, "output": {"every": 0.5},
-    }  # fmt: skip
+SECTION = {
+    "syrope": {"curve": [[x, 3 * T] for x, T in OWC], "highest_tension": 2700.0, **SHAPES["exponential"]},
+    "dynamic_stiffness": {"constant": 9e5, "per_tension": 15, "relaxation_time": 2},
+}
 
 
 def test_a_rope_that_is_cut_is_the_same_rope() -> None:
-    one, two = hybrid.run(two_lines(False)), hybrid.run(two_lines(True))
-    whole, lower = one.lines["rope"], two.lines["rope"]
-    halfway = np.array([[np.interp(35.0, whole.s, x[:, k]) for k in range(3)] for x in whole.position])
-    assert np.abs(halfway - lower.position[:, -1]).max() < 1e-7
-    top, cut = whole.tension[:, -1], two.lines["upper"].tension[:, 0]
-    assert np.abs(top - cut).max() < 1e-6 * np.abs(top).max()
+    assert_cut_is_whole(SECTION, heave=0.6)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("system", [False, True], ids=["one", "several"])
 def test_a_rope_goes_on_bit_for_bit(tmp_path: Path, system: bool) -> None:
-    scene = two_lines(True) if system else swing("exponential", 0.01)
+    scene = two_lines(SECTION, True, heave=0.6) if system else swing("exponential", 0.01)
     resumed(scene, tmp_path, 0.5 * scene["time"]["duration"])
 
 

@@ -63,46 +63,6 @@ def test_each_line_has_its_own_part_of_its_limits(moved: hybrid.Result) -> None:
         moved.utilisation()
 
 
-def test_a_system_of_one_line_is_the_cable_with_a_body_at_its_end() -> None:
-    """The same equations, by the small system instead of the march alone: equal to what Newton leaves in 240 steps."""
-    one = hybrid.run(
-        {
-            "environment": SEA, "cable": {"sections": [SECTION]},
-            "ends": {"start": PINNED | {"kind": "pinned"}, "end": {"kind": "body", "initial_guess": [40, 5, -1]} | BODY},
-            "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 30}, "dimension": 3,
-            "time": TIME, "output": {"errors": False},
-        }
-    )  # fmt: skip
-    system = hybrid.run(buoy())
-    line = system.lines["riser"]
-    assert np.array_equal(line.times, one.times) and len(one.times) == 101
-    assert np.abs(one.position[-1] - one.position[0]).max() > 0.3
-    assert np.abs(line.position - one.position).max() < 1e-7 * 108
-    assert np.abs(line.tension - one.tension).max() < 1e-5 * one.tension.max()
-    for name in ("energy/kinetic", "energy/potential", "work/drag", "work/waves"):
-        assert np.abs(line[name] - one[name]).max() < 1e-5 * np.abs(one[name]).max(), name
-    assert np.abs(line.envelope["tension_max"] - one.envelope["tension_max"]).max() < 1e-5 * one.tension.max()
-    assert np.array_equal(system["points/buoy/position"], line.position[:, -1])
-
-
-@pytest.mark.parametrize("start, end", [("low", "high"), ("high", "low")])
-def test_a_system_of_one_driven_line_is_the_cable(start: str, end: str) -> None:
-    """Also in the first step, whose end moves: equal to what Newton leaves and the small differences of its solution."""
-    heave = {"heave": {"amplitude": 1.5, "period": 4}, "ramp": 2}
-    points = {"low": PINNED, "high": {"position": [60, 5, -35.0], "motion": heave}}
-    tables: dict[str, Any] = {"environment": SEA, "time": {"duration": 1.0, "step": 0.05}, "output": {"every": 0.05}}
-    mesh = {"cells": 20}
-    ends = {name: points[x] | {"kind": "pinned"} for name, x in (("start", start), ("end", end))}
-    cable = {"cable": {"sections": [SECTION]}, "ends": ends, "initial": "equilibrium", "mesh": mesh, "dimension": 3}
-    one = hybrid.run(tables | cable | {"model": "catenary"})
-    line = {"start": start, "end": end, "sections": [SECTION], "mesh": mesh}
-    two = hybrid.run(tables | {"points": points, "lines": {"line": line}}).lines["line"]
-    assert np.abs(one.velocity).max() > 0.2 and np.array_equal(one.times, two.times)
-    assert np.abs(one.position - two.position).max() < 1e-10 * 108
-    for name in ("tension", f"reaction_{'end' if end == 'high' else 'start'}"):
-        assert np.abs(one[name] - two[name]).max() < 1e-8 * one.tension.max(), name
-
-
 def test_every_line_and_point_is_in_the_result(moved: hybrid.Result) -> None:
     assert list(moved.lines) == ["west", "east", "hose"]
     at = moved["points/float/position"]

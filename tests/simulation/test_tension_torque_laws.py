@@ -232,21 +232,6 @@ def test_zones_are_rods(name: str, damped: float) -> None:
     assert off < (1e-3 if not damped else 1.5 * apart("stiffness", damped))
 
 
-@pytest.mark.parametrize("name", ["table", "polyester", "creep"])
-def test_a_line_of_several_is_the_cable(name: str) -> None:
-    scene = sag(LAWS[name], ZONES, 0.02, time={"duration": 2.0, "step": 0.02, "rho_inf": 0.9})
-    one = hybrid.run(scene)
-    ends = scene["ends"]
-    held = {k: {key: x[key] for key in ("kind", "tangent", "normal")} for k, x in ends.items()}
-    line = {"start": "a", "end": "b", **scene["cable"], "model": ZONES, "mesh": scene["mesh"], "connections": held,
-            "initial": "equilibrium"}  # fmt: skip
-    points = {"a": {"position": [0, 0, 0]}, "b": {"position": [52, 0, 0], "motion": ends["end"]["motion"]}}
-    kept = {key: scene[key] for key in ("environment", "time", "output")}
-    other = hybrid.run({**kept, "points": points, "lines": {"one": line}}).lines["one"]
-    for key in (*ALIKE, "energy/stretch"):
-        assert np.abs(other[key] - one[key]).max() < 1e-6 * np.abs(one[key]).max(), key
-
-
 @pytest.mark.parametrize("name", ["table", "polyester"])
 def test_zones_that_move(name: str) -> None:
     """Cells that come and go keep the torque of the tension: against rods with the same tension."""
