@@ -158,12 +158,12 @@ def test_energy_that_comes_with_curved_material_is_booked(rate: float) -> None:
 def test_a_curved_rod_comes_to_rest_where_one_of_its_length_does() -> None:
     """Paid out slowly, in damping: the equilibrium of the longer line, from which one that is straight is far."""
     near = {"kind": "pinned", "position": [6, 0, 1]}
-    curled = {"cable.sections.0.intrinsic_curvature": CURL}
-    slowly = hybrid.run(curled(0.02, 40.0, near, **curled))
+    curved = {"cable.sections.0.intrinsic_curvature": CURL}
+    slowly = hybrid.run(curled(0.02, 40.0, near, **curved))
     long = float(slowly["payout/length"][-1])
     s = slowly.s[slowly.s <= LENGTH]
     rest, straight = (
-        hybrid.static(curled(None, 40.0, near, **{"cable.sections.0.length": long} | more)) for more in (curled, {})
+        hybrid.static(curled(None, 40.0, near, **{"cable.sections.0.length": long} | more)) for more in (curved, {})
     )
     there, other = (np.array([np.interp(s, x.s, x.position[-1, :, k]) for k in range(3)]).T for x in (rest, straight))
     found = slowly.position[-1, : s.size]
