@@ -11,7 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.run import payout_run
-from hybrid.simulation.lines_nodes import LineNodes
+from hybrid.simulation.payout_nodes import LineNodes
 from hybrid.simulation.run_payout import RunPayout
 from hybrid.solve.network_steps import NetworkSteps
 from tests.simulation.test_payout import clamped, kicks

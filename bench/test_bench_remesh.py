@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from test_bench_cells import CASES, TOUCHDOWN, from_file, scene_of
 
 import hybrid
-from hybrid.adapt.state_transfer import transfer_to
+from hybrid.adapt.manager import transfer_to
 from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.simulation import zone_switching
 from hybrid.simulation.cell_changes import CellChanges

@@ -28,7 +28,7 @@ from hybrid.model.build import build
 from hybrid.model.plane import planar, untwist
 from hybrid.outputs import output_grid
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.plane_stability import seed
+from hybrid.solve.stability import seed
 from hybrid.solve.statics import Search, solve_statics
 from hybrid.solve.stepper import Stepper
 

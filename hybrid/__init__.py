@@ -18,11 +18,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hybrid.accuracy.api import resume, run, static
     from hybrid.accuracy.run_forecast import plan
-    from hybrid.adapt.user_criterion import NodeState
+    from hybrid.adapt.zone_rules import NodeState
     from hybrid.couple.fmu_export import export_fmu
-    from hybrid.designs.component import openmdao_component
-    from hybrid.designs.design import design
-    from hybrid.designs.seek import seek
+    from hybrid.designs.design import design, openmdao_component
+    from hybrid.designs.nearest import seek
     from hybrid.designs.sensitivity import sensitivity
     from hybrid.designs.shares import shares
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from hybrid.scene.root import Scene
     from hybrid.scene.root import Scene as System  # noqa: F401  # deprecated
     from hybrid.simulation.lines_stiffness import offsets, stiffness
-    from hybrid.simulation.listed_outputs import kinds_of_quantities, listed_outputs
+    from hybrid.simulation.run_quantities import kinds_of_quantities, listed_outputs
     from hybrid.simulation.stepping import Simulation
     from hybrid.simulation.stepping import Simulation as SystemSimulation  # noqa: F401  # deprecated
     from hybrid.store.reader import Result
@@ -55,7 +54,7 @@ if TYPE_CHECKING:
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
     "HybridError": ("hybrid.errors", "HybridError"),
-    "NodeState": ("hybrid.adapt.user_criterion", "NodeState"),
+    "NodeState": ("hybrid.adapt.zone_rules", "NodeState"),
     "Outcome": ("hybrid.errors", "Outcome"),
     "Result": ("hybrid.store.reader", "Result"),
     "ResultError": ("hybrid.errors", "ResultError"),
@@ -72,11 +71,11 @@ _HOME = {
     "modes": ("hybrid.modal.api", "modes"),
     "offsets": ("hybrid.simulation.lines_stiffness", "offsets"),
     "open": ("hybrid.store.reader", "open_result"),
-    "openmdao_component": ("hybrid.designs.component", "openmdao_component"),
+    "openmdao_component": ("hybrid.designs.design", "openmdao_component"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
     "plan": ("hybrid.accuracy.run_forecast", "plan"),
-    "listed_outputs": ("hybrid.simulation.listed_outputs", "listed_outputs"),
-    "kinds_of_quantities": ("hybrid.simulation.listed_outputs", "kinds_of_quantities"),
+    "listed_outputs": ("hybrid.simulation.run_quantities", "listed_outputs"),
+    "kinds_of_quantities": ("hybrid.simulation.run_quantities", "kinds_of_quantities"),
     "plot": ("hybrid.view.plots", "plot_summary"),
     "plot_energy": ("hybrid.view.quantities", "plot_energy"),
     "plot_quantity": ("hybrid.view.quantities", "plot_quantity"),
@@ -89,7 +88,7 @@ _HOME = {
     "resume": ("hybrid.accuracy.api", "resume"),
     "run": ("hybrid.accuracy.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
-    "seek": ("hybrid.designs.seek", "seek"),
+    "seek": ("hybrid.designs.nearest", "seek"),
     "sensitivity": ("hybrid.designs.sensitivity", "sensitivity"),
     "shares": ("hybrid.designs.shares", "shares"),
     "static": ("hybrid.accuracy.api", "static"),

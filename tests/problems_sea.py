@@ -20,7 +20,7 @@ from scipy.optimize import brentq, root
 import hybrid
 from hybrid import Scene
 from hybrid.kernels.laws.seabed import contact
-from hybrid.scene.dispersion import wavenumber
+from hybrid.scene.stream_function import wavenumber
 
 Floats = NDArray[np.float64]
 Table = dict[str, Any]

@@ -22,7 +22,7 @@ import hybrid
 from hybrid.model.plan import output_times
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import Scene
-from hybrid.simulation.interrupts import interrupts
+from hybrid.simulation.progress import interrupts
 from hybrid.store.tradeoff_table import DONE, FAILED, REFERENCE, Row, TradeTable
 from hybrid.studies.levels import LevelTable, level_row
 from hybrid.studies.runs import RunStore, key_of

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybrid.accuracy.finer_result import beside
-from hybrid.accuracy.model_choice import chosen_and_surveyed
+from hybrid.accuracy.model_choice import CHOSEN, chosen_and_surveyed, rods_instead_of_slack
 from hybrid.accuracy.passes import Passes, emptied
-from hybrid.accuracy.rods_where_slack import CHOSEN, rods_instead_of_slack
-from hybrid.adapt.user_criterion import UserCriterion
+from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import ComputationError, ResultError, SceneError
 from hybrid.model.model_costs import with_model
 from hybrid.model.network import NetworkResolution
@@ -28,8 +27,7 @@ from hybrid.scene.schema import missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.case_at_rest import CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
-from hybrid.simulation.interrupts import interrupts
-from hybrid.simulation.progress import Listener, ProgressReporter, listener_of, tell_of_compiling
+from hybrid.simulation.progress import Listener, ProgressReporter, interrupts, listener_of, tell_of_compiling
 from hybrid.simulation.restart import remaining
 from hybrid.store.array_contents import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target, locked

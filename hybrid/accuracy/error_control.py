@@ -17,12 +17,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.accuracy.budget import Budget
 from hybrid.accuracy.error_order import COARSER
 from hybrid.accuracy.finer_result import NOT_KEPT, is_no_better, not_kept_text
 from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.model_errors import Comparable, model_errors_of, with_model_errors
 from hybrid.accuracy.refinement import COSTLY_ACCURACY, costly
+from hybrid.accuracy.run_forecast import Budget
 from hybrid.errors import ComputationError
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution

@@ -21,11 +21,14 @@ from hybrid.accuracy.error_order import (
     MOST_ORDER,
     ORDERS,
     RUBBING_ORDERS,
+    Block,
+    Errors,
     Falls,
     around,
     as_halved,
     at_all_outputs,
     blended,
+    bounded,
     confirmed_order,
     exceeds,
     falls,
@@ -33,6 +36,7 @@ from hybrid.accuracy.error_order import (
     magnitude,
     order,
     refinement,
+    scaled,
     squares,
     start_change,
     start_order,
@@ -40,12 +44,9 @@ from hybrid.accuracy.error_order import (
     times_foretold,
     with_neighbours,
 )
-from hybrid.accuracy.errors_by_cause import Block, Errors
 from hybrid.accuracy.snap_scatter import Between
-from hybrid.accuracy.step_ratios import usual_ratio
 from hybrid.model.material import NO_DOUBT
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.run_sample import (
     END_FORCES,
     RIGHT,
@@ -580,3 +581,25 @@ class Estimate:
         if not all(1.0 <= p <= MOST_ORDER for p in (*self.order.values(), *self.at_start.values())):
             raise ValueError("orders that no errors have")
         return self
+
+
+# How many times as short the steps of a run mostly are as those of another.
+#
+# Steps that follow the motion, or are halved where Newton's method fails, are not everywhere as much shorter in a finer
+# run as the counts of steps say: a run whose steps are limited to a third of a period may have more of them than a run
+# with twice as fine a limit, where a few moments are hard for it.
+
+# Steps are counted over so many usual steps of the slower run, before and after each of so many times.
+AROUND, TIMES = 2.0, 200
+
+
+def usual_ratio(fast: RunSample, slow: RunSample) -> float:
+    """The median over the time of the run; of runs that have not kept when their steps end, of their counts."""
+    logs = [np.append(0.0, run.forces[:, 0]) for run in (fast, slow)]
+    if any(x.size != run.steps + 1 or x.size < 3 for x, run in zip(logs, (fast, slow), strict=True)):
+        return fast.steps / max(slow.steps, 1)
+    usual = np.diff(logs[1])
+    near = AROUND * float((usual * usual).sum() / usual.sum())
+    t = np.linspace(0.0, logs[1][-1], TIMES)
+    steps = [np.interp(t + near, x, np.arange(x.size)) - np.interp(t - near, x, np.arange(x.size)) for x in logs]
+    return float(np.median(steps[0] / np.maximum(steps[1], 1e-9)))

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid.accuracy.error_control import ErrorController
-from hybrid.accuracy.errors_by_cause import Errors, summary
+from hybrid.accuracy.error_order import Errors, bounded, summary
 from hybrid.accuracy.extreme_errors import figures as extreme_figures
 from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.refinement import END_FORCE, asked_quantities, asked_text, figures, not_asked_text, sizes_of
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.plan import output_times
 from hybrid.scene.schema import AdaptiveModel, LineScene
-from hybrid.simulation.bounded_model_errors import bounded
 from hybrid.simulation.case import Case
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
 from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, is_along

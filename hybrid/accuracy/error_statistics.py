@@ -14,12 +14,10 @@ from typing import Any, Self
 import numpy as np
 
 from hybrid.accuracy.error_estimate import Estimate
-from hybrid.accuracy.error_order import MOST_ORDER, ORDER, Falls
-from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.error_order import MOST_ORDER, ORDER, Errors, Falls, bounded, scaled
 from hybrid.accuracy.snap_scatter import snap_times, steps_in_rise
 from hybrid.model.resolution import RequestedAccuracy
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.named_arrays import Tree, matched
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.accuracy.error_estimate import NOTHING, Estimate
-from hybrid.accuracy.error_order import COARSER
+from hybrid.accuracy.error_order import COARSER, Errors, doubtful
 from hybrid.accuracy.error_statistics import (
     LARGEST,
     STATISTICS,
@@ -26,7 +26,6 @@ from hybrid.accuracy.error_statistics import (
     snaps,
     statistics_of,
 )
-from hybrid.accuracy.errors_by_cause import Errors
 from hybrid.accuracy.extreme_errors import ExtremeErrors
 from hybrid.accuracy.finer_result import Judged
 from hybrid.accuracy.refinement import (
@@ -52,7 +51,6 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.bounded_model_errors import doubtful
 from hybrid.simulation.run_sample import (
     ALL,
     END_FORCES,

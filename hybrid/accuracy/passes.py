@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.accuracy.budget import Budget
 from hybrid.accuracy.error_control import ErrorController, comparison_resolutions
 from hybrid.accuracy.error_report import write_errors
 from hybrid.accuracy.finer_result import FinerResult
 from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.model_choice import chosen_and_surveyed
 from hybrid.accuracy.refinement import WORTH_WRITING, Free, times_the_cost
+from hybrid.accuracy.run_forecast import Budget
 from hybrid.errors import ComputationError
 from hybrid.model.build import zone_plans
 from hybrid.model.model_costs import NAMED, ModelChoice

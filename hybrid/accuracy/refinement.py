@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.error_order import Errors
 from hybrid.accuracy.extreme_errors import ExtremeErrors
 from hybrid.errors import AS_MUCH
 from hybrid.model.resolution import Limited, RequestedAccuracy, Resolution

@@ -28,7 +28,7 @@ from hybrid.cli.app import (
 
 if TYPE_CHECKING:
     from hybrid.designs.design import Found, Identified, Kept
-    from hybrid.designs.seek import Sought
+    from hybrid.designs.nearest import Sought
     from hybrid.designs.sensitivity import Derivative
     from hybrid.scene.root import Scene
 

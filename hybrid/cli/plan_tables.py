@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hybrid.scene.network_scene import Network
     from hybrid.scene.root import Scene
     from hybrid.scene.schema import LineScene
-    from hybrid.simulation.listed_outputs import Listed
+    from hybrid.simulation.run_quantities import Listed
 
 NAME, COLUMNS = 13, 80  # columns of names, and of the short form
 LARGE = 2e7  # bytes of a file that are worth a word

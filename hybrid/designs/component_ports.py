@@ -13,7 +13,7 @@ from hybrid.designs.problem import Problem
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.base import Finding
 from hybrid.scene.design import NAMED, Design, OfEquilibrium
-from hybrid.scene.task_file import TaskFile
+from hybrid.scene.read import TaskFile
 
 # Arithmetic of a design whose results are wanted and nothing is minimised; the output that has what is.
 NOTHING, MINIMISED = "0", "minimised"

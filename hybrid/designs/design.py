@@ -6,25 +6,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from hybrid.designs.component_ports import NOTHING, inputs_of, outputs_of, refuse_ports
+from hybrid.designs.edges import refuse_edges
 from hybrid.designs.equilibria import FINER, AnyScene, Equilibria, Point
-from hybrid.designs.found_scene import text_of_found
 from hybrid.designs.identify import Apart, Estimate, fit
 from hybrid.designs.measured import Measurements, measurements, quantity_of
 from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.nearest import Space
-from hybrid.designs.numbers import scene_with
+from hybrid.designs.numbers import scene_with, text_of_found
 from hybrid.designs.optimum import AT_BOUND, SETTLED, Optimum, Price, is_active, optimum, reached
 from hybrid.designs.problem import Constraint, Problem, as_asked, begun, problem_of, refused_result, scenes_of, space_of
-from hybrid.errors import ComputationError, Outcome, SceneError
+from hybrid.errors import ComputationError, Outcome, SceneError, optional_package
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.design import DESIGN, Design
-from hybrid.scene.read import SceneLike
-from hybrid.scene.task_file import TaskFile
+from hybrid.scene.read import SceneLike, TaskFile
+
+if TYPE_CHECKING:
+    from hybrid.designs.openmdao_component import DesignComponent
+
 
 # Parts of the largest that limits are beyond in the nearest that was found, from which one is said to be in the way.
 IN_THE_WAY = 1e-3
@@ -347,3 +351,41 @@ def _checked(problem: Problem, point: Point) -> tuple[list[str], Floats | None]:
                 f"ask for a limit that is {change:.2g} tighter, or for more cells"
             )
     return notes, finer
+
+
+# A design as a component of OpenMDAO: unknowns are its inputs, results its outputs, with exact derivatives.
+
+
+def openmdao_component(
+    source: str | PathLike[str] | Mapping[str, Any] | SceneLike | Design,
+    *,
+    unknowns: Mapping[str, Any] | None = None,
+    driven: bool = False,
+    **more: Any,
+) -> DesignComponent:
+    """A design as an `ExplicitComponent` of OpenMDAO.
+
+    source, unknowns, more (cases, results, limits, targets, minimise): as of `hybrid.design`; results need no
+    `minimise` here.  Inputs are the unknowns, by name; outputs are results, targets and limits by name, a limit with a
+    value for each of its cases and sections, and what is minimised as `minimised`.  Units are those of the scene.
+    driven: unknowns are design variables with their bounds, limits and targets constraints, what is minimised the
+    objective.  Derivatives are exact at rest, of motions those of `hybrid.design`.
+
+    Where there is no equilibrium it raises OpenMDAO's `AnalysisError`.  SceneError: the design or its scene is refused;
+    ComputationError: there is no equilibrium where it begins; ResultError: OpenMDAO is not installed.
+    """
+    optional_package("openmdao.api", "a component of OpenMDAO", "openmdao")
+    from hybrid.designs.openmdao_component import DesignComponent
+
+    if unknowns is not None and more.get("results"):
+        more.setdefault("minimise", NOTHING)
+    task, scene = task_of(source, unknowns, more)
+    refuse_ports(task)
+    asked = as_asked(scene, task)
+    refuse_edges(asked, [x.quantity for x in task.asked.targets.values()])  # a design takes them as they are
+    problem = problem_of(task, asked)
+    try:
+        problem.equilibria.at(problem.space.start)
+    except SceneError as error:
+        raise refused_result(task, error) from None
+    return DesignComponent(problem, inputs_of(problem, asked), outputs_of(problem, task, asked), driven)

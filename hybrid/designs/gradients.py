@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
-from hybrid.designs.line_at_rest import LineAtRest, steps_along
-from hybrid.designs.stretch import anywhere
+from hybrid.designs.line_at_rest import LineAtRest, anywhere, steps_along
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
 
@@ -81,3 +82,23 @@ def _each(moved: np.ndarray) -> Floats:
     q = np.zeros((int(np.count_nonzero(moved)), *moved.shape))
     q[(np.arange(len(q)), *np.nonzero(moved))] = 1.0
     return q
+
+
+# Solves with the matrix of an equilibrium and its transpose, to rounding of the matrix.
+
+
+class Factors:
+    """Factors of a sparse matrix.
+
+    Each solve is corrected once by what it leaves: rows in N beside rows in m and N m would else lose three digits of
+    what hardly answers.
+    """
+
+    def __init__(self, matrix: sparse.csc_array) -> None:
+        self._matrix, self._factors = matrix, splu(matrix)
+
+    def solve(self, right: Floats, transposed: bool = False) -> Floats:
+        """x (n, P) of A x = right, or of its transpose."""
+        matrix, kind = (self._matrix.T, "T") if transposed else (self._matrix, "N")
+        x = self._factors.solve(right, kind)
+        return np.asarray(x + self._factors.solve(right - matrix @ x, kind))

@@ -16,7 +16,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.base import Finding
 from hybrid.scene.design import Design
-from hybrid.scene.task_file import TaskFile
+from hybrid.scene.read import TaskFile
 from hybrid.studies.cases import Table, read_table
 
 COORDINATES = {"x": "position.x", "y": "position.y", "z": "position.z"}

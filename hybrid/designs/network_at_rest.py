@@ -21,8 +21,7 @@ from scipy import sparse
 from hybrid.accuracy.api import first_at_rest
 from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
 from hybrid.designs.contact_at_rest import ContactAtRest
-from hybrid.designs.factors import Factors
-from hybrid.designs.gradients import Gradients
+from hybrid.designs.gradients import Factors, Gradients
 from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
 from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, number_of, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError

@@ -20,8 +20,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.design import Design, OfEquilibrium, Unknown
-from hybrid.scene.read import as_scene, read_text, scene_text
-from hybrid.scene.task_file import TaskFile
+from hybrid.scene.read import TaskFile, as_scene, read_text, scene_text
 from hybrid.studies.cases import evaluated
 
 # Part of a variable of an expression by which it is differentiated.

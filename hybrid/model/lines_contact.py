@@ -14,8 +14,7 @@ from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.contents import Entry
 from hybrid.model.self_reach import payouts, self_reach
 from hybrid.scene.bodies import FreeBody
-from hybrid.scene.lines_contact import LinesContact
-from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint
+from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, LinesContact
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 

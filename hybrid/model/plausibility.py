@@ -1,7 +1,7 @@
 """Numbers of a scene that are possible, and more likely in another unit: each with place, expected range and remedy.
 
 A bound is a property of all materials and seas that are known, with room; what no reading could make right is refused
-when the scene is read (`scene/magnitude_checks.py` and the tables themselves).
+when the scene is read (`scene/motion_checks.py` and the tables themselves).
 """
 
 from __future__ import annotations

@@ -16,8 +16,6 @@ from hybrid.kernels.state.state import NO_SLOW, Floats, Sea, State, no_sea, with
 from hybrid.model.ends import DrivenEnd, rise
 from hybrid.model.obstacles import courses_of, facet_tables, obstacle_rows
 from hybrid.model.sections import pressing
-from hybrid.scene.dispersion import wavenumber
-from hybrid.scene.measured_spectrum import FINE, shares
 from hybrid.scene.schema import CurrentProfile, LineScene, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.spectra import (
     JonswapWaves,
@@ -28,6 +26,8 @@ from hybrid.scene.spectra import (
     SumOfWaves,
     TorsethaugenWaves,
 )
+from hybrid.scene.stream_function import wavenumber
+from hybrid.scene.wave_files import FINE, shares
 from hybrid.scene.waves import GivenWaves, MeasuredWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
 
 # Contact sets in over half the penetration of a cable at rest: it then rests on the linear part.

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from hybrid.scene.base import After, Before, Finding, Table, Words, refuse
-from hybrid.scene.suggestions import decimal_comma
+from hybrid.scene.base import After, Before, Finding, Table, Words, decimal_comma, refuse
 
 # Units in which a size may be given, what they measure, and how much of the SI unit they are.
 UNITS = {

@@ -21,8 +21,7 @@ from hybrid.scene.base import (
     number_or_list,
     refuse,
 )
-from hybrid.scene.capacity import capacity_findings
-from hybrid.scene.code_check import Code, RiserCode
+from hybrid.scene.code_check import Code, RiserCode, capacity_findings
 from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.stretch import (
     Creep,
@@ -30,6 +29,7 @@ from hybrid.scene.stretch import (
     DynamicStiffness,
     Layer,
     SlipLayer,
+    Syrope,
     TensionStrain,
     bending_findings,
     first_loading_findings,
@@ -39,7 +39,6 @@ from hybrid.scene.stretch import (
     rows_of,
     slopes,
 )
-from hybrid.scene.syrope import Syrope
 from hybrid.scene.waves import Waves
 
 

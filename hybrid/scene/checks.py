@@ -11,14 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any, Protocol
 
-from hybrid.scene import (
-    attachment_checks,
-    combinations,
-    magnitude_checks,
-    payout_checks,
-    sea_checks,
-    start_checks,
-)
+from hybrid.scene import attachment_checks, combinations, motion_checks, sea_checks, start_checks
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -40,9 +33,42 @@ from hybrid.scene.body_shapes import Carried
 from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.ends import Clamped, Ends, Free, Pinned
 from hybrid.scene.obstacles import Obstacles, SheaveObstacle
+from hybrid.scene.payout import Payout
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.quantities import of_one_line
 from hybrid.scene.start_checks import SAME_LENGTH
+
+# Contradictions between a line that is paid out and the rest of its scene.
+
+
+def _winch(ends: Ends) -> tuple[str, Pinned | Clamped, Payout] | None:
+    """The end at which line is paid out, by name, and how; the last one of two."""
+    found = None
+    for name, end in ends.named().items():
+        if isinstance(end, Pinned | Clamped) and end.payout is not None:
+            found = name, end, end.payout
+    return found
+
+
+def reel_has_diameters(
+    environment: Environment, ends: Ends, contact: Contact, obstacles: Obstacles
+) -> Iterator[Finding]:
+    """Contact of the line with itself and with obstacles, and soil, know the diameters on the reel."""
+    found = _winch(ends)
+    if found is None:
+        return
+    name = found[0]
+    soil = environment.seabed is not None and environment.seabed.soil is not None
+    if contact.self or obstacles or soil:
+        apart = "which parts of the cable keep apart (contact.self)"
+        how = apart if contact.self else "with which it touches obstacles" if obstacles else "needed for soil"
+        for i, section in enumerate(getattr(ends, name).payout.reel or ()):
+            if section.diameter is None:
+                expected = f"a number > 0, in m, {how}"
+                yield Finding(("ends", name, "payout", "reel", i, "diameter"), expected, "add `diameter: ...` (m)")
+
+
+# Contradictions between tables: each check looks at the tables its parameters name.
 
 # Error of a step, as a part of the length, that positions of 16 digits can still tell from their own round-off.
 FINEST_STEP = 1e-12
@@ -404,8 +430,8 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     sea_checks.seabed_is_no_depth,
     sea_checks.surface_over_seabed,
     sea_checks.nothing_in_the_ground,
-    magnitude_checks.friction,
-    magnitude_checks.end_forces,
+    motion_checks.friction,
+    motion_checks.end_forces,
     _zones_fill,
     _rods_can_bend,
     _stretches_on_cable,
@@ -425,5 +451,5 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _mesh_spans,
     _layers_are_meshed,
     _output_on_cable,
-    payout_checks.reel_has_diameters,
+    reel_has_diameters,
 )

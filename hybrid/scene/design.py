@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import Finding, Number, Positive, Table, Text, Whole, Words, refuse
+from hybrid.scene.read import Kind
 from hybrid.scene.study import Names, Value
-from hybrid.scene.task_file import Kind
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
 NAMED = "a name of letters and digits, of which an expression can speak"

@@ -12,21 +12,19 @@ from typing import Any
 from pydantic import ValidationError, model_validator
 
 from hybrid.scene.analysis import Equilibrium
-from hybrid.scene.base import Finding, Place, refuse
+from hybrid.scene.base import Finding, Place, nearest, refuse
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.checks import elevation_has_waves
 from hybrid.scene.combinations import holds_rod, refused, tables_of
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
-from hybrid.scene.motion_tables import TURNS, Motion
+from hybrid.scene.motion_tables import TURNS, Motion, farthest, moving_key, shift, smaller
 from hybrid.scene.network import JoinedLine, NetworkTables
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import ClampedConnection, Fairlead, FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.quantities import of_several_lines
 from hybrid.scene.schema import LineScene
 from hybrid.scene.start_checks import SAME_LENGTH
-from hybrid.scene.suggestions import nearest
-from hybrid.scene.ways import farthest, moving_key, shift, smaller
 
 
 class Network(NetworkTables):

@@ -19,9 +19,9 @@ from hybrid.scene.base import (
     Table,
     Text,
     Vector,
+    nearest,
     refuse,
 )
-from hybrid.scene.suggestions import nearest
 
 # Kinds: unit, what it is, which keys it needs, which it may have beside `line`, `smallest` and `largest`.
 KINDS: dict[str, tuple[str, str, tuple[str, ...], tuple[str, ...]]] = {

@@ -11,9 +11,20 @@ import annotated_types
 from pydantic import Tag
 from pydantic.fields import FieldInfo
 
-from hybrid.scene.base import Finding, Kinds, Place, Table, Words, dotted, unit_of
+from hybrid.scene.base import (
+    PATHS,
+    Finding,
+    Kinds,
+    Place,
+    Table,
+    Words,
+    decimal_comma,
+    dotted,
+    nearest,
+    speaks_of,
+    unit_of,
+)
 from hybrid.scene.schema_walk import Spot, all_keys, arms, follow, is_tag, item, meaning, tables
-from hybrid.scene.suggestions import PATHS, decimal_comma, nearest, speaks_of
 
 # A larger number would not help, as an example of how to write it.
 LARGEST = 1e12

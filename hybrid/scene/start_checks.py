@@ -12,8 +12,8 @@ from hybrid.scene.attachments import BendRestrictor, Spread
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import Ends, Triple
+from hybrid.scene.motion_tables import farthest, moving_key, shift, smaller
 from hybrid.scene.obstacles import Obstacles
-from hybrid.scene.ways import farthest, moving_key, shift, smaller
 
 # Positions that differ by less than this part of the cable's length are the same place:
 # people write six to eight digits.

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import Before, Finding, Number, Positive, Table, Text, Truth, Whole, Words, refuse, table_or_list
-from hybrid.scene.task_file import Kind
+from hybrid.scene.read import Kind
 
 # Cases of a study: each is a row in memory.
 MOST_CASES = 1_000_000

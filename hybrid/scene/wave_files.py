@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.scene.motion_file import RecordRefused, read_table
+from hybrid.scene.motion_file import RecordRefused, netcdf_reader, read_table
 
 Array = NDArray[np.float64]
 GIVEN, RECORD = ["amplitude", "frequency", "direction", "phase"], ["t", "elevation"]
@@ -136,3 +136,127 @@ def columns_of(wanted: list[str]) -> Callable[[str, list[str]], list[str]]:
         raise RecordRefused(f"columns {','.join(wanted)}", "name the columns in the first line of the file", given)
 
     return checked
+
+
+# Waves of a measured spectrum over frequency and direction, in a file: a sum of linear waves that has it.
+#
+#     symbol   meaning                                              unit
+#     E        spectrum of the elevation                            m^2/(Hz deg)
+#     S        its integral over directions                         m^2/Hz
+#     f, a     frequency, direction                                 Hz, deg
+#
+# A table of rows frequency, direction, density; or netCDF as wavespectra writes it (freq, dir, efth), whose directions
+# are those from which waves come, clockwise from north.
+
+COLUMNS = ["frequency", "direction", "density"]
+# Frequencies between which a spectrum is linear, and directions at which its parts are known.
+FINE, TURN = 20_001, 360.0
+# Part of a circle by which directions may be off even, or a gap may be larger than the others.
+GAP = 1.5
+
+
+def shares(omega: Array, S: Array, n: int, shift: float = 0.0) -> tuple[Array, Array]:
+    """Frequencies (n,) of n parts of a spectrum over fine frequencies, in their unit, and the part of energy in each.
+
+    Each has the root mean square of the frequencies of its part: the variance of the sea and that of its rate are then
+    those of the spectrum.  Parts are of equal energy; shift: by which part of one all but the outer edges lie lower.
+    """
+    energy, rate = (
+        np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(omega))]) for y in (S, omega**2 * S)
+    )
+    edges = np.arange(n + 1) / n
+    if shift and n > 1:
+        edges[1:-1] -= shift / n
+    parts = np.interp(edges * energy[-1], energy, rate)
+    share = np.diff(edges) if shift else np.full(n, 1.0 / n)
+    return np.asarray(
+        np.sqrt(np.diff(parts) / (share * energy[-1]) if shift else np.diff(parts) * n / energy[-1])
+    ), share
+
+
+@lru_cache(maxsize=4)
+def spectrum_waves(
+    path: str, record: int | None, north: float, n: int, seed: int, _changed: int, _size: int
+) -> Recorded:
+    """n waves of equal energy, each with a direction drawn from those at its frequency; RecordRefused.
+
+    record: which of several spectra of a netCDF file; north: deg, heading of north from x.  Read once for as long as
+    the file does not change.
+    """
+    name = os.path.basename(path)
+    if path.lower().endswith((".nc", ".h5")):
+        f, came, E = _of_wavespectra(path, name, record)
+        order = np.argsort((north - 180.0 - came) % TURN)
+        a, E = ((north - 180.0 - came) % TURN)[order], E[:, order]
+    else:
+        f, a, E = _of_table(path, name)
+    step = np.diff(np.append(a, a[0] + TURN))
+    if a.size > 1 and step.max() > GAP * np.median(step):
+        given = f"{name}: {step.max():g} deg between two of {a.size} directions"
+        raise RecordRefused("directions all around", "add rows with density 0 where nothing comes from", given)
+    width = 0.5 * (step + np.roll(step, 1))  # of each direction
+    S = E @ width
+    if not S.max() > 0.0:
+        raise RecordRefused("waves", "give a spectrum that is above zero somewhere", f"{name}: all zero")
+    fine = np.linspace(f[0], f[-1], FINE)
+    parts, _ = shares(fine, np.interp(fine, f, S), n)
+    draw = np.random.default_rng(seed)
+    phase, part = draw.uniform(0.0, 2.0 * np.pi, n), (draw.permutation(n) + draw.uniform(size=n)) / n
+    towards = np.array([_direction(x, y, f, a, step, E) for x, y in zip(parts, part, strict=True)])
+    variance = float(np.trapezoid(np.interp(fine, f, S), fine))
+    amplitude = np.full(n, np.sqrt(2.0 * variance / n))
+    return Recorded(np.column_stack([amplitude, 2.0 * np.pi * parts, phase, towards]))
+
+
+def _direction(x: float, part: float, f: Array, a: Array, step: Array, E: Array) -> float:
+    """Direction (deg) up to which a part of the energy at frequency x comes, from the first one round."""
+    k = int(np.clip(np.searchsorted(f, x) - 1, 0, f.size - 2))
+    weight = (x - f[k]) / (f[k + 1] - f[k])
+    D = (1.0 - weight) * E[k] + weight * E[k + 1]
+    if a.size == 1:
+        return float(a[0])
+    closed = np.append(D, D[0])
+    sums = np.concatenate([[0.0], np.cumsum(0.5 * (closed[1:] + closed[:-1]) * step)])
+    j = int(np.clip(np.searchsorted(sums, part * sums[-1], side="right") - 1, 0, step.size - 1))
+    left, p, q, h = part * sums[-1] - sums[j], closed[j], closed[j + 1], step[j]
+    root = np.sqrt(max(p * p + 2.0 * (q - p) * left / h, 0.0))  # of p y + (q - p) y^2/(2 h) = left
+    return float(a[j] + (2.0 * left / (p + root) if p + root > 0.0 else 0.0))
+
+
+def _of_table(path: str, name: str) -> tuple[Array, Array, Array]:
+    header, table, lines = read_table(path, columns_of(COLUMNS))
+    rows = table[:, [header.index(x) for x in COLUMNS]]
+    f, a = np.unique(rows[:, 0]), np.unique(rows[:, 1] % TURN)
+    i, j = np.searchsorted(f, rows[:, 0]), np.searchsorted(a, rows[:, 1] % TURN)
+    if f.size < 2 or len(rows) != f.size * a.size or np.unique(i * a.size + j).size != len(rows):
+        given = f"{name}: {len(rows)} rows, {f.size} frequencies, {a.size} directions"
+        raise RecordRefused("one row for each frequency and direction", "fill the gaps with density 0", given)
+    for bad in np.flatnonzero((rows[:, 2] < 0.0) | (rows[:, 0] <= 0.0))[:1]:
+        given = f"{name}, line {lines[bad]}: frequency {rows[bad, 0]:g}, density {rows[bad, 2]:g}"
+        raise RecordRefused("frequencies > 0 in Hz, densities >= 0 in m^2/(Hz deg)", "check the row", given)
+    E = np.zeros((f.size, a.size))
+    E[i, j] = rows[:, 2]
+    return f, a, E
+
+
+def _of_wavespectra(path: str, name: str, record: int | None) -> tuple[Array, Array, Array]:
+    """Frequencies (Hz), directions from which waves come (deg from north, clockwise), densities."""
+    fix = "write it by wavespectra: dataset.to_netcdf(..), or a CSV file of frequency,direction,density"
+    xarray = netcdf_reader(name)
+    try:
+        with xarray.open_dataset(path) as opened:
+            f, came = (np.asarray(opened[x].values, float) for x in ("freq", "dir"))
+            every = np.asarray(opened["efth"].transpose(..., "freq", "dir").values, float)
+    except Exception as error:  # of any of its engines
+        raise RecordRefused("netCDF with freq, dir and efth", fix, f"{name}: {error}"[:200]) from None
+    if f.size < 2:
+        raise RecordRefused("two frequencies or more", fix, f"{name}: {f.size}")
+    every = every.reshape(-1, f.size, came.size)
+    if record is None and len(every) > 1:
+        raise RecordRefused(f"record: 0 to {len(every) - 1}, which of them", "add `record: 0`", f"{name}: {len(every)}")
+    if (record or 0) >= len(every):
+        raise RecordRefused(f"a record from 0 to {len(every) - 1}", "count from 0", f"{name}, record {record}")
+    E = every[record or 0]
+    if not np.isfinite(E).all() or (E < 0.0).any() or (f <= 0.0).any() or (np.diff(f) <= 0.0).any():
+        raise RecordRefused("rising frequencies > 0, densities >= 0", "choose another record", name)
+    return f, came, E

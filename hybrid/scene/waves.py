@@ -240,7 +240,7 @@ class MeasuredWaves(_OfFile):
     @property
     def recorded(self) -> Recorded:
         """The waves of the file.  Only after validation: it is readable then."""
-        from hybrid.scene.measured_spectrum import spectrum_waves
+        from hybrid.scene.wave_files import spectrum_waves
 
         status, of = os.stat(self.file), (self.record, self.north, self.components, self.seed)
         return spectrum_waves(self.file, *of, status.st_mtime_ns, status.st_size)

@@ -23,7 +23,7 @@ from ruamel.yaml.tokens import (
 )
 
 from hybrid.errors import Complaint
-from hybrid.scene.suggestions import PATHS
+from hybrid.scene.base import PATHS
 from hybrid.scene.yaml_nodes import READABLE, WRITE_OUT
 
 OPENING, CLOSING = (FlowMappingStartToken, FlowSequenceStartToken), (FlowMappingEndToken, FlowSequenceEndToken)

@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hybrid.errors import Complaint
-from hybrid.scene.base import Place, Table, dotted
+from hybrid.scene.base import Place, Table, decimal_comma, did_you_mean, dotted
 from hybrid.scene.schema_walk import keys_at, shorthand_keys, tables_at, takes_names
-from hybrid.scene.suggestions import decimal_comma, did_you_mean
 from hybrid.scene.yaml_nodes import READABLE, WRITE_OUT, TooDeep, composed
 
 Spot = tuple[int, int]

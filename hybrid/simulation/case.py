@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from hybrid.adapt.user_criterion import UserCriterion, of_line
-from hybrid.errors import ComputationError
+from hybrid.adapt.zone_rules import UserCriterion, of_line
+from hybrid.errors import ComputationError, ResultError
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.material import NO_DOUBT
@@ -38,18 +41,16 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import LINE, network_of, short_form
-from hybrid.simulation.beside import beside, thread_count
-from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.layer_mesh import rods_at_rest
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
-from hybrid.simulation.load_change import with_loads_of
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
 from hybrid.simulation.network_run import NetworkRun, Recording, start_of
-from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
+from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter, at_once
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import is_cut_off, kept_resolution
 from hybrid.simulation.result_checks import damped_vibrations
 from hybrid.simulation.run_file import AnyRecorder, Cable
+from hybrid.simulation.run_of_lines import with_loads_of
 from hybrid.simulation.run_sample import (
     ALL,
     COMPARED,
@@ -81,8 +82,9 @@ from hybrid.store.stored_rows import ComparisonRecorder, RowsRecorder, StoredArr
 from hybrid.store.whole_file import LateFile
 from hybrid.store.writer import Recorder, WriteMode
 
-if TYPE_CHECKING:  # its tables take long to make
+if TYPE_CHECKING:
     from hybrid.scene.network_scene import Network
+
 
 # Of every step, what extremes of the end forces follow from.
 FORCES = ("t", "end_force_start", "end_force_end")
@@ -372,7 +374,7 @@ class Case:
     def beside(
         self, samples: Sequence[Callable[[], Samples]]
     ) -> AbstractContextManager[Sequence[Callable[[], Samples]]]:
-        """Runs to compare with, in threads where that is worth it (simulation.beside).
+        """Runs to compare with, in threads where that is worth it (`beside`).
 
         A criterion of the user may not expect to be called by several threads.
         """
@@ -553,3 +555,61 @@ def _datasets(data: Mapping[str, Any], *groups: str) -> list[str]:
 def doubt_of_line(line: LineResult) -> Floats:
     """`RunSample.doubt` of a complete run; of zones that move criteria of zones bound what bending does."""
     return line.correction.doubt if line.correction is not None and line.manager is None else np.array(NO_DOUBT)
+
+
+# Runs in threads beside each other: kernels release the GIL, and runs share nothing that they write.
+#
+# The first run is computed in the thread that asks, where listeners are called and signals are heard.
+
+THREADS = "HYBRID_THREADS"  # environment variable
+# s between two looks at what goes on while other threads are waited for.
+LOOK_EVERY = 0.1
+
+Found = TypeVar("Found")
+
+
+def thread_count() -> int:
+    """Threads that a run may use: what HYBRID_THREADS says, else one for each core that this process may use.
+
+    ResultError: the variable is no number from 1 on.
+    """
+    asked = os.environ.get(THREADS, "").strip()
+    if not asked:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if not (asked.isdecimal() and int(asked) > 0):
+        advice = f"{THREADS}=1 for one thread; without it there are as many as cores"
+        raise ResultError(
+            f"the environment variable {THREADS} is no number of threads\n    given:    '{asked}'\n"
+            f"    expected: a whole number from 1 on\n    try:      {advice}"
+        )
+    return int(asked)
+
+
+@contextmanager
+def beside(
+    tasks: Sequence[Callable[[], Found]], threads: int, look: Callable[[], None], stop: Callable[[], None]
+) -> Iterator[list[Callable[[], Found]]]:
+    """Functions that give what the tasks give, or raise what they raise; each is called once, in their order.
+
+    threads: this one included; with one, a task begins when its function is called.  look: called every `LOOK_EVERY` s
+    while another thread is waited for; stop: makes tasks end soon whose answers are no longer wanted.
+    """
+    if threads < 2 or len(tasks) < 2:
+        yield list(tasks)
+        return
+    pool = ThreadPoolExecutor(min(threads, len(tasks)) - 1, "hybrid-run")
+    try:
+        futures = [pool.submit(task) for task in tasks[1:]]
+        yield [tasks[0], *(partial(_found, *each, look) for each in zip(tasks[1:], futures, strict=True))]
+    finally:
+        if any(not future.done() for future in futures):
+            stop()
+        pool.shutdown(wait=True, cancel_futures=True)  # so that none writes a file after it was removed
+
+
+def _found(task: Callable[[], Found], future: Future[Found], look: Callable[[], None]) -> Found:
+    if future.cancel():  # no thread has begun with it
+        return task()
+    while wait([future], LOOK_EVERY).not_done:
+        look()
+    return future.result()

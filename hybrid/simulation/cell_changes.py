@@ -38,14 +38,14 @@ from hybrid.kernels.state.state import Line
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
-from hybrid.simulation.cell_arrays import (
+from hybrid.simulation.cell_views import (
     REST_OF_SEA,
+    CellViews,
     Kept,
     Shaped,
     blank_joined,
     blank_single,
 )
-from hybrid.simulation.cell_views import CellViews
 from hybrid.simulation.envelope import marks_on
 from hybrid.simulation.line_of_run import OneOfMany
 from hybrid.solve.stepper import HEAVY

@@ -46,12 +46,14 @@ from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.scene.plane import OUT
 from hybrid.simulation.contact_watch import Knot, note_departures, note_knot, sheaves_of
-from hybrid.simulation.doubtful_outputs import Bounds, doubtful, kinks_at
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, Loops, note_hockling, note_loops
-from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
+from hybrid.simulation.mesh_survey import ASKEW, hidden_layer, layer_text
 from hybrid.simulation.slack_bends import (
     TURNS,
+    Bounds,
+    doubtful,
+    kinks_at,
     slack_text_of,
     too_long_for_weight,
     turns_by_weight,

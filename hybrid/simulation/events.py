@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import nan
 from typing import Any, Protocol
+
+from hybrid.kernels.state.books import Clock, Counts
+from hybrid.kernels.step.accept import MANY, TINY
 
 
 class Sink(Protocol):
@@ -65,3 +68,85 @@ def slack_steps_text(tried: float, taken: float, waves: float) -> str:
         f"is too long for waves, which pass a cell in {waves:.2g} s; this step and others like it are "
         f"cut; time.step: {taken:.2g} follows them"
     )
+
+
+# Steps that have become so short that a run may not end: since when, what cuts them, and where.
+
+# Kind of the event.
+COLLAPSE = "steps collapse"
+# Steps so short, one after the other, after which a run that is only to be compared with is given up.
+GIVE_UP = 10 * MANY
+GAIN, TURN, NEWTON, ERROR = "gain", "turn", "newton", "error"
+# What cuts steps, and what to do about it.
+CAUSES = {
+    GAIN: ("energy that contact puts in", "shorter cells there"),
+    TURN: ("cells that turn by more than a step allows", "cells as long as the bend there, or damping"),
+    NEWTON: ("Newton's method, which does not converge", "more cells where the cable bends, or damping"),
+    ERROR: ("the error that a step makes", "a larger accuracy or time.tolerance, or damping of what is fast there"),
+}
+TOUCHES_ITSELF = "; the line touches itself there, and contact: {self: false} leaves that out"
+TOUCH_EACH_OTHER = "; lines touch each other there, and contact: {between: []} leaves that out"
+
+
+def collapse_text(steps: int, dt: float, longest: float, cuts: Mapping[str, int], s: float, contact: str) -> str:
+    """Text of the event of so many steps in a row, the last of dt (s), the longest of the run before.
+
+    cuts: tries that were given up, by cause; s: m, where the last was; contact: what touches now, TOUCHES_ITSELF or
+    TOUCH_EACH_OTHER; empty: nothing.
+    """
+    text = (
+        f"the last {steps} steps were shorter than {TINY:g} of the longest, {longest:.3g} s; the last took {dt:.3g} s"
+    )
+    most = max(cuts, key=lambda cause: cuts[cause], default="")
+    if not most or not cuts[most]:
+        return f"{text}; they grow no faster{contact}"
+    given = ", ".join(f"{CAUSES[x][0]} ({n})" for x, n in sorted(cuts.items(), key=lambda each: -each[1]) if n)
+    return f"{text}; tries were cut by {given}, last at s = {s:.6g} m: {CAUSES[most][1]}{contact}"
+
+
+# Events of an accepted step: steps that were cut, an error that is not known, a line that comes near itself.
+
+# What cuts steps, and where the tries are counted.
+CUTS = {GAIN: "cut_by_gain", TURN: "cut_by_turn", NEWTON: "cut_by_newton", ERROR: "cut_by_error"}  # of Counts
+
+
+def note_cut(clock: Clock, most: float, length: float, sink: Sink, told: bool) -> None:
+    """An end turns too far in a fixed step, which was cut: an event for the first.
+
+    most: rad in a step; length: m, of the line; told: whether nothing is to be said of it.
+    """
+    if not told:
+        text = steps_cut_text(float(clock.cut_angle), float(clock.cut_step), most)
+        sink.event(float(clock.previous), 0.0, length, "steps cut", text)
+    clock.mute_cuts = 1.0
+
+
+def note_slack(clock: Clock, waves: float, s: float, sink: Sink) -> None:
+    """A catenary was slack at s (m) in a step too long for its waves, and not in shorter ones: an event for the first.
+
+    waves: s, in which one passes a cell.
+    """
+    text = slack_steps_text(float(clock.slack_step), float(clock.last_dt), waves)
+    sink.event(float(clock.now), s, s, "steps cut", text)
+    clock.mute_slack = 1.0
+
+
+def note_iterations(clock: Clock, count: Counts, length: float, sink: Sink) -> None:
+    """A step was taken in all the Newton iterations that it may take though these had not converged: the first."""
+    most = int(count.most_iterations)
+    left = "though the next would still have" if most > 1 else "which"  # from one alone the next is not known
+    text = (
+        f"a step was taken after {most} Newton iterations, {left} changed it by {float(clock.correction):.2g} "
+        f"(relative), and so are others like it: most_iterations bounds their cost; "
+        f"steps/correction has what each left out; a shorter time.step or more iterations leave less"
+    )
+    sink.event(float(clock.now), 0.0, length, "iterations cut", text, threshold=float(most))
+
+
+def count_iterations(clock: Clock, count: Counts, length: float, sink: Sink) -> None:
+    """How many steps were taken so: an event with their number, at the end of the run."""
+    short, most = int(count.cut_short), int(count.most_iterations)
+    if short:
+        text = f"{short} of {int(count.steps)} steps were taken after {most} Newton iterations that had not converged"
+        now = float(clock.now)
+        sink.event(now, 0.0, length, "iterations cut", text, value=float(short), threshold=float(most))

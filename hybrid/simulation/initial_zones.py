@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from hybrid.adapt.manager import Allowed, DomainManager, Times
-from hybrid.adapt.user_criterion import UserCriterion
+from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.march.torque_transfer import carry_torque
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION

@@ -25,8 +25,8 @@ from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free, shows_bends, wants_survey
 from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.interrupts import at_once
-from hybrid.simulation.section_layers import MORE
+from hybrid.simulation.mesh_survey import MORE
+from hybrid.simulation.progress import at_once
 
 # Cells to a length lambda at a place that bends a rod, and beyond how many such lengths a longer cell hides the bend:
 # the curvature at the end of an exponential layer is then off by 1 % and by about 4 %.

@@ -47,13 +47,12 @@ from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.deferred_recorder import DeferredRecorder, OutputsAside, may_be_joined
 from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.failure import FASTEST
 from hybrid.simulation.kind_changes import Around
-from hybrid.simulation.outputs_aside import OutputsAside, may_be_joined
 from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.slack_bends import note_laid
@@ -69,9 +68,9 @@ from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
-    from hybrid.simulation.lines_cells import LineCells
-    from hybrid.simulation.lines_nodes import LineNodes
+    from hybrid.simulation.kind_changes import LineCells
     from hybrid.simulation.payout import PayingOut
+    from hybrid.simulation.payout_nodes import LineNodes
 
 # Columns of the step log that runs to compare with keep: time, forces at both ends.
 FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force_end")]

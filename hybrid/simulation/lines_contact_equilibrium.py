@@ -24,10 +24,9 @@ from hybrid.solve.flaws import behind_obstacles, passed_obstacles
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest, lines_at_rest
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.search import Start, Tally, in_slower_currents
+from hybrid.solve.search import Start, Tally, in_slower_currents, is_in_current
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.solve.softened import is_in_current
 
 # Turns by which an equilibrium without contact may differ from its start, whose shape may have a writhe of its own.
 OF_SHAPE = 0.5

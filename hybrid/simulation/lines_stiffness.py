@@ -22,6 +22,7 @@ from hybrid.model.clamps import seat_of, seated
 from hybrid.model.network import NetworkModel, build_system
 from hybrid.model.plane import in_space
 from hybrid.scene.analysis import Equilibrium
+from hybrid.scene.base import nearest
 from hybrid.scene.bodies import FixedBody, FreeBody, HeldBody
 from hybrid.scene.body_shapes import BodyShape
 from hybrid.scene.network import JoinedLine
@@ -29,7 +30,6 @@ from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
 from hybrid.scene.short_form import network_of, short_form
-from hybrid.scene.suggestions import nearest
 from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.lines_contact_equilibrium import contacts_of
 from hybrid.simulation.run_contact import refuse_within_itself

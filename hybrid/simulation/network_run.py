@@ -15,7 +15,7 @@ from weakref import proxy
 import numpy as np
 
 from hybrid.adapt.manager import DomainManager
-from hybrid.adapt.user_criterion import UserCriterion
+from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
 from hybrid.kernels.state import books as b
@@ -32,18 +32,27 @@ from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.network_scene import Network
 from hybrid.scene.plane import OUT
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.body_overlap import note_overlaps
-from hybrid.simulation.collapse import COLLAPSE, GIVE_UP, TOUCH_EACH_OTHER, TOUCHES_ITSELF, collapse_text
-from hybrid.simulation.events import Sink, energy_gains_text
+from hybrid.simulation.events import (
+    COLLAPSE,
+    CUTS,
+    GIVE_UP,
+    TOUCH_EACH_OTHER,
+    TOUCHES_ITSELF,
+    Sink,
+    collapse_text,
+    count_iterations,
+    energy_gains_text,
+    note_cut,
+    note_iterations,
+    note_slack,
+)
 from hybrid.simulation.failure import Stopped, explanation, first_remedy, touch_text, write_snapshot
-from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
-from hybrid.simulation.interrupts import at_once
+from hybrid.simulation.floating_watch import note_dry_bodies, note_overlaps, note_pulled_under
 from hybrid.simulation.line_result import FORCE_COLUMNS, WAITING, LineResult, LineStep, Wanted
 from hybrid.simulation.lines_contact import LinesWatch, shared_of
 from hybrid.simulation.lines_contact_start import note_crossings
-from hybrid.simulation.load_change import change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.lone_planes import LonePlanes
-from hybrid.simulation.progress import RESULT, ProgressReporter
+from hybrid.simulation.progress import RESULT, ProgressReporter, at_once
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import kept_resolution, other_program, refused, require_same
 from hybrid.simulation.run_checkpoint import (
@@ -65,11 +74,11 @@ from hybrid.simulation.run_contact import (
 )
 from hybrid.simulation.run_failures import Failures
 from hybrid.simulation.run_file import Cable, CableFile, LinesFile
+from hybrid.simulation.run_of_lines import change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.run_points import Rotations, Sampled
 from hybrid.simulation.run_quantities import RunQuantities
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, joined_lines, named
 from hybrid.simulation.run_zones import RunZones, Start, managers_for, start_at_rest, zones_as_placed
-from hybrid.simulation.step_events import CUTS, count_iterations, note_cut, note_iterations, note_slack
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
 from hybrid.solve.joined import LineFailed, NetworkState, NetworkTaken
 from hybrid.solve.lines_at_rest import LinesAtRest

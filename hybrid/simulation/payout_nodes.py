@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.adapt.state_transfer import states
+from hybrid.adapt.manager import states
 from hybrid.kernels.contact.self_distance import blank_itself, blank_itself_job, boxes_of
 from hybrid.kernels.machine.binding import Packed, Room, Table
 from hybrid.kernels.mesh.cell_changes import after_forces, before_forces
@@ -49,9 +49,10 @@ from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.line import lines
 from hybrid.outputs.joined_lines import Output
-from hybrid.simulation.cell_arrays import REST_OF_SEA, Kept, Shaped, blank_kept, seas
+from hybrid.simulation.cell_views import REST_OF_SEA, Kept, Shaped, blank_kept, seas
 from hybrid.simulation.envelope import marks_on
-from hybrid.simulation.line_of_run import OneOfMany
+from hybrid.simulation.kind_changes import by_itself, ends_alone
+from hybrid.simulation.line_of_run import OfRun, OneOfMany
 from hybrid.solve.stepper import HEAVY
 
 # Of the tables of a run, what depends on the cells.
@@ -361,3 +362,57 @@ def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
     for name in old._fields:
         if name not in but:
             getattr(new, name)[:] = getattr(old, name)
+
+
+# Lines of several that are paid out: nodes enter and leave between two steps without Python's help.
+#
+# Only in a line that is joined to nothing that moves with it and whose zones stay; what it needs for a change is what
+# one
+# cable needs (simulation.payout_nodes), in steps of all lines (simulation.lines_cells).
+
+
+class LineNodes(NodeChanges):
+    """Nodes of one of several lines that enter and leave, with the solver that it has now."""
+
+    def __init__(self, run: OfRun, number: int) -> None:
+        self._many, self._of_line, self._solver = run, run.lines[number], run.solver
+        owner = OneOfMany(run, number)
+        super().__init__(owner)
+
+    @staticmethod
+    def may_change(run: OfRun, number: int) -> bool:
+        """Whether nodes of a line can enter and leave so in a run whose solver is attached."""
+        model, line = run.model.models[number], run.lines[number]
+        stays = model.layout is None and line.paying is not None and not line.paying.ended
+        return stays and by_itself(run, number) and is_plain(model.line)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the line is solved by what the arrays were made for."""
+        watched = self._owner.itself.table if self._owner.itself is not None else None
+        same = self._solver is self._many.solver and self._of_line.watch_table is watched
+        return bool(same and self.still_fits())
+
+    @property
+    def job(self) -> np.ndarray:
+        """The table of kernels.run.payout_run that the compiled steps get."""
+        self._at.may_wait = self._owner.outputs_may_wait
+        return self._following.numbers
+
+    def change(self) -> None:
+        """A node enters or leaves now."""
+        f.change_node(self._following.numbers)
+        self.sync()
+
+    def outputs(self, rows: Floats) -> tuple[list[Output], Batch]:
+        """All outputs that wait, in rows, copied, each with its line; and what they have at the ends."""
+        model, begin, found, batches = self._owner.model, 0, list[Output](), list[Batch]()
+        for first, count, cells in self._waiting[: self._at.waiting].tolist():
+            batches.append(self._of_line.batch_of(rows[first : first + count], cells))
+            found += self._outputs_of(batches[-1], cells, begin)
+            begin += f.OF_REEL * cells
+        if len(rows) > self._at.used:
+            batches.append(self._of_line.batch_of(rows[self._at.used :], model.cells))
+            found += self._paying.outputs_of_now(model.line, batches[-1])
+        self._at.waiting = self._at.placed = self._at.used = 0
+        return found, ends_alone(batches)

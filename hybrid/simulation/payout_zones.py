@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hybrid.adapt.base_change import change_base
-from hybrid.adapt.manager import Change, DomainManager, Reason
+from hybrid.adapt.manager import Change, DomainManager, Reason, change_base
 from hybrid.kernels.mesh.stiffness_ramp import soften
 from hybrid.kernels.reel.reel import MovingZones, zones_that_stay
 from hybrid.kernels.state.state import State

@@ -21,7 +21,7 @@ from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.kernels.step.accept import GROWN
 from hybrid.model.build import Model
 from hybrid.model.plane import in_space, leaves_plane, planar, untwist
-from hybrid.solve.plane_stability import on_nodes, scaled, seed
+from hybrid.solve.stability import on_nodes, scaled, seed
 
 # Of the length: how far the push displaces a cable that goes on in space: a hundred times what an equilibrium may be
 # out of the plane, and nothing that anybody would see.

@@ -8,18 +8,20 @@ Listeners are called by the thread that made the reporter; what runs in other th
 
 from __future__ import annotations
 
+import signal
 import sys
 import threading
 import time as clock
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TextIO
+from typing import Any, Protocol, TextIO
 
+from hybrid.errors import command_for
 from hybrid.kernels.machine.compile import is_warm
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import Resolution
-from hybrid.simulation.notebook_progress import NotebookBar, in_notebook, notebook_bar
 
 PRE_RUN, ESTIMATION, RESULT, REFINEMENT = "mesh pre-run", "error estimation", "result", "refinement"
 
@@ -220,3 +222,127 @@ class StatusLine:
         if self._width:
             self._stream.write("\n")
             self._width = 0
+
+
+# Ctrl-C and SIGTERM as a flag that is looked at where work can stop.
+
+# s between two signals of which the second ends a run at once: process managers may send the same one twice.
+IMPATIENT = 1.0
+
+_AT_ONCE = [0]  # how many sections are entered in which a signal is raised when it comes
+
+
+@contextmanager
+def interrupts() -> Iterator[Callable[[], bool]]:
+    """Catch Ctrl-C and SIGTERM as a flag, so that a run ends between two steps and its file is complete, and a study
+    ends between two runs with its table written.  Gives the flag; may be nested: the inner one hears a signal first.
+
+    A second one, `IMPATIENT` s later, is raised at once, as in a long compilation or search of an equilibrium.  A
+    signal for which nothing was raised, because the run ended or failed first, goes to the handler from before.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+    caught: list[int] = []
+    first = 0.0  # s of the clock
+
+    def catch(number: int, _frame: object) -> None:
+        nonlocal first
+        if _AT_ONCE[0] or (caught and clock.monotonic() - first > IMPATIENT):
+            raise KeyboardInterrupt
+        first = first if caught else clock.monotonic()
+        caught.append(number)
+
+    before = {}
+    for number in (signal.SIGINT, signal.SIGTERM):
+        before[number] = signal.signal(number, catch)
+    try:
+        yield lambda: bool(caught)
+    except KeyboardInterrupt:
+        caught.clear()
+        raise
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if caught:
+            signal.raise_signal(caught[0])
+
+
+@contextmanager
+def at_once(heard: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    """A section that nothing is written in, such as the search of an equilibrium: a signal is raised when it comes.
+
+    heard: the flag of `interrupts`: one that came before is raised here.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    if heard():
+        raise KeyboardInterrupt
+    _AT_ONCE[0] += 1
+    try:
+        yield
+    finally:
+        _AT_ONCE[0] -= 1
+
+
+# Progress of a run as a bar in a notebook (ipywidgets, the extra `notebook`); without it there is a line of text.
+
+WITHOUT = f"progress as text; a bar in the notebook needs: {command_for('notebook')}"
+
+
+class Reported(Protocol):
+    """What a bar reads of a `Progress`."""
+
+    @property
+    def fraction(self) -> float: ...
+
+    @property
+    def text(self) -> str: ...
+
+
+def in_notebook() -> bool:
+    """Whether the code runs in a kernel of Jupyter; IPython is not imported to find out."""
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and getattr(ipython.get_ipython(), "kernel", None) is not None
+
+
+def notebook_bar() -> NotebookBar | None:
+    """A bar that is displayed at the first report; None, with a word on the error stream, without ipywidgets."""
+    try:
+        import ipywidgets
+    except ImportError:
+        sys.stderr.write(WITHOUT + "\n")
+        return None
+    return NotebookBar(ipywidgets)
+
+
+class NotebookBar:
+    """A bar with a line of text, in the cell that runs; it stays, with where the run ended."""
+
+    def __init__(self, widgets: Any) -> None:
+        self._bar = widgets.FloatProgress(value=0.0, min=0.0, max=1.0, layout=widgets.Layout(width="240px"))
+        self._text = widgets.Label(value="")
+        self._box = widgets.HBox([self._bar, self._text])
+        self._shown = False
+
+    def __call__(self, progress: Reported) -> None:
+        self._show()
+        self._bar.value, self._text.value = progress.fraction, progress.text
+
+    def say(self, text: str) -> None:
+        """A text beside the bar, until the first report."""
+        self._show()
+        self._text.value = text
+
+    def _show(self) -> None:
+        if not self._shown:
+            from IPython.display import display
+
+            display(self._box)
+            self._shown = True
+
+    def close(self) -> None:
+        """Mark a bar that did not reach its end."""
+        if self._shown and self._bar.value < 1.0:
+            self._bar.bar_style = "warning"

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.adapt.user_criterion import UserCriterion
+from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.machine.cache import compiler_hash
 from hybrid.model.mesh import MOST_CELLS, Grading

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from hybrid.adapt.user_criterion import UserCriterion
+from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE

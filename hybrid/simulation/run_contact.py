@@ -16,10 +16,16 @@ from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.model.network import NetworkModel
 from hybrid.model.self_reach import touching, touching_no_more
 from hybrid.simulation.contact_equilibrium import contact_of
-from hybrid.simulation.contact_start import GIVEN_UP, given_up
 from hybrid.simulation.lines_contact import PASSED, pair_text
 from hybrid.simulation.lines_contact_equilibrium import energy_between, touches_alone
-from hybrid.simulation.lines_contact_start import given_up_text, lines_near, touch_each_other, touching_now
+from hybrid.simulation.lines_contact_start import (
+    GIVEN_UP,
+    given_up,
+    given_up_text,
+    lines_near,
+    touch_each_other,
+    touching_now,
+)
 from hybrid.simulation.run_of_lines import RunOfLines, change_lines
 from hybrid.simulation.self_watch import deepest_text, diameters
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState

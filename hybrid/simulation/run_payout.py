@@ -23,8 +23,8 @@ from hybrid.kernels.state.state import Floats, state_for
 from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.failure import winch_text
-from hybrid.simulation.lines_nodes import LineNodes
 from hybrid.simulation.payout import Before, PayingOut
+from hybrid.simulation.payout_nodes import LineNodes
 from hybrid.simulation.payout_zones import PaidZones, moving_zones
 from hybrid.simulation.run_contact import renew_solver
 from hybrid.simulation.run_of_lines import RunOfLines

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from hybrid.kernels.state.state import Batch, Floats
 from hybrid.kernels.watch.named_quantities import PATH_ROW
-from hybrid.model.network import NetworkModel
+from hybrid.model.model_costs import with_models
+from hybrid.model.network import NetworkModel, build_system
+from hybrid.model.resolution import model_is_free, wants_errors
+from hybrid.outputs.line_forces import KEYS, Lines, pair_fields, pair_forces
 from hybrid.outputs.observation import Probe
 from hybrid.outputs.quantities import Quantities
 from hybrid.outputs.step_quantities import StepQuantities
 from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FreePoint
+from hybrid.scene.quantities import KINDS, Quantity
+from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.line_result import LineResult
-from hybrid.simulation.result_file import limits_of
+from hybrid.scene.short_form import network_of
+from hybrid.simulation.line_result import LineResult, Wanted, observer_of
+from hybrid.simulation.result_file import STEP_FIELDS, limits_of
+from hybrid.simulation.run_points import fields_of
+from hybrid.solve.shared_contact import SharedContact
+from hybrid.store.copying import GROUP
 from hybrid.store.format import Field
 
 MORE_CELLS = 4  # times as many as at first may a line have whose chords are looked at; with more nothing is known
@@ -162,3 +172,101 @@ class RunQuantities:
 
     def _radii(self, line: LineResult) -> Floats:
         return Quantities(line.scene, {}).radii(line.model.line.s)
+
+
+# Forces between lines that touch each other, at the outputs of a system: which pairs are named, and their values.
+
+
+def fields_of_pairs(model: NetworkModel) -> list[Field]:
+    """What is recorded of the pairs of lines whose contact is computed, and of these lines with themselves."""
+    return pair_fields([(model.names[a], model.names[b]) for a, b in _pairs(model).values()])
+
+
+def values_of_pairs(model: NetworkModel, shared: SharedContact | None, states: Sequence[Batch]) -> dict[str, Floats]:
+    """Values (nb, ...) of those fields, from nb states of all lines; shared: their contact, None: nothing touches."""
+    found: dict[str, Floats] = {}
+    nb, pairs = len(states[0].t), _pairs(model)
+    for a, b in pairs.values():
+        at = f"contacts/{model.names[a]}/{model.names[b]}"
+        found |= {f"{at}/{key}": np.zeros((nb, 3) if key == "force" else nb) for key in KEYS[a == b :]}
+    if shared is None or not pairs:
+        return found
+    lines, mine = Lines(shared.contact, shared.s), [states[k] for k in shared.lines]
+    for output in range(nb):
+        touch = np.concatenate([x.touch[output] for x in mine])
+        if not touch.any():
+            continue
+        r = np.concatenate([x.r[output] for x in mine])
+        for pair, values in pair_forces(lines, r, touch).items():
+            at = "contacts/" + "/".join(model.names[k] for k in pairs[pair])
+            for key, value in zip(KEYS, values, strict=True):
+                if f"{at}/{key}" in found:
+                    found[f"{at}/{key}"][output] = np.asarray(value)
+    return found
+
+
+def _pairs(model: NetworkModel) -> dict[tuple[int, int], tuple[int, int]]:
+    """Numbers of two lines, or of one twice, by their places among the lines that touch others, first <= second.
+
+    None, where nobody asks for their contact: which lines will meet is not known when a file is begun.
+    """
+    if model.touching is None or model.may_meet:
+        return {}
+    lines = model.touching.lines
+    each = zip(*np.nonzero(np.triu(model.touching.meets)), strict=True)
+    return {(int(j), int(k)): (lines[j], lines[k]) for j, k in each}
+
+
+# What a result will hold, by name, unit and description, before anything is computed.
+
+
+class Listed(NamedTuple):
+    """A quantity of a result: its name, unit, dimensions, and what it is."""
+
+    name: str
+    unit: str
+    dims: tuple[str, ...]
+    description: str
+
+
+def listed_outputs(scene: SceneLike) -> list[Listed]:
+    """What `hybrid run` (or `hybrid static` of a scene without time) will record over time; nothing is computed.
+
+    Of several lines: what is recorded of points and bodies, and of every line under `lines/<name>/`.
+    """
+    asked = as_scene(scene)
+    moves, named, system = asked.time is not None, bool(asked.line_names), network_of(asked)
+    free = [name for name in system.lines if model_is_free(system.scene_of(name))]
+    system = with_models(system, dict.fromkeys(free, "adaptive"))
+    model, found, scenes = build_system(system), list[Listed](), system.scenes_of_lines
+    if named:
+        found = _over_time([*fields_of(system), *fields_of_pairs(model), *RunQuantities(system, scenes).fields])
+    else:  # a cable is recorded by its own scene, which has its quantities
+        scenes = {name: asked.scene_of(key) for name, key in zip(scenes, asked.lines, strict=True)}
+    for (name, each), built in zip(scenes.items(), model.models, strict=True):
+        wanted = Wanted(error=built.follows_error and wants_errors(each))
+        fields = observer_of(each, built, moves, wanted=wanted).fields
+        found += _over_time(fields, steps=moves, begin=f"{GROUP}/{name}/" if named else "")
+    return _with_ranges(found, asked.output.quantities) if moves else found
+
+
+def kinds_of_quantities() -> list[Listed]:
+    """Kinds of `output.quantities`, which are recorded where a scene asks for them."""
+    words = {"end": "end given", "to": "touchdown point or other end", "what": "a point, a plane, a path or a line"}
+    return [Listed(kind, unit, ("t",), text.format(**words)) for kind, (unit, text, _, _) in KINDS.items()]
+
+
+def _with_ranges(found: list[Listed], asked: Mapping[str, Quantity]) -> list[Listed]:
+    """Listed quantities that say whether extremes and limits of them are those of every step; asked: by name."""
+    out = []
+    for x in found:
+        if x.name in asked or x.name in ("wall_tension", "von_mises"):
+            x = x._replace(description=f"{x.description}; extremes and limits: of every step")
+        out.append(x)
+    return out
+
+
+def _over_time(fields: Iterable[Field], steps: bool = False, begin: str = "") -> list[Listed]:
+    """Fields at every output, and what is logged at every step; the second values of places with two are left out."""
+    every = [Listed(begin + f.name, f.unit, ("t", *f.dims), f.description) for f in fields if "right/" not in f.name]
+    return every + [Listed(f"{begin}steps/{f.name}", f.unit, ("steps/t",), f.description) for f in STEP_FIELDS if steps]

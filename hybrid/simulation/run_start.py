@@ -14,20 +14,23 @@ from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Floats, State
+from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel, balanced_places, starts_between
 from hybrid.model.plane import as_kept, leaves_plane, planar
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FixedBody
+from hybrid.scene.end_loads import Triple
+from hybrid.scene.motion import motion_record
+from hybrid.scene.motion_tables import Motion
 from hybrid.scene.network_scene import Network, floating_groups
 from hybrid.scene.points import Fairlead, FixedPoint
-from hybrid.scene.schema import LineScene
-from hybrid.simulation.blended import blended_text, note_drawn, rotate_ends_in
-from hybrid.simulation.contact_start import refuse_start_in_obstacles
+from hybrid.scene.schema import LineScene, Points
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.equilibrium import count_turns, equilibrium_of, settling, solve_like
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.lines_contact_equilibrium import settle, solve_with_contact
+from hybrid.simulation.lines_contact_start import refuse_start_in_obstacles
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.solve.flaws import ON_BED, rubs_on
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, joined_ends
@@ -269,7 +272,7 @@ def begin_as_placed(
 
 
 def blended_of_lines(system: Network) -> Iterator[tuple[str, str]]:
-    """Points and bodies of lines, and texts of simulation.blended.note_blended; empty ones of what has no file."""
+    """Points and bodies of lines, and texts of `note_blended`; empty ones of what has no file."""
     for name, point in system.points.items():
         if isinstance(point, FixedPoint):
             yield name, blended_text(f"points.{name}", point.motion, point.position, bool(system.clamped_at(name)))
@@ -287,3 +290,77 @@ def named(failed: LineFailed, model: NetworkModel, first: str = "", left: Path |
     if not first and failed.line >= 0:
         first = slack_remedy(model.models[failed.line], failed.outcome, failed.s)
     return ComputationError(failed.outcome, failed.t, failed.s, detail, left, first, name)
+
+
+# What an end does that the start of a cable does not fit: blended in, with an event that says how.
+#
+# Motion files that do not start at rest where the end is, and tangents that the initial shape does not have; and what
+# the
+# line itself does not fit: points that are further apart, or nearer to each other, than it is long.
+
+AT_REST = 1e-9  # m, deg, m/s or deg/s, below which a record starts at rest
+# Of the strain that a section bears, the part beyond which a line along points starts stretched: 0.1 % of wire.
+DRAWN = 0.02
+
+
+def blended_text(where: str, motion: Motion | None, position: Triple | None, turns: bool) -> str:
+    """How the file of a motion begins, and until when it is blended in; empty: it has no file or no ramp.
+
+    position: m, of what moves; turns: whether it holds a direction.
+    """
+    if motion is None or motion.file is None or motion.ramp is None:
+        return ""
+    record, parts = motion_record(motion, position, turns), []
+    bases = (np.array(position or (0.0, 0.0, 0.0)), np.zeros(3))
+    for values, base, units in ((record.shift, bases[0], "m"), (record.rotation, bases[1], "deg")):
+        if values is None:
+            continue
+        first = np.array([np.interp(0.0, record.times, column) for column in values.T])
+        i = max(int(np.searchsorted(record.times, 0.0, side="right")) - 1, 0)
+        speed = np.linalg.norm((values[i + 1] - values[i]) / (record.times[i + 1] - record.times[i]))
+        for size, unit in ((float(np.linalg.norm(first - base)), units), (float(speed), f"{units}/s")):
+            parts += [f"{size:.4g} {unit}"] if size > AT_REST else []
+    begins = f"begins with {', '.join(parts)}" if parts else "begins at rest where it is held"
+    return (
+        f"the motion of {where} in {record.name} {begins}: it is blended in over {motion.ramp:g} s (ramp), and "
+        "followed exactly from then on"
+    )
+
+
+def note_drawn(scene: LineScene, events: EventLog) -> None:
+    """An event for a line that starts stretched, or compressed, as its points are drawn and its ends do not ask for."""
+    initial, cable, held = scene.initial, scene.cable, scene.ends.held()
+    if not isinstance(initial, Points) or initial.arc_lengths is not None or cable.inextensible:
+        return
+    fits = max(cable.length, math.dist(held["start"], held["end"]) if len(held) == 2 else 0.0)
+    drawn = initial.knots[-1]
+    if abs(drawn - fits) > DRAWN * cable.length * min(x.strain_limit for x in cable.sections):
+        strain = drawn / cable.length - 1.0
+        how = "stretched" if strain > 0.0 else "compressed"
+        text = (
+            f"a line of {cable.length:.6g} m that starts along {drawn:.6g} m of points, {how} by {abs(strain):.2%}: "
+            f"initial.points: expected {fits:.6g} m in all: move the points; or write `kind: equilibrium`, "
+            "and it starts at rest; where it is meant, give initial.arc_lengths"
+        )
+        events.event(0.0, 0.0, cable.length, "implausible", text)
+
+
+def rotate_ends_in(
+    scene: LineScene, model: Model, state: State, events: EventLog, held: tuple[bool, bool] = (True, True)
+) -> None:
+    """Tangents that the initial shape does not have are reached smoothly, and an event says so.
+
+    held: whether the start and the end are held, and not on what moves by the lines.
+    """
+    e = state.e
+    d = (e[0] / np.linalg.norm(e[0]), e[-1] / np.linalg.norm(e[-1]))
+    which = [bool(model.line.element[-k]) and held[k] for k in (0, 1)]
+    duration = min(model.time_scale, 0.5 * scene.require_time().duration)
+    for k, angle in model.ends.bring_in(d, which, duration):
+        s = float(model.line.s[-k])
+        text = (
+            f"the initial shape misses the tangent prescribed at s = {s:g} m by {np.degrees(angle):.3g} deg: "
+            f"it is rotated to it, and a force there grows, over the first {duration:.3g} s; "
+            f"start from an equilibrium to avoid this"
+        )
+        events.event(0.0, s, s, "end rotated in", text)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.adapt.user_criterion import UserCriterion
+from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.ends import DrivenEnd, contradictions

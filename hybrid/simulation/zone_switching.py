@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.adapt.manager import Change, DomainManager
-from hybrid.adapt.state_transfer import Clamp, transfer_to
+from hybrid.adapt.manager import Change, Clamp, DomainManager, transfer_to
 from hybrid.adapt.zone_rules import blank_review_job, quiet_review
 from hybrid.errors import KINK_COUNTS, Outcome
 from hybrid.kernels.machine.binding import Table

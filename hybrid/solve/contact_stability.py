@@ -17,8 +17,16 @@ from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.state.state import Floats
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.settling import gyration
-from hybrid.solve.stability import ANCHOR, LOST, NEUTRAL, SHIFTED, Stability, is_without_moment, stiffest_bending
+from hybrid.solve.stability import (
+    ANCHOR,
+    LOST,
+    NEUTRAL,
+    SHIFTED,
+    Stability,
+    gyration,
+    is_without_moment,
+    stiffest_bending,
+)
 
 EACH = 4  # unknowns of a node, (r, psi)
 # Sample points of contact lie a quarter of a diameter apart, and a line rests between them as in hollows: whether it

@@ -27,9 +27,9 @@ from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import MOST_FALLS, PUSHED, SAME, damped_bodies
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.settling import CALM, along, damped, nudged, stop
-from hybrid.solve.settling import CONTACT_DAMPING as DAMPING
 from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.stability import CALM, along, damped, nudged, stop
+from hybrid.solve.stability import CONTACT_DAMPING as DAMPING
 
 # Steps of the damped motion, at most; the largest, in time scales: what moves by more meets itself at full speed.
 STEPS, LARGEST = 20_000, 0.25

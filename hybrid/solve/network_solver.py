@@ -45,20 +45,17 @@ from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.step.step_law import REFUSED
 from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
-from hybrid.solve.joined import JoinedLine, NetworkState, NetworkTaken
-from hybrid.solve.joint_jobs import JointJobs, Rooms
+from hybrid.solve.joined import JoinedLine, JointJobs, NetworkState, NetworkTaken, Rooms
 from hybrid.solve.self_contact import SelfContact, left_over
-from hybrid.solve.settling import CONTACT_DAMPING
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.solve.stability import ANCHOR
+from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING
 from hybrid.solve.statics import (
     BALANCED,
     BALANCING,
     MOST_ITERATIONS,
 )
-from hybrid.solve.stepper import HEAVY, REACH, lie_on_bed
+from hybrid.solve.stepper import HEAVY, REACH, lie_on_bed, workspace_of
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
-from hybrid.solve.workspaces import workspace_of
 
 # Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.
 NEUTRAL = 1e-6

@@ -10,24 +10,30 @@ from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, MASS, V
-from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, OBSTACLES, SEABED, TOUCHES
-from hybrid.kernels.state.obstacle_rows import FREE, MOVES
-from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Floats
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.obstacles import half_thickness
+from hybrid.kernels.laws.soil import PART, depth_under
+from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, OBSTACLES, SEABED, SOIL, TOUCHES
+from hybrid.kernels.state.obstacle_rows import FREE, MOVES, ONSET_OF, STIFFNESS
+from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Ends, Floats, Line, Sea, State
+from hybrid.model.sea import ONSET
 from hybrid.solve.flaws import (
     at_rest,
     fold_text,
     lowest_tension,
+    on_obstacles,
     slack_text,
 )
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, NetworkTaken
-from hybrid.solve.laid import laid_without_tension
-from hybrid.solve.settling import (
+from hybrid.solve.stability import (
     CALM,
     GROWN,
     RELAXING_STEPS,
+    Stability,
     along,
     damped,
     growth_time,
@@ -35,8 +41,6 @@ from hybrid.solve.settling import (
     nudged,
     stop,
 )
-from hybrid.solve.softened import is_in_current, softened, softest, with_current
-from hybrid.solve.stability import Stability
 from hybrid.solve.stepper import Stepper, Taken
 
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
@@ -513,3 +517,98 @@ def damped_bodies(bodies: Floats, time_scale: float) -> Floats:
     slow = bodies.copy()
     slow[:, DAMPING : DAMPING + 36] += 2.0 / time_scale * bodies[:, MASS : MASS + 36]
     return slow
+
+
+# A line that lies somewhere without tension, before it is pulled to its equilibrium with friction.
+
+
+def laid_without_tension(line: Line, sea: Sea, ends: Ends, state: State) -> State:
+    """A copy of an equilibrium whose stretches on the bed and on obstacles have their unstretched length, without
+
+    friction yet.  A stretch keeps its path, and its place at a held end that lies there, too; one without such an end,
+    or with two, keeps the place of its middle.  The displacement of a node from here is the travel that friction
+    opposes (docs/theory.md, T17b).
+    """
+    laid, cells = state.copy(), line.h.size
+    laid.slip[:] = 0.0
+    touches = np.asarray(on_obstacles(line, sea, state).any(axis=0))
+    if line.bits & SEABED:
+        touches |= planes_under(sea, state.r)[1] > 0.5 * sea.onset
+    touches[0] |= bool(ends.held[0]) and bool(touches[1])
+    touches[cells] |= bool(ends.held[1]) and bool(touches[cells - 1])
+    shortening = (line.h / np.linalg.norm(state.e, axis=1) - 1.0)[:, None] * state.e
+    for first, last in _stretches(touches):
+        shift = np.vstack([np.zeros(3), np.cumsum(shortening[first:last], axis=0)])
+        count, held = last - first, (first == 0 and ends.held[0], last == cells and ends.held[1])
+        kept = 0.5 * (shift[count // 2] + shift[(count + 1) // 2])  # of the middle, between two nodes if need be
+        if any(held) and not all(held):
+            kept = shift[0 if held[0] else count]
+        laid.r[first : last + 1] += shift - kept
+    for k in np.flatnonzero(ends.held):
+        laid.r[-k] = state.r[-k]
+    laid.e[:] = np.diff(laid.r, axis=0)
+    d = laid.e / np.linalg.norm(laid.e, axis=1)[:, None]
+    across = laid.a1 - np.einsum("ij,ij->i", laid.a1, d)[:, None] * d
+    laid.a1[:] = across / np.linalg.norm(across, axis=1)[:, None]
+    return laid
+
+
+def _stretches(touches: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """First and last node of every run of nodes that touch, of at least two nodes."""
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], touches, [False]]).astype(np.int8)))
+    for first, after in turns.reshape(-1, 2):
+        if after - first > 1:
+            yield int(first), int(after) - 1
+
+
+# Easier seas, in which a line begins that finds its way to the real one: softer, with less current or none.
+
+# How deep a continuation lets a line lie first in the bed, of its length, and in an obstacle, of half of how thick
+# it is; in a plane as in the bed.
+SOFT_BED, SOFT = 0.05, 0.5
+
+
+def softened(line: Line, sea: Sea, part: float) -> Sea:
+    """The sea with this part of the stiffness of its bed and of its obstacles, which are pressed on as much deeper.
+
+    Soil that remembers becomes linear, as stiff as it is on average under what a line presses with, and comes back with
+    the part: where its pressure hardly grows with depth Newton's method does not find how deep a node lies.
+    """
+    rows = sea.obstacles.copy()
+    rows[:, STIFFNESS] *= part
+    rows[:, ONSET_OF] /= part
+    stiffness, onset, soil = sea.stiffness, sea.onset, sea.soil
+    if line.bits & SOIL:
+        depth, soil = _depth(line, sea), soil.copy()
+        stiffness, onset, soil[PART] = stiffness * onset / (ONSET * depth), ONSET * depth, part
+    return sea._replace(stiffness=stiffness * part, onset=onset / part, obstacles=rows, soil=soil)
+
+
+def _depth(line: Line, sea: Sea) -> float:
+    """m, in which soil bears what a line presses on the bed with."""
+    return float(depth_under(sea.soil, float(line.bed_width.max()), sea.onset * sea.stiffness / ONSET))
+
+
+def softest(line: Line, sea: Sea, length: float) -> float:
+    """The part of the stiffness of bed and obstacles at which a line of this length (m) lies as deep as it may."""
+    soft = 1.0
+    if line.bits & SEABED:
+        onset = ONSET * _depth(line, sea) if line.bits & SOIL else sea.onset
+        soft = onset / (SOFT_BED * length)
+    if line.bits & OBSTACLES:
+        thick = half_thickness(sea.obstacles)
+        deep = np.where(np.isfinite(thick), SOFT * thick, SOFT_BED * length)
+        soft = min(soft, float((sea.obstacles[:, ONSET_OF] / deep).min(initial=1.0)))
+    return min(1.0, soft)
+
+
+def with_current(sea: Sea, part: float) -> Sea:
+    """The sea with this part of its current."""
+    now = sea.now.copy()
+    now[1] *= part
+    return sea._replace(now=now)
+
+
+def is_in_current(line: Line, sea: Sea) -> bool:
+    """Whether a current acts on a line."""
+    return bool(line.bits & FLOW) and sea.now[1] != 0.0 and bool(np.any(sea.current))

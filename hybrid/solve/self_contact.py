@@ -33,7 +33,7 @@ from hybrid.kernels.state.state import (
     no_ends,
 )
 from hybrid.kernels.step.newton import ADDRESS, ASKED, NEAR, REST
-from hybrid.solve.workspaces import workspace_of
+from hybrid.solve.stepper import workspace_of
 
 # Sample points of a piece lie at most this part of a diameter apart, but for round-off, which must not decide how many
 # there are: pieces of the same length, in whatever unit, have as many.

@@ -35,13 +35,12 @@ from hybrid.solve.search import (
     stuck,
     summary_of,
 )
-from hybrid.solve.settling import DAMPING as SETTLING
-from hybrid.solve.settling import (
+from hybrid.solve.stability import DAMPING as SETTLING
+from hybrid.solve.stability import (
+    Stability,
     stop,
 )
-from hybrid.solve.stability import Stability
-from hybrid.solve.stepper import Stepper, Taken
-from hybrid.solve.workspaces import workspace_of
+from hybrid.solve.stepper import Stepper, Taken, workspace_of
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 REACH = 0.1  # of the length: largest shift of a node in one iteration

@@ -6,6 +6,7 @@ Chung & Hulbert 1993; Arnold & Bruels 2007; docs/theory.md section 2.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.seabed import normal_forces
 from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil, soil_at_rest
 from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
 from hybrid.kernels.state.forces import FRICTION, PLANAR, SOIL, TOUCHES, WAVES
+from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.report import (
     FORCE_A,
     LOCAL_ERROR,
@@ -30,9 +33,8 @@ from hybrid.kernels.state.report import (
     SLACKEST_CELL,
     USED_RHO,
 )
-from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State, Work
+from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State, Work, blank_line, blank_state, no_ends
 from hybrid.kernels.step.step import States, friction_axes
-from hybrid.solve.workspaces import workspace_of
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
 # Share of the line's length that a node may move in one Newton iteration of a step.
@@ -213,3 +215,21 @@ class Stepper:
         if self.line.bits & TOUCHES:
             lie_on_bed(self.line, sea, self.work, state)
         self.told = self.work.report.tolist()
+
+
+# Work arrays of a line; the address of what passes torques through its zones takes a millisecond to find: once.
+
+
+@cache
+def _torque_address() -> int:
+    """Of kernels.march.zone_torque.pass_torque, the same for all lines, whose arrays have the same types."""
+    return int(pass_torque.address(blank_line(1), no_ends(), blank_state(1), entry.workspace(1), 0, 0.0))
+
+
+def workspace_of(line: Line, keep: bool = False) -> Work:
+    """As kernels.run.entry.workspace_of; keep: factors stay, as they do where sheaves turn with the line."""
+    keep = keep or bool((line.moved == FREE).any())
+    if not line.torsion.size or line.bits & PLANAR:
+        return entry.workspace_of(line, keep)
+    work = entry.workspace_of(line._replace(torsion=line.torsion[:0]), keep=True)
+    return work._replace(torsion=torsion_of(line, keep)._replace(address=_torque_address()))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.scene.read import SceneLike, as_scene, one_line
-from hybrid.simulation.interrupts import interrupts
+from hybrid.simulation.progress import interrupts
 from hybrid.store.tradeoff_table import Row
 from hybrid.studies.runs import RunStore, StudyProgress, level_spec
 from hybrid.studies.tradeoff import force_difference, refuse_peers

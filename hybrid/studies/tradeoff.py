@@ -20,7 +20,7 @@ from hybrid.scene.accuracy import amount
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.read import SceneLike, as_scene, one_line
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.interrupts import interrupts
+from hybrid.simulation.progress import interrupts
 from hybrid.store.tradeoff_table import CHECK, FAILED, REFERENCE, Row, TradeTable, judged
 from hybrid.studies.runs import (
     COMPARED,

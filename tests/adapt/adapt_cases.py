@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from problems import Scene, free, pinned, scene, straight
 
-from hybrid.adapt.manager import Allowed, DomainManager, Times
-from hybrid.adapt.state_transfer import Remapped, remap
+from hybrid.adapt.manager import Allowed, DomainManager, Remapped, Times, remap
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on

@@ -23,7 +23,7 @@ from hybrid.outputs.probes import Observer
 from hybrid.simulation import run_cells
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.initial_zones import shares_asked
-from hybrid.simulation.lines_cells import LineCells
+from hybrid.simulation.kind_changes import LineCells
 from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.network_steps import NetworkSteps

@@ -368,7 +368,7 @@ def test_closing_twist_is_spread_evenly(angle):
 
 def test_intrinsic_twist_is_followed():
     """`twist` asks for a twist of the frames per length; it is had between all new cells."""
-    from hybrid.adapt.state_transfer import remap
+    from hybrid.adapt.manager import remap
 
     what, old = cable(), even(8, "C" * 8)
     line = on(what, old)

@@ -19,7 +19,7 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.model.build import build
 from hybrid.simulation import initial_zones
 from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.run_kinds import RunKinds
+from hybrid.simulation.run_zones import RunKinds
 from hybrid.simulation.zone_switching import on_layout
 from hybrid.store.reader import Result
 

@@ -12,8 +12,7 @@ from adapt_cases import Z, cable, hanging, layout, on, state_on, still
 
 import hybrid
 from hybrid.accuracy.passes import free_in
-from hybrid.adapt.manager import Allowed, DomainManager, Times
-from hybrid.adapt.state_transfer import transfer_to
+from hybrid.adapt.manager import Allowed, DomainManager, Times, transfer_to
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.criteria import EDGE
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes

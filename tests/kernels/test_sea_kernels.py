@@ -23,9 +23,9 @@ from hybrid.kernels.laws.water import FADED, SAME_WETNESS, wave_kinematics
 from hybrid.kernels.state.state import LANES, no_sea, with_waves
 from hybrid.kernels.watch.wave_slopes import PHASES, SLOPES, wave_slopes, waves_beside
 from hybrid.model.sea import HIGHEST, LOWEST, Surroundings, components, current_table, jonswap, surroundings
-from hybrid.scene.measured_spectrum import FINE, shares
 from hybrid.scene.spectra import JonswapWaves
 from hybrid.scene.stream_function import steady_wave
+from hybrid.scene.wave_files import FINE, shares
 from hybrid.scene.waves import RegularWaves, StreamFunctionWaves
 
 

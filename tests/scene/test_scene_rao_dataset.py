@@ -81,7 +81,7 @@ def test_damping_makes_it_lag() -> None:
          "radiation_damping": (("omega", *pair), [[[0.5]]]),
          "excitation_force": (("omega", "wave_direction", "influenced_dof"), [[[2.0]]])}, one,
     )  # fmt: skip
-    from hybrid.scene.rao_dataset import _response
+    from hybrid.scene.rao_file import _response
 
     _, _, X = _response(data, "x.nc")
     assert X[0, 0, 2] == pytest.approx(4.0 * np.exp(-0.5j * np.pi))  # F/(w B) = 4, 90 deg behind

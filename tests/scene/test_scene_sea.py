@@ -9,7 +9,6 @@ import pytest
 from scene_texts import AT_REST, OCEAN, SEA, SEA_LIST, SEA_TOO, SEA_UNIFORM, change, complaints, marked
 
 from hybrid.errors import SceneError
-from hybrid.scene.dispersion import wavenumber
 from hybrid.scene.read import parse_scene, scene_text, validate_scene
 from hybrid.scene.schema import (
     Body,
@@ -40,6 +39,7 @@ from hybrid.scene.schema import (
     UniformCurrent,
 )
 from hybrid.scene.start_checks import net_weight
+from hybrid.scene.stream_function import wavenumber
 
 # --- what is read ------------------------------------------------------------------------------
 

@@ -11,8 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.scene.angles import continuous, matrices_of, vectors_of
-from hybrid.scene.motion_file import RecordRefused, read_record
+from hybrid.scene.motion_file import RecordRefused, continuous, matrices_of, read_record, vectors_of
 
 ORIGIN, HEADING, FAIRLEAD = np.array([5.0, -3.0, 0.5]), 30.0, np.array([20.0, 4.0, -2.0])
 T = np.arange(0.0, 31.0, 0.1)

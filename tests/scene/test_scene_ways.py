@@ -12,8 +12,7 @@ import hybrid
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.plausibility import implausible
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.motion_tables import Harmonic, Motion, Travel
-from hybrid.scene.ways import farthest, shift
+from hybrid.scene.motion_tables import Harmonic, Motion, Travel, farthest, shift
 
 ROPE = {"length": 105.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e7}
 CHAIN = {"length": 105.0, "mass": 100.0, "diameter": 0.076, "axial_stiffness": 5e8}

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from hybrid.accuracy.error_control import ErrorController
-from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.error_order import Errors
 from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.refinement import Free
 from hybrid.model.network import NetworkResolution

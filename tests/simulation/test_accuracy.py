@@ -13,10 +13,9 @@ from scipy.interpolate import CubicSpline
 import hybrid
 from hybrid.accuracy import error_estimate, line_errors
 from hybrid.accuracy.error_estimate import OF_SIZES, SAFETY, Estimate
-from hybrid.accuracy.error_order import LEAST_FORCE_ORDER, ORDER, ORDERS, START_ORDERS, confirmed_order
+from hybrid.accuracy.error_order import LEAST_FORCE_ORDER, ORDER, ORDERS, START_ORDERS, Errors, confirmed_order
 from hybrid.accuracy.error_report import error_fields
 from hybrid.accuracy.error_statistics import statistics_of
-from hybrid.accuracy.errors_by_cause import Errors
 from hybrid.accuracy.finer_result import Judged
 from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.refinement import OF_MODEL, Free, Verdict, bounds_of, costly, judge, not_converged, refined

@@ -159,7 +159,7 @@ def test_a_signal_that_has_stopped_a_run_is_raised_once(number: signal.Signals, 
 
 def test_a_second_signal_ends_a_run_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As in an equilibrium that takes long, where no step looks at the first."""
-    monkeypatch.setattr("hybrid.simulation.interrupts.IMPATIENT", 0.0)
+    monkeypatch.setattr("hybrid.simulation.progress.IMPATIENT", 0.0)
     reached: list[str] = []
 
     def search(*_: object, **__: object) -> None:

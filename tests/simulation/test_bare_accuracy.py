@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.error_order import Errors
 from hybrid.accuracy.refinement import asked_text, bounds_of, judge, not_asked_text
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.model_costs import with_model

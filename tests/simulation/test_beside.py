@@ -14,8 +14,7 @@ import hybrid.solve.run
 from hybrid.model.network import NetworkResolution
 from hybrid.simulation import case as cases
 from hybrid.simulation import progress as reports
-from hybrid.simulation.beside import THREADS, beside, thread_count
-from hybrid.simulation.case import Case
+from hybrid.simulation.case import THREADS, Case, beside, thread_count
 from hybrid.simulation.progress import ESTIMATION, RESULT, Progress
 
 TOUCHDOWN = Path(__file__).parents[2] / "examples" / "touchdown.yaml"

@@ -11,8 +11,8 @@ import pytest
 from bits import differences
 
 import hybrid
-from hybrid.accuracy import budget as module
-from hybrid.accuracy.budget import OUTPUT, POINT, Budget
+from hybrid.accuracy import run_forecast as module
+from hybrid.accuracy.run_forecast import OUTPUT, POINT, Budget
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
 from hybrid.simulation.run_sample import RunSample

@@ -16,7 +16,7 @@ from test_bare_accuracy import scene as bare
 from test_result_first import stopped_in
 
 import hybrid
-from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.error_order import Errors
 from hybrid.accuracy.extreme_errors import ExtremeErrors, errors_by_cause, figures, order_of
 from hybrid.accuracy.refinement import figures as told_of
 from hybrid.accuracy.refinement import judge

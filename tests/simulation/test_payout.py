@@ -16,9 +16,9 @@ from hybrid.errors import SceneError
 from hybrid.model.payout import law_of, length_at
 from hybrid.scene.payout import Payout
 from hybrid.simulation import line_result
+from hybrid.simulation.deferred_recorder import OutputsAside
 from hybrid.simulation.line_result import LineResult
-from hybrid.simulation.lines_nodes import LineNodes
-from hybrid.simulation.outputs_aside import OutputsAside
+from hybrid.simulation.payout_nodes import LineNodes
 from tests.inside import OnlyLine
 
 G = 9.81

@@ -11,8 +11,8 @@ import pytest
 
 import hybrid
 from hybrid.cli.tables import zones_over_time
-from hybrid.simulation.lines_nodes import LineNodes
 from hybrid.simulation.payout import PayingOut
+from hybrid.simulation.payout_nodes import LineNodes
 from tests.inside import OnlyLine
 from tests.simulation.test_payout import G, hanging
 from tests.simulation.test_payout_zones import touching

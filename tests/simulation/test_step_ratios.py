@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hybrid.accuracy.error_estimate import Estimate
-from hybrid.accuracy.step_ratios import usual_ratio
+from hybrid.accuracy.error_estimate import Estimate, usual_ratio
 from hybrid.model.resolution import Resolution
 from hybrid.simulation.run_sample import RunSample
 

@@ -12,7 +12,7 @@ from bits import Stopping, differences, went_on
 from test_system_zones import ROPE, SEA, mooring, stepped_again
 
 import hybrid
-from hybrid.simulation.lines_cells import LineCells
+from hybrid.simulation.kind_changes import LineCells
 from hybrid.solve.network_steps import NetworkSteps
 from tests.said import line_of, said
 from tests.validation.test_validation_lines_contact import force_between, lowered

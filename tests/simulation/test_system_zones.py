@@ -12,7 +12,7 @@ from bits import Stopping, differences, went_on
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.simulation.run_kinds import RunKinds
+from hybrid.simulation.run_zones import RunKinds
 from tests.combinations.pairs import as_network
 from tests.said import ONE, both_ways, line_of, said
 

@@ -9,7 +9,7 @@ from hybrid.accuracy import api
 from hybrid.errors import ResultError
 from hybrid.simulation.case import Case
 from hybrid.simulation.line_result import LineResult
-from hybrid.simulation.run_kinds import RunKinds
+from hybrid.simulation.run_zones import RunKinds
 
 
 def swinging(model, **more):

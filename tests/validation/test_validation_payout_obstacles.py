@@ -13,7 +13,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.state.obstacle_rows import OBSTACLE, PIECE_END, STIFFNESS, STRAND, THINNER
 from hybrid.model.build import build
 from hybrid.model.obstacles import obstacle_rows
-from hybrid.simulation.lines_nodes import LineNodes
+from hybrid.simulation.payout_nodes import LineNodes
 from tests.combinations.pairs import as_network, seen_by, turned_and_mirrored
 from tests.problems import tables_with
 from tests.validation.obstacle_scenes import over_pipe, paid_over_drum

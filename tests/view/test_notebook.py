@@ -12,7 +12,7 @@ import pytest
 from reported import reported
 
 import hybrid
-from hybrid.simulation import notebook_progress
+from hybrid.simulation import progress
 from hybrid.simulation.progress import Progress, StatusLine, listener_of
 from hybrid.view.notebook import MIME, bundle
 from hybrid.view.space import MOST_FRAMES, MOST_POINTS
@@ -109,7 +109,7 @@ def test_progress_is_text_where_there_is_no_notebook_or_no_widget(
 def test_the_bar_follows_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     import ipywidgets as widgets
 
-    bar = notebook_progress.NotebookBar(widgets)
+    bar = progress.NotebookBar(widgets)
     shown: list[Any] = []
     monkeypatch.setattr("IPython.display.display", shown.append)
     for t in (1.0, 4.0):

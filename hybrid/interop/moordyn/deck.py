@@ -27,7 +27,7 @@ from hybrid.interop.moordyn.rows import (
 )
 from hybrid.interop.moordyn.stretch import OTHER, Past, pasts_of, tables_of
 from hybrid.interop.moordyn.types import LineType, line_type
-from hybrid.scene.suggestions import did_you_mean
+from hybrid.scene.base import did_you_mean
 
 Triple = tuple[float, float, float]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hybrid.interop.moordyn.rows import LEFT_OUT, NOT_NEEDED, TAKEN, Note, Row, Source, note, number
+from hybrid.scene.base import nearest
 from hybrid.scene.depths import MOST_POINTS
-from hybrid.scene.suggestions import nearest
 
 # A seafloor file of MoorDyn: numbers of x and y, the x, the y, then a row x y z for every point; z is negative.
 
