@@ -36,7 +36,7 @@ from hybrid import Scene
 from hybrid.errors import Outcome
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.run.entry import assembly, block_rows, workspace
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, State
 from hybrid.model.build import Model, build
 from hybrid.solve.statics import solve_statics

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.state.forces import (
+from hybrid.kernels.state.report import (
     ADDED_MASS,
     BODIES,
     BREAKOUT,

@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, V
-from hybrid.kernels.state.forces import BENDING_SLIP, BODIES, DRAG, SOIL
+from hybrid.kernels.state.report import BENDING_SLIP, BODIES, DRAG, SOIL
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.eigen import BELOW, lowest_modes
 from hybrid.linear.excitation import frequencies_of

@@ -35,8 +35,8 @@ from hybrid.adapt.zone_rules import (
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_lengths import FADE
-from hybrid.kernels.mesh.criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.mesh.stiffness_ramp import shares
+from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match, blank_transfer, transfer
 from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.mesh import zone_step as z
-from hybrid.kernels.mesh.criteria import CRITERIA, GIVEN, TORSION
+from hybrid.kernels.mesh.zone_criteria import CRITERIA, GIVEN, TORSION
 from hybrid.kernels.state.state import Floats
 
 

@@ -10,7 +10,7 @@ from textwrap import shorten, wrap
 from typing import TYPE_CHECKING, Any
 
 from hybrid.cli.progress_line import span
-from hybrid.kernels.state.forces import FORCES
+from hybrid.kernels.state.report import FORCES
 from hybrid.model.lines_contact import OTHERS
 from hybrid.model.plan import parts, size_of_result
 from hybrid.model.self_reach import WHERE_NEAR

@@ -50,8 +50,7 @@ from hybrid.kernels.run.network_tangents import (
 )
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, Clock, Counts, sample_size
-from hybrid.kernels.state.forces import WAVES
-from hybrid.kernels.state.report import ASSEMBLED
+from hybrid.kernels.state.report import ASSEMBLED, WAVES
 from hybrid.kernels.state.state import Batch, Floats, Line, State, batch_of_one, state_for
 from hybrid.kernels.watch.tangent_job import TANGENT_SIZES, blank_other
 from hybrid.model.ends import table_of_loads

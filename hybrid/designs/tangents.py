@@ -19,7 +19,7 @@ from hybrid.designs.line_at_rest import displaced
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import workspace
 from hybrid.kernels.state.books import Books, Clock, Counts, blank_books, sample_size
-from hybrid.kernels.state.forces import FRICTION, PLANAR, SELF_CONTACT, SOIL, VORTICES, WAVES
+from hybrid.kernels.state.report import FRICTION, PLANAR, SELF_CONTACT, SOIL, VORTICES, WAVES
 from hybrid.kernels.state.state import (
     LANES,
     Batch,

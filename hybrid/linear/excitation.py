@@ -13,7 +13,7 @@ import numpy as np
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.laws.water import wave_kinematics
-from hybrid.kernels.state.forces import DRAG, FLOW, SURFACE, WAVES
+from hybrid.kernels.state.report import DRAG, FLOW, SURFACE, WAVES
 from hybrid.kernels.state.state import LANES, RIDES, Floats, Line, Sea, State
 from hybrid.model.build import Model
 from hybrid.scene.combinations import RESPONSE_TO_MOTION

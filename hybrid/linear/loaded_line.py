@@ -11,7 +11,7 @@ from scipy import sparse
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
 from hybrid.kernels.laws.hinge_layer import FADED
-from hybrid.kernels.state.forces import BODIES, DRAG, WAVES
+from hybrid.kernels.state.report import BODIES, DRAG, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea
 from hybrid.linear.drag import axes_across, linear_law, of_cylinders, phases_of
 from hybrid.linear.excitation import Excitation, current_at, excitations_of, half_cells

@@ -29,8 +29,7 @@ from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.axial_law import DYNAMIC, PER_TENSION
 from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.run import entry
-from hybrid.kernels.state.forces import AXIAL_LAW, FRICTION, PLANAR, ROTARY, WAVES
-from hybrid.kernels.state.report import MOMENT_A
+from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, MOMENT_A, PLANAR, ROTARY, WAVES
 from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State, no_torsion
 from hybrid.kernels.step.step import friction_axes
 from hybrid.linear.memory import by_layers, with_layers, with_soil

@@ -29,7 +29,7 @@ from hybrid.kernels.laws.bending_slip import (
     follow_slip,
 )
 from hybrid.kernels.laws.soil import BRANCH, DEPTH, PRESSES, TURN, TURN_P, UP, settle_in_soil
-from hybrid.kernels.state.forces import SOIL
+from hybrid.kernels.state.report import SOIL
 from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State, Work
 
 # Step, of the largest tension, by which moments of layers are differentiated.

@@ -35,7 +35,6 @@ from hybrid.kernels.junctions.bodies import PLACE as ORIGIN
 from hybrid.kernels.junctions.body_forces import BY_BODY, BY_NODES, OF_LINE, OF_NODE, OF_SLOT, TOUCHED
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES
 from hybrid.kernels.state.obstacle_rows import (
     BEARING,
     EACH,
@@ -49,6 +48,7 @@ from hybrid.kernels.state.obstacle_rows import (
     TURNED,
 )
 from hybrid.kernels.state.obstacle_rows import FORCE as FORCE_OF
+from hybrid.kernels.state.report import FRICTION, OBSTACLES
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model

@@ -19,7 +19,7 @@ from hybrid.kernels.laws.bending_slip import EACH, PER_TENSION, STIFF
 from hybrid.kernels.laws.bending_slip import MOMENT as SLIPS_AT
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.laws.soil import DEPTH, PRESSES, STEEP, SUCTION
-from hybrid.kernels.state.forces import OBSTACLES, SEABED, SOIL
+from hybrid.kernels.state.report import OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.loaded_line import STRAIGHT, LoadedLine
 from hybrid.linear.memory import pulls

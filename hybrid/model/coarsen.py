@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from hybrid.kernels.march.zone_torque import COMPLIANCE, FREE
-from hybrid.kernels.state.forces import FRICTION, PLANAR, ROTARY, TOUCHES
+from hybrid.kernels.state.report import FRICTION, PLANAR, ROTARY, TOUCHES
 from hybrid.kernels.state.state import Floats, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director

@@ -9,8 +9,9 @@ from math import inf
 
 from hybrid.errors import OF_AN_END
 from hybrid.kernels.march.zone_torque import FIRST, LAST
-from hybrid.kernels.mesh.criteria import CRITERIA
-from hybrid.kernels.state.forces import (
+from hybrid.kernels.mesh.zone_criteria import CRITERIA
+from hybrid.kernels.state.obstacle_rows import STIFFNESS
+from hybrid.kernels.state.report import (
     BENDING_LAW,
     BENDING_SLIP,
     DRAG,
@@ -20,7 +21,6 @@ from hybrid.kernels.state.forces import (
     SELF_FRICTION,
     VORTICES,
 )
-from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.mesh import Zone
 from hybrid.model.obstacles import obstacle_rows

@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.laws.drag_law import body, half_cell, split
 from hybrid.kernels.laws.obstacles import distances
-from hybrid.kernels.state.forces import BODIES, DRAG, FLOW, OBSTACLES, SURFACE
+from hybrid.kernels.state.report import BODIES, DRAG, FLOW, OBSTACLES, SURFACE
 from hybrid.kernels.state.state import Floats, Line, Sea, State, state_for
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_director, transported

@@ -25,7 +25,7 @@ from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
 from hybrid.kernels.mesh.zone_line import Cable, blank_line_job, fill_line
-from hybrid.kernels.state.forces import (
+from hybrid.kernels.state.report import (
     AXIAL_LAW,
     BENDING_LAW,
     BENDING_SLIP,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.report import MAY_MEET, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.contents import Entry
 from hybrid.model.self_reach import payouts, self_reach

@@ -15,7 +15,7 @@ import numpy as np
 
 from hybrid.kernels.laws.axial_law import BY_STIFFNESS, EXPONENTIAL, LINEAR, QUADRATIC
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
-from hybrid.kernels.state.forces import (
+from hybrid.kernels.state.report import (
     ADDED_MASS,
     BODIES,
     DRAG,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.kernels.laws.water import calm_below
-from hybrid.kernels.state.forces import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
+from hybrid.kernels.state.report import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.generalized_alpha import weights
 from hybrid.kernels.step.step_law import SAFETY

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.kernels.junctions.carried_frames import SEAT, WITH_BODY, WITH_POINT
-from hybrid.kernels.state.forces import PLANAR, ROTARY
+from hybrid.kernels.state.report import PLANAR, ROTARY
 from hybrid.kernels.state.state import Floats, Line, Sea
 from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model, build, place_cells

@@ -12,43 +12,39 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import SceneError
-from hybrid.kernels.state.facet_rows import (
+from hybrid.kernels.state.obstacle_rows import (
     ALONG,
+    AXIS,
+    BEARING,
+    BEGAN,
     BEHIND,
+    BOX,
     BOX_ROW,
+    CARRIED,
+    DAMPING,
     FACET,
     FEATURE,
     FEATURES,
     FIRST_CORNER,
-    HIGHEST,
-    LEAF,
-    LOWEST,
-    NO_BOXES,
-    NO_FACETS,
-    NORMAL,
-    TURNS,
-)
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES
-from hybrid.kernels.state.obstacle_rows import (
-    AXIS,
-    BEARING,
-    BEGAN,
-    BOX,
-    CARRIED,
-    DAMPING,
     FIXED,
     FLAT,
     FREE,
     GROOVE,
     HALF_HEIGHT,
     HALF_LENGTH,
+    HIGHEST,
     INERTIA,
     KIND,
+    LEAF,
+    LOWEST,
     MEETS_FROM,
     MEETS_TO,
     MESH,
     MOVES,
     MU,
+    NO_BOXES,
+    NO_FACETS,
+    NORMAL,
     OBSTACLE,
     OFFSET,
     ONSET_OF,
@@ -71,7 +67,9 @@ from hybrid.kernels.state.obstacle_rows import (
     SWEEP,
     TORUS,
     TURNED,
+    TURNS,
 )
+from hybrid.kernels.state.report import FRICTION, OBSTACLES
 from hybrid.kernels.state.state import NO_CARRIED, NO_MOVES, NO_OBSTACLES, Floats, Moves
 from hybrid.model.ends import PATH, DrivenEnd, Motion, table_of_motions
 from hybrid.model.payout import longest_out, whole_scene, winch_side

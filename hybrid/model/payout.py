@@ -15,7 +15,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.reel import winch as w
 from hybrid.kernels.reel.reel import LEAVES
-from hybrid.kernels.state.forces import SOIL
+from hybrid.kernels.state.report import SOIL
 from hybrid.kernels.state.state import Floats, Line, slip_size
 from hybrid.model.layout import Layout, LineOnBase
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of

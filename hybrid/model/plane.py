@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, Floats, Line, State
 from hybrid.model.contents import Entry
 from hybrid.scene.plane import EXACT, TYPED, plane_of

@@ -10,8 +10,8 @@ import numpy as np
 from hybrid.kernels.laws.bed import HEIGHTS
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.soil import LATERAL, LEFT_A, LEFT_L, NUMBERS, OVER, PART, STRENGTH, SUCTION, WEDGE
-from hybrid.kernels.state.forces import BREAKOUT, FRICTION, REMEMBERS, SEABED, SOIL
 from hybrid.kernels.state.obstacle_rows import ANGLE, EACH, INERTIA, ROLLED
+from hybrid.kernels.state.report import BREAKOUT, FRICTION, REMEMBERS, SEABED, SOIL
 from hybrid.kernels.state.state import NO_SLOW, Floats, Sea, State, no_sea, with_waves
 from hybrid.model.ends import DrivenEnd, rise
 from hybrid.model.obstacles import courses_of, facet_tables, obstacle_rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import CatenaryModel, LineScene

@@ -21,7 +21,6 @@ from hybrid.kernels.laws.bending_law import RIGID
 from hybrid.kernels.laws.soil import PRESSES
 from hybrid.kernels.march.link import link_of
 from hybrid.kernels.march.zone_torque import TORQUE, TURN, torsion_energy
-from hybrid.kernels.state.forces import SOIL
 from hybrid.kernels.state.report import (
     CONTACT_FORCE,
     FORCE_A,
@@ -29,6 +28,7 @@ from hybrid.kernels.state.report import (
     PAYOUT_POWER,
     SEABED_ENERGY,
     SELF_CONTACT_ENERGY,
+    SOIL,
     STRETCH_ENERGY,
 )
 from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line

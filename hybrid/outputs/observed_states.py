@@ -15,7 +15,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.kernels.watch.observed_outputs import observed
 from hybrid.outputs.output_grid import Grid, ends_of

@@ -12,7 +12,7 @@ import numpy as np
 
 from hybrid.kernels.laws.axial_law import CREEP
 from hybrid.kernels.march.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
-from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.state.report import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea, remembers
 from hybrid.model.mesh import Zone
 from hybrid.model.sections import NEAR, OutputPoints

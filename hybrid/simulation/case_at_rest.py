@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 
-from hybrid.kernels.state.forces import SEABED
+from hybrid.kernels.state.report import SEABED
 from hybrid.model.material import NO_DOUBT
 from hybrid.model.network import NetworkResolution
 from hybrid.outputs.edge_errors import edge_errors, layer_errors

@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.errors import ComputationError
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
-from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.initial_shape import GIVEN

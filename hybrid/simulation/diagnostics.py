@@ -26,16 +26,17 @@ from hybrid.kernels.laws.obstacles import (
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, Clock
-from hybrid.kernels.state.forces import (
+from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RIDES
+from hybrid.kernels.state.report import (
+    BEND,
     FRICTION,
     OBSTACLES,
     PLANAR,
     SEABED,
     SELF_CONTACT,
     SOIL,
+    TWIST_NODE,
 )
-from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RIDES
-from hybrid.kernels.state.report import BEND, TWIST_NODE
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model

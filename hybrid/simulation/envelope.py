@@ -17,7 +17,7 @@ from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels.contact.self_distance import OF_0_6, blank_itself
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.state.report import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch.carried_extremes import Watched, pass_on
 from hybrid.kernels.watch.extremes import fold_extremes

@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
 from hybrid.kernels.mesh.zone_criteria import twist_of_rods
-from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, OBSTACLES, PLANAR, SELF_CONTACT
+from hybrid.kernels.state.report import FRICTION, MAY_TOUCH, OBSTACLES, PLANAR, SELF_CONTACT
 from hybrid.kernels.state.state import Line, State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined

@@ -11,7 +11,6 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import distances, put_obstacles
 from hybrid.kernels.run.network_sampling import SAMPLE_AXES, SAMPLE_PLACE
-from hybrid.kernels.state.forces import OBSTACLES, SEABED
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
     BOX,
@@ -23,6 +22,7 @@ from hybrid.kernels.state.obstacle_rows import (
     SIDE,
     STRAND,
 )
+from hybrid.kernels.state.report import OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.network import NetworkModel, build_system
 from hybrid.scene.attachments import sphere_diameter

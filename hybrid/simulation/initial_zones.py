@@ -15,8 +15,8 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.march.torque_transfer import carry_torque
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.cell_lengths import CALM_STEPS
-from hybrid.kernels.mesh.criteria import CRITERIA
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.mesh.zone_criteria import CRITERIA
+from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, Line, State
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import FEWER, picked

@@ -30,9 +30,8 @@ from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.fields import ROD
-from hybrid.kernels.state.forces import PLANAR, REMEMBERS
-from hybrid.kernels.state.state import FIELDS, Batch, Ends, Floats, Line, State, Work
+from hybrid.kernels.state.report import PLANAR, REMEMBERS
+from hybrid.kernels.state.state import FIELDS, ROD, Batch, Ends, Floats, Line, State, Work
 from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.simulation.cell_changes import LEAST_CELLS, CellChanges
 from hybrid.simulation.envelope import Envelope, marks_on

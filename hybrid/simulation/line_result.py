@@ -13,8 +13,7 @@ from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.march.link import holds_twist
 from hybrid.kernels.march.zone_torque import answers_of
-from hybrid.kernels.mesh.criteria import CRITERIA
-from hybrid.kernels.mesh.zone_criteria import twist_of_rods
+from hybrid.kernels.mesh.zone_criteria import CRITERIA, twist_of_rods
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state.books import (
     HIDES_ITSELF,
@@ -33,7 +32,7 @@ from hybrid.kernels.state.books import (
     blank_books,
     sample_size,
 )
-from hybrid.kernels.state.forces import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.report import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, sampled_size, slip_size
 from hybrid.kernels.watch.bending_error import sampled_size as error_size
 from hybrid.model.build import Model

@@ -10,7 +10,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT
+from hybrid.kernels.state.report import FRICTION, OBSTACLES, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.initial_shape import GIVEN, HUNG, first_state, hung

@@ -12,7 +12,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.contact.self_contact_law import OUTER
 from hybrid.kernels.junctions.lines_distance import JOINT
 from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles
-from hybrid.kernels.state.forces import OBSTACLES, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.report import OBSTACLES, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line, State
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import touching_among

@@ -16,7 +16,7 @@ import numpy as np
 from hybrid.errors import IN_SPACE
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SELF_CONTACT
+from hybrid.kernels.state.report import OBSTACLES, PLANAR, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.build import Model
 from hybrid.model.plane import in_space, planar

@@ -19,7 +19,7 @@ from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Moves, Work, state_for
 from hybrid.kernels.step.accept import MANY
 from hybrid.model.build import Model

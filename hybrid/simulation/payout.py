@@ -27,8 +27,7 @@ from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_pl
 from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job
 from hybrid.kernels.run.payout_run import energy_of
 from hybrid.kernels.state.books import Clock
-from hybrid.kernels.state.forces import FRICTION, STIFFNESS_DAMPING, TOUCHES
-from hybrid.kernels.state.report import LENGTH_OUT, PAYOUT_RATE
+from hybrid.kernels.state.report import FRICTION, LENGTH_OUT, PAYOUT_RATE, STIFFNESS_DAMPING, TOUCHES
 from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, slip_size, state_for
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout, LineOnBase, on_other_parts

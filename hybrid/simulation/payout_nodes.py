@@ -26,7 +26,7 @@ from hybrid.kernels.run.network import begin_line
 from hybrid.kernels.run.payout_run import NodeJob, blank_line_job, blank_node_job, blank_paid_run_job, make_line
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.forces import REMEMBERS
+from hybrid.kernels.state.report import REMEMBERS
 from hybrid.kernels.state.state import (
     NO_GRIP,
     NO_PEAK,

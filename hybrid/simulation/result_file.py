@@ -10,16 +10,17 @@ import numpy as np
 
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.machine.cache import cache_folder
-from hybrid.kernels.state.facet_rows import BEHIND, LEAF, NORMAL
-from hybrid.kernels.state.forces import OBSTACLES, SEABED, SURFACE
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
+    BEHIND,
     GROOVE,
     HALF_HEIGHT,
     HALF_LENGTH,
     HALF_WIDTH,
     KIND,
+    LEAF,
     MESH,
+    NORMAL,
     PLACE,
     RADIUS,
     RIM,
@@ -31,6 +32,7 @@ from hybrid.kernels.state.obstacle_rows import (
     STILL_SIDE,
     STRAND,
 )
+from hybrid.kernels.state.report import OBSTACLES, SEABED, SURFACE
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.build import Model
 from hybrid.model.payout import whole_scene

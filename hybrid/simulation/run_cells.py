@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import refined

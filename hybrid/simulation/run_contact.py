@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from hybrid.errors import Complaint, Outcome, SceneError
 from hybrid.kernels.state.books import ZONES
-from hybrid.kernels.state.forces import MAY_TOUCH
-from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
+from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT_ENERGY
 from hybrid.model.network import NetworkModel
 from hybrid.model.self_reach import touching, touching_no_more
 from hybrid.simulation.contact_equilibrium import contact_of

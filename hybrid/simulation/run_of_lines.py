@@ -13,7 +13,7 @@ import numpy as np
 
 from hybrid.adapt.manager import Change
 from hybrid.kernels.junctions.bodies import DONE, SPRING
-from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Line, Work
 from hybrid.model.build import Model
 from hybrid.model.failure import unclamped, without_hold

@@ -13,7 +13,7 @@ from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
+from hybrid.kernels.state.report import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel, balanced_places, starts_between

@@ -26,7 +26,7 @@ from hybrid.kernels.contact.self_distance import (
 )
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.books import Clock, Counts
-from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT
+from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.self_reach import COST

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.state.forces import SEABED
+from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.model.build import LEAST_WEIGHT, Model
 from hybrid.model.initial_shape import dead_loads, end_laid_anywhere

@@ -17,8 +17,7 @@ from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.run import entry
 from hybrid.kernels.state.books import Clock
-from hybrid.kernels.state.forces import PLANAR
-from hybrid.kernels.state.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
+from hybrid.kernels.state.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B, PLANAR
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.generalized_alpha import before_fixed, weights
 from hybrid.model.build import Model

@@ -33,7 +33,7 @@ from hybrid.kernels.mesh.zone_switch import (
 )
 from hybrid.kernels.mesh.zone_transfer import Transfer
 from hybrid.kernels.state.books import Clock
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout

@@ -16,7 +16,7 @@ from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import workspace
 from hybrid.kernels.state.books import Clock, Counts
-from hybrid.kernels.state.forces import FRICTION, SEABED, WAVES
+from hybrid.kernels.state.report import FRICTION, SEABED, WAVES
 from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line, Sea, State, Work, ends_in, no_sea
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.watch.bending_error import (

@@ -16,8 +16,7 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import MASS, V
 from hybrid.kernels.state.books import blank_books
-from hybrid.kernels.state.forces import FRICTION, SELF_FRICTION, WAVES
-from hybrid.kernels.state.report import TWIST
+from hybrid.kernels.state.report import FRICTION, SELF_FRICTION, TWIST, WAVES
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.solve.contact_stability import ContactStability

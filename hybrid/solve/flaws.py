@@ -11,7 +11,6 @@ from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances, half_thickness
 from hybrid.kernels.laws.soil import LATERAL
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
-from hybrid.kernels.state.forces import BODIES, FRICTION, OBSTACLES, SEABED
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
     FLAT,
@@ -28,6 +27,7 @@ from hybrid.kernels.state.obstacle_rows import (
     STRAND,
     TORUS,
 )
+from hybrid.kernels.state.report import BODIES, FRICTION, OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats, Line, Sea, State
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.stability import Stability, is_judged

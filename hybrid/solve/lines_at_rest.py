@@ -8,7 +8,7 @@ from functools import cached_property
 from itertools import chain
 
 from hybrid.errors import Outcome
-from hybrid.kernels.state.forces import FRICTION, WAVES
+from hybrid.kernels.state.report import FRICTION, WAVES
 from hybrid.kernels.state.state import Floats
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.network_solver import NO_BODIES, NetworkSolver

@@ -35,9 +35,18 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH, in_plane, in_space
 from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_system_step, solve_system
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.forces import FRICTION, PLANAR, TOUCHES, WAVES
 from hybrid.kernels.state.obstacle_rows import FREE, MOVES
-from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, SEABED_ENERGY, USED_RHO
+from hybrid.kernels.state.report import (
+    FRICTION,
+    LOCAL_ERROR,
+    NET_A,
+    PLANAR,
+    RESIDUAL,
+    SEABED_ENERGY,
+    TOUCHES,
+    USED_RHO,
+    WAVES,
+)
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, State, Work, state_for
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, Limits, Task

@@ -17,8 +17,8 @@ from hybrid.kernels.junctions.bodies import DAMPING, FRAME, MASS, V
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import half_thickness
 from hybrid.kernels.laws.soil import PART, depth_under
-from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, OBSTACLES, SEABED, SOIL, TOUCHES
 from hybrid.kernels.state.obstacle_rows import FREE, MOVES, ONSET_OF, STIFFNESS
+from hybrid.kernels.state.report import AXIAL_LAW, FLOW, OBSTACLES, SEABED, SOIL, TOUCHES
 from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Ends, Floats, Line, Sea, State
 from hybrid.model.sea import ONSET
 from hybrid.solve.flaws import (

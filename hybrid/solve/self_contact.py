@@ -19,8 +19,7 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import block_rows, out_of_balance
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.forces import ROTARY
-from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY
+from hybrid.kernels.state.report import FORCE_A, NET_A, ROTARY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import (
     Ends,
     Floats,

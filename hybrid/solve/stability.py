@@ -14,7 +14,7 @@ from hybrid.kernels.laws.out_of_plane import BAND, REACH, wrong_pivots_at_rest
 from hybrid.kernels.mesh.zone_transfer import carry_push
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import block_rows, workspace
-from hybrid.kernels.state.forces import AXIAL_LAW, DRAG, MASS_DAMPING, PLANAR, ROTARY
+from hybrid.kernels.state.report import AXIAL_LAW, DRAG, MASS_DAMPING, PLANAR, ROTARY
 from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
 
 # What drifts freely (a line between two buoys) is held where it starts by springs of this part of tension scale over

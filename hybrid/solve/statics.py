@@ -14,8 +14,7 @@ from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.laws.soil import settle_in_soil
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import Limits
-from hybrid.kernels.state.forces import FRICTION, WAVES
-from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.state.report import FRICTION, RESIDUAL, RESIDUAL_NODE, WAVES
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import (

@@ -21,17 +21,21 @@ from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
-from hybrid.kernels.state.forces import FRICTION, PLANAR, SOIL, TOUCHES, WAVES
 from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.report import (
     FORCE_A,
+    FRICTION,
     LOCAL_ERROR,
     NET_A,
+    PLANAR,
     RESIDUAL,
     SEABED_ENERGY,
     SLACKEST,
     SLACKEST_CELL,
+    SOIL,
+    TOUCHES,
     USED_RHO,
+    WAVES,
 )
 from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State, Work, blank_line, blank_state, no_ends
 from hybrid.kernels.step.step import States, friction_axes

@@ -15,7 +15,7 @@ import numpy as np
 from problems import Scene, clamped, pinned, scene
 
 from hybrid import run
-from hybrid.kernels.mesh.criteria import CRITERIA
+from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.model.material import TENSION_FLOOR
 from hybrid.store.reader import Result
 from hybrid.store.records import Event

@@ -28,8 +28,8 @@ from problems import Scene, clamped, pinned, scene
 import hybrid
 from hybrid.adapt.manager import Allowed, DomainManager, Times
 from hybrid.adapt.zone_rules import NodeState, cell_ratios, of_line
-from hybrid.kernels.mesh.criteria import BEND, CRITERIA
 from hybrid.kernels.mesh.stiffness_ramp import advance
+from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO
 from hybrid.kernels.state.state import no_sea
 

@@ -20,10 +20,20 @@ from problems import pinned
 from hybrid.adapt.manager import Allowed, DomainManager, Times
 from hybrid.adapt.zone_rules import wanted
 from hybrid.kernels.mesh.cell_errors import CURVATURE
-from hybrid.kernels.mesh.criteria import BEND, CLAMP, CONTACT, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
-from hybrid.kernels.mesh.zone_criteria import FORESEEN
+from hybrid.kernels.mesh.zone_criteria import (
+    BEND,
+    CLAMP,
+    CONTACT,
+    CRITERIA,
+    EDGE,
+    FORESEEN,
+    GIVEN,
+    POINT,
+    SLACK,
+    TORSION,
+)
 from hybrid.kernels.mesh.zone_step import LONGEST_LOOKAHEAD, LOOKAHEAD, REJECT_RATIO
-from hybrid.kernels.state.forces import SEABED
+from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import no_sea
 from hybrid.model.material import TENSION_FLOOR, Material
 

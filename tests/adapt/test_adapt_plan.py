@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hybrid.adapt.zone_rules import OFF, Rules, planned, spread, wanted, widen
-from hybrid.kernels.mesh.criteria import BEND, CRITERIA, SLACK
+from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, SLACK
 from hybrid.model.layout import edges
 
 K = len(CRITERIA)

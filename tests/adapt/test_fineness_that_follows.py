@@ -14,10 +14,10 @@ import hybrid
 from hybrid.accuracy.passes import free_in
 from hybrid.adapt.manager import Allowed, DomainManager, Times, transfer_to
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.mesh.criteria import EDGE
+from hybrid.kernels.mesh.zone_criteria import EDGE
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes
 from hybrid.kernels.mesh.zone_transfer import blank_transfer, transfer
-from hybrid.kernels.state.forces import SEABED
+from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, no_sea
 from hybrid.model.resolution import wants_survey
 from hybrid.simulation.run_sample import compared_cells, usual_cells

@@ -11,7 +11,7 @@ from adapt_cases import along, cable, even, on, state_on, still
 from hybrid.adapt.manager import Allowed, Change, DomainManager, Times
 from hybrid.adapt.zone_rules import blank_review_job, quiet_review
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.mesh.criteria import BEND, CRITERIA, GIVEN, TORSION
+from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, TORSION
 from hybrid.kernels.state.state import no_sea
 from hybrid.model.layout import Layout
 

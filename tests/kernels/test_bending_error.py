@@ -12,8 +12,7 @@ import hybrid
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.run.entry import assembly, workspace
-from hybrid.kernels.state.forces import ROTARY, SEABED, STIFFNESS_DAMPING
-from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.report import REPORT_SIZE, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import no_sea
 from hybrid.kernels.watch.bending_error import FINITE, FURTHEST, History, right_hand_side
 from hybrid.kernels.watch.neglected_moments import Bending, neglected_moments, tabulate_chords

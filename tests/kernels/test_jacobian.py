@@ -14,7 +14,8 @@ from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.march.configuration import update
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
-from hybrid.kernels.state.forces import (
+from hybrid.kernels.state.obstacle_rows import BEGAN, CARRIED, EACH, ENDED, PLACE, SPEED, SWEEP, TURNING
+from hybrid.kernels.state.report import (
     ADDED_MASS,
     BENDING_LAW,
     BODIES,
@@ -32,7 +33,6 @@ from hybrid.kernels.state.forces import (
     VORTICES,
     WAVES,
 )
-from hybrid.kernels.state.obstacle_rows import BEGAN, CARRIED, EACH, ENDED, PLACE, SPEED, SWEEP, TURNING
 from hybrid.kernels.state.state import NO_CARRIED, NO_GRIP, NO_MOVES, NO_ROOM, Ends, Line, Sea, blank_state
 from hybrid.model.obstacles import surface_of
 from hybrid.scene.mesh_file import Mesh

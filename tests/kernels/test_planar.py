@@ -16,9 +16,8 @@ from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.laws.out_of_plane import BAND, REACH, step_out_of_plane, wrong_pivots_at_rest
 from hybrid.kernels.march.configuration import update
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
-from hybrid.kernels.state import forces
-from hybrid.kernels.state.forces import PLANAR
-from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.state import report
+from hybrid.kernels.state.report import PLANAR, RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state.state import State
 from hybrid.kernels.step.generalized_alpha import Scheme
 
@@ -39,7 +38,7 @@ def flat_case(seed, element, bits, held=(0, 0), anisotropic=False):
     """The random line of test_jacobian, moved into a random plane with all that acts on it."""
     line, sea, ends, st = random_case(seed, element, bits, held)
     g = np.random.default_rng(seed + 100)
-    plane = axes(seed, bits & forces.SURFACE)
+    plane = axes(seed, bits & report.SURFACE)
     inside = plane[:2].T @ plane[:2]
     n = plane[2]
 
@@ -126,7 +125,7 @@ def test_both_marches_give_the_same_correction(zones, bits, held, seed):
     assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
 
 
-@pytest.mark.parametrize("bits", [0, forces.STIFFNESS_DAMPING])
+@pytest.mark.parametrize("bits", [0, report.STIFFNESS_DAMPING])
 @pytest.mark.parametrize("seed", range(3))
 def test_both_marches_bend_by_the_same_tables(bits, seed):
     line, *rest = flat_case(seed, ZONES["rod"], bits, (1, 0))
@@ -139,7 +138,7 @@ def test_both_marches_bend_by_the_same_tables(bits, seed):
     assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
 
 
-@pytest.mark.parametrize("bits", [0, forces.FRICTION, forces.FRICTION | forces.BREAKOUT])
+@pytest.mark.parametrize("bits", [0, report.FRICTION, report.FRICTION | report.BREAKOUT])
 @pytest.mark.parametrize("seed", range(3))
 def test_both_marches_lie_in_the_same_soil(bits, seed):
     line, sea, ends, st = flat_case(seed, ZONES["rod"], bits, (1, 0))
@@ -235,7 +234,7 @@ def test_a_singular_block_is_named():
 @pytest.mark.parametrize("seed", range(4))
 def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):
     """One step of the push equals the linear answer of the march in space to it, frames and spins included."""
-    bits = sum(getattr(forces, name) for name in ("DRAG", "ADDED_MASS", "MASS_DAMPING", "FLOW", "BODIES"))
+    bits = sum(getattr(report, name) for name in ("DRAG", "ADDED_MASS", "MASS_DAMPING", "FLOW", "BODIES"))
     line, sea, ends, st = flat_case(seed, ZONES[zones], bits, (1, 0), anisotropic=seed > 1)
     if zones == "rod" and seed == 1:
         line = with_tables(line)
@@ -290,7 +289,7 @@ def test_band_of_the_push_fits_its_work_array():
 @pytest.mark.parametrize("pressed", [0.0, -0.3, -3.0, -30.0])
 def test_stiffness_across_the_plane_is_definite_when_that_in_space_is(zones, pressed):
     """Pivots of the one against a Cholesky factor of the other, both with springs that hold what is free."""
-    line, sea, ends, st = flat_case(4, ZONES[zones], forces.ADDED_MASS, (1, 1))
+    line, sea, ends, st = flat_case(4, ZONES[zones], report.ADDED_MASS, (1, 1))
     st.T[:] = 2.0 + pressed
     st.v[:] = st.vd[:] = 0.0
     n, soft = line.plane[2], 1e-3

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.laws import soil
-from hybrid.kernels.state.forces import SOIL
+from hybrid.kernels.state.report import SOIL
 from hybrid.kernels.state.state import no_sea
 
 

@@ -12,8 +12,7 @@ from hybrid.kernels.laws.axial_law_with_torque import follow_law_with_torque
 from hybrid.kernels.march.configuration import update
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace_of
-from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.state.report import STRETCH_ENERGY
+from hybrid.kernels.state.report import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING, STRETCH_ENERGY
 from hybrid.kernels.state.state import NO_LAW, blank_state
 
 LAST = [5 * i + 4 for i in range(N + 1)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.state.forces import FRICTION, SEABED
+from hybrid.kernels.state.report import FRICTION, SEABED
 from hybrid.model.build import build
 from hybrid.model.failure import without_hold
 from hybrid.model.line import NO_INERTIA, line_on

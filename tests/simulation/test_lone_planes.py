@@ -12,7 +12,7 @@ from test_plane import deep_beam, planes, storm, swinging
 from test_system_contact import HOSE
 
 import hybrid
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.report import PLANAR
 from hybrid.scene.short_form import network_of
 from hybrid.solve.network_solver import NetworkSolver
 from tests.combinations.networks import differences, events_differ

@@ -14,8 +14,8 @@ from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import depths_in_obstacles, stored_energy
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.books import blank_books
-from hybrid.kernels.state.forces import OBSTACLES
 from hybrid.kernels.state.obstacle_rows import INERTIA, SPIN
+from hybrid.kernels.state.report import OBSTACLES
 from hybrid.model.bodies import body_model
 from hybrid.model.build import build
 from hybrid.model.lines_contact import Touching

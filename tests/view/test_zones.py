@@ -15,7 +15,7 @@ from test_result_plot import EVENTS, MIXED, assert_tidy, image, made, sag, texts
 
 import hybrid
 from hybrid.errors import ResultError
-from hybrid.kernels.mesh.criteria import CRITERIA
+from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.store.reader import Result
 from hybrid.view import zones as zoneplot
 from hybrid.view.figure import Axis, Map, Panel, Text

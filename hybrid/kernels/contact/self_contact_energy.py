@@ -21,16 +21,18 @@ from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.powers import find_powers, loses
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.state.books import RATES
-from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, TOUCHES
 from hybrid.kernels.state.report import (
+    AXIAL_LAW,
     CONTACT_WORK,
     FRICTION_WORK,
     LOST_WORK,
     OBSTACLE_WORK,
+    ROTARY,
     SEABED_ENERGY,
     SELF_CONTACT_ENERGY,
     SELF_FRICTION_WORK,
     STRETCH_ENERGY,
+    TOUCHES,
 )
 
 # Energy that a step may put in, and all steps together, as a part of the largest energy so far.

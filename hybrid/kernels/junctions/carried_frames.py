@@ -41,7 +41,7 @@ from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.element import after, angular_velocity, before
 from hybrid.kernels.laws.tension_torque import couples, rest_strain
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.state.forces import STIFFNESS_DAMPING
+from hybrid.kernels.state.report import STIFFNESS_DAMPING
 
 # Numbers of an end: G, A, a, the moment M, what goes into the balance of nodes and of the spin, [d]x G/l and d.G, and
 # where tension makes a torque what the moment gets by tension, and the length of the cell by the turn.

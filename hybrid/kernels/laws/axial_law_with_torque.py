@@ -43,8 +43,7 @@ from hybrid.kernels.laws.tension_torque import (
     zone_of,
 )
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import STIFFNESS_DAMPING
-from hybrid.kernels.state.report import LOST_WORK, STRETCH_ENERGY
+from hybrid.kernels.state.report import LOST_WORK, STIFFNESS_DAMPING, STRETCH_ENERGY
 
 
 @inner

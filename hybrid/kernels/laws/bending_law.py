@@ -32,7 +32,7 @@ from hybrid.kernels.laws.axial_law import piece_of
 from hybrid.kernels.laws.bending_slip import beside_spring, give_of_spring, slip_moment, slips
 from hybrid.kernels.laws.element import bending, damped_bending, relative_rotation, turns_freely
 from hybrid.kernels.machine.compile import called, inner, kernel
-from hybrid.kernels.state.forces import BENDING_LAW, BENDING_SLIP
+from hybrid.kernels.state.report import BENDING_LAW, BENDING_SLIP
 
 # Columns of Line.bend_law: of the half cells before and after a node, their first row in Line.bend_table, the row
 # behind their last, and their length (m; 0: there is none); then the give of an angular spring (rad per N m).

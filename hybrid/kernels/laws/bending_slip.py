@@ -50,8 +50,7 @@ from hybrid.kernels.laws.element import (
     turns_freely,
 )
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import BENDING_SLIP
-from hybrid.kernels.state.report import LOST_WORK
+from hybrid.kernels.state.report import BENDING_SLIP, LOST_WORK
 
 # Columns of Line.slip_law, EACH of a layer: K0, N m2; m0, N m, below 0 of an elastic one; mT, m; KT, m2.  K0, KT 0: none (as
 # behind the last).  Behind those of a clamp with an angular spring, where there is none, m0 is its give, rad/(N m).

@@ -31,8 +31,7 @@ from hybrid.kernels.laws.seabed import contact, pressure
 from hybrid.kernels.laws.soil import borne_length
 from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import BODIES, FLOW, SEABED, SOIL, SURFACE, WAVES
-from hybrid.kernels.state.report import CONTACT_FORCE, FORCE_A, NET_A
+from hybrid.kernels.state.report import BODIES, CONTACT_FORCE, FLOW, FORCE_A, NET_A, SEABED, SOIL, SURFACE, WAVES
 
 HALVINGS = 52  # of the last cell, which find where a line leaves the bed: to round-off, as derivatives need it
 FAR = 40.0  # layers to a cell from which on the two ends of the cell do not know of each other

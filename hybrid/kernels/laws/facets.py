@@ -17,7 +17,7 @@ import math
 
 from hybrid.kernels.algebra.rotations import add, dot, scale, sub
 from hybrid.kernels.machine.compile import called, inner
-from hybrid.kernels.state.facet_rows import (
+from hybrid.kernels.state.obstacle_rows import (
     ALONG,
     BEHIND,
     CORNERS,

@@ -17,21 +17,25 @@ from hybrid.kernels.laws.soil import left_of, soil_force
 from hybrid.kernels.laws.vortices import lift_at
 from hybrid.kernels.laws.water import current_at, wetted, wetted_stretch
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import (
+from hybrid.kernels.state.report import (
     ADDED_MASS,
+    ADDED_MASS_POWER,
     BODIES,
+    CONTACT_FORCE,
     DRAG,
+    DRAG_POWER,
     FLOW,
     FRICTION,
     MASS_DAMPING,
+    MASS_DAMPING_POWER,
     OBSTACLES,
     SEABED,
     SOIL,
     SURFACE,
     VORTICES,
+    WAVE_POWER,
     WAVES,
 )
-from hybrid.kernels.state.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
 
 WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
 Z3 = (0.0, 0.0, 0.0)

@@ -24,19 +24,23 @@ from hybrid.kernels.laws.seabed import contact, pressure
 from hybrid.kernels.laws.soil import left_of, soil_force
 from hybrid.kernels.laws.water import current_at, wetted_stretch
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.state.forces import (
+from hybrid.kernels.state.report import (
     ADDED_MASS,
+    ADDED_MASS_POWER,
     BODIES,
+    CONTACT_FORCE,
     DRAG,
+    DRAG_POWER,
     FLOW,
     FRICTION,
     MASS_DAMPING,
+    MASS_DAMPING_POWER,
     SEABED,
     SOIL,
     SURFACE,
+    WAVE_POWER,
     WAVES,
 )
-from hybrid.kernels.state.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
 
 WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
 Z2 = (0.0, 0.0)

@@ -18,7 +18,6 @@ from hybrid.kernels.laws.obstacle_motion import (
 from hybrid.kernels.laws.obstacles import grip, half_cell, meets, reach_of
 from hybrid.kernels.laws.surfaces import Z3, gradient_of_normal, is_far, surface
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.obstacle_rows import (
     ANGLE,
     EACH,
@@ -38,7 +37,7 @@ from hybrid.kernels.state.obstacle_rows import (
     TRAVEL,
     TURNED,
 )
-from hybrid.kernels.state.report import CONTACT_WORK, FRICTION_WORK, OBSTACLE_WORK
+from hybrid.kernels.state.report import CONTACT_WORK, FRICTION, FRICTION_WORK, OBSTACLE_WORK
 
 
 @inner

@@ -29,7 +29,6 @@ from hybrid.kernels.laws.obstacle_motion import row3, surface_velocity, swept, w
 from hybrid.kernels.laws.seabed import contact, depth_of, stored, with_cell
 from hybrid.kernels.laws.surfaces import E9, Z3, Z9, bent, gradient_of_normal, is_far, surface
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
     BOX,
@@ -63,6 +62,7 @@ from hybrid.kernels.state.obstacle_rows import (
     THINNER,
     TURNING,
 )
+from hybrid.kernels.state.report import FRICTION, OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.state import Floats, Sea
 
 

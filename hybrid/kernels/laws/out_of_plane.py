@@ -39,7 +39,7 @@ from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell
 from hybrid.kernels.laws.soil import left_of, soil_force
 from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import (
+from hybrid.kernels.state.report import (
     ADDED_MASS,
     BENDING_SLIP,
     BODIES,

@@ -25,7 +25,6 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, sca
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles, row3, row9, way_along
 from hybrid.kernels.laws.obstacles import normal_force
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.obstacle_rows import (
     ALGORITHMIC,
     ALONE,
@@ -47,6 +46,7 @@ from hybrid.kernels.state.obstacle_rows import (
     TURNED,
     YIELDING,
 )
+from hybrid.kernels.state.report import FRICTION
 
 
 @kernel

@@ -32,7 +32,7 @@ import math
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import BREAKOUT, FRICTION, SOIL
+from hybrid.kernels.state.report import BREAKOUT, FRICTION, SOIL
 from hybrid.kernels.state.state import Floats, Line, Sea
 
 # Places of Sea.soil: su0, Pa; rho, Pa/m; a; b; K; f; whether there is lateral resistance; gamma, N/m3; J; of friction

@@ -42,8 +42,7 @@ from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.drag_law import split as split_velocity
 from hybrid.kernels.laws.water import current_at, wetted_stretch
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import FLOW, SURFACE, WAVES
-from hybrid.kernels.state.report import DRAG_POWER
+from hybrid.kernels.state.report import DRAG_POWER, FLOW, SURFACE, WAVES
 
 # Columns of Line.wake_law: lift of the half cells before and after a node, rho/2 D Cv h/2 (kg/m); diameter (m; 0: there
 # are no vortices); frequencies; time over which the lift grows (s); phase at the start (rad).

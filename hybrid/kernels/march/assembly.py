@@ -48,10 +48,12 @@ from hybrid.kernels.laws.tension_torque import (
     rest_strain,
 )
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import (
+    AXIAL_LAW,
     RESIDUAL,
     RESIDUAL_NODE,
+    ROTARY,
+    STIFFNESS_DAMPING,
     STIFFNESS_DAMPING_POWER,
 )
 

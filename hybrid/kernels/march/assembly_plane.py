@@ -33,13 +33,16 @@ from hybrid.kernels.laws.cell import Chord, Rates
 from hybrid.kernels.laws.end_forces import note_end
 from hybrid.kernels.laws.node_forces_plane import node_loads2
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import AXIAL_LAW, BENDING_SLIP, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import (
     ASSEMBLED,
+    AXIAL_LAW,
+    BENDING_SLIP,
     MOMENT_A,
     MOMENT_B,
     RESIDUAL,
     RESIDUAL_NODE,
+    ROTARY,
+    STIFFNESS_DAMPING,
     STIFFNESS_DAMPING_POWER,
 )
 

@@ -14,7 +14,7 @@ from hybrid.kernels.laws.tension_torque import couples, rest_strain, stretch_ene
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import get3
 from hybrid.kernels.march.zone_torque import FIRST, LAST, TORQUE
-from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.state.report import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import Floats
 
 

@@ -21,8 +21,15 @@ from hybrid.kernels.march.assembly import (
     element_at_start,
 )
 from hybrid.kernels.march.march import catenary_cell, is_bent
-from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.state.report import ASSEMBLED, MOMENT_A, MOMENT_B, RESIDUAL_NODE
+from hybrid.kernels.state.report import (
+    ASSEMBLED,
+    AXIAL_LAW,
+    MOMENT_A,
+    MOMENT_B,
+    RESIDUAL_NODE,
+    ROTARY,
+    STIFFNESS_DAMPING,
+)
 
 
 @inner

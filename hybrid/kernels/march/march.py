@@ -27,8 +27,15 @@ from hybrid.kernels.march.assembly import (
     keep_row,
     size_of_spin,
 )
-from hybrid.kernels.state.forces import AXIAL_LAW, STIFFNESS_DAMPING
-from hybrid.kernels.state.report import ASSEMBLED, MOMENT_A, MOMENT_B, RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.state.report import (
+    ASSEMBLED,
+    AXIAL_LAW,
+    MOMENT_A,
+    MOMENT_B,
+    RESIDUAL,
+    RESIDUAL_NODE,
+    STIFFNESS_DAMPING,
+)
 
 
 @inner

@@ -9,9 +9,9 @@ from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import FIRST, LAST
 from hybrid.kernels.state.books import CONTACT, FRICTION, HYSTERESIS, OBSTACLE, RATES, WORKS
-from hybrid.kernels.state.forces import BENDING_SLIP, SELF_CONTACT, TOUCHES
 from hybrid.kernels.state.report import (
     ADDED_MASS_POWER,
+    BENDING_SLIP,
     CONTACT_WORK,
     DRAG_POWER,
     FORCE_A,
@@ -22,8 +22,10 @@ from hybrid.kernels.state.report import (
     NET_A,
     OBSTACLE_WORK,
     SEABED_ENERGY,
+    SELF_CONTACT,
     SELF_FRICTION_WORK,
     STIFFNESS_DAMPING_POWER,
+    TOUCHES,
     WAVE_POWER,
 )
 

@@ -29,8 +29,7 @@ from hybrid.kernels.laws.tension_torque import COUPLES, compliance, couples, dam
 from hybrid.kernels.laws.tension_torque import TORQUE as NODE_TORQUE
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import JOINED
-from hybrid.kernels.state.forces import STIFFNESS_DAMPING
-from hybrid.kernels.state.report import MOMENT_A, MOMENT_B, STIFFNESS_DAMPING_POWER
+from hybrid.kernels.state.report import MOMENT_A, MOMENT_B, STIFFNESS_DAMPING, STIFFNESS_DAMPING_POWER
 from hybrid.kernels.state.state import Floats, Line, Torsion, no_torsion
 
 # Parts of `pass_torque`.

@@ -22,8 +22,7 @@ from hybrid.kernels.mesh.zone_step import Zones, blank_zones
 from hybrid.kernels.mesh.zone_transfer import carry_push
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.forces import FRICTION, TOUCHES, WAVES
-from hybrid.kernels.state.report import SEABED_ENERGY
+from hybrid.kernels.state.report import FRICTION, SEABED_ENERGY, TOUCHES, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea, State, Work, blank_line, blank_state, no_sea, no_work
 from hybrid.kernels.step.job import read
 from hybrid.kernels.step.step import friction_axes

@@ -32,10 +32,9 @@ from hybrid.kernels.mesh.cell_errors import (
     second_slope,
     tension_beside,
 )
-from hybrid.kernels.mesh.criteria import EDGE
 from hybrid.kernels.mesh.wave_lengths import lower_by_waves
-from hybrid.kernels.mesh.zone_criteria import FORESEEN, depth, raise_ratio
-from hybrid.kernels.state.forces import SEABED
+from hybrid.kernels.mesh.zone_criteria import EDGE, FORESEEN, depth, raise_ratio
+from hybrid.kernels.state.report import SEABED
 
 TURN = 0.3  # rad that a cell turns through
 TWIST = 0.25  # rad that a cell of a rod is twisted by: cells that stay have as much (model.build)

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import rows
-from hybrid.kernels.state.fields import HALF, MEAN, POINT, ROD, SHARED, Field
-from hybrid.kernels.state.state import FIELDS, blank_line
+from hybrid.kernels.state.state import FIELDS, HALF, MEAN, POINT, ROD, SHARED, Field, blank_line
 
 WEIGHT, B_1, KAPPA_1 = 0, 1, 4  # columns of a row; of B and kappa the first of three
 FIRST = 7

@@ -34,11 +34,14 @@ from hybrid.kernels.mesh.cell_errors import (
     over_shares,
 )
 from hybrid.kernels.mesh.cell_lengths import FADE, arc_less_chord, follow_arcs, foresee_edges, plan_cells
-from hybrid.kernels.mesh.criteria import CLAMP, CONTACT, CRITERIA, TORSION
 from hybrid.kernels.mesh.stiffness_ramp import advance, freed, length_defect, shares, soften
 from hybrid.kernels.mesh.wave_lengths import QUIET, TAU, WAVES, follow_waves, spread_of_velocity
 from hybrid.kernels.mesh.zone_criteria import (
+    CLAMP,
+    CONTACT,
+    CRITERIA,
     MOST,
+    TORSION,
     TWISTED,
     NodeKinds,
     blank_kinds,
@@ -51,8 +54,8 @@ from hybrid.kernels.mesh.zone_criteria import (
 )
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import WORKS, Clock, Counts
-from hybrid.kernels.state.forces import OBSTACLES
 from hybrid.kernels.state.obstacle_rows import STRAND
+from hybrid.kernels.state.report import OBSTACLES
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 
 # How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.

@@ -24,7 +24,7 @@ from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
 from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.state.forces import ROTARY
+from hybrid.kernels.state.report import ROTARY
 from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
 
 CARRIED, CLAMPED, NOTHING = 2, 1, 0

@@ -24,7 +24,7 @@ from hybrid.kernels.reel.reel import (
     LENGTH_OF,
     STRAIN_OF,
 )
-from hybrid.kernels.state.forces import BENDING_LAW, VORTICES
+from hybrid.kernels.state.report import BENDING_LAW, VORTICES
 
 
 @inner

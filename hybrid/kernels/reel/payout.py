@@ -70,8 +70,7 @@ from hybrid.kernels.reel.winch import (
     tension_held,
 )
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.forces import TOUCHES
-from hybrid.kernels.state.report import FORCE_A, FORCE_B, LENGTH_OUT, NET_A, PAYOUT_POWER, PAYOUT_RATE
+from hybrid.kernels.state.report import FORCE_A, FORCE_B, LENGTH_OUT, NET_A, PAYOUT_POWER, PAYOUT_RATE, TOUCHES
 
 # --- the force of the fairlead --------------------------------------------------------------------
 

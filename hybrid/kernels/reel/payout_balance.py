@@ -14,7 +14,7 @@ from hybrid.kernels.laws.cell import Chord, Rates, chord, moment_force, rotary_f
 from hybrid.kernels.laws.node_forces import Z9, node_loads
 from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.reel.paid_length import growing, node
-from hybrid.kernels.state.forces import ROTARY
+from hybrid.kernels.state.report import ROTARY
 from hybrid.kernels.watch.extremes import moment_at
 
 # Nodes before the cell that grows, and behind it, whose elements and cells are others than before; one to spare.

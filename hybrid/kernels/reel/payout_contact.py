@@ -17,8 +17,8 @@ from hybrid.kernels.laws.obstacles import normal_at, stored_along
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.reel.paid_length import cell, changes_length, growing, length_that_came, node
-from hybrid.kernels.state.forces import FRICTION, TOUCHES
 from hybrid.kernels.state.obstacle_rows import EACH, FORCE, SWEEP, TRAVEL
+from hybrid.kernels.state.report import FRICTION, TOUCHES
 
 
 @inner

@@ -33,7 +33,7 @@ from hybrid.kernels.reel.reel import (
 )
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock
-from hybrid.kernels.state.forces import PLANAR, STIFFNESS_DAMPING
+from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
 from hybrid.kernels.step.generalized_alpha import lead
 

@@ -28,7 +28,7 @@ from hybrid.kernels.laws.axial_law import SHIFT, has_law
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.machine.named_numbers import NamedNumbers
-from hybrid.kernels.state.forces import PLANAR, STIFFNESS_DAMPING
+from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
 from hybrid.kernels.step.generalized_alpha import radius_of_step, scheme
 
 

@@ -20,9 +20,8 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
-from hybrid.kernels.state.forces import PLANAR, REMEMBERS
 from hybrid.kernels.state.obstacle_rows import FREE
-from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.report import PLANAR, REMEMBERS, REPORT_SIZE
 from hybrid.kernels.state.state import (
     Ends,
     Floats,

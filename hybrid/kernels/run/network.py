@@ -47,8 +47,8 @@ from hybrid.kernels.machine.references import caller
 from hybrid.kernels.march.configuration import first_bad, measure, update
 from hybrid.kernels.march.powers import book_work, find_powers
 from hybrid.kernels.state.books import RATES
-from hybrid.kernels.state.forces import FRICTION, TOUCHES
 from hybrid.kernels.state.report import (
+    FRICTION,
     LOCAL_ERROR,
     RESIDUAL,
     RESIDUAL_NODE,
@@ -56,6 +56,7 @@ from hybrid.kernels.state.report import (
     SELF_CONTACT_ENERGY,
     SLACKEST,
     SLACKEST_CELL,
+    TOUCHES,
 )
 from hybrid.kernels.step.accept import book_torques, impose_now, keep_past, watch
 from hybrid.kernels.step.generalized_alpha import Scheme, scheme

@@ -67,8 +67,7 @@ from hybrid.kernels.state.books import (
     Clock,
     Counts,
 )
-from hybrid.kernels.state.forces import WAVES
-from hybrid.kernels.state.report import NET_A
+from hybrid.kernels.state.report import NET_A, WAVES
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.generalized_alpha import scheme
 from hybrid.kernels.step.newton import with_radius

@@ -28,7 +28,7 @@ from hybrid.kernels.reel.winch import Winch, at_its_end
 from hybrid.kernels.run.following_run import call, call_solver, put, put_at
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, Clock, blank_books
-from hybrid.kernels.state.forces import TOUCHES
+from hybrid.kernels.state.report import TOUCHES
 from hybrid.kernels.state.state import (
     Ends,
     Floats,

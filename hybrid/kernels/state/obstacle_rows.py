@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 # Of Sea.obstacles: kind; place (m); unit axis of a cylinder, torus, sheave and the first of a box, unit normal of a plane;
 # unit vector across it, the second axis of a box; radius of the surface moved out by the strand's (m; of a plane how far it
 # is moved out; of a box that of its edges, of a torus that of its section, of a sheave that at the bottom of its groove);
@@ -50,3 +53,21 @@ ANGLE, SPIN, ALGORITHMIC, TRUE = 0, 1, 2, 3
 TRAVEL, FORCE, EACH = 0, 3, 6
 # Of each obstacle in a sample: place (m), R, force of the line on it (N), moment about that place (N m).
 SEEN_TURN, SEEN_FORCE, SEEN_MOMENT, SEEN = 3, 12, 15, 18
+
+
+# What rows of Sea.boxes and Sea.facets hold: surfaces of triangles in axes of their obstacle, and a tree of boxes.
+
+# Of Sea.boxes, each before what it holds (pre-order): lowest and highest coordinates (m); the row behind what it holds;
+# the facet of one that holds a single one, else -1.
+LOWEST, HIGHEST, BEHIND, LEAF, BOX_ROW = 0, 3, 6, 7, 8
+# Of Sea.facets: three corners (m), counter-clockwise from outside; unit normal; then of each feature, the edges from the
+# first, second and third corner on and these corners: normal, weighted by the angles of the facets around it; 1 where the
+# surface turns there, else 0; along which unit vector it does not (0: it turns all around).
+CORNERS, NORMAL, FEATURES = 0, 9, 12
+TURNS, ALONG, FEATURE = 3, 4, 7
+FACET = FEATURES + 6 * FEATURE
+# Which feature of a facet is nearest: its face, or one of the six.
+FACE, FIRST_CORNER = -1, 3
+
+NO_BOXES: NDArray[np.float64] = np.zeros((0, BOX_ROW))
+NO_FACETS: NDArray[np.float64] = np.zeros((0, FACET))

@@ -5,27 +5,74 @@ All are NamedTuples of contiguous arrays with fixed types, so that one compiled 
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.machine.references import by_reference
-from hybrid.kernels.state.facet_rows import NO_BOXES, NO_FACETS
-from hybrid.kernels.state.fields import HALF, MEAN, POINT, ROD, SHARED, blank, cell, fields_of, node
-from hybrid.kernels.state.forces import REMEMBERS
 from hybrid.kernels.state.obstacle_rows import (
     CARRIED,
     EACH,
     ENDED,
     FORCE,
     FREE,
+    NO_BOXES,
+    NO_FACETS,
     OBSTACLE,
     OFFSET,
     SEEN,
     TURNED,
 )
-from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.report import REMEMBERS, REPORT_SIZE
+
+# What a field of a line is: one for every node or cell, and how it follows from what the material has per length.
+#
+# Each field of `kernels.state.state.Line` says it beside its name; whatever makes, copies or moves lines reads it from
+# there.
+
+# How a field of a cell or of a node follows from what there is per length, x, over the length h of the cells.
+MEAN = 0  # of a cell: the mean of x
+HALF = 1  # h x/2, of half the cell
+ROD = 2  # h x where the cell is of a rod, else 0
+SHARED = 3  # of a node: h x/2 of the cells beside it, and what a body there has
+POINT = 4  # of a node: of the body there
+OWN = 5  # by a rule of its own (kernels.mesh.fill_line)
+
+
+class Field(NamedTuple):
+    """What stands beside the name of a field."""
+
+    of_node: bool
+    rule: int = OWN
+    columns: int = 0  # 0: one number
+    kind: Any = np.float64
+    optional: bool = False  # whether a line may have none of it: then the array is empty
+
+
+def node(rule: int = OWN, columns: int = 0, kind: Any = np.float64, optional: bool = False) -> Field:
+    """There is one for every node."""
+    return Field(True, rule, columns, kind, optional)
+
+
+def cell(rule: int = OWN, columns: int = 0, kind: Any = np.float64, optional: bool = False) -> Field:
+    """There is one for every cell."""
+    return Field(False, rule, columns, kind, optional)
+
+
+def fields_of(line: type) -> dict[str, Field]:
+    """The fields along the line, of a class whose annotations have them."""
+    found = {name: getattr(x, "__metadata__", ()) for name, x in get_type_hints(line, include_extras=True).items()}
+    return {name: x[0] for name, x in found.items() if x}
+
+
+def blank(field: Field, cells: int) -> NDArray[Any]:
+    """Zeros of a field on so many cells; of one that a line may have none of, none."""
+    size = 0 if field.optional else cells + field.of_node
+    return np.zeros((size, field.columns) if field.columns else size, field.kind)
+
+
+# The arrays a solver works on: the line (what does not move), its ends, the sea around it, its state, its work.
 
 Floats = NDArray[np.float64]
 # Nodes for which waves are computed at a time: two vectors of eight float64, or four of four.

@@ -23,10 +23,12 @@ from hybrid.kernels.state.books import (
     STRETCHED,
     ZONES,
 )
-from hybrid.kernels.state.forces import PLANAR, SELF_FRICTION, TOUCHES
 from hybrid.kernels.state.report import (
     BEND,
+    PLANAR,
     PUSH_ENERGY,
+    SELF_FRICTION,
+    TOUCHES,
     TWIST,
     WRONG_PIVOTS,
 )

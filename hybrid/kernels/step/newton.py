@@ -24,8 +24,7 @@ from hybrid.kernels.march.assembly_plane import march_planar
 from hybrid.kernels.march.configuration import first_bad, measure, update
 from hybrid.kernels.march.march import march
 from hybrid.kernels.march.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
-from hybrid.kernels.state.forces import FRICTION
-from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE, SELF_CONTACT_ENERGY
+from hybrid.kernels.state.report import FRICTION, RESIDUAL, RESIDUAL_NODE, SELF_CONTACT_ENERGY
 from hybrid.kernels.step.generalized_alpha import Scheme, before_fixed, radius_of_step, scheme
 from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
 

@@ -44,9 +44,8 @@ from hybrid.kernels.state.books import (
     SAMPLE_WORK,
     WORKS,
 )
-from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.obstacle_rows import SEEN
-from hybrid.kernels.state.report import ASSEMBLED, LENGTH_OUT, PAYOUT_RATE, REPORT_SIZE
+from hybrid.kernels.state.report import ASSEMBLED, LENGTH_OUT, PAYOUT_RATE, PLANAR, REPORT_SIZE
 
 # Of the step: an output so near to its end is its end.
 SAME_TIME = 1e-9

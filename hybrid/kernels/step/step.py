@@ -21,23 +21,29 @@ from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES, REMEMBERS, ROTARY, TOUCHES, VORTICES, WAVES
 from hybrid.kernels.state.obstacle_rows import EACH
 from hybrid.kernels.state.report import (
     BEND,
     BEND_NODE,
     CONTACT_WORK,
+    FRICTION,
     FRICTION_WORK,
     LOCAL_ERROR,
     LOCAL_ERROR_NODE,
     OBSTACLE_WORK,
+    OBSTACLES,
     PUSH_ENERGY,
+    REMEMBERS,
+    ROTARY,
     SEABED_ENERGY,
     SLACKEST,
     SLACKEST_CELL,
+    TOUCHES,
     TWIST,
     TWIST_NODE,
     USED_RHO,
+    VORTICES,
+    WAVES,
     WRONG_PIVOTS,
 )
 from hybrid.kernels.state.state import Floats, State

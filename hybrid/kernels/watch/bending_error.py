@@ -37,8 +37,7 @@ from hybrid.kernels.state.books import (
     Clock,
     Counts,
 )
-from hybrid.kernels.state.forces import FRICTION, PLANAR, ROTARY, SEABED, STIFFNESS_DAMPING
-from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.report import FRICTION, PLANAR, REPORT_SIZE, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 from hybrid.kernels.step.generalized_alpha import Scheme, scheme
 from hybrid.kernels.watch.neglected_moments import Bending, chord_of, neglected_moments, tabulate_chords, turn_chords

@@ -46,8 +46,7 @@ from hybrid.kernels.state.books import (
     TENSION,
     TORQUE,
 )
-from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
-from hybrid.kernels.state.report import FORCE_A
+from hybrid.kernels.state.report import FORCE_A, OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
 from hybrid.kernels.watch.soft_rods import BENT, bend_direction, of_chords, part_of_stiffness, restore_stiffness
 
 SAME_PLACE = 1e-9  # part of a length

@@ -22,8 +22,7 @@ from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.march.left_over import left_over_in_space
 from hybrid.kernels.march.left_over_plane import left_over_in_plane
-from hybrid.kernels.state.forces import ROTARY, STIFFNESS_DAMPING, WAVES
-from hybrid.kernels.state.report import ASSEMBLED
+from hybrid.kernels.state.report import ASSEMBLED, ROTARY, STIFFNESS_DAMPING, WAVES
 from hybrid.kernels.step.accept import keep_past
 from hybrid.kernels.step.sampling import sample_step
 from hybrid.kernels.watch.tangent_job import (
