@@ -578,14 +578,6 @@ def test_a_figure_beside_a_run_with_fixed_steps(truth):
     assert 0.5 < result.attributes["error_total_position"] / error < 3.0
 
 
-def test_a_figure_that_cannot_be_had_is_said():
-    """On two cells there is nothing coarser; the result stands, without a figure, and says so."""
-    chain = swinging(mesh={"cells": 2}, time={"duration": 1.0, "step": 0.02}, accuracy="1%")
-    result = hybrid.run(chain)
-    kinds = {e.kind for e in result.events}
-    assert "no error figure" in kinds and "errors" not in result
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("exact", [False, True])
 def test_steps_land_on_ramps_and_where_asked_on_outputs(exact):

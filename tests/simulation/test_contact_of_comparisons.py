@@ -7,12 +7,10 @@ from typing import Any
 
 import pytest
 from test_self_contact_default import led_through
-from test_system_contact import RUBS, TIME, system
 
 import hybrid
 from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
-from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.run_sample import Samples
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
@@ -60,24 +58,3 @@ def test_a_tether_far_from_itself_does_not_stall() -> None:
     assert result.attributes["effort_runs"] <= 6 and result.attributes["cells"] < 1500
     assert len(result["steps/t"]) < 1500
     assert not {event.kind for event in result.events} & {"line touches itself", "line meets itself", "no error figure"}
-
-
-@pytest.mark.parametrize("tail", ["rod", "catenary"])  # with the latter, leaving bending out is a cause of its own
-@pytest.mark.parametrize("duration", [0.1, TIME["duration"]])
-def test_those_of_a_system_likewise(duration: float, tail: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    contact: list[bool | None] = []
-    make = NetworkRun.__init__
-
-    def noted(self: NetworkRun, given: Any, target: Any, text: Any, moves: bool, *args: Any, **more: Any) -> None:
-        if moves:
-            contact.append(given.lines["hose"].contact.self)
-        make(self, given, target, text, moves, *args, **more)
-
-    monkeypatch.setattr(NetworkRun, "__init__", noted)
-    scene = system(contact={"friction": RUBS["friction"]})
-    scene |= {"time": {**TIME, "duration": duration}, "output": {"every": 0.1, "points": 21, "errors": True}}
-    scene["lines"]["tail"] |= {"model": tail, "mesh": {"cells": 20}}
-    result = hybrid.run(scene, progress=False)
-    touches = "line touches itself" in {event.kind for event in result.lines["hose"].events}
-    assert touches == (duration > 1.0)
-    assert contact[0] is None and set(contact[1:]) == ({None} if touches else {False})

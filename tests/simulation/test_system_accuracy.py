@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences
 
 import hybrid
-import hybrid.simulation.network_run
 from hybrid.accuracy import error_control
 from hybrid.accuracy.finer_result import NOT_KEPT, Replacement
-from hybrid.accuracy.passes import Passes
 from hybrid.accuracy.refinement import Verdict
 from hybrid.errors import ComputationError
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.analysis import RodModel
-from hybrid.simulation import progress as reports
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import COMPARED, END_FORCES, RIGHT
 
@@ -97,25 +92,6 @@ def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> 
     assert len({int(line.attributes["cells"]) for line in result.lines.values()}) > 1  # each has a mesh of its own
     steps = np.diff(result.lines["tow"]["steps/t"])
     assert steps.max() > 2.0 * steps.min()  # and they follow the motion
-
-
-@pytest.mark.slow
-def test_a_stopped_run_goes_on_bit_for_bit(
-    result: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(hybrid.simulation.network_run, "LOOK", 1)
-    monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
-    monkeypatch.setattr(hybrid.accuracy.refinement, "LITTLE", np.inf)  # an event that goes by clocks
-    path = tmp_path / "stopped.h5"
-
-    def stop(progress: reports.Progress) -> None:
-        if progress.name == "result" and progress.t > 2.0:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(with_zones(), path, progress=stop)
-    hybrid.resume(path).close()
-    assert result.file is not None and differences(result.file, path) == []
 
 
 def fails(*_: Any, **__: Any) -> None:
@@ -198,18 +174,6 @@ def test_an_accuracy_too_high_is_missed_and_says_so() -> None:
 
 
 @pytest.mark.long
-def test_an_equilibrium_has_an_accuracy_too() -> None:
-    scene = bridle(accuracy={"tension": "0.02%"})
-    del scene["time"]
-    found = hybrid.static(scene)
-    for line in found.lines.values():
-        assert all(x["met"] for x in verdicts(line).values()) and line["errors/total/position"].shape == (
-            1,
-            len(line.s),
-        )
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("how", ["no better", "failed"])
 def test_a_finer_run_that_is_no_better_is_not_kept(how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The lines are one result: that before the finer one stays, in its file, with errors that know of the finer one."""
@@ -263,47 +227,3 @@ def test_what_a_line_does_not_have_is_refused_with_its_name() -> None:
     scene["lines"]["west"]["accuracy"] = {"bending_moment": "5%"}
     with pytest.raises(hybrid.SceneError, match=r"lines\.west\.accuracy"):
         hybrid.run(scene)
-
-
-@pytest.mark.long
-def test_a_finer_result_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It stays beside the result, and is resumed from where it was; another run does not take it."""
-    section = {"length": 20, "mass": 1.5, "axial_stiffness": 1e6, "diameter": 0.02}
-    heave = {"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0}
-    scene: dict[str, Any] = {
-        "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [15, 0, 2], "motion": heave}},
-        "lines": {"rope": {"start": "a", "end": "b", "model": "catenary", "sections": [section]}},
-        "time": {"duration": 0.8},
-        "output": {"every": 0.1},
-        "accuracy": "0.05%",
-    }
-    surveyed = Passes._surveyed
-
-    def rougher(self: Passes, first: NetworkResolution) -> NetworkResolution:
-        found = surveyed(self, first).lines
-        return NetworkResolution({n: replace(x.coarser(8.0), local=10 * (x.local or 0.0)) for n, x in found.items()})
-
-    monkeypatch.setattr(Passes, "_surveyed", rougher)
-    Stopping(monkeypatch)
-    seen: list[float] = []
-
-    def note(now: reports.Progress) -> None:
-        if now.name == reports.REFINEMENT:
-            seen.append(now.t)
-
-    def stop(now: reports.Progress) -> None:
-        if now.name == reports.REFINEMENT and now.t > 0.4:
-            raise KeyboardInterrupt
-
-    hybrid.run(scene, tmp_path / "whole.h5").close()
-    path, left = tmp_path / "run.h5", tmp_path / ".run.h5.finer"
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene, path, progress=stop)
-    assert left.exists()
-    finer = left.read_bytes()
-    hybrid.resume(path, progress=note).close()
-    assert seen[0] > 0.3 and not left.exists()
-    assert differences(path, tmp_path / "whole.h5") == []
-    left.write_bytes(finer)
-    hybrid.run(scene | {"title": "another"}, path).close()
-    assert not left.exists()

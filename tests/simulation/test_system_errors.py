@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import copy
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hybrid
-from hybrid.errors import ComputationError
-from hybrid.simulation.case import Case
 from hybrid.store.limits import extreme_errors
 
 LEG = {"length": 140, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
@@ -77,27 +74,6 @@ def test_quantities_of_lines_have_errors_of_all_steps(more: dict[str, Any]) -> N
     assert (lift.verdict, lift.why) == ("within", "")
     off = abs(result["extremes/lift"][1] - fine["extremes/lift"][1])
     assert off < extreme_errors(result)["lift largest"] < 0.1 * lift.value
-
-
-@pytest.mark.long
-def test_a_longer_run_has_figures_of_all_of_it(result: hybrid.Result, tmp_path: Path) -> None:
-    assert result.file is not None
-    more = hybrid.resume(result.file, tmp_path / "more.h5", until=12.0)
-    line = more.lines["hose"]
-    assert line["errors/total/tension"].shape == line.tension.shape == (31, 12)
-    first = result.lines["hose"]["errors/total/tension"]
-    assert np.allclose(line["errors/total/tension"][:20], first[:20], rtol=0.3, atol=0.2 * first.max())
-
-
-def test_where_a_coarser_run_fails_an_event_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: Any, **__: Any) -> None:
-        raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
-
-    monkeypatch.setattr(Case, "sample", fails)
-    found = hybrid.run(mooring(errors=True) | {"time": {"duration": 1.0, "step": 0.1}})
-    for line in found.lines.values():
-        assert [e.kind for e in line.events].count("no error figure") == 1
-    assert found.status == "complete" and "error_total_position" not in found.attributes
 
 
 @pytest.mark.parametrize(
