@@ -130,12 +130,6 @@ def test_a_criterion_may_be_a_mask():
     assert rods(result, -1)[0][1] == LENGTH
 
 
-def test_a_criterion_needs_zones_that_move():
-    what = calm().model_dump(exclude_none=True) | {"model": "rod"}
-    with pytest.raises(TypeError, match="not adaptive"):
-        hybrid.run(Scene.model_validate(what), criterion=lambda look: np.zeros(look.s.size))
-
-
 # --- criteria as fields ---------------------------------------------------------------------------------
 
 

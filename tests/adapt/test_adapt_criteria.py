@@ -23,11 +23,9 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.kernels.mesh.zone_criteria import (
     BEND,
     CLAMP,
-    CONTACT,
     CRITERIA,
     EDGE,
     FORESEEN,
-    GIVEN,
     POINT,
     SLACK,
     TORSION,
@@ -59,14 +57,6 @@ def sharp(turn, hn):
 def least(T):
     """The smaller tension of the two cells at every node."""
     return np.minimum(np.append(T, T[-1]), np.append(T[0], T))
-
-
-def test_there_is_a_criterion_for_every_number():
-    names = [x.name for x in CRITERIA]
-    assert [names[k] for k in (BEND, SLACK, CLAMP, POINT, EDGE, TORSION, GIVEN, CONTACT)] == [
-        "bend", "slack", "clamp", "point", "edge", "torsion", "given", "contact",
-    ]  # fmt: skip
-    assert all(0.0 < x.off < 1.0 for x in CRITERIA)
 
 
 # --- by hand --------------------------------------------------------------------------------------------

@@ -305,14 +305,6 @@ def test_counted_from_the_other_end(name):
     assert np.abs(tensions(other)[:, ::-1] - tensions(one)).max() < 1e-6 * np.abs(tensions(one)).max()
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_two_runs_are_one(name):
-    again = hybrid.run(SCENES[name]())
-    assert again.events == ran(name).events
-    for field in ("position", "tension", "work/zones", "work/scheme"):
-        assert (again[field] == ran(name)[field]).all()
-
-
 def fixed(what: Scene, model: str, nodes: Floats) -> hybrid.Result:
     text = what.model_dump(exclude_none=True)
     return hybrid.run(Scene.model_validate(text | {"model": {"kind": model}, "mesh": {"nodes": nodes.tolist()}}))

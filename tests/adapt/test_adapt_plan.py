@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hybrid.adapt.zone_rules import OFF, Rules, planned, spread, wanted, widen
-from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, SLACK
+from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA
 from hybrid.model.layout import edges
 
 K = len(CRITERIA)
@@ -312,11 +312,6 @@ def test_more_noise_never_means_less_rod(what):
         one.at(t, ratios)
         two.at(t, 1.2 * ratios)
         assert not (one.rod & ~two.rod).any()
-
-
-def test_slack_lets_go_later_than_bend():
-    """Tension comes back faster than bends go: its `off` is a half, the others' a quarter."""
-    assert CRITERIA[SLACK].off == 0.5 and CRITERIA[BEND].off == 0.25
 
 
 # --- layouts ---

@@ -128,18 +128,6 @@ def test_a_winch_at_the_start_is_the_mirror_image(rate: float) -> None:
             np.testing.assert_allclose(y[::-1][: x.size // 2], x[: x.size // 2], rtol=1e-6, atol=1e-9)
 
 
-def test_a_winch_that_holds_a_tension() -> None:
-    """Its length as with rods as long as the shortest cells."""
-    lengths = []
-    for model, cells in ((FOLLOWING, 40), ("rod", 320)):
-        scene = pinned(0.0, model=model, mesh={"cells": cells})
-        winch = {"tension": 800.0, "inertia": 300.0, "damping": 50.0, "max_rate": 2.0, "ramp": 4.0}
-        scene["ends"]["end"]["payout"] = {"longest": 130.0, "winch": winch}
-        lengths.append(hybrid.run(scene)["payout/length"])
-    assert np.ptp(lengths[1]) > 3.0
-    assert np.abs(lengths[0] - lengths[1]).max() < 0.02
-
-
 @pytest.mark.parametrize("model", [FOLLOWING, {"kind": "adaptive", "tolerance": 1e-5, "hold_time": 1.0}])
 def test_the_tension_now_is_that_of_the_result(model: dict[str, Any], tmp_path: Path) -> None:
     """From outside, between outputs, which zones that move on a line that is paid out refused with a traceback."""
@@ -152,19 +140,6 @@ def test_the_tension_now_is_that_of_the_result(model: dict[str, Any], tmp_path: 
     result = hybrid.open(tmp_path / "run.h5")
     k = int(np.argmin(np.abs(result.t - t)))
     np.testing.assert_allclose(found, result["tension"][k], rtol=1e-9)
-
-
-@pytest.mark.long
-def test_a_step_is_taken_back() -> None:
-    """`save` and `restore` over cells that change, and nodes that enter."""
-    with hybrid.Simulation(pinned(0.8)) as sim:
-        sim.advance(4.0)
-        saved, places = sim.save(), []
-        for _ in range(2):
-            sim.advance(6.0)
-            places.append(sim.forces().end.copy())
-            sim.restore(saved)
-    assert np.array_equal(*places)
 
 
 @pytest.mark.parametrize("side", ["end", "start"])

@@ -211,3 +211,35 @@ def test_resumed_bit_for_bit(name: str, tmp_path: Path) -> None:
     whole = resumed(scene, tmp_path, *stops)
     for line in whole.lines.values() or [whole]:
         assert "payout/length" not in line or np.ptp(line["payout/length"]) > 0.01
+
+
+BACK = {"zones that move": zones.touching(), "cells that follow": cells.pinned(0.8), "buoy": to_a_buoy()}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", BACK)
+def test_a_step_is_taken_back(name: str) -> None:
+    """`save` and `restore` over nodes that enter, and over zones or cells that change."""
+    with hybrid.Simulation(BACK[name]) as sim:
+        sim.advance(4.0)
+        saved, forces = sim.save(), []
+        for _ in range(2):
+            sim.advance(6.0)
+            forces.append(sim.forces("cable")[1] if name == "buoy" else sim.forces().end.copy())
+            sim.restore(saved)
+    assert np.array_equal(*forces)
+
+
+# --- as other lines -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("model", "like"), [(zones.ADAPTIVE, 40), (cells.FOLLOWING, 320)], ids=["zones", "cells"])
+def test_a_winch_that_holds_a_tension_has_the_length_of_rods(model: Any, like: int) -> None:
+    lengths = []
+    for each, count in ((model, 40), ("rod", like)):
+        scene = cells.pinned(0.0, model=each, mesh={"cells": count})
+        hold = {"tension": 800.0, "inertia": 300.0, "damping": 50.0, "max_rate": 2.0, "ramp": 4.0}
+        scene["ends"]["end"]["payout"] = {"longest": 130.0, "winch": hold}
+        lengths.append(hybrid.run(scene)["payout/length"])
+    assert np.ptp(lengths[1]) > 3.0
+    assert np.abs(lengths[0] - lengths[1]).max() < 0.02

@@ -71,33 +71,6 @@ def test_zones_that_move_in_a_current_across_are_those_of_the_turned_scene() -> 
     assert np.abs(found.position[-1, :, 1]).max() > 0.1
 
 
-def test_a_step_is_taken_back() -> None:
-    """`save` and `restore` over cells that enter and zones that change."""
-    with hybrid.Simulation(touching()) as sim:
-        sim.advance(4.0)
-        saved = sim.save()
-        places = []
-        for _ in range(2):
-            sim.advance(6.0)
-            places.append(sim.forces().end.copy())
-            sim.restore(saved)
-    assert np.array_equal(*places)
-
-
-def test_a_winch_that_holds_a_tension_with_zones_that_move() -> None:
-    """Its length as with rods."""
-    lengths = []
-    for model in (ADAPTIVE, "rod"):
-        scene = touching(model=model)
-        scene["ends"]["end"] |= {"kind": "pinned"}
-        del scene["ends"]["end"]["tangent"]
-        winch = {"tension": 800.0, "inertia": 300.0, "damping": 50.0, "max_rate": 2.0, "ramp": 4.0}
-        scene["ends"]["end"]["payout"] = {"longest": 130.0, "winch": winch}
-        lengths.append(hybrid.run(scene)["payout/length"])
-    assert np.ptp(lengths[1]) > 3.0
-    assert np.abs(lengths[0] - lengths[1]).max() < 0.02
-
-
 def stretching(law: dict[str, Any], rate: float, model: Any = ADAPTIVE) -> hybrid.Result:
     scene = touching(rate, model)
     section = scene["cable"]["sections"][0]

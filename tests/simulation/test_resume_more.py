@@ -168,10 +168,6 @@ def test_another_program_goes_on_and_says_so(tmp_path, monkeypatch, whole):
         assert (result.position == same.position).all()
 
 
-def test_the_program_is_named_by_all_that_computes():
-    assert restore.program() == restore.program() and len(restore.program().split()) == 2
-
-
 def test_a_file_without_checkpoints_is_refused(tmp_path):
     hybrid.static(swinging(time=None), tmp_path / "rest.h5").close()
     with pytest.raises(hybrid.ResultError, match="no checkpoint"):

@@ -237,19 +237,6 @@ def test_beside_a_buoy_they_move_as_rods() -> None:
         assert np.abs(pulls[0] - pulls[1]).max() < 0.02 * pulls[1].mean()
 
 
-def test_a_step_is_taken_back() -> None:
-    """`save` and `restore` over cells that enter and zones that change."""
-    with hybrid.Simulation(to_a_buoy()) as sim:
-        sim.advance(4.0)
-        saved = sim.save()
-        places = []
-        for _ in range(2):
-            sim.advance(6.0)
-            places.append(sim.forces("cable")[1])
-            sim.restore(saved)
-    assert np.array_equal(*places)
-
-
 @pytest.mark.long
 def test_loads_that_change_on_the_way(tmp_path: Path) -> None:
     """Another current from the middle on, as with rods."""

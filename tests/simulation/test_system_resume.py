@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import random
-import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -104,7 +100,6 @@ def clamped() -> dict[str, Any]:
     }  # fmt: skip
 
 
-LONG = {"duration": 30.0, "step": 0.02}
 SCENES = {"mooring": mooring(), "spar": spar(), "clamped": clamped()}
 
 
@@ -187,39 +182,6 @@ def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping, mo
     hybrid.run(mooring(), path, progress=look).close()
     ((status, outputs, of_lines),) = seen
     assert status == "running" and 40 <= outputs < 101 and of_lines == 3 * [outputs]
-
-
-KILLED = """
-import os, signal, sys, threading
-import hybrid
-from hybrid.simulation import progress, network_run
-
-def kill(progress):
-    if progress.step >= int(step):
-        threading.Timer(float(later), os.kill, (os.getpid(), signal.SIGKILL)).start()
-
-scene, path, step, later = sys.argv[1:]
-network_run.WORK, progress.REPORT_EVERY = 3000, -1.0
-hybrid.run(scene, path, progress=kill)
-"""
-
-
-@pytest.mark.slow
-def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Some ms after a step that is drawn, so that it is not always between two steps."""
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 3000)
-    scene, whole = tmp_path / "float.yaml", tmp_path / "whole.h5"
-    scene.write_text(hybrid.scene_text(hybrid.Scene.model_validate(mooring(time=LONG))))
-    hybrid.run(scene, whole).close()
-    draw, steps = random.Random(7), LONG["duration"] / LONG["step"]
-    for share in (0.3, 0.8):
-        path = tmp_path / f"{share}.h5"
-        asked = [str(scene), str(path), str(round(share * steps)), str(draw.uniform(0.0, 0.02))]
-        assert subprocess.run([sys.executable, "-c", KILLED, *asked]).returncode == -signal.SIGKILL
-        with hybrid.open(path) as part:
-            assert part.status == "running" and len(part.times)
-        hybrid.resume(path).close()
-        assert differences(whole, path) == []
 
 
 @pytest.mark.long  # 0.9 s
