@@ -39,7 +39,7 @@ class Compares(Comparable, Protocol):
     """What computes the runs that a result is compared with; all raise ComputationError."""
 
     def beside(self, samples: Sequence[Callable[[], Samples]]) -> Beside:
-        """Several of them at the same time (simulation.beside)."""
+        """Several of them at the same time (simulation.case)."""
 
 
 def comparison_resolutions(

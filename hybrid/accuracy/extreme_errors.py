@@ -18,7 +18,7 @@ finer ones find a sharper one every time.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -149,25 +149,6 @@ def figures(extremes: Mapping[str, np.ndarray], errors: Mapping[str, np.ndarray]
         of = name.removeprefix(f"{EXTREMES}/")
         found |= {f"{of} {bound}": float(x) for bound, x in zip(("smallest", "largest"), e, strict=True)}
     return json.dumps(found)
-
-
-def errors_by_cause(
-    result: Mapping[str, np.ndarray], others: Iterable[tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray] | None]]
-) -> dict[str, np.ndarray]:
-    """Errors of the extremes of a run; others: for each cause those of a run that is twice as coarse, and of the next.
-
-    Errors by all causes add; None: there is no next one.
-    """
-    found: dict[str, np.ndarray] = {}
-    for coarse, coarsest in others:
-        c = _changes(result, coarse)
-        b = _changes(coarse, coarsest) if coarsest is not None else {}
-        for name, change in c.items():
-            before = b.get(name)
-            most = float(before.max(initial=0.0)) if before is not None else 0.0
-            p = order_of(float(change.max(initial=0.0)), most, COARSER, COARSER) if before is not None else ORDER
-            found[name] = found.get(name, 0.0) + _errors(change, before, p, COARSER, COARSER)
-    return found
 
 
 def order_of(last: float, before: float, finer: float, finer_before: float) -> float:

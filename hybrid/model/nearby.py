@@ -40,7 +40,7 @@ def nearby(
 ) -> Model | None:  # fmt: skip
     """The model of `scene`, in the cells and zones that `model` has of the scene `of`; None: its cells are others.
 
-    without: bits of forces that its line leaves out (kernels.state.forces); clamped: frames of ends hang on directions
+    without: bits of forces that its line leaves out (kernels.state.report); clamped: frames of ends hang on directions
     of the scene alone, and are those of it.
     Its start, its other starts and its contents are those of `model`.  Tables of `scene` that are the same objects as
     those of `of` count as unchanged.

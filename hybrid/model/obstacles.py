@@ -100,7 +100,7 @@ CELLS_PER_RADIUS, MOST_CELLS = 4.0, 2000
 
 
 def obstacle_bits(scene: LineScene) -> int:
-    """Bits of kernels.state.forces that the obstacles of a scene ask for."""
+    """Bits of kernels.state.report that the obstacles of a scene ask for."""
     if not scene.obstacles:
         return 0
     return OBSTACLES | (FRICTION if any(x.friction for x in scene.obstacles.values()) else 0)

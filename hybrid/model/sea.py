@@ -162,7 +162,7 @@ def rubs(bed: Seabed | None) -> bool:
 
 
 def bed_bits(bed: Seabed | None) -> int:
-    """The forces that a seabed asks for (kernels.state.forces)."""
+    """The forces that a seabed asks for (kernels.state.report)."""
     if bed is None:
         return 0
     breaks = rubs(bed) and bed.friction is not None and bed.friction.residual is not None

@@ -85,7 +85,7 @@ def least_slack(scene: LineScene) -> float:
 
 
 def contact_bits(scene: LineScene) -> int:
-    """Bits of kernels.state.forces for the start of a run."""
+    """Bits of kernels.state.report for the start of a run."""
     reach = self_reach(scene)
     if reach.asked:
         return SELF_CONTACT | (SELF_FRICTION if scene.contact.friction else 0)

@@ -144,7 +144,7 @@ class NetworkRun:
         """target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether
 
         its motion is wanted, else its equilibrium under full loads; resolution: how finely, None: as the scene asks
-        for, or the checkpoint says; criterion: one more for zones that move (adapt.user_criterion); changes: loads and
+        for, or the checkpoint says; criterion: one more for zones that move (adapt.zone_rules); changes: loads and
         motions of these systems hold from some time on.
         """
         source, planes = recording.source, recording.planes

@@ -368,7 +368,7 @@ def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
 #
 # Only in a line that is joined to nothing that moves with it and whose zones stay; what it needs for a change is what
 # one
-# cable needs (simulation.payout_nodes), in steps of all lines (simulation.lines_cells).
+# cable needs (simulation.payout_nodes), in steps of all lines (simulation.kind_changes).
 
 
 class LineNodes(NodeChanges):

@@ -159,7 +159,7 @@ def _go_on(run: RunOfLines, numbers: Sequence[int], after: str) -> None:
 
 
 def gives_up_contact(run: RunOfLines, dt: float) -> bool:
-    """No step of dt (s) leads on: as simulation.contact_start.gives_up_contact, of all lines that touch themselves."""
+    """No step of dt (s) leads on: as `gives_up_contact`, of all lines that touch themselves."""
     numbers = []
     for line in run.lines:
         contact = line.contact

@@ -69,7 +69,7 @@ class RunSample:
     # Numbers of the output points at which its values along the line are (`compared_places`); in no checkpoint.
     places: np.ndarray = field(default_factory=lambda: ALL)
     # of a result: errors (nt, ns) by its cells beside edges of contact (outputs.edge_errors), of an equilibrium beside
-    # its ends, joints and loads as well (outputs.layer_errors)
+    # its ends, joints and loads as well (outputs.edge_errors)
     at_edges: Mapping[str, np.ndarray] = field(default_factory=dict)
     # what limits are held against, of all steps (store.limits.extremes_about); {}: the scene has no limits
     extremes: Mapping[str, np.ndarray] = field(default_factory=dict)

@@ -80,7 +80,7 @@ class Solver(Protocol):
     bodies: Floats  # (B, NUMBERS)
     scale: float  # N
     length: float  # m, of the longest line
-    settling: float  # damping of their motion to rest, as of solve.settling.damped
+    settling: float  # damping of their motion to rest, as of solve.stability.damped
 
     def newton(self, start: NetworkState) -> Solution:
         """Static Newton from `start`, which stays; not OK too where what was found is no equilibrium."""

@@ -1,4 +1,4 @@
-"""What a `Result` reads from: an HDF5 file, or a group of one; of a result in memory see store.array_recorder."""
+"""What a `Result` reads from: an HDF5 file, or a group of one; of a result in memory see store.array_contents."""
 
 from __future__ import annotations
 

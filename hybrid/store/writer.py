@@ -103,7 +103,7 @@ class Recorder(BaseRecorder):
     target: path, or a BytesIO for a result in memory.
     outputs: the number of outputs if it is known; it only makes small files smaller.
     overwrite: replace an existing result.  Another program's file is never replaced.
-    templates: folder where templates of files are kept (store.template); None: in this process alone.
+    templates: folder where templates of files are kept (store.whole_file); None: in this process alone.
     parts: results of lines, laid by in memory, that are groups of this file from now on and are written with it.
     """
 

@@ -17,7 +17,7 @@ from test_result_first import stopped_in
 
 import hybrid
 from hybrid.accuracy.error_order import Errors
-from hybrid.accuracy.extreme_errors import ExtremeErrors, errors_by_cause, figures, order_of
+from hybrid.accuracy.extreme_errors import ExtremeErrors, figures, order_of
 from hybrid.accuracy.refinement import figures as told_of
 from hybrid.accuracy.refinement import judge
 from hybrid.model.resolution import Resolution, has_limits, requested_accuracy
@@ -104,11 +104,10 @@ def test_the_error_counts_where_it_may_pass_the_limit() -> None:
     assert found.largest("max_tension") == pytest.approx(0.01)
 
 
-def test_errors_by_causes_add() -> None:
+def test_figures_are_named_by_what_they_are_of() -> None:
     one = {"max_tension": np.array([0.8]), "extremes/gap": np.array([1.0, 2.0])}
-    other = {"max_tension": np.array([0.7]), "extremes/gap": np.array([1.1, 2.0])}
-    found = errors_by_cause(one, [(other, None), (other, None)])
-    assert json.loads(figures(one, found)) == pytest.approx(
+    errors = {"max_tension": np.array([0.2]), "extremes/gap": np.array([0.2, 0.0])}
+    assert json.loads(figures(one, errors)) == pytest.approx(
         {"max_tension": 0.2, "gap smallest": 0.2, "gap largest": 0.0}
     )
 

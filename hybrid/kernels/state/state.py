@@ -158,7 +158,7 @@ class Line(NamedTuple):
     point_upright: Annotated[Floats, node(POINT)]
     # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
     footing: Annotated[Floats, node(POINT)]
-    bits: int  # which optional forces are on (kernels.state.forces)
+    bits: int  # which optional forces are on (kernels.state.report)
     plane: Floats = NO_PLANE  # (3, 3) rows p, q and the normal p x q of the plane that a planar line lies in
     # (K, 5) catenary zones that a torque passes through: first cell, cell after the last, compliance (rad per N m),
     # turn without torque (rad), stiffness-proportional damping time (s)
@@ -285,7 +285,7 @@ class Sea(NamedTuple):
     carried: Floats  # (M, CARRIED) how far they have (kernels.laws.obstacle_motion); empty: none does
     grip: Floats  # (N+1, 6 M) as `State.grip`, at the start of the step; empty: no obstacle moves
     rolling: Floats  # (3 K, N+1, 5) room for answers to K sheaves that turn freely (kernels.laws.sheaves)
-    boxes: Floats = NO_BOXES  # (B, BOX_ROW) boxes over facets (kernels.state.facet_rows); empty: no obstacle has any
+    boxes: Floats = NO_BOXES  # (B, BOX_ROW) boxes over facets (kernels.state.obstacle_rows); empty: no obstacle has any
     facets: Floats = NO_FACETS  # (F, FACET) of surfaces of triangles, in axes of their obstacles
     soil: Floats = NO_SLOW  # of a bed that remembers (kernels.laws.soil); empty: it does not
 
