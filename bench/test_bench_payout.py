@@ -11,7 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.run import payout_run
-from hybrid.simulation.payout_nodes import LineNodes
+from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_payout import RunPayout
 from hybrid.solve.network_steps import NetworkSteps
 from tests.simulation.test_payout import clamped, kicks
@@ -48,7 +48,7 @@ def test_cost_of_paying_out(monkeypatch: pytest.MonkeyPatch) -> None:
         "paid out, 150 outputs, looked at between nodes": (sagging(True), False),
         "paid out, 2 outputs": (sagging(True, 37.5), True),
     }
-    together, taken = LineNodes.may_change, {name: list[float]() for name in cases}
+    together, taken = NodeChanges.may_change, {name: list[float]() for name in cases}
     in_steps, within, go = {name: list[float]() for name in cases}, [0.0], NetworkSteps.go
 
     def timed(run: NetworkSteps, *by: Any) -> int:
@@ -60,7 +60,7 @@ def test_cost_of_paying_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(NetworkSteps, "go", timed)
     for _ in range(RUNS + 1):
         for name, (scene, joined) in cases.items():
-            monkeypatch.setattr(LineNodes, "may_change", staticmethod(together if joined else lambda *_: False))
+            monkeypatch.setattr(NodeChanges, "may_change", staticmethod(together if joined else lambda *_: False))
             within[0] = 0.0
             begin = time.process_time()
             hybrid.run(scene)

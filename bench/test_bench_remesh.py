@@ -139,7 +139,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
         found.append((float(off), float(np.linalg.norm(state.v, axis=1).max())))
 
     def compiled(self: CellChanges, *given: Any) -> float:
-        k, n, parity, on = self.side, self.cells, int(self._run.count.parity), self._on
+        k, n, parity, on = self.side, self.cells, int(self._owner.count.parity), self._on
         booked = change(self, *given)
         to, m = self.side, self.cells
         note(on.line(k, n), on.state(k, parity, n), on.line(to, m), on.state(to, 0, m))

@@ -34,10 +34,12 @@ from hybrid.kernels.run import following_run as f
 from hybrid.kernels.run.network import begin_line
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.state import Line
+from hybrid.kernels.state.report import REMEMBERS
+from hybrid.kernels.state.state import Batch, Floats, Line
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
+from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.simulation.cell_views import (
     REST_OF_SEA,
     CellViews,
@@ -47,7 +49,9 @@ from hybrid.simulation.cell_views import (
     blank_single,
 )
 from hybrid.simulation.envelope import marks_on
-from hybrid.simulation.line_of_run import OneOfMany
+from hybrid.simulation.kind_changes import carries_all
+from hybrid.simulation.line_of_run import OfRun, OneOfMany, by_itself, ends_alone
+from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.stepper import HEAVY
 
 LEAST_CELLS = 3  # with which tables are made
@@ -60,16 +64,18 @@ MOST_WAITING, MOST_PLACES = 256, 20_000
 
 
 class CellChanges:
-    """Changes of the cells of a line of a run, and of what is rod."""
+    """Changes of the cells of a line of a run, and of what is rod, with the solver that it has now."""
 
     alone = True  # whether cells change without a return to Python
 
-    def __init__(self, owner: OneOfMany) -> None:
+    def __init__(self, run: OfRun, number: int, switching: ZoneSwitching) -> None:
         """Room for all; `adopt` before the first change."""
-        assert owner.switching is not None and owner.model.layout is not None
-        self._owner, self._run, self._switching = owner, owner.run, owner.switching
+        self._of_run, self._line, self._solver = run, run.lines[number], run.solver
+        owner = OneOfMany(run, number, switching)
+        assert owner.model.layout is not None
+        self._owner, self._switching = owner, switching
         self._fixed_to = self._key(owner)
-        model, manager, layout = owner.model, owner.switching.manager, owner.model.layout
+        model, manager, layout = owner.model, switching.manager, owner.model.layout
         self.most, self.base = int(layout.starts[-1]), int(layout.rod.size)
         self._starts = layout.starts
         self._finest, self._piece = layout.finest.nodes, model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
@@ -113,11 +119,28 @@ class CellChanges:
     def _key(owner: OneOfMany) -> tuple[Any, ...]:
         """What the tables hold as it is."""
         model = owner.model
-        return id(model.on_base), model.line.bits, id(model.line.plane), id(model.ends), bool(owner.run.push.size)
+        return id(model.on_base), model.line.bits, id(model.line.plane), id(model.ends), bool(owner.push.size)
 
-    def still_fits(self) -> bool:
-        """Whether the line is of the kind that the arrays were made for."""
-        return self._fixed_to == self._key(self._owner)
+    @staticmethod
+    def may_change(run: OfRun, number: int, switching: ZoneSwitching) -> bool:
+        """Whether cells of a line can change so in a run whose solver is attached."""
+        if not switching.zones.clock.share > 0.0 or run.payout is not None or not by_itself(run, number):
+            return False
+        model = run.model.models[number]
+        plain = carries_all(model, switching) and not model.line.bits & REMEMBERS
+        return plain and switching.manager.layout.rod.size >= LEAST_CELLS
+
+    def fits(self, switching: ZoneSwitching) -> bool:
+        """Whether the line is solved by what the arrays were made for, and its zones are these."""
+        watched = self._owner.itself.table if self._owner.itself is not None else None
+        same = self._solver is self._of_run.solver and self._line.watch_table is watched
+        return bool(same and switching is self._switching and self._fixed_to == self._key(self._owner))
+
+    @property
+    def job(self) -> np.ndarray:
+        """The table of kernels.run.following_run that the compiled steps get."""
+        self._at.alone, self._at.may_wait = self.alone, self._owner.outputs_may_wait
+        return self._following.numbers
 
     # --- tables -------------------------------------------------------------------------------------
 
@@ -227,9 +250,9 @@ class CellChanges:
                 "kinds": (fill_kinds, kinds[0].table),
                 "end": (end_switch, switches[0].table),
                 "renew": (renew, renews[0].table),
-                "before_forces": (before_forces, self._run.table),
-                "after_forces": (after_forces, self._run.table),
-                "books": (begin_line, self._run.table),
+                "before_forces": (before_forces, self._owner.table),
+                "after_forces": (after_forces, self._owner.table),
+                "books": (begin_line, self._owner.table),
             },
         )
 
@@ -238,7 +261,7 @@ class CellChanges:
         of_zones: list[Shaped], of_itself: list[Shaped], switches: list[Shaped], renews: list[Shaped],
     ) -> None:  # fmt: skip
         """The table of runs whose cells change in compiled code."""
-        run, zones = self._run, self._switching.zones
+        owner, zones = self._owner, self._switching.zones
 
         def stacked(shaped: list[Shaped], places: Any = slice(None)) -> np.ndarray:
             return np.array([x.numbers[:, places] for x in shaped])
@@ -252,9 +275,9 @@ class CellChanges:
             tree = self._on.itself.tree.__array_interface__["data"][0]
             self._at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
         numbers: dict[str, Any] = {
-            "calls": self._calls, "at": self._at, "clock": run.clock, "own": run.books.clock, "counts": run.count,
-            "work": run.books.work, "zone_clock": zones.clock, "zone_counts": zones.counts, "numbers": self._numbers,
-            "run": run.table.numbers, "run_places": in_run, "in_run": stacked(of_run, in_run),
+            "calls": self._calls, "at": self._at, "clock": owner.clock, "own": owner.books.clock, "counts": owner.count,
+            "work": owner.books.work, "zone_clock": zones.clock, "zone_counts": zones.counts, "numbers": self._numbers,
+            "run": owner.table.numbers, "run_places": in_run, "in_run": stacked(of_run, in_run),
             "zones": self._switching.table.numbers, "zone_places": in_zones, "in_zones": stacked(of_zones, in_zones),
             "itself": itself, "itself_places": itself_places, "in_itself": in_itself,
             "layouts": np.array([x.numbers for x in layouts]), "line": lines[0].table.numbers, "lines": stacked(lines),
@@ -263,11 +286,11 @@ class CellChanges:
             "here": zones.here, "waiting": self._waiting, "places": self._places,
         }  # fmt: skip
         self._following.bind(**numbers)
-        self._at.task = run.table.part("task").start
+        self._at.task = owner.table.part("task").start
 
     def _bind_calls(self, of_odd: list[Shaped], calls: dict[str, tuple[Any, Any]]) -> None:
         """Addresses of what a change calls; of_odd: what the table of odd steps gets."""
-        even, odd = self._run.table.even, self._run.table.odd
+        even, odd = self._owner.table.even, self._owner.table.odd
         places = of_odd[0].places(IN_RUN)
         in_odd = np.array([x.numbers[:, places] for x in of_odd])
         self._following.bind(even=even.numbers, odd=odd.numbers, in_odd=in_odd)
@@ -278,7 +301,7 @@ class CellChanges:
 
     def adopt(self) -> None:
         """Go on with the line of the run as it is now, in these arrays."""
-        owner, run, switching, model = self._owner, self._run, self._switching, self._owner.model
+        owner, switching, model = self._owner, self._switching, self._owner.model
         layout, n, k = model.layout, model.cells, 0
         assert layout is not None
         if not self._bound:
@@ -286,11 +309,11 @@ class CellChanges:
                 self._bind_all()
             self._bound = True
         self._at.side, self._at.cells = k, n
-        parity, at = int(run.count.parity), self._on.layout(k, n)
+        parity, at = int(owner.count.parity), self._on.layout(k, n)
         for which in (0, 1):
-            _copy(run.states[which], self._on.state(k, which, n))
-            if run.push.size:
-                self._on.push(k, which, n)[:] = run.pushes[which]
+            _copy(owner.states[which], self._on.state(k, which, n))
+            if owner.push.size:
+                self._on.push(k, which, n)[:] = owner.pushes[which]
         zones = self._on.zones(k, n)
         _copy(switching.zones, zones, (*OF_BASE, "kinds"))
         _copy(switching.zones.kinds, zones.kinds, ("free",))
@@ -299,20 +322,15 @@ class CellChanges:
         _copy(owner.stepper.work, self._on.work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
         if self._watch is not None:
             _copy(self._watch.itself, self._on.itself._replace(width=self._on.width(n)), ("tree", "stack"))
-        _copy(run.books, self._on.books(n), tuple(x for x in Books._fields if x not in Kept._fields))
+        _copy(owner.books, self._on.books(n), tuple(x for x in Books._fields if x not in Kept._fields))
         at.place[:], at.s[:], at.of[:], at.rods[:] = layout.places, model.line.s, layout.base_of_cell, layout.rod_cells
         self._on.sides[k].first[:] = self._on.base[:] = layout.first
-        run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
-        self._calls.solver = run.solver_address()
+        owner.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
+        self._calls.solver = owner.solver_address()
         f.put_cells(self._following.numbers)
         self.adopted, self._synced = True, -1
-        run.count.parity = parity
+        owner.count.parity = parity
         self.sync()
-
-    @property
-    def due(self) -> bool:
-        """Whether cells are to change."""
-        return bool(self._switching.zones.counts.cells_due)
 
     def change_zones(self, change: Change) -> float:
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
@@ -322,7 +340,7 @@ class CellChanges:
 
     def _to_zones(self, change: Change) -> float:
         """Other zones, of which Python's model knows nothing yet, and the energy, J, that is booked for it."""
-        switching, manager, t = self._switching, self._switching.manager, self._run.t
+        switching, manager, t = self._switching, self._switching.manager, self._owner.t
         switching.zones.next_rod[:] = change.rod
         z.plan_next(switching.table.numbers)
         for k, clamp in enumerate(switching.clamps(self._owner.model.ends.at(t))):
@@ -331,7 +349,7 @@ class CellChanges:
                 self._clamps[k] = clamp
         booked = self.change(lambda: manager.adopt_rods(change.rod, change, t))
         manager.take(manager.layout._replace(rod=change.rod.copy()), self._on.zones(self.side, self.cells))
-        switching.limit_steps(self._run.clock)
+        switching.limit_steps(self._owner.clock)
         return booked
 
     def change(self, adopt: Callable[[], None] | None = None) -> float:
@@ -344,7 +362,6 @@ class CellChanges:
         if adopt is not None:
             adopt()
         f.end_cells(table)
-        self._run.set_quota(self.cells)
         return float(self._numbers[AFTER] - self._numbers[BEFORE])
 
     # --- outputs that wait --------------------------------------------------------------------------
@@ -360,12 +377,27 @@ class CellChanges:
         fill_line(table)
         return self._on.line(k, m)
 
+    def outputs(self, rows: Floats) -> tuple[list[Output], Batch]:
+        """All outputs that wait, in rows, copied, each with its line; and what they have at the ends."""
+        model, begin, found, batches = self._owner.model, 0, list[Output](), list[Batch]()
+        assert model.layout is not None
+        for first, count, cells in self._waiting[: self._at.waiting].tolist():
+            line = self._line_of(self._places[begin : begin + cells + 1], model.layout.rod)
+            batches.append(self._line.batch_of(rows[first : first + count], cells))
+            found += outputs_in(batches[-1], line, model.zones)
+            begin += cells + 1
+        if len(rows) > self._at.used:
+            batches.append(self._line.batch_of(rows[self._at.used :], model.cells))
+            found += outputs_in(batches[-1], model.line, model.zones)
+        self._at.waiting = self._at.placed = self._at.used = 0
+        return found, ends_alone(batches)
+
     def sync(self) -> None:
         """What Python has of the line is that of now."""
         if not self._stale:
             return
         self._synced = int(self._at.changes)
-        owner, run, k, n = self._owner, self._run, self.side, self.cells
+        owner, k, n = self._owner, self.side, self.cells
         model, switching, line = owner.model, self._switching, self._on.line(k, n)
         assert model.layout is not None
         zones, sea, work, books = self._on.zones(k, n), self._on.sea_on(n), self._on.work_on(n), self._on.books(n)
@@ -373,20 +405,20 @@ class CellChanges:
         layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy())
         model = replace(model, line=line, layout=layout, zones=layout.zones, sea=model.sea.with_values(sea))
         sea.now[:] = now
-        run.books, run.states = books, (self._on.state(k, 0, n), self._on.state(k, 1, n))
-        if run.push.size:
+        old, new = self._on.state(k, 0, n), self._on.state(k, 1, n)
+        owner.books, owner.states = books, (old, new)
+        if owner.push.size:
             at = self._on.layout(k, n)
-            run.pushes = at.push, at.next_push
-        run.table.hold(
-            line=line, sea=sea, old=run.states[0], new=run.states[1], was=run.pushes[0], now=run.pushes[1], work=work,
-            books=books,
+            owner.pushes = at.push, at.next_push
+        owner.table.hold(
+            line=line, sea=sea, old=old, new=new, was=owner.pushes[0], now=owner.pushes[1], work=work, books=books,
         )  # fmt: skip
         switching.take(model, zones)
-        switching.table.hold(line=line, sea=sea, old=run.states[0], new=run.states[1], zones=zones)
+        switching.table.hold(line=line, sea=sea, old=old, new=new, zones=zones)
         if self._watch is not None:
             itself = self._on.itself._replace(width=self._on.width(n), tree=self._on.itself.tree[: boxes_of(n)])
             self._watch.itself = itself
-            self._watch.table.hold(line=line, old=run.states[0], new=run.states[1], itself=itself)
+            self._watch.table.hold(line=line, old=old, new=new, itself=itself)
         owner.take(model, work)
 
 

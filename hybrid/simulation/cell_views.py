@@ -45,7 +45,7 @@ class CellViews:
         """most: cells at most; marked: nodes of them beside which extremes are kept on both sides; at: numbers of the
         run (kernels.run.following_run)."""
         assert owner.switching is not None and owner.model.layout is not None
-        self._owner, self._run, self._switching, self._at = owner, owner.run, owner.switching, at
+        self._owner, self._switching, self._at = owner, owner.switching, at
         base, some = int(owner.model.layout.rod.size), owner.envelope is not None
         self.base = np.zeros(base + 1, np.int64)
         self.sides = Side(most, base), Side(most, base)
@@ -118,7 +118,7 @@ class CellViews:
 
     def push(self, k: int, which: int, cells: int) -> Floats:
         """Of a run that carries one, else none."""
-        if not self._run.push.size:
+        if not self._owner.push.size:
             return NO_PUSH
         layout = self.layout(k, cells)
         return layout.next_push if which else layout.push
@@ -135,9 +135,9 @@ class CellViews:
     def books(self, cells: int) -> Books:
         own = self._view(self._kept, cells)._asdict() | {"base": self.base}
         if not self._binding:
-            return self._run.books._replace(**own)
+            return self._owner.books._replace(**own)
         if (Books, cells) not in self._views:
-            self._views[Books, cells] = self._run.books._replace(**own)
+            self._views[Books, cells] = self._owner.books._replace(**own)
         return self._views[Books, cells]
 
 

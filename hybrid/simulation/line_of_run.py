@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
+import numpy as np
+
 from hybrid.kernels.contact.self_distance import Itself
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH
@@ -23,6 +25,10 @@ from hybrid.solve.self_contact import SelfContact
 
 if TYPE_CHECKING:  # a line that is not paid out does without
     from hybrid.simulation.payout import PayingOut
+
+
+# What outputs have of nodes and of cells.
+OF_NODES, OF_CELLS = ("r", "v", "vd", "kb"), ("e", "T", "a1", "w", "h")
 
 
 class OfLine(Protocol):
@@ -133,7 +139,7 @@ class OneOfMany:
     def __init__(self, run: OfRun, number: int, switching: ZoneSwitching | None = None) -> None:
         self._system, self._number, self.switching = run, number, switching
         line = run.lines[number]
-        self.run, self.envelope, self.marked = self, line.envelope, line.marked
+        self.envelope, self.marked = line.envelope, line.marked
         self._plane = None if run.planes is None else run.planes.of(number)
         self.table = LineTables(*run.solver.tables_by_itself(number))
         table = line.watch_table
@@ -209,9 +215,21 @@ class OneOfMany:
         """Of the kernel that marches it."""
         return self._system.solver.marcher_of(self._number)
 
-    def set_quota(self, cells: int) -> None:
-        """Calls go on for as long as before: that is of all lines."""
-
     def take(self, model: Model, work: Work) -> None:
         """Go on with the line in other cells, which the run has changed to."""
         self._system.adopt_cells(self._number, model, work)
+
+
+def ends_alone(batches: Sequence[Batch]) -> Batch:
+    """Outputs of one line on several meshes one behind the other, with their ends as the only nodes."""
+    own: dict[str, list[Any]] = {name: [getattr(x, name) for x in batches] for name in Batch._fields}
+    own |= {name: [x[:, [0, -1]] if x.size else x for x in own[name]] for name in OF_NODES}
+    own |= {name: [x[:, :1] if x.size else x for x in own[name]] for name in OF_CELLS}
+    return Batch(**{name: np.concatenate(x) for name, x in own.items()})
+
+
+def by_itself(run: OfRun, number: int) -> bool:
+    """Whether nothing but its own steps knows of the cells of a line, in a run whose solver is attached."""
+    line, watched = run.lines[number], run.watch is not None and run.watch.is_needed
+    alone = number in run.solver.lone and not run.solver.mixes and not watched
+    return alone and line.contact is None and line.correction is None

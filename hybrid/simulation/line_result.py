@@ -67,9 +67,9 @@ from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
-    from hybrid.simulation.kind_changes import LineCells
+    from hybrid.simulation.cell_changes import CellChanges
     from hybrid.simulation.payout import PayingOut
-    from hybrid.simulation.payout_nodes import LineNodes
+    from hybrid.simulation.payout_nodes import NodeChanges
 
 # Columns of the step log that runs to compare with keep: time, forces at both ends.
 FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force_end")]
@@ -161,7 +161,7 @@ class Waiting(NamedTuple):
 class LineResult:
     """What is recorded of one line."""
 
-    cells: LineCells | LineNodes | None = None  # what changes cells, or lets nodes enter and leave, without Python
+    cells: CellChanges | NodeChanges | None = None  # what changes cells, or lets nodes enter and leave, without Python
     _at_rest: tuple[Sequence[float], State]  # the sharpest bend and twist of an equilibrium, and its state
     _sampled: Sequence[Output] = ()  # of several meshes, of which `output` is still to be told
 

@@ -51,8 +51,7 @@ from hybrid.model.line import lines
 from hybrid.outputs.joined_lines import Output
 from hybrid.simulation.cell_views import REST_OF_SEA, Kept, Shaped, blank_kept, seas
 from hybrid.simulation.envelope import marks_on
-from hybrid.simulation.kind_changes import by_itself, ends_alone
-from hybrid.simulation.line_of_run import OfRun, OneOfMany
+from hybrid.simulation.line_of_run import OfRun, OneOfMany, by_itself, ends_alone
 from hybrid.solve.stepper import HEAVY
 
 # Of the tables of a run, what depends on the cells.
@@ -81,12 +80,14 @@ class Side:
 
 
 class NodeChanges:
-    """Nodes of a line of a run that enter and leave, where zones stay."""
+    """Nodes of a line of a run that enter and leave, where zones stay, with the solver that it has now."""
 
-    def __init__(self, owner: OneOfMany) -> None:
+    def __init__(self, run: OfRun, number: int) -> None:
         """Room for all; `adopt` before the first change."""
+        self._of_run, self._of_line, self._solver = run, run.lines[number], run.solver
+        self._owner = owner = OneOfMany(run, number)
         assert owner.payout is not None
-        self._owner, self._run, self._paying = owner, owner.run, owner.payout
+        self._paying = owner.payout
         self._fixed_to = self._key(owner)
         plan, model, reel, damped = owner.payout.plan, owner.model, owner.payout.reel, owner.payout.damped
         self.most = owner.payout.most_cells
@@ -102,7 +103,7 @@ class NodeChanges:
         self._lacks = np.empty(MOST_WAITING * f.OF_REEL * self.most)
         self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
         self._itself = blank_itself(np.zeros(self.most))
-        self._base = np.zeros(owner.run.books.base.size, np.int64)
+        self._base = np.zeros(owner.books.base.size, np.int64)
         self._calls, self._at = f.PaidCalls(), f.PaidPlaces()
         self._waiting = np.zeros((MOST_WAITING, 3), np.int64)
         self._following, self._line_table = Table(blank_paid_run_job()), Table(blank_line_job())
@@ -115,11 +116,32 @@ class NodeChanges:
         model, paying = owner.model, owner.payout
         assert paying is not None
         same = id(model.line.plane), id(model.ends), id(paying.reel.law), id(owner.envelope)
-        return model.line.bits, bool(owner.run.push.size), *same
+        return model.line.bits, bool(owner.push.size), *same
 
-    def still_fits(self) -> bool:
-        """Whether the line is of the kind that the arrays were made for."""
-        return self._fixed_to == self._key(self._owner)
+    @staticmethod
+    def may_change(run: OfRun, number: int) -> bool:
+        """Whether nodes of a line can enter and leave so in a run whose solver is attached."""
+        model, line = run.model.models[number], run.lines[number]
+        stays = model.layout is None and line.paying is not None and not line.paying.ended
+        return stays and by_itself(run, number) and is_plain(model.line)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the line is solved by what the arrays were made for."""
+        watched = self._owner.itself.table if self._owner.itself is not None else None
+        same = self._solver is self._of_run.solver and self._of_line.watch_table is watched
+        return bool(same and self._fixed_to == self._key(self._owner))
+
+    @property
+    def job(self) -> np.ndarray:
+        """The table of kernels.run.payout_run that the compiled steps get."""
+        self._at.may_wait = self._owner.outputs_may_wait
+        return self._following.numbers
+
+    def change(self) -> None:
+        """A node enters or leaves now."""
+        f.change_node(self._following.numbers)
+        self.sync()
 
     @property
     def cells(self) -> int:
@@ -151,7 +173,7 @@ class NodeChanges:
 
     def _push(self, k: int, which: int, cells: int) -> Floats:
         """Of a run that carries one, else none."""
-        if not self._run.push.size:
+        if not self._owner.push.size:
             return NO_PUSH
         found: Floats = self._sides[k].pushes.view(cells)[which]
         return found
@@ -167,7 +189,7 @@ class NodeChanges:
 
     def _books(self, k: int, cells: int) -> Books:
         kept = self._sides[k].kept.view(cells)._asdict()
-        return self._run.books._replace(base=self._base, **kept)
+        return self._owner.books._replace(base=self._base, **kept)
 
     # --- tables -------------------------------------------------------------------------------------
 
@@ -177,7 +199,7 @@ class NodeChanges:
         before = self._books(k, n)
         carry = CarryJob(
             self._line(k, n), self._line(to, m), self._state(k, parity, n), self._state(to, 0, m), self._reel(k, n),
-            self._reel(to, m), self._run.clock, before.tension, self._paying.plan.nodes,
+            self._reel(to, m), self._owner.clock, before.tension, self._paying.plan.nodes,
         )  # fmt: skip
         job = NodeJob(
             carry, self._whole, owner.model.ends.values, self._sea_on(m), self._work_on(m), self._state(to, 1, m),
@@ -215,7 +237,7 @@ class NodeChanges:
 
     def _bind_all(self) -> None:
         """Tables of changes from either side to the other, and of runs on either."""
-        run, paying = self._run, self._paying
+        owner, paying = self._owner, self._paying
         envelope, plan, most = self._owner.envelope, paying.plan, self.most + 2
         borne = np.ascontiguousarray(1.0 + plan.cable.max_strain[:: 1 if plan.side else -1])
         start, bounds = np.zeros((plan.nodes.size, 3)), np.zeros((4, b.EXTREMES, 1))
@@ -247,9 +269,10 @@ class NodeChanges:
         self._tables = of_run, of_paid, of_itself, nodes, of_odd  # what is bound there stays alive
         in_run, in_paid = of_run[0].places(IN_RUN), of_paid[0].places(IN_PAID)
         numbers: dict[str, Any] = {
-            "calls": self._calls, "at": self._at, "clock": run.clock, "own": run.books.clock, "counts": run.count,
+            "calls": self._calls, "at": self._at, "clock": owner.clock, "own": owner.books.clock, "counts": owner.count,
             "winch": paying.reel.winch, "first": self._reel(0, self.most), "second": self._reel(1, self.most),
-            "run": run.table.numbers, "run_places": in_run, "in_run": np.array([x.numbers[:, in_run] for x in of_run]),
+            "run": owner.table.numbers, "run_places": in_run,
+            "in_run": np.array([x.numbers[:, in_run] for x in of_run]),
             "paid": paying.table.numbers, "paid_places": in_paid,
             "in_paid": np.array([x.numbers[:, in_paid] for x in of_paid]), "node": nodes[0].table.numbers,
             "itself": itself, "itself_places": in_itself,
@@ -258,7 +281,7 @@ class NodeChanges:
         }  # fmt: skip
         self._following.bind(**numbers)
         at = self._at
-        at.task = run.table.part("task").start
+        at.task = owner.table.part("task").start
         if self._watch is not None:
             tree = self._itself.tree.__array_interface__["data"][0]
             at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
@@ -266,16 +289,16 @@ class NodeChanges:
 
     def _bind_calls(self, of_run: list[Shaped], of_odd: list[Shaped], node: Table) -> None:
         """Addresses of what a change calls; of_odd: what the table of odd steps gets."""
-        run, paying = self._run, self._paying
+        owner, paying = self._owner, self._paying
         calls: dict[str, tuple[Any, Any]] = {
             "change": (f.change_line, node), "carry": (carry_node, Table(blank_carry_job)),
             "fit": (f.fit_changed, node), "book": (f.book_change, node), "renew": (f.renew_run, node),
-            "before_forces": (before_forces, run.table), "stand_still": (stand_still, paying.table),
-            "after_forces": (after_forces, run.table), "books": (begin_line, run.table),
+            "before_forces": (before_forces, owner.table), "stand_still": (stand_still, paying.table),
+            "after_forces": (after_forces, owner.table), "books": (begin_line, owner.table),
         }  # fmt: skip
         in_run = of_run[0].places(IN_RUN)
         in_odd = np.array([x.numbers[:, in_run] for x in of_odd])
-        self._following.bind(even=run.table.even.numbers, odd=run.table.odd.numbers, in_odd=in_odd)
+        self._following.bind(even=owner.table.even.numbers, odd=owner.table.odd.numbers, in_odd=in_odd)
         for name, (kernel, table) in calls.items():
             setattr(self._calls, name, kernel.address(table.numbers))
 
@@ -283,29 +306,29 @@ class NodeChanges:
 
     def adopt(self) -> None:
         """Go on with the line of the run as it is now, in these arrays."""
-        owner, run, model, n = self._owner, self._run, self._owner.model, self._owner.model.cells
+        owner, model, n = self._owner, self._owner.model, self._owner.model.cells
         if not self._bound:
             self._bind_all()
             self._bound = True
         self._at.on, self._at.cells = 0, n
-        parity = int(run.count.parity)
+        parity = int(owner.count.parity)
         for which in (0, 1):
-            _copy(run.states[which], self._state(0, which, n), ("turn",))
-            if run.push.size:
-                self._push(0, which, n)[:] = run.pushes[which]
+            _copy(owner.states[which], self._state(0, which, n), ("turn",))
+            if owner.push.size:
+                self._push(0, which, n)[:] = owner.pushes[which]
         _copy(model.line, self._line(0, n), ("bits", "plane", "torsion", *TENSION_TORQUE))
         _copy(model.sea.values, self._sea_on(n), REST_OF_SEA)
         _copy(owner.stepper.work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
         _copy(self._paying.reel, self._reel(0, n), OF_REEL)
-        self._base[:] = run.books.base
+        self._base[:] = owner.books.base
         if self._watch is not None:
             _copy(self._watch.itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
-        _copy(run.books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
-        run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
-        self._calls.solver = run.solver_address()
+        _copy(owner.books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
+        owner.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
+        self._calls.solver = owner.solver_address()
         f.put_paid(self._following.numbers)
         self.adopted, self._synced = True, -1
-        run.count.parity = parity
+        owner.count.parity = parity
         self.sync()
 
     def sync(self) -> None:
@@ -313,7 +336,7 @@ class NodeChanges:
         if self._at.changes == self._synced:
             return
         self._synced = int(self._at.changes)
-        owner, run, paying, k, n = self._owner, self._run, self._paying, int(self._at.on), self.cells
+        owner, paying, k, n = self._owner, self._paying, int(self._at.on), self.cells
         line, sea, work, books, reel = (
             self._line(k, n), self._sea_on(n), self._work_on(n), self._books(k, n), self._reel(k, n),
         )  # fmt: skip
@@ -322,21 +345,18 @@ class NodeChanges:
         model = replace(owner.model, line=line, zones=paying.plan.zones_of(length), sea=around, length=length)
         sea.now[:] = now
         paying.count, paying.reel = n - paying.rides, reel
-        run.books, run.states = books, (self._state(k, 0, n), self._state(k, 1, n))
-        run.pushes = self._push(k, 0, n), self._push(k, 1, n)
-        run.table.hold(
-            line=line, sea=sea, old=run.states[0], new=run.states[1], was=run.pushes[0], now=run.pushes[1], work=work,
-            books=books,
+        old, new = self._state(k, 0, n), self._state(k, 1, n)
+        owner.books, owner.states = books, (old, new)
+        owner.pushes = self._push(k, 0, n), self._push(k, 1, n)
+        owner.table.hold(
+            line=line, sea=sea, old=old, new=new, was=owner.pushes[0], now=owner.pushes[1], work=work, books=books,
         )  # fmt: skip
-        paying.table.hold(
-            line=line, sea=sea, old=run.states[0], new=run.states[1], report=work.report, reel=reel, X=work.X, W=work.W
-        )
+        paying.table.hold(line=line, sea=sea, old=old, new=new, report=work.report, reel=reel, X=work.X, W=work.W)
         owner.take(model, work)
         if self._watch is not None:
             tree = self._itself.tree[: boxes_of(n)]
             itself = self._watch.itself = self._itself._replace(width=self._width(n), tree=tree)
-            self._watch.table.hold(line=line, old=run.states[0], new=run.states[1], itself=itself)
-        run.set_quota(n)
+            self._watch.table.hold(line=line, old=old, new=new, itself=itself)
 
     # --- outputs that wait --------------------------------------------------------------------------
 
@@ -351,59 +371,6 @@ class NodeChanges:
         reel.lack[:], reel.rate[:], reel.since[:], reel.span[:] = lacks
         return paying.outputs_in(line, reel, batch)
 
-
-def is_plain(line: Line) -> bool:
-    """Whether a line has nothing that a node which enters or leaves would have to carry in Python."""
-    laws = "torsion", "tension_twist", "law", "bend_law", "slip_law", "wake_law", "moved"
-    return not any(getattr(line, name).size for name in laws) and not line.bits & REMEMBERS
-
-
-def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
-    for name in old._fields:
-        if name not in but:
-            getattr(new, name)[:] = getattr(old, name)
-
-
-# Lines of several that are paid out: nodes enter and leave between two steps without Python's help.
-#
-# Only in a line that is joined to nothing that moves with it and whose zones stay; what it needs for a change is what
-# one
-# cable needs (simulation.payout_nodes), in steps of all lines (simulation.kind_changes).
-
-
-class LineNodes(NodeChanges):
-    """Nodes of one of several lines that enter and leave, with the solver that it has now."""
-
-    def __init__(self, run: OfRun, number: int) -> None:
-        self._many, self._of_line, self._solver = run, run.lines[number], run.solver
-        owner = OneOfMany(run, number)
-        super().__init__(owner)
-
-    @staticmethod
-    def may_change(run: OfRun, number: int) -> bool:
-        """Whether nodes of a line can enter and leave so in a run whose solver is attached."""
-        model, line = run.model.models[number], run.lines[number]
-        stays = model.layout is None and line.paying is not None and not line.paying.ended
-        return stays and by_itself(run, number) and is_plain(model.line)
-
-    @property
-    def fits(self) -> bool:
-        """Whether the line is solved by what the arrays were made for."""
-        watched = self._owner.itself.table if self._owner.itself is not None else None
-        same = self._solver is self._many.solver and self._of_line.watch_table is watched
-        return bool(same and self.still_fits())
-
-    @property
-    def job(self) -> np.ndarray:
-        """The table of kernels.run.payout_run that the compiled steps get."""
-        self._at.may_wait = self._owner.outputs_may_wait
-        return self._following.numbers
-
-    def change(self) -> None:
-        """A node enters or leaves now."""
-        f.change_node(self._following.numbers)
-        self.sync()
-
     def outputs(self, rows: Floats) -> tuple[list[Output], Batch]:
         """All outputs that wait, in rows, copied, each with its line; and what they have at the ends."""
         model, begin, found, batches = self._owner.model, 0, list[Output](), list[Batch]()
@@ -416,3 +383,15 @@ class LineNodes(NodeChanges):
             found += self._paying.outputs_of_now(model.line, batches[-1])
         self._at.waiting = self._at.placed = self._at.used = 0
         return found, ends_alone(batches)
+
+
+def is_plain(line: Line) -> bool:
+    """Whether a line has nothing that a node which enters or leaves would have to carry in Python."""
+    laws = "torsion", "tension_twist", "law", "bend_law", "slip_law", "wake_law", "moved"
+    return not any(getattr(line, name).size for name in laws) and not line.bits & REMEMBERS
+
+
+def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
+    for name in old._fields:
+        if name not in but:
+            getattr(new, name)[:] = getattr(old, name)

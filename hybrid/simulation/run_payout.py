@@ -24,7 +24,7 @@ from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.failure import winch_text
 from hybrid.simulation.payout import Before, PayingOut
-from hybrid.simulation.payout_nodes import LineNodes
+from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.payout_zones import PaidZones, moving_zones
 from hybrid.simulation.run_contact import renew_solver
 from hybrid.simulation.run_of_lines import RunOfLines
@@ -49,7 +49,7 @@ class RunPayout:
         self._rows = np.array([x.table.numbers for x in self.lines.values()])
         for row, x in zip(self._rows, self.lines.values(), strict=True):
             x.table.move(row)
-        self._nodes: dict[int, LineNodes] = {}  # what lets nodes enter and leave without Python
+        self._nodes: dict[int, NodeChanges] = {}  # what lets nodes enter and leave without Python
 
     def _take(self, models: Mapping[int, Model]) -> None:
         run = self._run
@@ -95,8 +95,8 @@ class RunPayout:
         run, nodes = self._run, self._nodes.get(k)
         if nodes is None or not nodes.fits:
             self._nodes.pop(k, None)
-            if not run.loop.counts.samples and LineNodes.may_change(run, k):
-                self._nodes[k] = LineNodes(run, k)
+            if not run.loop.counts.samples and NodeChanges.may_change(run, k):
+                self._nodes[k] = NodeChanges(run, k)
                 self._nodes[k].adopt()
             if k not in self.zones:
                 run.lines[k].cells = self._nodes.get(k)

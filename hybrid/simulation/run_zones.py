@@ -27,6 +27,7 @@ from hybrid.model.layout import Layout
 from hybrid.model.network import NetworkModel
 from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import AdaptiveModel, LineScene
+from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.initial_zones import (
     MOST_ROUNDS,
     STRICTER,
@@ -34,7 +35,7 @@ from hybrid.simulation.initial_zones import (
     on_fewer,
     zones_without_equilibrium,
 )
-from hybrid.simulation.kind_changes import LineCells, LineKinds, carries_all, copy_into
+from hybrid.simulation.kind_changes import LineKinds, carries_all, copy_into
 from hybrid.simulation.lines_contact_equilibrium import nearness_in
 from hybrid.simulation.run_cells import equilibrium_on_cells, following
 from hybrid.simulation.run_contact import go_on_as_attached, renew_solver
@@ -221,7 +222,7 @@ class _LineZones:
         clock.letting_go = LETTING_GO * manager.pace
         self.pending: Change | None = None
         self.paid: PaidZones | None = None  # of a line that is paid out
-        self.cells: LineCells | None = None  # what changes its cells without Python
+        self.cells: CellChanges | None = None  # what changes its cells without Python
 
     def follow(self, run: RunOfLines, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
@@ -303,8 +304,8 @@ class RunZones:
         run, line = self._run, self._run.lines[x.number]
         if x.cells is None or not x.cells.fits(x.switching):
             x.cells = None
-            if may and not run.loop.counts.samples and LineCells.may_change(run, x.number, x.switching):
-                x.cells = LineCells(run, x.number, x.switching)
+            if may and not run.loop.counts.samples and CellChanges.may_change(run, x.number, x.switching):
+                x.cells = CellChanges(run, x.number, x.switching)
                 x.cells.adopt()
             line.cells = x.cells
 

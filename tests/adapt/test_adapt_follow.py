@@ -23,7 +23,6 @@ from hybrid.outputs.probes import Observer
 from hybrid.simulation import run_cells
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.initial_zones import shares_asked
-from hybrid.simulation.kind_changes import LineCells
 from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.network_steps import NetworkSteps
@@ -221,7 +220,7 @@ def test_a_line_that_is_watched_changes_its_cells_in_arrays_made_once(monkeypatc
     monkeypatch.setattr(RunZones, "_switch", switch_line)
     once = hybrid.run(scene)
     by_python = sum(changed)
-    monkeypatch.setattr(LineCells, "may_change", lambda *_: False)
+    monkeypatch.setattr(CellChanges, "may_change", lambda *_: False)
     anew = hybrid.run(scene)
     assert sum(changed) - by_python > 20 > 5 >= by_python
     assert [(e.t, e.kind, e.text) for e in once.events] == [(e.t, e.kind, e.text) for e in anew.events]
@@ -391,7 +390,7 @@ def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.Mo
     left, change = [], CellChanges.change
 
     def measured(self: CellChanges, *given) -> float:
-        k, n, parity = self.side, self.cells, int(self._run.count.parity)
+        k, n, parity = self.side, self.cells, int(self._owner.count.parity)
         line, state = self._on.line(k, n), self._on.state(k, parity, n)
         size, before = line.mass.sum() * np.linalg.norm(state.v, axis=1).max(), line.mass @ state.v
         booked = change(self, *given)

@@ -18,7 +18,7 @@ from hybrid.scene.payout import Payout
 from hybrid.simulation import line_result
 from hybrid.simulation.deferred_recorder import OutputsAside
 from hybrid.simulation.line_result import LineResult
-from hybrid.simulation.payout_nodes import LineNodes
+from hybrid.simulation.payout_nodes import NodeChanges
 from tests.inside import OnlyLine
 
 G = 9.81
@@ -530,7 +530,7 @@ def test_outputs_looked_at_together_are_those_looked_at_one_by_one(model: str, m
     monkeypatch.setattr(OutputsAside, "record", lambda x, *more: (calls.append(len(x.waiting)), record(x, *more))[1])
     again = hybrid.run(scene)
     assert max(calls) > 5  # nodes enter about every 3 s, with six outputs between
-    monkeypatch.setattr(LineNodes, "may_change", lambda *_: False)
+    monkeypatch.setattr(NodeChanges, "may_change", lambda *_: False)
     monkeypatch.setattr(LineResult, "outputs_join", False)
     monkeypatch.setattr(line_result, "WAITING", 1)
     alone = hybrid.run(scene)

@@ -12,7 +12,7 @@ import pytest
 import hybrid
 from hybrid.cli.tables import zones_over_time
 from hybrid.simulation.payout import PayingOut
-from hybrid.simulation.payout_nodes import LineNodes
+from hybrid.simulation.payout_nodes import NodeChanges
 from tests.inside import OnlyLine
 from tests.simulation.test_payout import G, hanging
 from tests.simulation.test_payout_zones import touching
@@ -194,7 +194,7 @@ def test_nodes_enter_and_leave_as_by_python(
     )
     found = hybrid.run(given)
     assert not one_by_one
-    monkeypatch.setattr(LineNodes, "may_change", lambda *_: False)
+    monkeypatch.setattr(NodeChanges, "may_change", lambda *_: False)
     other = hybrid.run(given)
     assert len(one_by_one) >= 3
     for name in (x for x in found.names if x != "steps/cpu" and found[x].dtype.kind == "f"):

@@ -12,7 +12,7 @@ from bits import Stopping, differences, went_on
 from test_system_zones import ROPE, SEA, mooring, stepped_again
 
 import hybrid
-from hybrid.simulation.kind_changes import LineCells
+from hybrid.simulation.cell_changes import CellChanges
 from hybrid.solve.network_steps import NetworkSteps
 from tests.said import line_of, said
 from tests.validation.test_validation_lines_contact import force_between, lowered
@@ -55,7 +55,7 @@ def test_cells_change_without_python_as_with_it(model: Tables, monkeypatch: pyte
     monkeypatch.setattr(NetworkSteps, "go", lambda steps: (calls.append(1), go(steps))[1])
     whole = hybrid.run(said(tables, network=True))
     line, compiled = line_of(whole), len(calls)
-    monkeypatch.setattr(LineCells, "may_change", lambda run, number, switching: False)
+    monkeypatch.setattr(CellChanges, "may_change", lambda run, number, switching: False)
     cable = line_of(hybrid.run(said(tables, network=True)))
     assert compiled <= 0.7 * (len(calls) - compiled)
     assert cells(line) == cells(cable) and len({*cells(cable)}) > 3

@@ -13,7 +13,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.state.obstacle_rows import OBSTACLE, PIECE_END, STIFFNESS, STRAND, THINNER
 from hybrid.model.build import build
 from hybrid.model.obstacles import obstacle_rows
-from hybrid.simulation.payout_nodes import LineNodes
+from hybrid.simulation.payout_nodes import NodeChanges
 from tests.combinations.pairs import as_network, seen_by, turned_and_mirrored
 from tests.problems import tables_with
 from tests.validation.obstacle_scenes import over_pipe, paid_over_drum
@@ -161,7 +161,7 @@ def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(chute: Any, tmp_path: Path)
 
 def test_nodes_enter_as_by_python(chute: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, one = chute
-    monkeypatch.setattr(LineNodes, "may_change", lambda *_: False)
+    monkeypatch.setattr(NodeChanges, "may_change", lambda *_: False)
     two = hybrid.run(scene)
     for name in (x for x in one.names if x != "steps/cpu" and one[x].dtype.kind == "f"):
         assert np.array_equal(one[name], two[name], equal_nan=True), name
