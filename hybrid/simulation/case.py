@@ -102,6 +102,14 @@ class Case:
     """
 
     moves = True
+    beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
+    late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
+    late_finer: LateFile | None = None  # of a finer one, which may take its place
+    reach: Reach | None = None  # how far the first line moves, by a pre-run
+    _results = 0  # that were begun
+    _told: tuple[object, str] | None = None  # a scene, and what it is as a text
+    _start: tuple[Network, NetworkResolution, Start] | None = None  # that was looked at last
+    _apart: tuple[Network, Network] | None = None  # a network, and the same without contact
 
     def __init__(
         self,
@@ -129,15 +137,7 @@ class Case:
         }
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
-        self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
-        self.late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
-        self.late_finer: LateFile | None = None  # of a finer one, which may take its place
-        self._results = 0  # that were begun
-        self._told: tuple[object, str] | None = None  # a scene, and what it is as a text
         self._owner = threading.get_ident()  # the thread that puts files in their places
-        self._start: tuple[Network, NetworkResolution, Start] | None = None  # that was looked at last
-        self._apart: tuple[Network, Network] | None = None  # a network, and the same without contact
-        self.reach: Reach | None = None  # how far the first line moves, by a pre-run
         self.near_themselves = set[str]()  # lines that came near themselves in a run to compare with
         # Whether contact of lines with themselves is computed in runs to compare with: where it is asked for, or a line
         # has touched itself in a result.  Before, coarse cells would meet where those of the result do not.
