@@ -60,7 +60,10 @@ BY_TABLE = {
         junctions.joined_sheaves.spin_sheaves junctions.body_contact.meet_bodies""",
 }
 
-IN_TESTS = {"plane": "run.network_tangents.follow_system", "space": "run.network_run.sample_system"}
+IN_TESTS = {
+    "plane": "run.network_tangents.follow_in_plane run.network_tangents.follow_system",
+    "space": "run.network_run.sample_system",
+}
 
 
 def main(half: str, for_tests: bool) -> None:

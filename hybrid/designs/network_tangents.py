@@ -26,6 +26,7 @@ from hybrid.designs.tangents import (
     books_beside,
     copied,
     joined,
+    lie_in,
     line_like,
     opposite,
     parts_of_sizes,
@@ -46,15 +47,17 @@ from hybrid.kernels.run.network_tangents import (
     blank_bodies,
     blank_system_tangents,
     correct_beside,
+    follow_in_plane,
     follow_system,
 )
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, Clock, Counts, sample_size
-from hybrid.kernels.state.report import ASSEMBLED, WAVES
+from hybrid.kernels.state.report import ASSEMBLED, PLANAR, WAVES
 from hybrid.kernels.state.state import Batch, Floats, Line, State, batch_of_one, state_for
 from hybrid.kernels.watch.tangent_job import TANGENT_SIZES, blank_other
 from hybrid.model.ends import table_of_loads
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.model.plane import in_space
 from hybrid.model.resolution import Resolution
 from hybrid.scene.network_scene import Network
 from hybrid.simulation.line_result import observer_of
@@ -107,6 +110,13 @@ class NetworkOthers:
         self._base: list[list[Batch]] = [[] for _ in lines]  # outputs of the run
         self._books: list[list[Books]] = []
         self._found = np.zeros((len(lines), 2), np.int64)
+
+    @property
+    def are_flat(self) -> bool:
+        """Whether all lines lie in one plane, whatever the number, and none is joined to what moves with it."""
+        every = [build_system(self._system, self._resolution), *self._models]
+        plane, joined = every[0].models[0].plane, any(k >= 0 for model in every for ends in model.joints for k in ends)
+        return plane is not None and not joined and all(lie_in(plane, x) for model in every for x in model.models)
 
     def begin(self, run: NetworkRun) -> None:
         """Stand beside the state that a run begins with, and follow its steps from there on.  Unfollowed."""
@@ -220,8 +230,7 @@ class NetworkOthers:
     def _solver(self, rests: bool) -> NetworkSolver:
         """For the state that the run begins with; rests: without what does not act at rest."""
         lines = joined_lines(self._model, 0.0)
-        if rests:
-            lines = [x._replace(line=at_rest(x.line)) for x in lines]
+        lines = [x._replace(line=at_rest(x.line) if rests else in_space(x.line)) for x in lines]
         solver = NetworkSolver(lines, len(self._model.free), self._run.solver.bodies.copy())
         solver.keep_factors()
         return solver
@@ -314,7 +323,8 @@ class NetworkOthers:
             solver, loop.turns, clock=loop.clock, counts=loop.counts, books=lambda p, l: self._books[p][l]
         )
         numbers = self._tables.job.numbers
-        loop.take_tangents(numbers, follow_system.address(numbers))
+        flat = bool(self._model.models[0].line.bits & PLANAR)
+        loop.take_tangents(numbers, (follow_in_plane if flat else follow_system).address(numbers))
 
     def _ends(self, x: JoinedLine, state: State) -> Any:
         """What ends of a line impose, as outputs have it: they are where its nodes are."""
@@ -388,6 +398,7 @@ def refuse_system(run: NetworkRun) -> None:
             "a line is clamped to what turns with it": bool(model.seats[:, :, TURNS].any()),
             "a body has a shape": bool(model.rides.size),
             "a body has members": bool((run.solver.bodies[:, PIECES] > 0.0).any()),
+            "some lines lie in planes": len({x.line.bits & PLANAR for x in model.models}) > 1,
             "bodies turn at first": bool(run.state.bodies[:, W : W + 3].any()),
             "steps follow errors": run.loop.controlled,
         }

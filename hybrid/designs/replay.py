@@ -30,31 +30,39 @@ from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.reader import Result, open_result, written_result
 
+# Tolerance of Newton's method in steps: until its corrections no longer shrink.  At a kink of contact steps that are
+# solved to 1e-9 may end on its wrong side: forces at anchors were up to 0.1 off (bench/test_bench_tangents.py).
+SOLVED_TO = 0.0
+
 
 class Course(NamedTuple):
     """How a run is replayed: how finely each line is computed, by name in the network, with places of its nodes.
 
-    scene: as it was computed: the model of one cable is that which the run has chosen.
+    scene: as it was computed: the model of one cable is that which the run has chosen; dimension: of its network, 3: no
+    plane of a line is known, which other numbers may move; tolerance: of Newton's method in steps.
     """
 
     scene: Any
     lines: Mapping[str, Resolution]
+    dimension: int | None = 3
+    tolerance: float = SOLVED_TO
 
     def at(self, finer: bool) -> Mapping[str, Resolution]:
         """How finely lines are computed; finer: on cells and in steps half as long."""
         return {k: _halved(x) for k, x in self.lines.items()} if finer else self.lines
 
-    def network(self, scene: Any, dimension: int | None = 3) -> Network:
-        """The network that computes a scene with other numbers in a replay; its errors are not estimated.
+    def as_asked(self) -> Course:
+        """With lines in planes where the scene has them."""
+        return self._replace(dimension=self.scene.dimension)
 
-        dimension: tangents know no plane of a line.
-        """
+    def network(self, scene: Any) -> Network:
+        """The network that computes a scene with other numbers in a replay; its errors are not estimated."""
         made = scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})
         if not scene.line_names:
             made = network_of(made.model_copy(update={"model": self.scene.model}))
         elif scene.output.errors:  # lines pass each other as where these are estimated
             made = made.model_copy(update={"contact": passing_each_other(self.scene).contact})
-        found: Network = made.model_copy(update={"dimension": dimension})
+        found: Network = made.model_copy(update={"dimension": self.dimension})
         return found  # runs of several lines estimate no errors by themselves
 
 
@@ -67,7 +75,7 @@ def course_of(scene: Any) -> Course:
     if not _is_open(scene):
         first = NetworkResolution.first(scene).lines if scene.line_names else {LINE: first_resolution(scene)}
         course = Course(scene, first)
-        flat = build_system(course.network(scene, scene.dimension), NetworkResolution(first)).models
+        flat = build_system(course.as_asked().network(scene), NetworkResolution(first)).models
         if scene.dimension is None and any(x.plane is not None for x in flat):
             refuse_push(run(scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})))
         return _with_nodes(course)
@@ -114,7 +122,7 @@ def replay(
     with short_form(course.scene).said():
         run_system(
             network, target, scene_text(network), ProgressReporter(None, scene.require_time().duration), lambda: False,
-            resolution=NetworkResolution(course.at(finer)), recording=Recording(begun=begun),
+            resolution=NetworkResolution(course.at(finer), course.tolerance), recording=Recording(begun=begun),
         )  # fmt: skip
     return written_result(target)
 

@@ -41,15 +41,18 @@ from hybrid.kernels.watch.tangent_job import (
 )
 from hybrid.kernels.watch.wave_slopes import PHASES, SLOPES
 from hybrid.model.build import Model
-from hybrid.model.plane import planar
+from hybrid.model.plane import in_space, planar
 from hybrid.scene.schema import LineScene
 
-# Part of a number by which the scene of the other line differs; of coordinates, of lengths: what moves a line far moves
+# Part of a number by which the scene of the other line differs: rounding by it is as much as what both sides differ by,
+# 1e-6 of forces at anchors (bench/test_bench_tangents.py).  Of coordinates, of lengths: what moves a line far moves
 # nodes into contact and out of it.
-PART, OF_PLACES, OF_LENGTHS = 2.5e-7, 1e-7, 1e-8
+PART, OF_PLACES, OF_LENGTHS = 2.5e-6, 1e-7, 1e-8
 PLACE, LENGTH = re.compile(r"(position\[\d\]|\.z|\.surface)$"), re.compile(r"(\blength|\.at(\[\d\])?)$")
 # Phases of waves round the motion more than other numbers do, and waves move a line less than these.
 OF_WAVES, WAVE = 4e-6, re.compile(r"\bwaves\b")
+# Of the axes of two planes that are one, by rounding.
+SAME_PLANE = 1e-12
 AT_START = 2  # corrections of an equilibrium, and of first accelerations, with factors of their own
 # Numbers that outputs of the other lines may take in memory, 1 GB.
 MOST_SAMPLED = 128_000_000
@@ -125,7 +128,7 @@ def line_like(model: Model, base: Model) -> Line:
     """The line of a scene with more of a number, of the kind of that of the run.  Unfollowed: it is another."""
     line = model.line
     if base.line.bits & PLANAR and not line.bits & PLANAR:
-        if model.plane is None or base.plane is None or np.abs(model.plane - base.plane).max() > 1e-12:
+        if base.plane is None or not lie_in(base.plane, model):
             raise Unfollowed("the number moves the plane of the line")
         line = planar(line, base.plane)
     elif line.bits & PLANAR and not base.line.bits & PLANAR:
@@ -138,6 +141,11 @@ def line_like(model: Model, base: Model) -> Line:
     if not np.array_equal(model.ends.values.held, base.ends.values.held):
         raise Unfollowed("the number changes what ends hold")
     return line
+
+
+def lie_in(plane: Floats, model: Model) -> bool:
+    """Whether a line lies in a plane (3, 3): its number has not moved that."""
+    return model.plane is not None and bool(np.abs(model.plane - plane).max() <= SAME_PLANE)
 
 
 def refuse_what(what: Mapping[str, bool]) -> None:
@@ -237,5 +245,5 @@ def beside(here: State, rate: State, spin: Floats, h: float) -> State:
 
 
 def at_rest(line: Line) -> Line:
-    """A line without what does not act in an equilibrium."""
-    return line._replace(bits=line.bits & ~(FRICTION | WAVES))
+    """A line in space, without what does not act in an equilibrium."""
+    return in_space(line._replace(bits=line.bits & ~(FRICTION | WAVES)))

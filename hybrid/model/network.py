@@ -15,6 +15,7 @@ from hybrid.kernels.laws.members import PIECE
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.obstacle_rows import MEETS_FROM, MEETS_TO, ONSET_OF, STRAND, TURNED
 from hybrid.kernels.state.state import Floats, State
+from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of, loads_of
 from hybrid.model.build import Model, build
 from hybrid.model.catenary_guess import pulls
@@ -53,6 +54,7 @@ class NetworkResolution:
     """How finely several lines are computed: each its cells and the error allowed per step, all the same steps."""
 
     lines: Mapping[str, Resolution]  # by name
+    tolerance: float = TOLERANCE  # of Newton's method in steps
 
     @classmethod
     def first(cls, system: Network) -> NetworkResolution:

@@ -504,7 +504,7 @@ class NetworkRun:
             line.held = np.minimum(x.ends.held, 1)
         follows = [line.correction is not None for line in self.lines]
         lines = [x._replace(serves=x.serves or y) for x, y in zip(lines, follows, strict=True)]
-        self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared)
+        self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared, self.resolution.tolerance)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
         if self.planes is not None:
@@ -1065,7 +1065,7 @@ def run_system(
     name: of the pass; resolution, recording, criterion, changes: as of `NetworkRun`.
     """
     mode = recording.mode._replace(before=recording.mode.before or {})  # it can be resumed
-    recording = recording._replace(mode=mode, planes=recording.begun is None)  # what is followed beside is in space
+    recording = recording._replace(mode=mode, planes=True)
     run = NetworkRun(system, target, text, True, resolution, recording, criterion, changes)
     reporter.begin(name, run.resolution.one)
     run.record_motion(reporter, interrupted)

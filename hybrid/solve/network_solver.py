@@ -49,7 +49,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, State, Work, state_for
 from hybrid.kernels.step.job import blank_job
-from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, Limits, Task
+from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, TOLERANCE, Limits, Task
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.step.step_law import REFUSED
 from hybrid.kernels.watch.named_quantities import note_quantities
@@ -105,15 +105,15 @@ class NetworkSolver:
 
     def __init__(
         self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES,
-        contacts: Sequence[SelfContact | None] = (), shared: SharedContact | None = None,
+        contacts: Sequence[SelfContact | None] = (), shared: SharedContact | None = None, tolerance: float = TOLERANCE,
     ) -> None:  # fmt: skip
         """points: how many free points there are; bodies: (B, NUMBERS), what they are, read at every step; contacts: of
 
         lines that touch themselves, in the order of the lines, None: of one that does not; empty: none does.  shared:
-        contact of lines that may touch each other, which have none of their own.
-        Each point and body must be at an end of some line.
+        contact of lines that may touch each other, which have none of their own; tolerance: of Newton's method in
+        steps.  Each point and body must be at an end of some line.
         """
-        self.lines, self.bodies = tuple(lines), bodies
+        self.lines, self.bodies, self.tolerance = tuple(lines), bodies, tolerance
         self.body_work = np.zeros((len(bodies), WORK))
         self._fairleads = np.array([x.fairleads for x in lines], float).reshape(-1, 2, 3)
         self._arms, self._gaps = np.zeros_like(self._fairleads), np.zeros_like(self._fairleads)
@@ -293,7 +293,7 @@ class NetworkSolver:
 
     def limits_by_itself(self, number: int) -> Limits:
         """What Newton's method works with in a line that is solved by itself."""
-        return Limits(REACH * self.lines[number].length, self.lines[number].scale, MOST_OF_STEP)
+        return Limits(REACH * self.lines[number].length, self.lines[number].scale, MOST_OF_STEP, self.tolerance)
 
     def marcher_of(self, number: int) -> int:
         """Address of the kernel that solves steps of a line that is solved by itself."""
@@ -478,7 +478,7 @@ class NetworkSolver:
         limits = task.limits
         self._asked[:] = (
             task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most,
-            task.rho_before, task.fixed, t, 1.0, task.cut,
+            task.rho_before, task.fixed, t, 1.0, task.cut, limits.tolerance,
         )  # fmt: skip
         self._let_march()
         outcome, iterations, left, line, where = solve_system(self._all.jobs[0].numbers)
@@ -638,7 +638,7 @@ class NetworkSolver:
         `NetworkTaken.rho` of it.  t: s, of `new`, for extremes.  fixed: whether steps have a fixed length, but for
         parts of one.
         """
-        limits = Limits(REACH * self.length, 1.0, most)
+        limits = Limits(REACH * self.length, 1.0, most, self.tolerance)
         task = Task(STEP, dt, before, rho, limits=limits, rho_before=rho_before, fixed=fixed)
         taken = self._solve(task, old, new, t)
         if taken.outcome != Outcome.OK:

@@ -100,7 +100,7 @@ class NetworkSteps:
         self._job.bind(
             outputs=self.outputs, bodies=self.body_samples, worked=self.worked, clock=self.clock, counts=counts,
             lines=self.lines, seen=self.seen, log=self._log,
-            limits=np.array([REACH * solver.length, MOST_ITERATIONS, solver.arm]),
+            limits=np.array([REACH * solver.length, MOST_ITERATIONS, solver.arm, solver.tolerance]),
             sampler=sample_system.address(self._job.numbers), **jobs,
         )  # fmt: skip
         self._first = jobs["even"]

@@ -22,6 +22,7 @@ from hybrid.designs.network_tangents import NetworkOthers
 from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.designs.replay import course_of
 from hybrid.designs.tangents import Unfollowed
+from hybrid.kernels.state.report import PLANAR
 from tests.designs.test_in_motion import heaved, on_the_bed
 
 OF = ["max tension@240", "last tension@100", "std position.z@150", "max velocity.z@200", "t=3.31 tension@120"]
@@ -83,6 +84,27 @@ KEYS = [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.gravity", "end
 @pytest.mark.parametrize("model", ["catenary", "rod"])
 def test_a_touchdown_that_moves(model: str) -> None:
     agree(on_the_bed(model), OF, KEYS)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", ["catenary", "rod"])
+def test_a_line_in_a_plane_is_followed_in_it(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the same tangents as in space, where it goes by a number that moves its plane."""
+    tables, of, found = on_the_bed(model), ["last tension@start", "std position.z@150", "max tension@end"], []
+    plain, bits = NetworkOthers._follow, list[int]()
+
+    def follow(self: NetworkOthers, reports: Any) -> None:
+        plain(self, reports)
+        bits.append(self._model.models[0].line.bits & PLANAR)
+
+    monkeypatch.setattr(NetworkOthers, "_follow", follow)
+    tables["time"]["duration"] = 2.0
+    for dimension, beside in ((None, []), (3, []), (None, ["ends.end.position[1]"])):
+        scene = hybrid.validate_scene(tables | ({"dimension": dimension} if dimension else {}))
+        found.append(in_motion(scene, of, KEYS + beside).derivatives[: len(KEYS)])
+    assert [x > 0 for x in bits] == [True, False, False]
+    np.testing.assert_allclose(found[0], found[1], rtol=2e-6, atol=1e-6 * np.abs(found[1]).max())
+    np.testing.assert_allclose(found[1], found[2], rtol=1e-12)
 
 
 @pytest.mark.long

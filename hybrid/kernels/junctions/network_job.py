@@ -74,6 +74,7 @@ class NetworkTask(NamedNumbers):
     time: float
     part: float
     cut: float  # whether a step is taken as the last iteration has left it, converged or not
+    tolerance: float
 
 
 def blank_system_job() -> NetworkJob:
@@ -92,7 +93,7 @@ read_system = reader(blank_system_job())
 @inner
 def task_of(asked):
     """The task that is asked."""
-    limits = Limits(asked.reach, asked.scale, int(asked.most))
+    limits = Limits(asked.reach, asked.scale, int(asked.most), asked.tolerance)
     return Task(
         int(asked.what), asked.dt, asked.before, asked.rho_of_step, asked.cv, asked.ca, False, limits, asked.cut != 0.0,
         asked.rho_of_last, asked.fixed != 0.0,

@@ -71,7 +71,7 @@ def solve_job(plane, space, job):
         limits, cut = task.limits, job.books.counts.most_iterations > 0
         if cut:
             left = job.books.counts.most_iterations - job.books.counts.taken
-            limits = Limits(limits.reach, limits.scale, min(left, limits.most))
+            limits = Limits(limits.reach, limits.scale, min(left, limits.most), limits.tolerance)
         fixed = job.books.counts.controlled == 0
         task = Task(STEP, dt, clock.step_before, clock.rho, 0.0, 0.0, False, limits, cut, clock.rho_before, fixed)
     states, calls = States(old, new, was, now), Calls(job.contact, job.contact_table, iterated, job.reel_table)

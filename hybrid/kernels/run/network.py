@@ -170,7 +170,7 @@ def size_up(tables, ca):
     shift, turn, size, worst, where = 0.0, 0.0, 0.0, 0, -1
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        reach, scale, _ = job.task.limits
+        reach, scale, _, _ = job.task.limits
         far, turned, cell, change, big = measure(job.new.e, job.new.T, job.work.x)
         shift = max(shift, far / reach)
         if not turned <= turn:
@@ -528,7 +528,7 @@ def solve_system(table):
         if task.what == STEP:
             asked.part = part
             ask_sheaves(system, ROLL_ON)
-        outcome, left = has_converged(size, before, it, part)
+        outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
         before = size if part == 1.0 else math.inf
         if task.what == EQUILIBRIUM:
             outcome = NOT_CONVERGED if strength > 1.0 else outcome

@@ -69,8 +69,8 @@ REGROUP = 16
 # changes then needs no Python.
 CELLS_DUE = 32
 # Of `limits`: the reach of Newton's method, m; its iterations at most; the arm by which moments on bodies are compared
-# with forces, m.
-OF_REACH, OF_ITERATIONS, OF_ARM = 0, 1, 2
+# with forces, m; the tolerance of Newton's method.
+OF_REACH, OF_ITERATIONS, OF_ARM, OF_TOLERANCE = 0, 1, 2, 3
 
 
 class StepsJob(NamedTuple):
@@ -88,7 +88,7 @@ class StepsJob(NamedTuple):
     marchers: NDArray[np.int64]  # (L - J,) addresses of the kernels that solve their steps
     clock: Clock  # of all lines
     counts: Counts
-    limits: Floats  # (3,) above
+    limits: Floats  # (4,) above
     lines: NDArray[np.int64]  # (4,) above
     seen: NDArray[np.int64]  # (L,) bits of kernels.state.books: how near a line came to itself in the last step
     log: Floats  # (rows, L, len(LOG))
@@ -142,7 +142,7 @@ def blank_steps_job() -> StepsJob:
     clock, counts = Clock(), Counts()
     lone = np.zeros((1, 1), np.int64)
     return StepsJob(
-        none, none, none, none, none, lone, none, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
+        none, none, none, none, none, lone, none, none, clock, counts, np.zeros(4), none, none, log, *no_loads(),
         np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
         none, none, lone, none, lone, none, lone, none, lone, none, none,
     )  # fmt: skip
@@ -251,6 +251,7 @@ def try_step(steps, system):
     asked.before, asked.rho_of_step, asked.rho_of_last = clock.last_dt, clock.rho, clock.last_rho
     asked.cv, asked.ca, asked.scale, asked.fixed = 0.0, 0.0, 1.0, 1.0 - counts.controlled
     asked.reach, asked.most, counts.is_cut = steps.limits[OF_REACH], steps.limits[OF_ITERATIONS], 0
+    asked.tolerance = steps.limits[OF_TOLERANCE]
     asked.cut = 1.0 if counts.most_iterations > 0 else 0.0
     if counts.most_iterations > 0:
         asked.most = min(asked.most, float(counts.most_iterations - counts.taken))

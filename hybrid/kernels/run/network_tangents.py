@@ -1,6 +1,6 @@
-"""What the motion of several lines answers to numbers of its scene: tangents along the steps of a run.
+"""What the motion of lines answers to numbers of its scene: tangents along the steps of a run.
 
-As of one cable (kernels.watch.tangents), line by line; what lines hand over to points and bodies is solved with the
+As of one line (kernels.watch.tangents), line by line; what lines hand over to points and bodies is solved with the
 factors of the lines that the last iteration has left, as another right-hand side (kernels.junctions.right_sides).
 
 A body has tangents of its own: of its place r, of its turn theta (inertial), of the rotation vector n of the step, and
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, SPAN
+from hybrid.kernels.algebra.block_elimination_plane import solve_again_planar
 from hybrid.kernels.algebra.kept_factors import carry_block, solve_with
 from hybrid.kernels.algebra.rotations import (
     add,
@@ -110,7 +111,7 @@ class OtherBodies(NamedTuple):
 
 
 class NetworkTangents(NamedTuple):
-    """Arguments of `follow_system` and `correct_beside`."""
+    """Arguments of `follow_system`, `follow_in_plane` and `correct_beside`."""
 
     even: NDArray[np.int64]  # of a NetworkJob of the lines that are joined to what moves with them, as of StepsJob
     odd: NDArray[np.int64]
@@ -318,8 +319,8 @@ def set_right_side(line_work, job, other, starts, ends):
 
 
 @inner
-def answer(system, net, p):
-    """Corrections of all other lines and bodies: in work.x of the lines of the run and in what its bodies work with."""
+def answer_joined(system, net, p):
+    """Corrections of the other lines that move with points and bodies, and of these."""
     own = read_bodies(net.bodies[p])
     m, points = system.A.shape[1] - 1, system.net.shape[0]
     for j in range(system.tables.shape[0]):
@@ -335,9 +336,20 @@ def answer(system, net, p):
                 system.A[first + 6 * b + k, m] += own.right[b, k]
         substitute_dense(system.A, m)
         correct_all(system, points, m)
+
+
+@inner
+def answer(plane, space, system, net, p):
+    """Corrections of all other lines and bodies: in work.x of the lines of the run and in what its bodies work with."""
+    if space is not None:
+        answer_joined(system, net, p)
     for k in range(net.lone.shape[0]):
         job = read_job(net.lines[net.lone[k]])
-        solve_with(job.work.X, job.work.W, read_other(job.tables[p]).left, job.work.x, False)
+        left = read_other(job.tables[p]).left
+        if space is not None:
+            solve_with(job.work.X, job.work.W, left, job.work.x, False)
+        if plane is not None:
+            solve_again_planar(plane, job.work.X, left, job.work.x)
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         stay_held(job, job.work.x)
@@ -389,13 +401,13 @@ def how_many(net, p):
 
 
 @inner
-def correct_lines(net, p, s, k, count, wanted):
+def correct_lines(space, net, p, s, k, count, wanted):
     """Add corrections to tangents of all lines, the k-th of so many, and keep how large they are."""
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         other = read_other(job.tables[p])
         sizes = other.sizes
-        correct_rates(1, job.work.x, s, other.rates, other.spin)
+        correct_rates(space, job.work.x, s, other.rates, other.spin)
         r, T = largest_correction(job.work.x)
         if k == 1:
             sizes[SECOND_R], sizes[SECOND_T] = max(sizes[SECOND_R], r), max(sizes[SECOND_T], T)
@@ -408,14 +420,15 @@ def correct_lines(net, p, s, k, count, wanted):
 
 
 @inner
-def end_lines(net, p, s):
+def end_lines(plane, space, net, p, s):
     """The other lines stand where tangents lead; in their outputs ends are where nodes are."""
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         other = read_other(job.tables[p])
         books, n = other.books, other.line.h.shape[0]
         begin = books.counts.samples
-        end_other(None, 1, job, other, s, new_of(job, job), old_of(job, other), new_of(job, other), job.work.report)
+        new, there_old, there = new_of(job, job), old_of(job, other), new_of(job, other)
+        end_other(plane, space, job, other, s, new, there_old, there, job.work.report)
         for i in range(begin, books.counts.samples):
             row = books.samples[i]
             for j in range(3):
@@ -424,38 +437,41 @@ def end_lines(net, p, s):
 
 
 @inner
-def advance(system, net, p, s):
+def advance(plane, space, system, net, p, s):
     """The other lines and bodies of a number from the beginning of the last step of the run to its end."""
     bodies = read_bodies(net.bodies[p])
-    load_bodies(bodies.numbers, bodies.loads, bodies.history, net.clock.now)
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         other = read_other(job.tables[p])
-        begin_other(1, job, other, s, old_of(job, other))
-    predict_body_rates(system, bodies, s)
-    place_fairleads(system, net, p, s)
+        begin_other(space, job, other, s, old_of(job, other))
+    if space is not None:
+        load_bodies(bodies.numbers, bodies.loads, bodies.history, net.clock.now)
+        predict_body_rates(system, bodies, s)
+        place_fairleads(system, net, p, s)
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         other = read_other(job.tables[p])
-        carry_spins(None, 1, other, old_of(job, job), new_of(job, job), old_of(job, other), new_of(job, other))
+        carry_spins(plane, space, other, old_of(job, job), new_of(job, job), old_of(job, other), new_of(job, other))
     count, wanted = how_many(net, p)
     for k in range(count):
         for l in range(net.lines.shape[0]):
             job = read_job(net.lines[l])
             other = read_other(job.tables[p])
-            leave_over(None, 1, job, other, s, new_of(job, job), old_of(job, other), new_of(job, other))
-        put_bodies(system, bodies)
-        answer(system, net, p)
-        correct_lines(net, p, s, k, count, wanted)
-        correct_body_rates(system, bodies.rates, s)
-    find_body_rates(bodies, s)
-    end_lines(net, p, s)
+            leave_over(plane, space, job, other, s, new_of(job, job), old_of(job, other), new_of(job, other))
+        if space is not None:
+            put_bodies(system, bodies)
+        answer(plane, space, system, net, p)
+        correct_lines(space, net, p, s, k, count, wanted)
+        if space is not None:
+            correct_body_rates(system, bodies.rates, s)
+    if space is not None:
+        find_body_rates(bodies, s)
+    end_lines(plane, space, net, p, s)
 
 
-@kernel
-def follow_system(table):
-    """Tangents of all lines and bodies through the last step of their run; table: of NetworkTangents.  Returns 0."""
-    net = read_tangents(table)
+@inner
+def follow(plane, space, net):
+    """Tangents of all lines and bodies through the last step of their run."""
     own = net.even
     if net.counts.parity == 0:
         own = net.odd
@@ -463,13 +479,27 @@ def follow_system(table):
     task = task_of(system.asked)
     task = with_radius(task, task.rho)
     s = scheme(task.rho, task.before, task.rho_before, task.dt)
-    settle(system)
+    if space is not None:
+        settle(system)
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
-        keep_own(None, 1, job, s, old_of(job, job), new_of(job, job))
+        keep_own(plane, space, job, s, old_of(job, job), new_of(job, job))
     for p in range(net.bodies.shape[0]):
-        advance(system, net, p, s)
+        advance(plane, space, system, net, p, s)
     return 0
+
+
+@kernel
+def follow_system(table):
+    """The same of lines in space; table: of NetworkTangents.  Returns 0."""
+    return follow(None, 1, read_tangents(table))
+
+
+@kernel
+def follow_in_plane(table):
+    """The same of lines in one plane that are joined to nothing that moves with them.  Returns 0."""
+    net = read_tangents(table)
+    return follow(read_job(net.lines[0]).line.plane, None, net)
 
 
 @kernel
@@ -490,5 +520,5 @@ def correct_beside(table):
         job = read_job(net.lines[l])
         leave_over_at_rest(job, read_other(job.tables[p]), cv, ca)
     put_bodies(system, read_bodies(net.bodies[p]))
-    answer(system, net, p)
+    answer(None, 1, system, net, p)
     return 0

@@ -44,12 +44,20 @@ CUT_SHORT = -1  # a step that is taken though Newton has not converged in the it
 STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = 0, 1, 2, 3, 4
 
 
+# Newton stops when the next correction, predicted from the last two by quadratic
+# convergence, turns no chord by more than the tolerance (rad) and changes no tension by more
+# than it of the largest.  Differences between two ways of computing the same thing
+# (ends swapped, scene rotated) then stay near 1e-9, a hundred times above round-off.
+TOLERANCE = 1e-9
+
+
 class Limits(NamedTuple):
     """What Newton works with."""
 
     reach: float  # m, largest shift of a node in one iteration
     scale: float  # N, tension scale of the scene
     most: int  # iterations
+    tolerance: float = TOLERANCE  # of the correction that would come next
 
 
 class Task(NamedTuple):
@@ -81,11 +89,6 @@ class Calls(NamedTuple):
     reel_table: NDArray[np.int64]
 
 
-# Newton stops when the next correction, predicted from the last two by quadratic
-# convergence, turns no chord by more than TOLERANCE (rad) and changes no tension by more
-# than TOLERANCE of the largest.  Differences between two ways of computing the same thing
-# (ends swapped, scene rotated) then stay near 1e-9, a hundred times above round-off.
-TOLERANCE = 1e-9
 # Below this the correction is accepted when it no longer shrinks: round-off of ill-scaled lines.
 ROUND_OFF = 1e-6
 # Round-off of the length of the line, as a part of it (equal cells are all rounded the same way), and the most, as a
@@ -151,18 +154,18 @@ def round_off_tension(line, ca, scale):
 
 
 @inner
-def has_converged(size, before, it, part):
+def has_converged(size, before, it, part, tolerance):
     """Outcome OK or NOT_CONVERGED after correction `it`, and the next correction as it is predicted.
 
     size, before: of this correction and the one before, relative; before: infinite for the first one and behind one
     that was shortened, from which nothing can be predicted; part: of the correction that was made.
     """
     if not before < math.inf:
-        return (OK if part == 1.0 and size <= TOLERANCE else NOT_CONVERGED), size
+        return (OK if part == 1.0 and size <= tolerance else NOT_CONVERGED), size
     ratio = size / before
     left = size * min(1.0, ratio * ratio)
     if part == 1.0:
-        if size <= TOLERANCE or (it > 1 and size < 1e-3 and left <= 0.1 * TOLERANCE):
+        if size <= tolerance or (it > 1 and size < 1e-3 and left <= 0.1 * tolerance):
             return OK, left
         if it > 4 and size < ROUND_OFF and ratio > 0.3:
             return OK, size
@@ -226,7 +229,7 @@ def solve(plane, space, task, line, sea, ends, states, work, strains, calls):
     """
     old, new, _, _ = states
     contact, contact_table, reel, reel_table = calls
-    reach, scale, most = task.limits
+    reach, scale, most, tolerance = task.limits
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
         task, s, turn, where = start_step(plane, space, task, line, sea, old, new, work, contact, contact_table)
@@ -290,7 +293,7 @@ def solve(plane, space, task, line, sea, ends, states, work, strains, calls):
                 roll_on(line, sea, new, s, part, work.x)
         turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
-        outcome, left = has_converged(size, before, it, part)
+        outcome, left = has_converged(size, before, it, part, tolerance)
         before = size if part == 1.0 else math.inf
     cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
     if cut_short:
