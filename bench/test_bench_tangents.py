@@ -18,10 +18,11 @@ from derivative_scenes import KINDS, keys_of, scene_at_anchor, scene_in_motion
 
 import hybrid
 from hybrid.designs import in_motion as way
-from hybrid.designs.in_motion import Motion, by_tangents, parse_history, size_of
+from hybrid.designs.in_motion import Motion, by_tangents, size_of
 from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.designs.replay import Course, course_of, replay
 from hybrid.designs.tangents import Unfollowed
+from hybrid.designs.wanted import parse_wanted
 
 pytestmark = pytest.mark.bench
 SCENES, ROUNDS = int(os.environ.get("SCENES", "200")), 3
@@ -57,7 +58,7 @@ def test_tangents_of_random_scenes() -> None:
             continue
         scene = hybrid.validate_scene(tables)
         names = [*OF, f"std position.z@{0.45 * scene.length!r}"]
-        wanted, keys = [parse_history(scene, x) for x in names], keys_of(tables)
+        wanted, keys = [parse_wanted(scene, x, moves=True) for x in names], keys_of(tables)
         try:
             course = course_of(scene)
             numbers = {key: number_of(scene, key) for key in keys}
@@ -106,7 +107,7 @@ def test_anchors_on_the_bed() -> None:
     for seed in range(int(os.environ.get("FIRST", "0")), min(SCENES, 40)):
         kind, tables, key = scene_at_anchor(seed)
         scene = hybrid.validate_scene(tables)
-        wanted = [parse_history(scene, x) for x in of]
+        wanted = [parse_wanted(scene, x, moves=True) for x in of]
         try:
             found, course = way.in_motion(scene, of, [key]), course_of(scene)
         except hybrid.ComputationError as error:
@@ -127,7 +128,7 @@ def test_tension_is_even_on_a_bed_without_friction() -> None:
     """At the anchor its derivative is that of the line beside it."""
     scene, key = hybrid.validate_scene(scene_in_motion(3)[1]), "ends.end.position[0]"
     beside = scene.length / 20.0  # the first output point
-    wanted = [parse_history(scene, x) for x in ("last tension@0", f"last tension@{beside!r}")]
+    wanted = [parse_wanted(scene, x, moves=True) for x in ("last tension@0", f"last tension@{beside!r}")]
     course, number = course_of(scene), number_of(scene, key)
     asked = scene, wanted, course, {key: number}, {key: size_of(scene, key, number)}
     for way_of in (by_tangents, way.by_differences):
@@ -167,7 +168,7 @@ def test_cost_of_a_tangent(model: str, cells: int, dimension: int | None, waves:
     sections = ("length", "mass", "diameter", "axial_stiffness", "drag.normal", "added_mass.normal")
     keys = [f"cable.sections[0].{x}" for x in sections]
     keys += ["ends.end.motion.heave.amplitude", "environment.seabed.stiffness"]
-    wanted = [parse_history(scene, x) for x in OF]
+    wanted = [parse_wanted(scene, x, moves=True) for x in OF]
     numbers = {key: number_of(scene, key) for key in keys}
     sizes = {key: size_of(scene, key, x) for key, x in numbers.items()}
 

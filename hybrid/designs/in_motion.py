@@ -8,8 +8,6 @@ the base run, and no derivative is made of them.
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from typing import Any, NamedTuple
@@ -18,19 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.designs.edges import refuse_edges
-from hybrid.designs.line_at_rest import AXES, refuse_parts
 from hybrid.designs.network_tangents import NetworkOthers
 from hybrid.designs.numbers import at_a_bound, number_of, scene_with, size_of
 from hybrid.designs.replay import Course, course_of, replay, with_outputs
 from hybrid.designs.tangents import Seen, Unfollowed, has_two_sides, step_of
+from hybrid.designs.wanted import Wanted, over_time, parse_wanted, peaks, smoothed
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import Spread
 
-NAME = re.compile(r"^(max|min|mean|std|last|t=\S+) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
-OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
 # Parts of a number by which runs differ: differences of second order by both, from which one of fourth order follows.
 # Of steps that are solved to rounding: 1e-3 left 4e-5 of forces at an anchor on a bed (bench/test_bench_tangents.py).
 PARTS = (3e-4, 6e-4)
@@ -42,26 +38,6 @@ WEAK = 0.04
 SAME_ZONE = 0.005
 # Of the length, within which a place is at the end of a section.
 OF_ENDS = 1e-6
-
-
-class Wanted(NamedTuple):
-    """A result over the time of a run, in parts; line: "" of one cable; at: m, infinity: the end, None: all places, or
-
-    those of a section; time: s, at which it is wanted (over: "t"), between outputs by the straight line.
-    """
-
-    over: str
-    line: str
-    name: str
-    axis: str
-    at: float | None
-    section: int | None = None
-    time: float = math.nan
-
-    @property
-    def place(self) -> Wanted:
-        """Whose history it is of."""
-        return self._replace(over="", time=0.0)
 
 
 class Slopes(NamedTuple):
@@ -82,7 +58,7 @@ def in_motion(asked: Scene, of: Sequence[str], by: Sequence[str]) -> Slopes:
     not those of the base run.
     """
     refuse_edges(asked, of)
-    wanted, course = [parse_history(asked, x) for x in of], course_of(asked)
+    wanted, course = [parse_wanted(asked, x, moves=True) for x in of], course_of(asked)
     numbers = {key: number_of(asked, key) for key in by}
     sizes = {key: size_of(asked, key, number) for key, number in numbers.items()}
     apart: dict[str, str] = {}  # why tangents are not known
@@ -192,51 +168,6 @@ def by_differences(
         slopes[i] = (4.0 * found[0] - found[1]) / 3.0
         errors[i] = np.abs(slopes[i] - found[0])
     return Slopes(base.values, slopes, errors, len(numbers) * (DIFFERENCES,))
-
-
-def parse_history(asked: Scene, text: str) -> Wanted:
-    found = NAME.match(text)
-    example = "max east/tension@end" if asked.line_names else "max tension@end"
-    if found is None or bool(found[2]) != bool(asked.line_names):
-        expected = "max, min, mean, std, last or t=TIME, and NAME@S, of several lines LINE/NAME@S"
-        raise SceneError([Complaint("of", text, expected, example)])
-    over, _, name, axis, at = found.groups()
-    line = found[2] or ""
-    time = math.nan
-    if over.startswith("t="):
-        over, time = "t", _time_of(asked, text, over.removeprefix("t="))
-    section = OF_SECTION.match(at or "")
-    at = None if section is not None else at
-    if line not in asked.lines:
-        raise SceneError([Complaint("of", text, f"a line of {', '.join(asked.lines)}", example)])
-    cable = asked.lines[line].cable
-    length, count = cable.length, len(cable.sections)
-    if section is not None and int(section[1]) >= count:
-        raise SceneError([Complaint("of", text, f"a section of the line, which has {count}, counted from 0", example)])
-    try:
-        s = {None: None, "start": 0.0, "end": length}[at] if at in (None, "start", "end") else float(at)
-    except ValueError:
-        raise SceneError([Complaint("of", text, "a number of metres behind @", example)]) from None
-    if s is not None and not 0.0 <= s <= length:
-        raise SceneError([Complaint("of", text, f"an arc length between 0 and {length:g} m", example)])
-    refuse_parts(name, axis or "", "", s)
-    if s is None and name in PROBES and "s" in PROBES[name].dims and over not in ("max", "min"):
-        raise SceneError([Complaint("of", text, "a place", f"{text}@end")])
-    of_section = None if section is None else int(section[1])
-    return Wanted(over, line, name, axis or "", np.inf if s == length else s, of_section, time)
-
-
-def _time_of(asked: Scene, text: str, number: str) -> float:
-    """The time of a result, s; SceneError: it is none, or beyond the run."""
-    duration = asked.require_time().duration
-    try:
-        time = float(number)
-    except ValueError:
-        time = math.nan
-    if not 0.0 <= time <= duration:
-        expected = f"a time between 0 and {duration:g} s"
-        raise SceneError([Complaint("of", text, expected, f"t={0.5 * duration:g} tension@end")])
-    return time
 
 
 class Motion:
@@ -349,8 +280,7 @@ class Motion:
             names = ", ".join(name for name in PROBES if "/" not in name)
             raise SceneError([Complaint("of", x.name, f"one of {names}", "max tension@end")]) from None
         dims = PROBES[x.name].dims if x.name in PROBES else ()
-        if dims[-1:] == ("xyz",):
-            value = value[..., AXES.index(x.axis)] if x.axis else np.linalg.norm(value, axis=-1)
+        value = x.component(value)
         if "edge" in dims:
             value = value[:, -1]
         if "s" not in dims:
@@ -398,62 +328,3 @@ def _alike(one: Sequence[Sequence[tuple[str, float]]], other: Sequence[Sequence[
 
 
 # Statistics of a history (outputs, places): an extreme is the largest of its peaks, each with when and where it is.
-
-# Part of an extreme within which other peaks stand beside it, and so many at most.
-BESIDE, MOST = 0.1, 12
-
-
-def over_time(history: Floats, over: str, where: Any) -> tuple[float, Any]:
-    """The statistic of a history, and when and where an extreme is; where: None: not known yet."""
-    if over in ("max", "min"):
-        if where is None:
-            flat = np.nanargmax(history) if over == "max" else np.nanargmin(history)
-            where = np.unravel_index(int(flat), history.shape)
-        return float(history[where]), where
-    x = history[:, 0]
-    return float({"mean": x.mean(), "std": x.std(), "last": x[-1]}[over]), None
-
-
-def peaks(history: Floats, over: str, where: Any) -> list[Any]:
-    """When and where peaks are that stand beside an extreme, from the largest on, behind the extreme itself.
-
-    They are the largest of each place over time, as the place of an extreme goes along a line, and of each peak over
-    time and place.
-    """
-    if over not in ("max", "min"):
-        return [where]
-    high = np.pad(np.nan_to_num(history if over == "max" else -history, nan=-np.inf), 1, constant_values=-np.inf)
-    inside, (n, m) = high[1:-1, 1:-1], history.shape
-    peak = np.isfinite(inside)
-    for i, k in np.argwhere(np.ones((3, 3))) - 1:
-        if (i, k) != (0, 0):  # of equal neighbours the first
-            beside = high[1 + i : 1 + i + n, 1 + k : 1 + k + m]
-            peak &= (inside > beside) if (i, k) < (0, 0) else (inside >= beside)
-    peak[np.argmax(inside, axis=0), np.arange(m)] = True
-    top = inside[where]
-    near = [(int(i), int(k)) for i, k in np.argwhere(peak & (inside >= top - BESIDE * abs(top)))]
-    near.sort(key=lambda x: -float(inside[x]))
-    first = (int(where[0]), int(where[1]))
-    return [first, *[x for x in near if x != first][: MOST - 1]]
-
-
-def smoothed(history: Floats, over: str, cut: NDArray[np.bool_]) -> Floats:
-    """Of every output and place the extreme of parabolas through it and its neighbours in time and place, but for
-
-    these places (places,), where a value may be two.
-
-    Outputs and places count as evenly spaced there.  The largest of all changes evenly, as an extreme goes from one to
-    the next: between two it is that of either parabola.
-    """
-    side, out = 1.0 if over == "max" else -1.0, history.copy()
-    for axis in (0, 1):
-        x, table = np.moveaxis(history, axis, 0), np.moveaxis(out, axis, 0)
-        if x.shape[0] < 3:
-            continue
-        before, here, after = x[:-2], x[1:-1], x[2:]
-        bent = after - 2.0 * here + before
-        hill = (side * bent < 0.0) & (np.abs(after - before) < 2.0 * np.abs(bent))  # it is between the neighbours
-        if axis == 1:
-            hill &= ~(cut[:-2] | cut[1:-1] | cut[2:])[:, None]
-        table[1:-1][hill] -= (after - before)[hill] ** 2 / (8.0 * bent[hill])
-    return out

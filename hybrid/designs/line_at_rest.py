@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -11,6 +10,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from hybrid.designs.wanted import Wanted
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.march.assembly import JOINED
@@ -22,15 +22,12 @@ from hybrid.linear.matrices import ANCHOR, rotation
 from hybrid.linear.memory import settle_layers
 from hybrid.model.build import Model
 from hybrid.model.sections import jump_points, output_points
-from hybrid.outputs.probes import PROBES, Observer
+from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.line_result import WANTED, observer_of
 from hybrid.solve.joined import JoinedLine
 from hybrid.solve.stepper import POWERS
 
-NAME = re.compile(r"^(?:(max|min) )?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
-OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
-AXES = "xyz"
 # How far a state is moved to differentiate its results: a part of chords, and of the largest tension.
 ALONG = 1e-5
 # Differences to both sides that are unequal by this part of them, and this part of the result, are of a jump.
@@ -44,40 +41,6 @@ MANY, ALIKE = 3, (1e-11, 1e-6)
 SAME, VARIES = ("element", "spin"), ("s", "h", "hn", "k0", "kb", "ck", "mass", "force", "rotary", "polar")
 SAME_PLACE = 1e-9  # part of the length within which a node is at a jump
 TURNED = 1e-9  # N m over N m, torque through catenary zones that is none
-
-
-class Wanted(NamedTuple):
-    """A result in parts: `max` or `min` of a quantity or "", its name, its component or "", and its place, m; the end
-
-    of the line, wherever that is, is at infinity.  section: along which alone an extreme is taken; None: all of them.
-    """
-
-    extreme: str
-    name: str
-    axis: str
-    at: float | None
-    section: int | None = None
-
-
-def parse_result(text: str, length: float) -> Wanted:
-    """The parts of a result such as `position.z@125` of a line of length m; SceneError: it is none."""
-    found = NAME.match(text)
-    expected = "NAME@S, NAME.x@S, max NAME or min NAME, such as tension@0, tension@end or max curvature"
-    if found is None:
-        raise SceneError([Complaint("of", text, expected, "tension@0")])
-    extreme, name, axis, at = found.groups()
-    section = OF_SECTION.match(at or "")
-    if section is not None:
-        if not extreme:
-            raise SceneError([Complaint("of", text, expected, f"max {text}")])
-        return Wanted(extreme, name, axis or "", None, int(section[1]))
-    try:
-        s = {None: None, "start": 0.0, "end": length}.get(at) if at in (None, "start", "end") else float(at)
-    except ValueError:
-        raise SceneError([Complaint("of", text, expected, "a number of metres behind @")]) from None
-    if s is not None and not 0.0 <= s <= length:
-        raise SceneError([Complaint("of", text, f"an arc length between 0 and {length:g} m", f"{name}@{length:g}")])
-    return Wanted(extreme or "", name, axis or "", np.inf if s == length else s)
 
 
 class Beside(NamedTuple):
@@ -136,7 +99,7 @@ class LineAtRest:
         self._frames = frames
         self.here = Beside(scene, model, self._ends(model, frames), model.sea.at(np.inf))
         self._at = [x.at for x in wanted if x.at is not None]
-        self._nodes = any(x.extreme for x in wanted) or not self._at
+        self._nodes = any(x.over for x in wanted) or not self._at
         self._observer, self._peak_of = self._observed(self.here), dict[Wanted, Peak]()
         self._values, self._left_here = np.zeros(len(self.wanted)), cast("tuple[Floats, Floats] | None", None)
         self._line = _at_rest(model.line)
@@ -196,24 +159,21 @@ class LineAtRest:
         observer = self._observer
         found = observer.values_of(observer.look(self._output(self.here, self.left(self.here)[1])))
         for x in self.wanted:
-            if x.extreme and "s" in observer.dims(x.name):
-                value = _component(x, np.asarray(found[x.name][0]))
+            if x.over and "s" in observer.dims(x.name):
+                value = x.component(np.asarray(found[x.name][0]))
                 nodes = self._along(x)
                 at_nodes = value[np.searchsorted(observer.s, self.model.line.s[nodes])]
-                sign, jumps = 1.0 if x.extreme == "max" else -1.0, jump_points(self.here.scene)
+                sign, jumps = 1.0 if x.over == "max" else -1.0, jump_points(self.here.scene)
                 self._peak_of[x] = _peak(self.model.line.s[nodes], at_nodes, sign, jumps)
                 self._peak_of[x].nodes[:] = nodes[self._peak_of[x].nodes]
         self._values = self._results(found, [(observer.s, self.model.line.s)])[0]
         return self._values
 
     def _along(self, x: Wanted) -> np.ndarray:
-        """Of which nodes an extreme is taken; SceneError: the line has no such section."""
+        """Of which nodes an extreme is taken."""
         s, sections = self.model.line.s, self.here.scene.cable.sections
         if x.section is None:
             return np.arange(s.size)
-        if x.section >= len(sections):
-            expected = f"a section of the line, which has {len(sections)}, counted from 0"
-            raise SceneError([Complaint("of", f"sections[{x.section}]", expected, f"sections[{len(sections) - 1}]")])
         ends = np.cumsum([0.0, *(each.length for each in sections)])
         near = 1e-9 * s[-1]
         return np.flatnonzero((s >= ends[x.section] - near) & (s <= ends[x.section + 1] + near))
@@ -358,10 +318,6 @@ class LineAtRest:
             if wanted.name not in observer.names:
                 names = ", ".join(sorted(name for name in observer.names if "/" not in name))
                 raise SceneError([Complaint("of", wanted.name, f"one of {names}", "tension@0")])
-            refuse_parts(wanted.name, wanted.axis, wanted.extreme, wanted.at)
-            if "s" in observer.dims(wanted.name) and wanted.at is None and not wanted.extreme:
-                fix = f"{wanted.name}@0, max {wanted.name}"
-                raise SceneError([Complaint("of", wanted.name, "a place or an extreme", fix)])
         return observer.of([wanted.name for wanted in self.wanted])
 
     def _slopes(self, more: Floats, less: Floats, steps: Floats) -> Floats:
@@ -407,36 +363,16 @@ class LineAtRest:
 
     def _result(self, x: Wanted, s: Floats, nodes: Floats, value: Floats) -> float:
         """One result; an extreme is that of the place, among nodes, where it is in the equilibrium."""
-        dims, value = self._observer.dims(x.name), _component(x, value)
+        dims, value = self._observer.dims(x.name), x.component(value)
         if "edge" in dims:  # where contact begins and ends: the last of them
             return float(np.append(np.nan, value[np.isfinite(value)])[-1])
         if "s" not in dims:
             return float(value)
-        if x.extreme:
+        if x.over:
             peak = self._peak_of[x]
             return float(peak.weights @ value[np.searchsorted(s, nodes[peak.nodes])])
         assert x.at is not None
         return float(np.interp(x.at, s, value))
-
-
-def refuse_parts(name: str, axis: str, extreme: str, at: float | None) -> None:
-    """SceneError: a component of what is no vector, an extreme along the line or a place of what has one value."""
-    if name not in PROBES:
-        return
-    dims, whole = PROBES[name].dims, f"{name}.{axis}" if axis else name
-    if axis and dims[-1:] != ("xyz",):
-        raise SceneError([Complaint("of", whole, f"{name}, which has no components", name)])
-    if (extreme or at is not None) and "s" not in dims:
-        place = "" if at is None else f"@{'end' if np.isinf(at) else f'{at:g}'}"
-        expected = f"{whole} alone, which has one value for the whole line"
-        raise SceneError([Complaint("of", f"{extreme} {whole}{place}".lstrip(), expected, whole)])
-
-
-def _component(wanted: Wanted, value: Floats) -> Floats:
-    """The component that is wanted of a vector, or its size; what is no vector itself."""
-    if PROBES[wanted.name].dims[-1:] != ("xyz",) if wanted.name in PROBES else True:
-        return value
-    return np.asarray(value[..., AXES.index(wanted.axis)] if wanted.axis else np.linalg.norm(value, axis=-1))
 
 
 def _at_rest(line: Line) -> Line:

@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.designs.in_motion import DIFFERENCES, TANGENTS, Motion, followed, parse_history, size_of
+from hybrid.designs.in_motion import DIFFERENCES, TANGENTS, Motion, followed, size_of
 from hybrid.designs.numbers import number_of
 from hybrid.designs.replay import Course, course_of
 from hybrid.designs.tangents import Unfollowed, has_two_sides, step_of
+from hybrid.designs.wanted import parse_wanted
 from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats
 
@@ -85,7 +86,7 @@ class Motions:
         self.rows = {case: np.array([k for k in moving if wanted[k][0] == case], int) for case in scenes}
         self.rows = {case: rows for case, rows in self.rows.items() if rows.size}
         self._of = {
-            case: [parse_history(scenes[case], wanted[k][1].removesuffix(IN_MOTION)) for k in rows]
+            case: [parse_wanted(scenes[case], wanted[k][1].removesuffix(IN_MOTION), moves=True) for k in rows]
             for case, rows in self.rows.items()
         }
         self.place = {int(k): (case, i) for case, rows in self.rows.items() for i, k in enumerate(rows)}

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -22,8 +22,9 @@ from hybrid.accuracy.api import first_at_rest
 from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
 from hybrid.designs.contact_at_rest import ContactAtRest
 from hybrid.designs.gradients import Factors, Gradients
-from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
+from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, moment_on_body
 from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, number_of, with_number
+from hybrid.designs.wanted import Wanted, parse_wanted
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.obstacle_rows import ROLLED
@@ -32,7 +33,7 @@ from hybrid.linear.matrices import linear_network
 from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, nearby_clamped, same_nodes, seats_know_no_shape, shaped_anew
-from hybrid.model.network import NetworkModel, NetworkResolution, with_surfaces
+from hybrid.model.network import NetworkModel, with_surfaces
 from hybrid.scene.analysis import Output
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FreeBody, RigidBody
@@ -42,13 +43,12 @@ from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE, ShortForm, network_of, short_form
+from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.network_run import static_system
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 
-OF_LINE = re.compile(r"^(?:(max|min) )?([^/@]+)/(.+)$")
 # Tables of a scene on which every line hangs; numbers of a free body on which none does.
 OF_ALL = ("environment", "obstacles", "output")
 OF_BODIES = (*OF_ALL, "points", "bodies")
@@ -62,30 +62,6 @@ OF_BODY = {
 # Places of nodes (`Resolution.places`) by line; empty: as the scene asks for.
 Places = Mapping[str, tuple[float, ...]]
 NO_PLACES: Places = MappingProxyType({})
-
-
-def _network_of(scene: Any) -> tuple[Any, Network, NetworkResolution, ShortForm | None]:
-    """The scene as it is computed, the network that does, how finely, and where keys of the scene are in that."""
-    scene, resolution = first_at_rest(scene)
-    network, form = network_of(scene), short_form(scene)
-    return scene, network, resolution, None if scene.line_names else form
-
-
-def parse_result_of(scene: Scene, text: str) -> tuple[str, Wanted]:
-    """The line and the parts of a result such as `east/tension@end`, `max hose/curvature`; SceneError: it is none.
-
-    Of a line that has no name `tension@end`.
-    """
-    if not scene.line_names:
-        return LINE, parse_result(text, scene.length)
-    found = OF_LINE.match(text)
-    name = found[2] if found is not None else ""
-    if found is None or name not in scene.lines:
-        names = ", ".join(scene.lines)
-        example = f"{next(iter(scene.lines))}/tension@end"
-        raise SceneError([Complaint("of", text, f"LINE/NAME@S, max LINE/NAME or min LINE/NAME, of {names}", example)])
-    text = f"{found[1]} {found[3]}" if found[1] else found[3]
-    return name, parse_result(text, scene.lines[name].cable.length)
 
 
 class _Changed(NamedTuple):
@@ -104,12 +80,13 @@ class NetworkAtRest(OfScene):
 
         SceneError, ComputationError: as of `hybrid.sensitivity`.
         """
-        wanted = [parse_result_of(scene, x) for x in of]
-        self.scene, system, resolution, self._form = _network_of(scene.without_friction())
+        wanted = [parse_wanted(scene, x, moves=False) for x in of]
+        self.scene, resolution = first_at_rest(scene.without_friction())
+        system, self._form = network_of(self.scene), short_form(self.scene)
         refuse_use(self.scene, "derivatives", given="hybrid sensitivity")
         finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
         resolution = replace(resolution, lines=finely)
-        with nullcontext() if self._form is None else self._form.said():
+        with self._form.said():
             run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
         assert run.found is not None
         self._system, self._names, self._outputs = system, run.model.names, dict[str, Output]()
@@ -122,20 +99,21 @@ class NetworkAtRest(OfScene):
             x._replace(line=model.line) for x, model in zip(run.found.solver.lines, run.model.models, strict=True)
         ]
         self._free = [[k for k in (0, 1) if x.joints[k] >= 0] for x in joined]
-        self._order = [(name, k) for name in self._names for k, (line, _) in enumerate(wanted) if line == name]
+        called = dict(zip(scene.lines, self._names, strict=True))
+        self._order = [(name, k) for name in self._names for k, x in enumerate(wanted) if called[x.line] == name]
         solver = NetworkSolver(joined, len(run.found.solver.net), run.found.solver.bodies)
         self._bodies, self._model = BodiesAtRest(solver, run.state, run.model), run.model
         self._network = linear_network(solver, run.state, self._names, sticks=False, quick=False)
         rows = zip(self._names, run.model.models, run.state.lines, self._free, strict=True)
         self.lines = [
             LineAtRest(
-                self._scenes[name], model, state, [x for line, x in wanted if line == name], free,
+                self._scenes[name], model, state, [x for x in wanted if called[x.line] == name], free,
                 self._bodies.frames(l, solver.lines[l].seats),
             )
             for l, (name, model, state, free) in enumerate(rows)
         ]  # fmt: skip
         A = sparse.csc_array(self._network.stiffness + self._network.skew)
-        self.contact = self._contact(run.found, run.state, [x for _, x in wanted])
+        self.contact = self._contact(run.found, run.state, wanted)
         if self.contact is not None:
             A = A + self._of_unknowns(self.contact.stiffness)
         self._matrix = A + self._bodies.stiffness_besides(A) if self._bodies.count else A
@@ -299,7 +277,7 @@ class NetworkAtRest(OfScene):
 
     def _key_in(self, key: str) -> str:
         """The key of the network that a key of the scene is."""
-        pairs = [] if self._form is None else [(dotted(there), dotted(here)) for there, here in self._form.pairs]
+        pairs = [(dotted(there), dotted(here)) for there, here in self._form.pairs]
         for there, here in sorted(pairs, key=lambda x: -len(x[1])):
             if re.match(rf"{re.escape(here)}\b", key):
                 with suppress(SceneError):

@@ -16,7 +16,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.build import places_of
 from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.network import NetworkResolution, build_system
-from hybrid.model.resolution import Resolution, accuracy_of, first_resolution
+from hybrid.model.resolution import Resolution, accuracy_of
 from hybrid.model.sections import NEAR
 from hybrid.scene.network_scene import Network
 from hybrid.scene.read import read_text, scene_text
@@ -24,10 +24,8 @@ from hybrid.scene.root import Scene
 from hybrid.scene.short_form import LINE, network_of, short_form
 from hybrid.simulation.network_run import Recording, run_system
 from hybrid.simulation.progress import ProgressReporter
-from hybrid.simulation.restore import kept_resolution, resolution_from
+from hybrid.simulation.restore import kept_resolution
 from hybrid.store.array_contents import MemoryTarget
-from hybrid.store.checkpoint import read_checkpoint
-from hybrid.store.hdf5_file import opened
 from hybrid.store.reader import Result, open_result, written_result
 
 # Tolerance of Newton's method in steps: until its corrections no longer shrink.  At a kink of contact steps that are
@@ -73,9 +71,9 @@ def course_of(scene: Any) -> Course:
     may leave.  ComputationError: one is pushed out of it.
     """
     if not _is_open(scene):
-        first = NetworkResolution.first(scene).lines if scene.line_names else {LINE: first_resolution(scene)}
-        course = Course(scene, first)
-        flat = build_system(course.as_asked().network(scene), NetworkResolution(first)).models
+        first = NetworkResolution.first(network_of(scene))
+        course = Course(scene, first.lines)
+        flat = build_system(course.as_asked().network(scene), first).models
         if scene.dimension is None and any(x.plane is not None for x in flat):
             refuse_push(run(scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})))
         return _with_nodes(course)
@@ -87,11 +85,7 @@ def course_of(scene: Any) -> Course:
             computed: Any = read_text(result.scene_text)[0]
             part = next(x for _, x in result.each_line())
             ends = tuple(np.array(part["steps/t"], float).tolist())
-        if scene.line_names:
-            found = dict(kept_resolution(computed, path).lines)
-        else:
-            with opened(path) as file:
-                found = {LINE: resolution_from(read_checkpoint(file).resolution, computed)}
+        found = dict(kept_resolution(network_of(computed), path).lines)
     if any(x.local is not None for x in found.values()):
         longest = float(np.diff([0.0, *ends]).max())
         found = {k: replace(x, local=None, later=0.0, step=longest, ends=ends) for k, x in found.items()}

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import brentq
 
 import hybrid
-from hybrid.designs.in_motion import over_time, peaks, smoothed
 from hybrid.designs.motions import PART, TANGENT, Motions, Peaks
 from hybrid.designs.numbers import scene_with
+from hybrid.designs.wanted import over_time, peaks, smoothed
 from tests.designs.test_in_motion import G, W, as_lines, heaved, on_the_bed
 
 MASS, AMPLITUDE = "cable.sections[0].mass", "ends.start.motion.heave.amplitude"

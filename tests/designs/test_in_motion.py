@@ -12,10 +12,11 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.designs.in_motion import Motion, in_motion, parse_history
+from hybrid.designs.in_motion import Motion, in_motion
 from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.designs.replay import course_of, replay
 from hybrid.designs.tangents import Unfollowed
+from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.scene.read import as_scene
 
@@ -250,7 +251,7 @@ def test_forces_at_an_anchor_on_the_bed_where_contact_has_kinks(seed):
     """
     _, tables, key = scene_at_anchor(seed)
     scene, of = hybrid.validate_scene(tables), ["last tension@start", "last reaction_start.z", "last contact_force"]
-    number, wanted, course = number_of(scene, key), [parse_history(scene, x) for x in of], course_of(scene)
+    number, wanted, course = number_of(scene, key), [parse_wanted(scene, x, moves=True) for x in of], course_of(scene)
     more, less = (Motion(changed_scene(scene, key, number * x), wanted, course).values for x in (1 + 1e-6, 1 - 1e-6))
     ours, errors = (x[0] for x in in_motion(scene, of, [key])[1:3])
     theirs = (more - less) / (2e-6 * number)

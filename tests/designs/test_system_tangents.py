@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from hybrid.designs import in_motion as way
-from hybrid.designs.in_motion import DIFFERENCES, TANGENTS, by_differences, by_tangents, in_motion, parse_history
+from hybrid.designs.in_motion import DIFFERENCES, TANGENTS, by_differences, by_tangents, in_motion
 from hybrid.designs.numbers import number_of, size_of
 from hybrid.designs.replay import course_of
+from hybrid.designs.wanted import parse_wanted
 from hybrid.scene.read import as_scene
 
 SECTION = {
@@ -70,7 +71,7 @@ def asked_of(tables: dict[str, Any], of: list[str], keys: list[str]) -> tuple[An
     scene = as_scene(tables)
     numbers = {key: number_of(scene, key) for key in keys}
     sizes = {key: size_of(scene, key, x) for key, x in numbers.items()}
-    return scene, [parse_history(scene, x) for x in of], course_of(scene), numbers, sizes
+    return scene, [parse_wanted(scene, x, moves=True) for x in of], course_of(scene), numbers, sizes
 
 
 def agree(tables: dict[str, Any], of: list[str], keys: list[str], monkeypatch: pytest.MonkeyPatch) -> None:

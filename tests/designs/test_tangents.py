@@ -15,13 +15,13 @@ from hybrid.designs.in_motion import (
     by_differences,
     by_tangents,
     in_motion,
-    parse_history,
     size_of,
 )
 from hybrid.designs.network_tangents import NetworkOthers
 from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.designs.replay import course_of
 from hybrid.designs.tangents import Unfollowed
+from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.state.report import PLANAR
 from tests.designs.test_in_motion import heaved, on_the_bed
 
@@ -32,7 +32,7 @@ SECTION = "cable.sections[0]"
 def both(tables: dict[str, Any], of: list[str], keys: list[str]) -> tuple[np.ndarray, ...]:
     """(P, W) derivatives by tangents and by differences, their errors in turn, and results by numbers."""
     scene = hybrid.validate_scene(tables)
-    wanted, course = [parse_history(scene, x) for x in of], course_of(scene)
+    wanted, course = [parse_wanted(scene, x, moves=True) for x in of], course_of(scene)
     numbers = {key: number_of(scene, key) for key in keys}
     asked = scene, wanted, course, numbers, {key: size_of(scene, key, x) for key, x in numbers.items()}
     found, theirs = by_tangents(*asked), by_differences(*asked)
@@ -161,7 +161,7 @@ def test_lengths_move_nodes_into_contact_and_past_places(bed: bool) -> None:
         tables["ends"]["start"]["position"] = [0, 0, 0]
     scene, key = hybrid.validate_scene(tables), f"{SECTION}.length"
     of = ["last tension@end", "last tension@150", "max tension@152", "std position.z@150", "last position.x@151"]
-    wanted, course, number = [parse_history(scene, x) for x in of], course_of(scene), number_of(scene, key)
+    wanted, course, number = [parse_wanted(scene, x, moves=True) for x in of], course_of(scene), number_of(scene, key)
     ours = by_tangents(scene, wanted, course, {key: number}, {key: number}).derivatives[0]
     off = []
     for part in (1e-4, 1e-6):

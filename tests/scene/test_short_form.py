@@ -104,6 +104,7 @@ def test_places_and_messages_of_a_network_are_said_in_words_of_the_scene() -> No
         assert form.place(there) == here
     said = form.text("line cable breaks from point end; see lines.cable.sections[0] and points.start.break_at")
     assert said == "the cable breaks from ends.end; see cable.sections[0] and ends.start.release_at"
+    assert short_form(network_of(scene("body"))).text("point end gives way") == "point end gives way"
     found = form.finding(Finding(("points", "end", "initial_guess"), "a place near lines.cable.initial"))
     assert found.at == ("ends", "end", "initial_guess") and found.expected == "a place near initial"
 
