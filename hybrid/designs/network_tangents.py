@@ -282,12 +282,13 @@ class NetworkOthers:
             jobs.append(job)
         turns, bodies = solver.take_turns(states), [self._bind_bodies(x, solver, states[0]) for x in self._others]
         asked, by, table = np.zeros(1, np.int64), np.zeros(2), Table(blank_system_tangents)
+        even, odd = solver.jobs_of_joined()
         table.bind(
-            even=turns["joined_even"], odd=turns["joined_odd"], joined=turns["joined"], lone=turns["lone_lines"],
+            even=even.numbers, odd=odd.numbers, joined=turns["joined"], lone=turns["lone_lines"],
             lines=np.array([x.numbers for x in jobs]), bodies=np.array([x.numbers for x in bodies]), clock=clock,
             counts=counts, asked=asked, by=by,
         )  # fmt: skip
-        return _Tables(table, asked, by, reports, own, [*kept, *jobs, *bodies])
+        return _Tables(table, asked, by, reports, own, [*kept, *jobs, *bodies, even, odd])
 
     def _bind_bodies(self, other: _Other, solver: NetworkSolver, state: NetworkState) -> Table:
         table, count = Table(blank_bodies), len(state.bodies)

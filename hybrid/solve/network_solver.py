@@ -420,6 +420,15 @@ class NetworkSolver:
         self.turns = states
         return self._bind_turns()
 
+    def jobs_of_joined(self) -> tuple[Table, Table]:
+        """Jobs of both parities without lines that are solved by themselves: none is left where all are."""
+        if self.joined or self._together is not self._all:
+            return self._together.jobs
+        even, odd = (x.again(np.empty_like(x.numbers)) for x in self._together.jobs)
+        for x in (even, odd):
+            x.bind(tables=self.lone_numbers[:0], joints=np.zeros((0, 2), np.int64))
+        return even, odd
+
     def _bind_turns(self) -> dict[str, Any]:
         """Let all jobs lead from one of the states that take turns to the other."""
         assert self.turns is not None
