@@ -19,13 +19,14 @@ from hybrid.model.ends import DrivenEnd
 Said = Callable[[np.ndarray], Any]
 
 
-def heaved(said: Said, steps: int = 80) -> hybrid.Result:
-    """The fairlead of examples/touchdown.yaml, whose velocities (3,) m/s are said so."""
+def heaved(said: Said, size: float = 1.5, period: float = 8.0, steps: int = 80) -> hybrid.Result:
+    """The fairlead of examples/touchdown.yaml goes up and down by `size`, m; said: what velocities (3,) m/s are given."""
+    w = 2.0 * np.pi / period
     with hybrid.Simulation(touchdown("model=catenary", PINNED)) as simulation:
         for k in range(steps):
-            phase, w = 2.0 * np.pi / 8.0 * 0.05 * (k + 1), 2.0 * np.pi / 8.0
-            velocity = np.array([0.0, 0.0, 1.5 * w * np.sin(phase)])
-            simulation.set_end("end", [205.0, 0.0, 1.5 * (1.0 - np.cos(phase))], said(velocity))
+            phase = 0.05 * w * (k + 1)
+            velocity = np.array([0.0, 0.0, size * w * np.sin(phase)])
+            simulation.set_end("end", [205.0, 0.0, size * (1.0 - np.cos(phase))], said(velocity))
             simulation.step()
         return simulation.result()
 
@@ -114,10 +115,5 @@ def test_the_velocity_of_places() -> None:
 @pytest.mark.parametrize(("size", "told"), [(1e-9, False), (1e-3, True)])
 def test_what_another_solver_leaves_of_a_thing_that_rests_is_no_way(size: float, told: bool) -> None:
     """Places that go back and forth by so many m, with velocities of the other sign."""
-    with hybrid.Simulation(touchdown("model=catenary", PINNED)) as simulation:
-        for k in range(40):
-            phase, w = 2.0 * np.pi / 2.0 * 0.05 * (k + 1), 2.0 * np.pi / 2.0
-            velocity = [0.0, 0.0, -size * w * np.sin(phase)]
-            simulation.set_end("end", [205.0, 0.0, size * (1.0 - np.cos(phase))], velocity)
-            simulation.step()
-        assert bool([x for x in simulation.result().events if x.kind == "implausible"]) == told
+    found = heaved(lambda v: -v, size, 2.0, 40)
+    assert bool([x for x in found.events if x.kind == "implausible"]) == told
