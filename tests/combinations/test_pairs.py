@@ -150,12 +150,3 @@ def test_a_feature_computed_otherwise_is_the_same() -> None:
 def test_a_pair_computed_otherwise_is_the_same(part: int) -> None:
     """All pairs that are not refused: the motion, at rest to 1e-9 of the length, and the energy of its stretch."""
     assert not differences([*pairs()][part::4])
-
-
-@pytest.mark.parametrize("name", ["two stiffnesses", "curved", "soil", "sheave", "clamp"])
-def test_a_line_alone_is_found_at_rest_by_the_ways_of_a_cable(name: str) -> None:
-    """In a network a line that nothing joins to others has the cable's search: the same ways, the same bits."""
-    tables = scene_of(name)
-    with hybrid.static(tables) as cable, hybrid.static(as_network(tables)) as network:
-        assert network.attributes["static_path"] == cable.attributes["static_path"]
-        np.testing.assert_array_equal(network.lines[LINE].position, cable.position)

@@ -12,7 +12,6 @@ import test_payout_cells as cells
 import test_payout_damping as damping
 import test_payout_laws as laws
 import test_payout_layers as layers
-import test_payout_stretch as stretch
 import test_payout_zones as zones
 import test_winch as winch
 import test_winch_of_joined as joined
@@ -123,7 +122,7 @@ ENERGY: dict[str, tuple[Tables, float, float]] = {
         ("layers", 0.8, True), ("layers", -0.8, True), ("layers", 0.8, False), ("layers", -0.8, False),
         ("tension", 0.8, True), ("table", -0.8, True), ("damped", 0.8, True), ("locks", 0.8, True))},
     "layers, a spring": (sprung("layers"), 1e-3, 2.0), "layers, a winch": (with_winch(layers.paid()), 1e-3, 2.0),
-    "tension by a table": (stretch.paid(stretch.TABLE), 3e-4, 2.5), "rope": (stretch.paid(stretch.ROPE), 3e-4, 2.5),
+    "tension by a table": (laws.stretched(laws.TABLE), 3e-4, 2.5), "rope": (laws.stretched(laws.ROPE), 3e-4, 2.5),
     **{f"winch, {model}": (of_winch(model), 1.5e-4, 3.0) for model in ("catenary", "rod", "clamped")},
 }  # fmt: skip
 
@@ -147,8 +146,8 @@ def test_energy_is_balanced(name: str) -> None:
 
 def reeled() -> Tables:
     """A rope by a law with another one of the same law on the reel."""
-    scene = stretch.paid(stretch.ROPE, step=0.1)
-    reel = sagging(EA=1.0)["cable"]["sections"][0] | {"mass": 6.0} | stretch.ROPE
+    scene = laws.stretched(laws.ROPE, step=0.1)
+    reel = sagging(EA=1.0)["cable"]["sections"][0] | {"mass": 6.0} | laws.ROPE
     del reel["axial_stiffness"]
     scene["ends"]["end"]["payout"]["reel"] = [reel]
     return scene

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_payout_stretch import EA, ROPE, SAME, TABLE
+from test_payout_laws import ROPE, SAME, STIFF, TABLE
 
 import hybrid
 from tests.combinations.pairs import scene_of, seen_by
@@ -80,7 +80,7 @@ def stretching(law: dict[str, Any], rate: float, model: Any = ADAPTIVE) -> hybri
 
 @pytest.mark.parametrize("rate", [0.8, -0.8])
 def test_a_straight_table_is_a_stiffness_where_zones_move(rate: float) -> None:
-    one, other = stretching({"axial_stiffness": EA}, rate), stretching(SAME, rate)
+    one, other = stretching({"axial_stiffness": STIFF}, rate), stretching(SAME, rate)
     assert sum(x.kind in CHANGES for x in one.events) >= 2
     for name in ("reaction_end", "position", "energy/stretch", "work/end", "work/zones"):
         assert np.abs(other[name] - one[name]).max() < 1e-6 * np.abs(one[name]).max()
