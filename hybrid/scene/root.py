@@ -47,6 +47,7 @@ class Scene(Table):
 
     if TYPE_CHECKING:  # what both forms have, each in its own way, and what the short one has
 
+        def __init__(self, **tables: Any) -> None: ...
         @property
         def lines(self) -> Mapping[str, Any]: ...
         @property
