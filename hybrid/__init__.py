@@ -45,9 +45,8 @@ if TYPE_CHECKING:
     from hybrid.studies.study import study
     from hybrid.studies.tradeoff import trade
     from hybrid.view.comparison import write_comparison as compare
-    from hybrid.view.plots import plot_summary as plot
-    from hybrid.view.plots import plot_zones
-    from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape, plot_zone_map
+    from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape, plot_zone_map, plot_zones
+    from hybrid.view.quantities import plot_summary as plot
     from hybrid.view.report import write_report as report
     from hybrid.view.space import plot_space
 
@@ -76,13 +75,13 @@ _HOME = {
     "plan": ("hybrid.accuracy.run_forecast", "plan"),
     "listed_outputs": ("hybrid.simulation.run_quantities", "listed_outputs"),
     "kinds_of_quantities": ("hybrid.simulation.run_quantities", "kinds_of_quantities"),
-    "plot": ("hybrid.view.plots", "plot_summary"),
+    "plot": ("hybrid.view.quantities", "plot_summary"),
     "plot_energy": ("hybrid.view.quantities", "plot_energy"),
     "plot_quantity": ("hybrid.view.quantities", "plot_quantity"),
     "plot_shape": ("hybrid.view.quantities", "plot_shape"),
     "plot_space": ("hybrid.view.space", "plot_space"),
     "plot_zone_map": ("hybrid.view.quantities", "plot_zone_map"),
-    "plot_zones": ("hybrid.view.plots", "plot_zones"),
+    "plot_zones": ("hybrid.view.quantities", "plot_zones"),
     "report": ("hybrid.view.report", "write_report"),
     "response": ("hybrid.modal.response", "response"),
     "resume": ("hybrid.accuracy.api", "resume"),

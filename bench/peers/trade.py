@@ -27,7 +27,7 @@ from hybrid.store.tradeoff_table import DONE, FAILED, REFERENCE, Row, TradeTable
 from hybrid.studies.levels import LevelTable, level_row
 from hybrid.studies.runs import RunStore, key_of
 from hybrid.studies.tradeoff import ACCURACIES, END_FORCES, force_difference, with_errors
-from hybrid.view.tradeoff import plot_trade
+from hybrid.view.study_report import plot_trade
 from peers import adapters
 from peers.adapters.interface import PeerFailed, PeerRun
 

@@ -20,8 +20,7 @@ from hybrid.cli.tables import (
     verdicts_of,
 )
 from hybrid.errors import Complaint, SceneError
-from hybrid.store.envelope import NOT_VERIFIED
-from hybrid.store.partners import TOUCH
+from hybrid.store.envelope import NOT_VERIFIED, TOUCH
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console

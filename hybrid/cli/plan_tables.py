@@ -15,7 +15,7 @@ from hybrid.model.lines_contact import OTHERS
 from hybrid.model.plan import parts, size_of_result
 from hybrid.model.self_reach import WHERE_NEAR
 from hybrid.scene.analysis import PER_PERIOD
-from hybrid.store.hockling import kink_torque
+from hybrid.store.capacity import kink_torque
 
 if TYPE_CHECKING:
     from hybrid.model.plan import NetworkPlan, Plan

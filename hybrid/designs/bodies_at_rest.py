@@ -21,7 +21,7 @@ from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.state.obstacle_rows import RADIUS
 from hybrid.kernels.state.state import Floats, Line
-from hybrid.linear.loaded_members import stiffness_by_water
+from hybrid.linear.loaded_line import stiffness_by_water
 from hybrid.model.bodies import loads_of
 from hybrid.model.network import NetworkModel, bodies_of
 from hybrid.scene.network_scene import Network

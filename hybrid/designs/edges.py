@@ -15,7 +15,7 @@ from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.numbers import changed_scene, number_of, size_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
-from hybrid.outputs.touchdown import penetration
+from hybrid.outputs.observation import penetration
 from hybrid.scene.root import Scene
 
 WAY = "differences of equilibria, from cell to cell"

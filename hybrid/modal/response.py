@@ -22,14 +22,12 @@ from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, PLACE, V
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.excitation import frequencies_of, refuse_motions
-from hybrid.linear.loaded_line import LoadedLine
-from hybrid.linear.loaded_members import LoadedMembers, stiffness_by_water, turning_doubts
+from hybrid.linear.loaded_line import LoadedLine, LoadedMembers, stiffness_by_water, turning_doubts
 from hybrid.linear.matrices import ComplexSolver, linear_network
 from hybrid.linear.response_results import LineResponse, Response
 from hybrid.linear.touching import Rest
 from hybrid.modal.api import equilibrium_of, of_first_length
-from hybrid.modal.left_out import left_out
-from hybrid.modal.validity import closing_doubts, doubts_of, name_of, touching_doubts
+from hybrid.modal.validity import closing_doubts, doubts_of, left_out, name_of, touching_doubts
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene

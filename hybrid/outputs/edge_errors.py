@@ -33,8 +33,7 @@ from hybrid.kernels.watch.contact_edges import (
     put_largest,
     refine_windows,
 )
-from hybrid.outputs.observation import Observation
-from hybrid.outputs.touchdown import sinking
+from hybrid.outputs.observation import Observation, sinking
 
 # What datasets of them begin with, and the quantities that they are of.
 EDGE_ERRORS, MISSED = "errors/edges/", ("curvature", "bending_moment")

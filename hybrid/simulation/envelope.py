@@ -27,8 +27,7 @@ from hybrid.model.plane import as_begun
 from hybrid.model.sections import NEAR, SECTION_LIMITS, limits_along, modules_of, section_changes
 from hybrid.model.self_reach import no_contact
 from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.section_use import Pipes
-from hybrid.outputs.step_quantities import StepQuantities
+from hybrid.outputs.section_use import Pipes, StepQuantities
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.self_watch import SelfWatch
 from hybrid.solve.run import no_extremes

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
-from hybrid.store.hockling import formation_ratio, formation_tension, pop_out
+from hybrid.store.capacity import formation_ratio, formation_tension, pop_out
 
 # Change of writhe, turns, that is a loop: a small one has nearly 1.
 LOOP = 0.75

@@ -29,7 +29,7 @@ from hybrid.simulation.run_of_lines import RunOfLines, change_lines
 from hybrid.simulation.self_watch import deepest_text, diameters
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.store.partners import meeting_text
+from hybrid.store.envelope import meeting_text
 
 # Diameters by which ways from a joint to where lines that lie along each other meet differ at most.
 ALONG = 2.0

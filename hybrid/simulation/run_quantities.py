@@ -12,10 +12,10 @@ from hybrid.kernels.watch.named_quantities import PATH_ROW
 from hybrid.model.model_costs import with_models
 from hybrid.model.network import NetworkModel, build_system
 from hybrid.model.resolution import model_is_free, wants_errors
-from hybrid.outputs.line_forces import KEYS, Lines, pair_fields, pair_forces
 from hybrid.outputs.observation import Probe
+from hybrid.outputs.obstacle_forces import KEYS, Lines, pair_fields, pair_forces
 from hybrid.outputs.quantities import Quantities
-from hybrid.outputs.step_quantities import StepQuantities
+from hybrid.outputs.section_use import StepQuantities
 from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.quantities import KINDS, Quantity

@@ -20,8 +20,8 @@ from hybrid.store.format import EVENTS, Field, annotate, attach_scales, checked,
 from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
 from hybrid.store.integrity import copy_unsigned, sign_new
 from hybrid.store.named_arrays import Tree
+from hybrid.store.recorder import NUMBERS, Table, write_rows
 from hybrid.store.records import FINER_RESULT, PENDING
-from hybrid.store.table import NUMBERS, Table, write_rows
 from hybrid.store.whole_file import LateFile
 
 AFTERWARDS = ("error_", "effort_", "accuracy_")  # what attributes begin with that are brought here

@@ -27,8 +27,7 @@ from hybrid.store.format import (
     values_of_fixed,
     write_attributes,
 )
-from hybrid.store.recorder import STATUS, BaseRecorder, pause
-from hybrid.store.table import Table
+from hybrid.store.recorder import STATUS, BaseRecorder, Table, pause
 
 
 class ArrayDataset:

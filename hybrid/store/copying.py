@@ -18,7 +18,7 @@ from hybrid.errors import ResultError
 from hybrid.store.format import chunk_rows, plain_text
 from hybrid.store.hdf5_file import in_memory
 from hybrid.store.integrity import check_stored
-from hybrid.store.table import Table
+from hybrid.store.recorder import Table
 
 _BLOCK = 1 << 22  # bytes that are copied at a time
 

@@ -18,7 +18,7 @@ from hybrid.errors import ResultError
 from hybrid.statistics import extremes, fatigue, moments
 from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.capacity import mooring_use
-from hybrid.store.envelope import Judged
+from hybrid.store.envelope import Judged, Pressed, contacts_of
 from hybrid.store.hdf5_file import is_held
 from hybrid.store.histories import (
     FIBRES,
@@ -32,7 +32,6 @@ from hybrid.store.histories import (
     summary_of,
     usual_names,
 )
-from hybrid.store.partners import Pressed, contacts_of
 from hybrid.store.stored_result import StoredResult
 from hybrid.store.verdicts import Verdicts, section_limits, verdicts_of
 from hybrid.store.whole_file import LateFile

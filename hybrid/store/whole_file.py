@@ -54,7 +54,7 @@ from hybrid.store.hdf5_file import CACHE, LIBVER, beside, in_memory, unwritable
 from hybrid.store.hdf5_file import SLOTS as CHUNK_SLOTS
 from hybrid.store.integrity import tail_of
 from hybrid.store.named_arrays import Tree, pack, unpack
-from hybrid.store.table import NUMBERS, write_rows
+from hybrid.store.recorder import NUMBERS, write_rows
 
 # Tables whose lengths are known when a run has ended: HDF5 writes their rows.
 TABLES = ("steps", "zones", "events")

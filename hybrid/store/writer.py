@@ -58,9 +58,8 @@ from hybrid.store.hdf5_file import (
 )
 from hybrid.store.integrity import sign
 from hybrid.store.named_arrays import Tree, pack
-from hybrid.store.recorder import STATUS, BaseRecorder, pause
+from hybrid.store.recorder import STATUS, BaseRecorder, Table, pause
 from hybrid.store.records import PENDING
-from hybrid.store.table import Table
 from hybrid.store.whole_file import LateFile, template
 
 # Outputs are held back at most so many times as long as writing takes: a reader hardly notices, a kill loses no more,

@@ -32,7 +32,7 @@ from hybrid.studies.runs import (
     run_spec,
     scene_data,
 )
-from hybrid.view.tradeoff import plot_trade
+from hybrid.view.study_report import plot_trade
 
 ACCURACIES = ("10%", "3%", "1%", "0.3%", "0.1%")
 # The reference: a third of the finest default accuracy.  Finer accuracies need a finer reference: errors below half of

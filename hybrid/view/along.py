@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.store.capacity import pop_out
 from hybrid.store.envelope import GROUP, SCALE, extreme, farthest, has_envelope
-from hybrid.store.hockling import pop_out
 from hybrid.store.reader import Result
 from hybrid.store.verdicts import quantity_limits, section_limits
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.store.envelope import extreme
-from hybrid.store.partners import partner_of
+from hybrid.store.envelope import extreme, partner_of
 from hybrid.store.reader import Result
 from hybrid.view import report_parts as parts
 from hybrid.view.along import is_without_moment

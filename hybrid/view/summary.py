@@ -13,10 +13,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import LIMIT_EVENTS, is_of_the_run
+from hybrid.store.capacity import formation_ratio, formation_tension
 from hybrid.store.code_checks import clauses_of
-from hybrid.store.envelope import BROKEN, GROUP, NOT_VERIFIED, NOTHING, SCALE, has_envelope, not_verified
-from hybrid.store.hockling import formation_ratio, formation_tension
-from hybrid.store.partners import ITSELF, partner_of
+from hybrid.store.envelope import (
+    BROKEN,
+    GROUP,
+    ITSELF,
+    NOT_VERIFIED,
+    NOTHING,
+    SCALE,
+    has_envelope,
+    not_verified,
+    partner_of,
+)
 from hybrid.store.reader import Result
 from hybrid.store.records import UNKNOWN, not_converged_in
 from hybrid.store.verdicts import accuracy_text, asked_accuracy, doubt_of, quantity_limits, section_limits

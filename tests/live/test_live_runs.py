@@ -15,8 +15,8 @@ pytestmark = extras.of_file("starlette", "uvicorn", "websockets")
 from viewed import SCENE, Page, served
 
 import hybrid
-from hybrid.live import playback as playing
-from hybrid.live.playback import Playback
+from hybrid.live import session as playing
+from hybrid.live.session import Playback
 from hybrid.live.workers import Run
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import hybrid
 from hybrid.linear.drag import shape_of_drag
-from hybrid.modal import left_out
+from hybrid.modal import validity
 
 EA, LENGTH, T0 = 1e6, 50.0, 2e4
 COUNT = 13
@@ -17,7 +17,7 @@ PERIODS = 32.0 * 10.0 / np.arange(20.0, 20.0 + COUNT)  # s, of which 320 s are a
 @pytest.fixture(autouse=True)
 def many_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that what is found hardly scatters with the phases."""
-    monkeypatch.setattr(left_out, "PARTS", 60)
+    monkeypatch.setattr(validity, "PARTS", 60)
 
 
 def harmonics(amplitude: float, seed: int) -> list[dict[str, float]]:

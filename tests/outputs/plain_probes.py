@@ -15,9 +15,9 @@ from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.report import CONTACT_FORCE, FORCE_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.mesh import Zone
+from hybrid.outputs.observation import Touchdown
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.probes import Observer
-from hybrid.outputs.touchdown import Touchdown
 from hybrid.solve.bending_corrector import Shift
 
 cross = np.cross

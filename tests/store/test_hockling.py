@@ -9,7 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.cli.plan_tables import plan_rows
-from hybrid.store.hockling import formation_tension, kink_torque, pop_out, strand_distance
+from hybrid.store.capacity import formation_tension, kink_torque, pop_out, strand_distance
 
 
 def loop(m: float, s: np.ndarray) -> np.ndarray:

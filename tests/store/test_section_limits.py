@@ -13,7 +13,7 @@ import hybrid
 from hybrid.cli.tables import extremes_facts
 from hybrid.scene.study import Kept
 from hybrid.store.envelope import extreme, extremes_of_outputs, farthest, judged
-from hybrid.store.table import _PIECE
+from hybrid.store.recorder import _PIECE
 from hybrid.studies.collect import collected
 from hybrid.view.along import extent
 
@@ -117,7 +117,7 @@ def test_an_output_between_nodes_breaks_a_limit_that_its_envelope_keeps(tmp_path
 def test_outputs_of_a_long_run_are_read_in_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same event whether the outputs are read at once or eleven at a time."""
     assert _PIECE >= 100_000
-    monkeypatch.setattr("hybrid.store.table._PIECE", 11 * 501)
+    monkeypatch.setattr("hybrid.store.recorder._PIECE", 11 * 501)
     result = hybrid.run(released(min_tension=-345.5), tmp_path / "run.h5")
     (told,) = [event for event in result.events if event.kind == "tension below limit"]
     assert told.value == float(result["tension"].min())

@@ -20,7 +20,7 @@ import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.store.tradeoff_table import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
 from hybrid.studies import runs, tradeoff
-from hybrid.view.tradeoff import plot_trade
+from hybrid.view.study_report import plot_trade
 
 # A second of a line that hangs in water: every model can do it, and a run is some 0.1 s.
 SAG: dict[str, Any] = {

@@ -1,6 +1,6 @@
 """Loops whose strands touch, driven slowly, against closed solutions: snap, pop-out, ply (docs/loops.md).
 
-EI = 1, L = 1, 320 cells, clamps along x.  Snap and pop-out are folds of the localised loop (store.hockling): it snaps
+EI = 1, L = 1, 320 cells, clamps along x.  Snap and pop-out are folds of the localised loop (store.capacity): it snaps
 shut at the fold of its slack, and pops out when the distance of its strands is the diameter.  Strands begin to touch at
 1.05 diameters (docs/theory.md, 16): pop-out is that of hard strands 1.03 to 1.05 diameters thick, on finer meshes and
 slower ways, too.
@@ -17,7 +17,7 @@ import pytest
 from scipy.optimize import brentq
 
 import hybrid
-from hybrid.store import hockling
+from hybrid.store import capacity
 
 Floats = np.ndarray
 D = 0.02
@@ -91,11 +91,11 @@ def popped(turns: int, GJ: float, width: float, contact: float) -> tuple[float, 
     """Tension and slack at which a loop of so many turns pops out whose strands leave each other `contact` widths apart."""
 
     def excess(m: float) -> float:
-        torque = 2.0 * m * hockling.strand_distance(m) / (contact * width)
+        torque = 2.0 * m * capacity.strand_distance(m) / (contact * width)
         return torque / GJ + 4.0 * math.acos(m) - 2.0 * math.pi * turns
 
     m = float(brentq(excess, 0.05, 0.58))
-    tension = (hockling.strand_distance(m) / (contact * width)) ** 2
+    tension = (capacity.strand_distance(m) / (contact * width)) ** 2
     return tension, 4.0 * math.sqrt((1.0 - m * m) / tension)
 
 

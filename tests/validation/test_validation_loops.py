@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.store.hockling import formation_tension
+from hybrid.store.capacity import formation_tension
 
 
 def clamped(slack: float, turns: float) -> hybrid.Result:

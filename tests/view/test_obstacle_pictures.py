@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import hybrid
-from hybrid.live.drawing import around, frames
+from hybrid.live.pictures import around, frames
 from hybrid.view.figure import Area, Axis, Marks, Panel
 from hybrid.view.matplotlib_backend import draw_panel
 from hybrid.view.obstacles import hull, obstacles_at, outlines, surfaces

@@ -22,8 +22,8 @@ from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
 from hybrid.view import figure as look
 from hybrid.view import panels
-from hybrid.view import plots as plot
 from hybrid.view import projections as views
+from hybrid.view import quantities as plot
 from hybrid.view.decimate import stretches_of
 from hybrid.view.figure import Axis, Line, Panel
 from hybrid.view.matplotlib_backend import draw_panel, new_axes
@@ -642,7 +642,7 @@ def test_nonsense_is_refused(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_no_pyplot_and_no_matplotlib_before_something_is_drawn() -> None:
     code = (
-        "import sys, hybrid.view.plots as p, hybrid.view.report; assert 'matplotlib' not in sys.modules; sys.path.insert(0, sys.argv[1]);"
+        "import sys, hybrid.view.quantities as p, hybrid.view.report; assert 'matplotlib' not in sys.modules; sys.path.insert(0, sys.argv[1]);"
         "from test_result_plot import made, sag; p.plot_summary(made(sag)).canvas.draw(); p.plot_zones(made(sag));"
         "assert 'matplotlib.pyplot' not in sys.modules and 'matplotlib' in sys.modules"
     )

@@ -16,7 +16,7 @@ from hybrid.errors import ResultError
 from hybrid.store.tradeoff_table import TradeTable
 from hybrid.view.animation import animate
 from hybrid.view.save import is_ours
-from hybrid.view.tradeoff import plot_trade
+from hybrid.view.study_report import plot_trade
 
 Write = Callable[..., Any]
 

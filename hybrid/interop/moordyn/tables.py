@@ -18,10 +18,9 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from hybrid.interop.moordyn.cables import End, between
-from hybrid.interop.moordyn.deck import Deck, Line, Point, Rod
+from hybrid.interop.moordyn.deck import Deck, Line, LineType, Point, Rod
 from hybrid.interop.moordyn.rows import DIFFERS, TAKEN, Note, note
 from hybrid.interop.moordyn.stretch import tables_of
-from hybrid.interop.moordyn.types import LineType
 from hybrid.scene.attachments import sphere_diameter
 from hybrid.scene.cable import Section
 
