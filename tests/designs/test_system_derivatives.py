@@ -1,4 +1,4 @@
-"""Derivatives of several lines against differences of equilibria, and against one cable."""
+"""Derivatives of several lines against differences of equilibria."""
 
 from __future__ import annotations
 
@@ -70,25 +70,6 @@ def test_results_are_those_of_the_equilibrium():
         pull = found.lines["north"].reaction_start[-1][2]
     np.testing.assert_allclose(rest.values[[0, 1, 3]], [*whole[:2], pull], rtol=1e-9)
     assert rest.values[2] == pytest.approx(whole[2], rel=0.01)  # at nodes, and at output points
-
-
-def test_a_system_of_one_line_is_the_cable():
-    section = CHAIN | {"bending_stiffness": 2e3, "torsional_stiffness": 2e3}
-    places = {"start": ANCHORS["east"], "end": [0, 0, 0]}
-    ends = {name: {"kind": "pinned", "position": place} for name, place in places.items()}
-    cable = {"environment": SEA, "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium",
-             "model": "rod", "mesh": {"cells": 40}}  # fmt: skip
-    line = {"start": "east", "end": "top", "sections": [section], "model": "rod", "mesh": {"cells": 40}}
-    points = {"east": {"position": ANCHORS["east"]}, "top": HELD}
-    of = ["tension@end", "max curvature", "position.z@100"]
-    one = hybrid.sensitivity(cable, of, ["cable.sections[0].length", "ends.end.position[2]", "environment.gravity"])
-    same = hybrid.sensitivity(
-        {"environment": SEA, "points": points, "lines": {"only": line}},
-        ["only/tension@end", "max only/curvature", "only/position.z@100"],
-        ["lines.only.sections[0].length", "points.top.position[2]", "environment.gravity"],
-    )
-    for x, y in zip(one, same, strict=True):
-        assert y.derivative == pytest.approx(x.derivative, rel=1e-6), (x.of, x.by)
 
 
 @pytest.mark.long

@@ -24,6 +24,7 @@ from hybrid.designs.tangents import Unfollowed
 from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.state.report import PLANAR
 from tests.designs.test_in_motion import heaved, on_the_bed
+from tests.designs.test_system_tangents import asked_of
 
 OF = ["max tension@240", "last tension@100", "std position.z@150", "max velocity.z@200", "t=3.31 tension@120"]
 SECTION = "cable.sections[0]"
@@ -31,10 +32,7 @@ SECTION = "cable.sections[0]"
 
 def both(tables: dict[str, Any], of: list[str], keys: list[str]) -> tuple[np.ndarray, ...]:
     """(P, W) derivatives by tangents and by differences, their errors in turn, and results by numbers."""
-    scene = hybrid.validate_scene(tables)
-    wanted, course = [parse_wanted(scene, x, moves=True) for x in of], course_of(scene)
-    numbers = {key: number_of(scene, key) for key in keys}
-    asked = scene, wanted, course, numbers, {key: size_of(scene, key, x) for key, x in numbers.items()}
+    asked = asked_of(tables, of, keys)
     found, theirs = by_tangents(*asked), by_differences(*asked)
     np.testing.assert_allclose(found.values, theirs.values, rtol=1e-12)
     floor = np.abs(found.values) / np.array(list(asked[-1].values()))[:, None]
