@@ -201,7 +201,7 @@ def test_rods_with_all_of_their_stiffness_are_as_they_were(name: str, monkeypatc
     """To the last bit."""
     scene = tables_with(BASE, STIFF[name])
     assert build(validate_scene(scene)).cable.hinges[2, 0] > 0.0
-    found, hinges = hybrid.run(scene), cast(Any, Material.hinges).fget
+    found, hinges = hybrid.run(scene), cast(Any, Material.hinges).func
     monkeypatch.setattr(Material, "hinges", property(lambda self: hinges(self)[:3] * [[1.0], [1.0], [0.0]]))
     plain = hybrid.run(scene)
     np.testing.assert_array_equal(found.curvature, plain.curvature)
