@@ -167,7 +167,7 @@ def test_a_second_signal_ends_a_run_at_once(tmp_path: Path, monkeypatch: pytest.
             reached.append(name)
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("hybrid.simulation.case.Case._network_start", search)
+    monkeypatch.setattr("hybrid.simulation.case.Case._first_state", search)
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(WIRE, tmp_path / "run.h5")
     assert reached == ["first", "second"]
