@@ -229,6 +229,17 @@ def test_one_line_is_no_other_case_than_several() -> None:
     assert sum("System" in name for name in classes) <= CLASSES_OF_SYSTEMS
 
 
+# Files, those below 100 lines, and those above 700: only less.  What is small joins its subject.
+MOST_FILES, SMALL_FILES, LONG_FILES = 478, 25, 3
+
+
+def test_files_are_as_long_as_a_subject() -> None:
+    sizes = [file.read_text(encoding="utf-8").count("\n") for file in FILES if not file.name.startswith("__")]
+    assert len(FILES) <= MOST_FILES
+    assert sum(size < 100 for size in sizes) <= SMALL_FILES
+    assert sum(size > 700 for size in sizes) <= LONG_FILES
+
+
 def test_only_the_command_line_prints() -> None:
     found = [
         f"{file.relative_to(PACKAGE)}:{node.lineno}"
