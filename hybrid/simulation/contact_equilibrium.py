@@ -94,7 +94,8 @@ def settled_from(model: Model, t: float, start: State, near: bool = False) -> Eq
         found = settled_system([x], 0, NO_BODIES, first, lambda: ([contact_of(model)], None), keeps, near)
     except LineFailed as failed:
         raise ComputationError(failed.outcome, None, failed.s, failed.detail) from None
-    return Equilibrium(found.state.lines[0], found.path, found.iterations, found.residual, False, touches=True)
+    how = found.path, found.iterations, found.residual
+    return Equilibrium(found.state.lines[0], *how, False, touches=True, unjudged=found.unjudged)
 
 
 def is_apart(model: Model, t: float, state: State) -> bool:

@@ -169,8 +169,7 @@ def _together(model: NetworkModel, t: float, found: Sequence[Equilibrium]) -> Li
         return made
 
     path = max(found, key=lambda x: len(x.path)).path  # of the line that took most ways
-    touches = any(x.touches for x in found)
-    why = "a damped motion with contact, without friction, led there" if touches else ""
+    touches, why = any(x.touches for x in found), next((x.unjudged for x in found if x.unjudged), "")
     return LinesAtRest(
         states, path, sum(x.iterations for x in found), max(x.residual for x in found), solver, touches, why, rubs,
         tuple(found), {k: x.not_settled for k, x in enumerate(found)},

@@ -60,6 +60,7 @@ class Equilibrium:
     with_friction: bool  # True when friction took part
     blurred: bool = False  # True when round-off of the bending of very short cells hides whether it buckles
     touches: bool = False  # whether a damped motion with contact with itself led there
+    unjudged: str = ""  # where that is so: why it is not known that it would stay
     not_settled: str = ""  # why friction has not settled where a scene leaves that to the program
 
     @property

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
 
 import hybrid
+from hybrid.errors import ComputationError, Outcome
+from hybrid.simulation import equilibrium
 from hybrid.simulation.contact_equilibrium import gauss_integral
 
 WIDTH, LENGTH = 0.02, 8.0
@@ -155,3 +157,20 @@ def test_a_knot_that_is_given_is_a_knot_at_rest() -> None:
     tight = hybrid.static(scene)
     assert gauss_integral(tight.position[0], tight.position[0]) == pytest.approx(-3.15, abs=0.1)
     assert apart(tight) * WIDTH > 0.94 * 0.012 and "line touches itself" in {e.kind for e in tight.events}
+
+
+@pytest.mark.long
+def test_a_line_that_loses_its_turns_without_contact_is_found_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing is asked of contact: the equilibrium, and whether it stays, are those of a line that asks for it."""
+
+    def lost(*_: object) -> NoReturn:
+        raise ComputationError(Outcome.TURNS_LOST, None, 0.0, "on all ways")
+
+    tables = twisted("rod") | {"mesh": {"cells": 80}}
+    asked = hybrid.static(tables)
+    del tables["contact"]
+    monkeypatch.setattr(equilibrium, "_without_contact", lost)
+    found = hybrid.static(tables)
+    np.testing.assert_allclose(found.position, asked.position, rtol=0.0, atol=1e-12)
+    judged = ["stability not judged" in {e.kind for e in x.events} for x in (asked, found)]
+    assert judged[0] == judged[1]
