@@ -151,9 +151,8 @@ def test_libraries_that_draw_are_known_to_their_back_end_only() -> None:
         names = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
         if file.name not in (
             "matplotlib_backend.py",
-            "plots.py",
             "quantities.py",
-            "tradeoff.py",
             "save.py",
+            "study_report.py",
         ):  # types of results there
             assert not any(name.startswith("matplotlib") for name in names), file
