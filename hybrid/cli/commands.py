@@ -103,10 +103,10 @@ def static(
     scene: SceneFile, output: StaticFile = None, settings: Settings = None,
     plot: Drawn = False, keep: Keep = False, quiet: Quiet = False, as_json: Json = False,
     stiffness: Annotated[
-        str | None, typer.Option(metavar="WHAT", help="Of several lines: stiffness at point:NAME or body:NAME.")
+        str | None, typer.Option(metavar="WHAT", help="Stiffness at body:NAME or point:NAME (a cable: start, end).")
     ] = None,
     offsets: Annotated[
-        str | None, typer.Option(metavar="WHAT", help="Of several lines: forces on WHAT, held beside its place ..")
+        str | None, typer.Option(metavar="WHAT", help="Forces on WHAT, as above, held beside its place ..")
     ] = None,
     reach: Annotated[float | None, typer.Option(metavar="M", help=".. up to so many metres to either side ..")] = None,
     heading: Annotated[float, typer.Option(metavar="DEG", help=".. along a heading from the x axis.")] = 0.0,

@@ -125,7 +125,7 @@ def named(function: Any, name: str) -> FunctionType:
 def kernel(function: Callable[..., Any] | None = None, inlined: bool = True) -> Any:
     """Compile an entry point: called from Python, kept on disk under `cache_folder`.
 
-    inlined: False compiles in a tenth of the time, for kernels that do much beside what takes time.
+    inlined: False compiles in about half of the time, for kernels that do much beside what takes time.
     """
     return Entry(function, inlined) if function else lambda decorated: Entry(decorated, inlined)
 
