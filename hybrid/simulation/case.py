@@ -612,4 +612,5 @@ def _found(task: Callable[[], Found], future: Future[Found], look: Callable[[], 
         return task()
     while wait([future], LOOK_EVERY).not_done:
         look()
+    look()  # at its end
     return future.result()
