@@ -227,7 +227,7 @@ class RunStore:
         data["time"]["duration"] *= WARM_PART
         data["output"].pop("every", None)
         with suppress(ComputationError, SceneError, ArithmeticError, ValueError, LookupError):
-            run(data)
+            run(as_scene(data))
 
 
 def key_of(scene: LineScene, repeat: int, also: str = "") -> str:
