@@ -555,17 +555,18 @@ class LineResult:
         self._stop_if(watch.stretch(state) or watch.left_plane(state.r) or watch.shape(t, sharp, state), t, state)
 
     def _judge_rest(self, seen: Observation, values: Mapping[str, Floats]) -> None:
-        """The same of an equilibrium that is a result, as it is computed for its output.
+        """The same of an equilibrium, as it is computed for its output.
 
         One to compare with may be too coarse to be a result: what it differs by is what is asked of it.
         """
-        if isinstance(self.recorder, ComparisonRecorder):
-            return
         watch, (sharp, state) = self.diagnostics, self._at_rest
-        watch.mesh(seen)
-        stop = watch.stretch(state) or watch.left_plane(state.r) or watch.shape(0.0, sharp, state)
-        self._stop_if(stop, None, state)
-        watch.loops(seen.batch.t, values, seen.grid.s)
+        compared = isinstance(self.recorder, ComparisonRecorder)
+        if not compared:
+            watch.mesh(seen)
+        stop = watch.stretch(state) or watch.left_plane(state.r)
+        self._stop_if(stop or (None if compared else watch.shape(0.0, sharp, state)), None, state)
+        if not compared:
+            watch.loops(seen.batch.t, values, seen.grid.s)
 
     def waiting(self) -> Waiting:
         """Outputs and steps that wait, to come back to."""
