@@ -80,6 +80,16 @@ def test_points_that_nothing_holds_are_refused() -> None:
         read_text(text)
 
 
+def test_a_pendant_may_be_the_first_line_at_its_knot() -> None:
+    """It carries the knot in the balance of forces, and the other lines hold that: in a current it was refused."""
+    text = TEXT.replace("surface: 30}", "surface: 30, current: [1, 0, 0]}").replace(
+        "lines:\n",
+        "  top: {initial_guess: [0, 0, 9], mass: 10, volume: 0.1}\nlines:\n"
+        "  pendant: {start: buoy, end: top, sections: [{length: 9, mass: 1, diameter: 0.05, drag: {normal: 1}}]}\n",
+    )
+    assert system(text).carried("pendant") == ("start",)
+
+
 def test_a_guess_out_of_reach_is_only_a_guess() -> None:
     found = system(TEXT.replace("initial_guess: [0, 0, 5]", "initial_guess: [0, 0, 500]"))
     result = hybrid.static(found)
