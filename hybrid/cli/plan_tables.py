@@ -19,10 +19,8 @@ from hybrid.store.capacity import kink_torque
 
 if TYPE_CHECKING:
     from hybrid.model.plan import NetworkPlan, Plan
-    from hybrid.scene.analysis import Time
     from hybrid.scene.network_scene import Network
     from hybrid.scene.root import Scene
-    from hybrid.scene.schema import LineScene
     from hybrid.simulation.run_quantities import Listed
 
 NAME, COLUMNS = 13, 80  # columns of names, and of the short form
@@ -52,41 +50,20 @@ def plan_facts(plan: Plan | NetworkPlan) -> dict[str, Any]:
     return found
 
 
-def plan_rows(scene: Any, plan: Any) -> list[str]:
-    """A plan for people, in rows of COLUMNS columns."""
-    rows = _rows_of_system if scene.line_names else _rows_of_cable
-    return rows(scene, plan)
-
-
-def contents_tables(plan: Any) -> list[Callable[[], Any]]:
-    """What makes everything that is on and off of a plan, of lines with names one after another."""
-    if not hasattr(plan, "lines"):
-        return [partial(_contents_table, plan)]
-    each = ((partial(str, f"line {name}"), partial(_contents_table, line)) for name, line in plan.lines.items())
-    return [content for both in each for content in both]
-
-
-def _rows_of_cable(scene: LineScene, plan: Plan) -> list[str]:
-    """The plan of a cable."""
-    on = {entry.what: entry.why for entry in plan.contents if entry.on}
-    sections, attached = scene.cable.sections, len(scene.cable.attachments)
-    length = sum(section.length for section in sections)
-    line = [f"{length:.6g} m", _count(len(sections), "section")] + ([_count(attached, "attachment")] * bool(attached))
-    plane = any(what.startswith("computed in a plane") for what in on)
-    rows = {
-        "implausible": _noted(plan, "implausible"),
-        "ignored": _noted(plan, "ignored"),
-        "line": ", ".join(line),
-        "ends": "; ".join(what.removeprefix("ends.") for what in on if what.startswith("ends.")),
-        "model": _model(plan),
-        "dimension": "2: all of the scene lies in a plane" if plane else "3",
-        "mesh": _mesh(plan),
-        "payout": _payout(plan),
+def plan_rows(scene: Scene, plan: Plan | NetworkPlan) -> list[str]:
+    """A plan for people, in rows of COLUMNS columns: its lines, and what they have in common."""
+    each = dict(plan.each_line())
+    alone, every = each.get(""), list(each.values())
+    on = {entry.what: entry.why for line in every for entry in line.contents if entry.on}
+    rows = _rows_of_lines(scene, each) if alone is None else _rows_of_line(scene, alone, on)
+    rows |= {
+        "mesh": _mesh(every),
+        "payout": _payout(alone),
         "forces": _forces(on),
-        "contact": _contact(on),
-        "hockling": _hockling(plan),
-        "time": _steps(scene.time, plan, bool(scene.contact.self)),
-        "runs": _runs(plan),
+        "contact": "; ".join(x for x in (_of_lines(scene, on) if alone is None else "", _contact(on)) if x),
+        "hockling": _hockling(alone),
+        "time": _steps(scene, plan),
+        "runs": _runs(max(every, key=lambda x: x.most_runs)),
         "outputs": _outputs(scene),
         "accuracy": _accuracy(on),
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
@@ -98,52 +75,53 @@ def _rows_of_cable(scene: LineScene, plan: Plan) -> list[str]:
     ]
 
 
-def _rows_of_system(system: Network, plan: NetworkPlan) -> list[str]:
-    """The plan of several lines: each of them, what joins them, and what they have in common."""
-    rows = _rows_of_lines(system, plan)
-    every = list(plan.lines.values())
-    on = {entry.what: entry.why for line in every for entry in line.contents if entry.on}
-    rows |= {
-        "free points": ", ".join(plan.free) or "none",
-        "bodies": ", ".join(f"{name} ({body.kind})" for name, body in system.bodies.items()),
-        "mesh": f"{_count(plan.cells, 'cell')}, {plan.unknowns} unknowns",
-        "forces": _forces(on),
-        "contact": "; ".join(x for x in (_of_lines(system, on), _contact(on)) if x),
-        "time": _steps(system.time, plan),
-        "runs": _runs(max(every, key=lambda x: x.most_runs)),
-        "outputs": _outputs(system),
-        "accuracy": _accuracy(on),
-        "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
+def contents_tables(plan: Plan | NetworkPlan) -> list[Callable[[], Any]]:
+    """What makes everything that is on and off of a plan, of lines with names one after another."""
+    found: list[Callable[[], Any]] = []
+    for name, line in plan.each_line():
+        found += [partial(str, f"line {name}")] * bool(name) + [partial(_contents_table, line)]
+    return found
+
+
+def _rows_of_line(scene: Scene, plan: Plan, on: Mapping[str, str]) -> dict[str, str]:
+    """Rows of a line without a name, as far as its model; on: what is on."""
+    sections, attached = scene.cable.sections, len(scene.cable.attachments)
+    length = sum(section.length for section in sections)
+    line = [f"{length:.6g} m", _count(len(sections), "section")] + ([_count(attached, "attachment")] * bool(attached))
+    plane = any(what.startswith("computed in a plane") for what in on)
+    return {
+        "implausible": _noted(plan, "implausible"),
+        "ignored": _noted(plan, "ignored"),
+        "line": ", ".join(line),
+        "ends": "; ".join(what.removeprefix("ends.") for what in on if what.startswith("ends.")),
+        "model": _model(plan),
+        "dimension": "2: all of the scene lies in a plane" if plane else "3",
     }
-    return [
-        shorten(system.title, 160, placeholder=" …") or "untitled scene",
-        *_table(rows),
-        "of each line, what is on and off, and why: --verbose",
-    ]
 
 
-def _rows_of_lines(system: Network, plan: NetworkPlan) -> dict[str, str]:
-    """A row for each line, with its ends; of many lines one for all that are alike, with their names."""
+def _rows_of_lines(system: Any, each: Mapping[str, Plan]) -> dict[str, str]:
+    """A row for each line, with its ends, of many one for all that are alike, with their names; points and bodies."""
     rows: dict[str, str] = {}
     alike: dict[str, list[str]] = {}
-    for name, line in plan.lines.items():
+    for name, line in each.items():
         joined = system.lines[name]
         length = sum(section.length for section in joined.sections)
         what = f"{_model(line)}, {_count(sum(line.cells), 'cell')}"
         what += "".join(f"; {text}" for text in _clamps(system, name))
-        if len(plan.lines) > MOST_LISTED:
+        if len(each) > MOST_LISTED:
             alike.setdefault(f"{length:.6g} m, {what} each", []).append(name)
         else:
             rows[f"line {name}"] = f"{length:.6g} m, {joined.start} to {joined.end}, {what}"
         rows |= {f"  {name}, {kind}": _noted(line, kind) for kind in ("implausible", "ignored")}
-        rows[f"  {name}, hockling"] = _hockling(line)
+        rows |= {f"  {name}, payout": _payout(line), f"  {name}, hockling": _hockling(line)}
     groups: dict[str, str] = {}
     for what, names in alike.items():
         key = _count(len(names), "line")
         while key in groups:
             key += " "  # another row of the same name
         groups[key] = f"{what}: {', '.join(names)}" if len(names) > 1 else f"{what.removesuffix(' each')}: {names[0]}"
-    return groups | rows
+    bodies = ", ".join(f"{name} ({body.kind})" for name, body in system.bodies.items())
+    return groups | rows | {"free points": ", ".join(system.free) or "none", "bodies": bodies}
 
 
 def _noted(plan: Plan, kind: str) -> str:
@@ -175,7 +153,7 @@ def _contact(on: Mapping[str, str]) -> str:
     return f"of the line with itself, {why}" if why.startswith(WHERE_NEAR) else ""
 
 
-def _of_lines(system: Network, on: Mapping[str, str]) -> str:
+def _of_lines(system: Any, on: Mapping[str, str]) -> str:
     """Which lines touch each other, and what else they touch."""
     pairs, found = [f"{a} with {b}" for a, b in system.touching_pairs], []
     if pairs:
@@ -248,17 +226,19 @@ def _model(plan: Plan) -> str:
     return ", ".join(kinds[:4]) + (f" and {len(kinds) - 4} more" if len(kinds) > 4 else "")
 
 
-def _mesh(plan: Plan) -> str:
-    cells = sum(plan.cells)
-    if plan.base_cells is not None:
-        few = f"{plan.base_cells} cells as catenary, " if plan.base_cells < cells else ""
-        return f"{few}{_count(cells, 'cell')} ({plan.unknowns} unknowns) if all is rod"
-    return f"{_count(cells, 'cell')}, {plan.unknowns} unknowns"
+def _mesh(plans: Sequence[Plan]) -> str:
+    """Cells and unknowns of all lines."""
+    cells, unknowns = sum(sum(x.cells) for x in plans), sum(x.unknowns for x in plans)
+    if any(x.base_cells is not None for x in plans):
+        base = sum(sum(x.cells) if x.base_cells is None else x.base_cells for x in plans)
+        few = f"{base} cells as catenary, " if base < cells else ""
+        return f"{few}{_count(cells, 'cell')} ({unknowns} unknowns) if all is rod"
+    return f"{_count(cells, 'cell')}, {unknowns} unknowns"
 
 
-def _payout(plan: Plan) -> str:
+def _payout(plan: Plan | None) -> str:
     """How long the line will be, its largest rate, and its cells then."""
-    paid = plan.payout
+    paid = None if plan is None else plan.payout
     if paid is None:
         return ""
     cells = f"up to {paid.cells} cells"
@@ -270,9 +250,9 @@ def _payout(plan: Plan) -> str:
     return f"{turns[0]} to {turns[1]} m{way}, at most {paid.rate:.3g} m/s; {cells}"
 
 
-def _hockling(plan: Plan) -> str:
+def _hockling(plan: Plan | None) -> str:
     """The torque with which the line could throw a loop as it hangs, and from which on that would kink."""
-    found = plan.critical_torque
+    found = None if plan is None else plan.critical_torque
     if found is None:
         return ""
     about = "about " if found.rough else ""
@@ -287,11 +267,11 @@ def _hockling(plan: Plan) -> str:
     return text
 
 
-def _steps(time: Time | None, plan: Plan | NetworkPlan, touches: bool = False) -> str:
-    """touches: contact of the line with itself is asked for, and nobody knows for how long it does."""
+def _steps(scene: Scene, plan: Plan | NetworkPlan) -> str:
+    time = scene.time
     if time is None:
         return "no motion, statics only"
-    cpu = _cpu(plan, touches)
+    cpu = _cpu(scene, plan)
     if time.controlled:
         return f"{time.duration:.6g} s in about {plan.steps} steps, as the motion asks; {cpu}"
     steps = f"{time.duration:.6g} s in {plan.steps} steps"
@@ -300,12 +280,14 @@ def _steps(time: Time | None, plan: Plan | NetworkPlan, touches: bool = False) -
     return f"{steps} of {plan.step:.6g} s{short}; {cpu}"
 
 
-def _cpu(plan: Plan | NetworkPlan, touches: bool) -> str:
+def _cpu(scene: Scene, plan: Plan | NetworkPlan) -> str:
     """Processor time of all runs, and what it rests on."""
-    most, every = plan.most_seconds, [*getattr(plan, "lines", {"": plan}).values()]
-    why = "finer runs are needed" if any(x.most_runs > x.runs for x in every) else "a line goes slack and becomes a rod"
+    most, each = plan.most_seconds, dict(plan.each_line())
+    finer = any(x.most_runs > x.runs for x in each.values())
+    why = "finer runs are needed" if finer else "a line goes slack and becomes a rod"
     notes = [f"up to {span(most)} if {why}"] if most is not None and most > 1.05 * plan.seconds else []
-    notes += ["several times as much while it touches itself"] if touches else []
+    if any(scene.scene_of(name).contact.self for name in each):  # and nobody knows for how long it touches
+        notes.append("several times as much while it touches itself")
     notes += [] if plan.measured else ["estimated from tables: no step was tried"]
     return f"about {span(plan.seconds)} of CPU for all runs" + (f" ({'; '.join(notes)})" if notes else "")
 

@@ -129,16 +129,16 @@ def _failed(error: ComputationError, text: str, file: str) -> dict[str, Any]:
 
 def _plan_rows(scene: Any, made: Any) -> list[list[str]]:
     """What a run would compute, as rows of a name and a text."""
-    if scene.line_names:
-        rows = []
-        for name, line in made.lines.items():
+    rows: list[list[str]] = []
+    for name, line in made.each_line():
+        if name:
             kinds = ", ".join(dict.fromkeys(zone.kind for zone in line.zones))
             rows.append([f"line {name}", f"{kinds}, {sum(line.cells)} cells"])
+        else:
+            chosen = [["model", "the cheapest, by a pre-run: " + ", ".join(kind for kind, _ in line.choice)]]
+            rows += chosen * bool(line.choice) + _zone_rows(line)
+    if name:
         rows.append(["in all", f"{made.cells} cells, {made.unknowns} unknowns"])
-    else:
-        rows = _zone_rows(made)
-        if model_is_free(scene):
-            rows.insert(0, ["model", "the cheapest, by a pre-run: " + ", ".join(kind for kind, _ in made.choice)])
     if scene.time is None:
         rows.append(["time", "no motion (no table `time`)"])
     else:

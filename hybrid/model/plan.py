@@ -71,6 +71,10 @@ class Plan:
     chosen: str = ""  # kind of model, where the pre-run has chosen it
     why: str = ""  # and why: what a step of each kind costs, on how many cells, and where zones would be rod
 
+    def each_line(self) -> Iterable[tuple[str, Plan]]:
+        """Names and plans of the lines: this is that of a line without a name."""
+        return [("", self)]
+
     @property
     def ledger(self) -> tuple[Entry, ...]:
         """Former name of `contents`."""
@@ -144,7 +148,7 @@ def count_steps(scene: LineScene) -> int:
 
 @dataclass(frozen=True)
 class NetworkPlan:
-    """What lines with names require: the plan of each line by name, and what they come to together."""
+    """What lines require: the plan of each line by name, and what they come to together."""
 
     lines: dict[str, Plan]
     free: tuple[str, ...]  # names of the points that are free
@@ -155,6 +159,15 @@ class NetworkPlan:
     seconds: float  # of processor time, of all runs that are expected
     most_seconds: float | None = None  # as of `Plan`
     measured: bool = False
+
+    def each_line(self) -> Iterable[tuple[str, Plan]]:
+        """Names and plans of the lines."""
+        return self.lines.items()
+
+    @property
+    def of_scene(self) -> Plan | NetworkPlan:
+        """What a user asks for: of a line without a name that of the line."""
+        return self.lines.get("", self)
 
 
 @overload
@@ -168,15 +181,17 @@ def plan(scene: SceneLike) -> Any:
 
     Of lines with names it is a NetworkPlan.
     """
-    scene, plans = as_scene(scene), dict[str, Plan]()
-    scenes = scene.scenes_of_lines
+    return plan_of_lines(as_scene(scene)).of_scene
+
+
+def plan_of_lines(scene: Any) -> NetworkPlan:
+    """The same of every line of a scene, and of all together."""
+    scenes, plans = scene.scenes_of_lines, dict[str, Plan]()
     for name, line in scenes.items():
         if scene.time:
             refuse_too_much(line)
         with said_of_line(name):
             plans[name] = _plan_of_line(line)
-    if not scene.line_names:
-        return plans[""]
     for name in (tuple(scenes)[k] for k in that_may_meet(scene, scenes)):
         plans[name] = replace(plans[name], contents=(*plans[name].contents, MEETS))
     every = list(plans.values())

@@ -9,6 +9,7 @@ import pytest
 import hybrid
 from hybrid.accuracy import run_forecast
 from hybrid.accuracy.run_forecast import Seen, _cost_of_a_step, _steps_a_second, _still_to_come
+from hybrid.cli.plan_tables import plan_rows
 from hybrid.scene.short_form import LINE, network_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -39,6 +40,22 @@ def test_a_network_of_one_line_has_the_plan_of_its_cable() -> None:
     asked = scene("1%", "model=adaptive")
     of_cable = hybrid.plan(asked, measure=False)
     assert of_cable.choice and hybrid.plan(network_of(asked), measure=False).lines[LINE] == of_cable
+
+
+@pytest.mark.parametrize(
+    ("name", "own"), [("rov_tether", "mesh"), ("laying_winch", "payout"), ("armoured_cable", "hockling")]
+)
+def test_its_words_are_those_of_the_cable(name: str, own: str) -> None:
+    """What zones that move may need, how a line is paid out, and when it throws a loop."""
+    asked = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["model=adaptive", "mesh=null"] * (own == "mesh"))
+    said = []
+    for form in (asked, network_of(asked)):
+        rows = plan_rows(form, hybrid.plan(form, measure=False))
+        text = " ".join(" ".join(rows).split())
+        said.append({key: text[text.index(key) + len(key) :] for key in (own, "forces", "accuracy")})
+    for key in said[0]:
+        begin = said[0][key][:40]
+        assert said[1][key].startswith(begin), key
 
 
 def test_what_the_first_steps_show_is_in_the_plan() -> None:
