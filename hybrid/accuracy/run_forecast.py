@@ -7,8 +7,7 @@ whether a finer run is needed and contact to come, is the difference between the
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
@@ -23,13 +22,13 @@ from hybrid.kernels.state.state import State
 from hybrid.model import plan as tables
 from hybrid.model.build import Model, build
 from hybrid.model.contents import with_accuracy
-from hybrid.model.model_costs import COST_STEP, NAMED, ModelChoice, with_model
+from hybrid.model.model_costs import COST_STEP, NAMED, ModelChoice
 from hybrid.model.network import NetworkResolution
-from hybrid.model.plan import NetworkPlan, Plan, count_steps
-from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
+from hybrid.model.plan import NetworkPlan, Plan
+from hybrid.model.resolution import Resolution, requested_accuracy, wants_errors
 from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import kernels_of
 from hybrid.simulation.network_run import NetworkRun, Recording
@@ -74,10 +73,9 @@ def plan(scene: SceneLike, *, measure: bool = True) -> Any:
     that of a run; False: nothing is computed, and they are estimated from tables, as where kernels are not compiled
     yet.  Of several lines it is a NetworkPlan.
     """
-    asked: Any = as_scene(scene)
-    made: Any = tables.plan(asked)
-    measured: Any = _measured_lines if asked.line_names else _measured
-    return measured(asked, made) if measure and asked.time is not None else made
+    asked = as_scene(scene)
+    made = tables.plan_of_lines(asked)
+    return (_measured(asked, made) if measure and asked.time is not None else made).of_scene
 
 
 class Seen(NamedTuple):
@@ -110,13 +108,14 @@ def _steps_a_second(seen: Sequence[Seen]) -> float:
 class _Probe(Case):
     """A case whose passes end (KeyboardInterrupt) when their budget is used up."""
 
-    def __init__(self, scene: LineScene) -> None:
+    def __init__(self, scene: Scene) -> None:
         super().__init__(scene, None)
         self.run: NetworkRun | None = None  # the last
-        self.at_rest: tuple[Model, State] | None = None  # where it begins, if that is an equilibrium
+        self.at_rest: dict[str, tuple[Model, State]] = {}  # where lines begin, if that is an equilibrium
         self._end = np.inf
         self._most_steps = np.inf
         self.seen: list[Seen] = []  # of the last run
+        self.iterations: list[int] = []  # of Newton's method, in its steps that were looked at
         self.interrupted = self._is_used_up
 
     def _is_used_up(self) -> bool:
@@ -124,6 +123,7 @@ class _Probe(Case):
         if self.run is not None:
             steps = self.run.steps
             self.seen.append(Seen(now, steps, self.run.t))
+            self.iterations.append(self.run.loop.counts.iterations)
         if steps < self._most_steps and self._end + ONCE < now < np.inf and len(self.seen) == 2:
             self._end = now + FIRST_STEPS  # what is done once, as compiling, is no cost of a step
         return steps >= self._most_steps or now > self._end
@@ -134,7 +134,7 @@ class _Probe(Case):
 
     def _network_run(self, *args: Any, **kwargs: Any) -> NetworkRun:
         self.run = super()._network_run(*args, **kwargs)
-        self.seen = [Seen(clock.process_time(), 0, 0.0)]
+        self.seen, self.iterations = [Seen(clock.process_time(), 0, 0.0)], []
         return self.run
 
     def first_steps(self, resolution: NetworkResolution) -> tuple[NetworkRun, float, float]:
@@ -143,9 +143,10 @@ class _Probe(Case):
         begin = begun = clock.process_time()
         self.allow(np.inf)
         run = self._network_run(resolution, None, Recording(touches=self.touches_itself))
-        (line,), (model,) = run.state.lines, run.model.models
-        self.at_rest = None if run.found is None else (model, line.copy())
-        known = resolution.one.local is None and model.payout is None
+        names, models, lines = run.model.names, run.model.models, [x.copy() for x in run.state.lines]
+        if run.found is not None:
+            self.at_rest = dict(zip(names, zip(models, lines, strict=True), strict=True))
+        known = resolution.one.local is None and all(x.payout is None for x in models)
         self.allow(FIRST_STEPS, ENOUGH_STEPS if known else np.inf)
         try:
             run.begin_motion()
@@ -165,48 +166,60 @@ class _Probe(Case):
             raise KeyboardInterrupt
 
 
-def _measured(scene: LineScene, found: Plan) -> Plan:
+def _measured(scene: Scene, found: NetworkPlan) -> NetworkPlan:
     """The same, with what the pre-run and the first steps show.
 
     As it is where kernels are to be compiled first, or the equilibrium would take longer to find than a plan may.
     """
-    if sum(found.cells) > MOST_CELLS or not is_warm(kernels_of(scene)):
+    if found.cells > MOST_CELLS or not is_warm(kernels_of(scene)):
         return found
-    case, first, cut = _Probe(scene), first_resolution(scene), False
-    finely, choices, begin = NetworkResolution({LINE: first}), dict[str, ModelChoice](), clock.process_time()
-    case.allow(CHOICE if found.choice else PRE_RUN)
+    case, cut, begin = _Probe(scene), False, clock.process_time()
+    scenes, finely, choices = case.lines, NetworkResolution.of(case.lines), dict[str, ModelChoice]()
+    plans = dict(zip(scenes, found.lines.values(), strict=True))
+    open_yet = [name for name, x in plans.items() if x.choice]
+    case.allow(CHOICE if open_yet else PRE_RUN)
     try:
         try:
             choices, finely = chosen_and_surveyed(case, finely)
         except KeyboardInterrupt:
             cut = True
-            if found.choice:  # as the pre-run is
-                case.scene = with_model(scene, "rod")
+            case.scene = case.with_models(dict.fromkeys(open_yet, "rod"))  # as the pre-run is
         survey, coarse = clock.process_time() - begin, case.run
-        still = _still_to_come(case.seen, scene.require_time().duration) if cut and coarse is not None else 0.0
+        if cut and coarse is not None:
+            survey += _still_to_come(case.seen, scene.require_time().duration)
         if not is_warm(kernels_of(case.scene)):
             return found
         run, setup, spent = case.first_steps(finely)
     except ComputationError:
         return found  # the run will say why
-    duration, resolution, choice = scene.require_time().duration, finely.one, choices.get(LINE, NAMED)
-    survey += still
-    steps = _steps(scene, resolution, run, coarse, case.seen)
-    motion = steps * _dearer(found) * spent / max(run.steps, 1)
-    seconds, most = _of_passes(scene, setup, motion, duration / scene.output_interval, found)
-    if scene.contact.self:  # by name: the first steps show nothing of it
+    steps = _steps(found, finely.one, run, coarse, case.seen)
+    motion = steps * _dearer(plans.values()) * _later(case, run) * spent / max(run.steps, 1)
+    seconds, most = _of_passes(scenes, setup, motion, plans)
+    if any(x.contact.self for x in scenes.values()):  # by name: the first steps show nothing of it
         seconds, most = seconds + (TOUCHING - 1.0) * motion, most + (MOST_TOUCHING - 1.0) * motion
-    model = build(case.scene, resolution)
-    payout = model.payout.forecast(duration) if model.payout is not None else None
-    torque = found.critical_torque
-    if case.at_rest is not None:
-        here, state = case.at_rest
-        torque = tables.critical_torque(scene, here, state.T)
+    if case.network.slack_becomes_rod:
+        most += (TOUCHING - 1.0) * motion
+    made, lines = zip(finely.lines.values(), case.scene.scenes_of_lines.values(), strict=True), dict[str, Plan]()
+    for name, called, (resolution, line) in zip(found.lines, scenes, made, strict=True):
+        model, choice = build(line, resolution), choices.get(called, NAMED)
+        lines[name] = _of_line(case, called, scenes[called], plans[called], model, choice)
     return replace(
-        found, **tables.mesh_of(model), payout=payout, critical_torque=torque,
-        contents=with_accuracy(found.contents, scene, case.reach),
-        seconds=survey + seconds, most_seconds=survey + most, measured=True, steps=round(steps),
-        step=min(resolution.step, duration / steps), chosen=choice.kind, why=choice.why,
+        tables.together(lines, found.free), seconds=survey + seconds, most_seconds=survey + most, measured=True,
+        steps=round(steps), step=min(finely.one.step, scene.require_time().duration / steps),
+    )  # fmt: skip
+
+
+def _of_line(case: _Probe, name: str, scene: LineScene, found: Plan, model: Model, choice: ModelChoice) -> Plan:
+    """A line as it will be computed: its cells, how it is paid out, its accuracy in metres; scene: as it was asked."""
+    payout = model.payout.forecast(scene.require_time().duration) if model.payout is not None else None
+    torque = found.critical_torque
+    if name in case.at_rest:
+        here, state = case.at_rest[name]
+        torque = tables.critical_torque(scene, here, state.T)
+    contents = with_accuracy(found.contents, scene, case.reach.get(name))
+    return replace(
+        found, **tables.mesh_of(model), payout=payout, critical_torque=torque, contents=contents,
+        chosen=choice.kind, why=choice.why,
     )  # fmt: skip
 
 
@@ -215,27 +228,35 @@ def _still_to_come(seen: Sequence[Seen], duration: float) -> float:
     return _cost_of_a_step(seen) * _steps_a_second(seen) * max(duration - seen[-1].t, 0.0)
 
 
-def _dearer(found: Plan) -> float:
-    """How much dearer a step is on average than the first ones, of a line that is paid out."""
-    if found.payout is None or not np.isfinite(found.payout.mean_cells):
+def _dearer(plans: Iterable[Plan]) -> float:
+    """How much dearer a step is on average than the first ones, where lines are paid out."""
+    first = mean = 0.0
+    for x in plans:
+        first += sum(x.cells)
+        mean += sum(x.cells) if x.payout is None or np.isnan(x.payout.mean_cells) else x.payout.mean_cells
+    return (COST_STEP + CELL * mean) / (COST_STEP + CELL * first)
+
+
+def _later(case: _Probe, run: NetworkRun) -> float:
+    """How much dearer a step is than the first ones, once loads and motions that grow from nothing have grown."""
+    if len(run.lines) == 1 or run.t >= min(_grown(case.network), case.scene.require_time().duration):
         return 1.0
-    first, mean = (COST_STEP + CELL * x for x in (sum(found.cells), found.payout.mean_cells))
-    return mean / first
+    return max(1.0, LATER / max(float(np.mean(case.iterations)), 1.0))
 
 
 def _steps(
-    scene: LineScene, resolution: Resolution, run: NetworkRun, coarse: NetworkRun | None, seen: Sequence[Seen]
+    found: NetworkPlan, resolution: Resolution, run: NetworkRun, coarse: NetworkRun | None, seen: Sequence[Seen]
 ) -> float:
     """Steps of the result, which has come as far as its run.
 
     coarse: of the mesh pre-run, whose steps, longer by one factor, show how many each part of the motion asks for.
     seen: of its run.
     """
-    duration = scene.require_time().duration
+    duration = run.times[-1]
     if run.t >= duration:
         return float(run.steps)
     if resolution.local is None:
-        return float(count_steps(scene))
+        return float(found.steps)
     rate = _steps_a_second(seen)
     if run.steps < SETTLED:  # they still grow: not shorter than the next is to be
         rate = min(rate, 1.0 / float(run.loop.clock.next_dt))
@@ -251,77 +272,34 @@ def _steps(
     return run.steps * times.size / passed * duration / max(coarse.t, 1e-9 * duration)
 
 
-def _of_passes(scene: LineScene, setup: float, motion: float, outputs: float, found: Plan) -> tuple[float, float]:
+def _of_passes(
+    scenes: Mapping[str, LineScene], setup: float, motion: float, plans: Mapping[str, Plan]
+) -> tuple[float, float]:
     """Processor time, s, of all runs after the pre-run: expected, and at most.
 
-    setup, motion: s, of a result before its first step, and of its steps; outputs: their number.
+    setup, motion: s, of a result before its first step, and of its steps; scenes, plans: of the lines by name.
     """
-    points = scene.output.points if isinstance(scene.output.points, int) else len(scene.output.points)
-    one = setup + motion
-    result = one + outputs * (OUTPUT + POINT * points) + FILE
-    if not wants_errors(scene):
-        return result, result
-    first = result + 3.0 * setup + COMPARISONS * motion + JUDGING
-    if requested_accuracy(scene) is None or found.most_runs == found.runs:
+    one, files = setup + motion, sum(map(_of_file, scenes.values()))
+    estimated = sum(map(wants_errors, scenes.values()))
+    if not estimated:
+        return one + files, one + files
+    first = one + files + 3.0 * setup + COMPARISONS * motion + JUDGING * estimated
+    if all(requested_accuracy(scenes[name]) is None or x.most_runs == x.runs for name, x in plans.items()):
         return first, first
     expected = first + FINER * one
     return expected, min(first + MOST_FINER * one, max(MOST_TIMES * expected, LEAST))
+
+
+def _of_file(scene: LineScene) -> float:
+    """Processor time, s, of the outputs of a line and of writing them."""
+    points = scene.output.points if isinstance(scene.output.points, int) else len(scene.output.points)
+    return scene.require_time().duration / scene.output_interval * (OUTPUT + POINT * points) + FILE
 
 
 def _grown(system: Network) -> float:
     """When all loads and motions of a system that grow from nothing have grown, s."""
     moved = [getattr(x, "motion", None) for x in (*system.points.values(), *system.bodies.values())]
     return max((getattr(x, "ramp", None) or 0.0 for x in (system.environment.waves, *moved)), default=0.0)
-
-
-def _measured_lines(system: Network, found: NetworkPlan) -> NetworkPlan:
-    """The same of several lines: their first steps, as often as all runs would take them."""
-    if found.cells > MOST_CELLS or not is_warm(kernels_of(system)):
-        return found
-    time, begin = system.require_time(), clock.process_time()
-    try:
-        run = NetworkRun(system, None, "", moves=True, recording=Recording(planes=True))
-        run.begin_motion()
-        first = [x.T.copy() for x in run.state.lines]
-        begun = clock.process_time()
-        tried: list[int] = []  # iterations of Newton's method, of steps that were looked at
-
-        def look() -> None:
-            tried.append(run.loop.counts.iterations)
-            if clock.process_time() - begun > FIRST_STEPS:
-                raise KeyboardInterrupt
-
-        with suppress(KeyboardInterrupt):
-            for stop in run.stops():
-                run.go_to(stop, look)
-    except (ComputationError, LineFailed):
-        return found  # the run will say why
-    spent, setup = clock.process_time() - begun, begun - begin
-    steps = float(run.steps) if run.t >= time.duration else float(found.steps)
-    if run.loop.controlled:
-        rate = run.steps / max(run.t, 1e-9 * time.duration)
-        if run.steps < SETTLED:
-            rate = min(rate, 1.0 / float(run.loop.clock.next_dt))
-        steps = run.steps + rate * max(time.duration - run.t, 0.0)
-    motion = steps * spent / max(run.steps, 1)
-    if run.t < min(_grown(system), time.duration):
-        motion *= max(1.0, LATER / max(float(np.mean(tried)), 1.0))
-    scenes = {name: system.scene_of(name) for name in system.lines}
-    if not system.starts_as_placed:
-        at_rest = zip(run.model.names, run.model.models, first, strict=True)
-        torques = {name: tables.critical_torque(scenes[name], x, T) for name, x, T in at_rest}
-        lines = {name: replace(x, critical_torque=torques[name]) for name, x in found.lines.items()}
-        found = replace(found, lines=lines)
-    outputs = time.duration / system.output_interval
-    each = [_of_passes(scene, 0.0, 0.0, outputs, found.lines[name]) for name, scene in scenes.items()]
-    expected, most = max(_of_passes(scene, setup, motion, 0.0, found.lines[name]) for name, scene in scenes.items())
-    more = sum(x for x, _ in each)
-    if system.slack_becomes_rod:
-        most += (TOUCHING - 1.0) * motion
-    return replace(
-        found, seconds=expected + more, most_seconds=most + more, measured=True, steps=round(steps),
-        step=min(found.step, time.duration / steps),
-    )  # fmt: skip
 
 
 # How much all results for an accuracy may take: some times what the first result foretells of them.

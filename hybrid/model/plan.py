@@ -166,8 +166,13 @@ class NetworkPlan:
 
     @property
     def of_scene(self) -> Plan | NetworkPlan:
-        """What a user asks for: of a line without a name that of the line."""
-        return self.lines.get("", self)
+        """What a user asks for: of a line without a name that of the line, with what all lines come to."""
+        if "" not in self.lines:
+            return self
+        return replace(
+            self.lines[""], steps=self.steps, step=self.step, seconds=self.seconds, most_seconds=self.most_seconds,
+            measured=self.measured,
+        )  # fmt: skip
 
 
 @overload
@@ -194,11 +199,16 @@ def plan_of_lines(scene: Any) -> NetworkPlan:
             plans[name] = _plan_of_line(line)
     for name in (tuple(scenes)[k] for k in that_may_meet(scene, scenes)):
         plans[name] = replace(plans[name], contents=(*plans[name].contents, MEETS))
+    return together(plans, scene.free)
+
+
+def together(plans: dict[str, Plan], free: tuple[str, ...]) -> NetworkPlan:
+    """Plans of lines by name, and what they come to; free: names of the points that are free."""
     every = list(plans.values())
     shortest = min(every, key=lambda x: x.step)  # all have the steps in common
     return NetworkPlan(
-        plans, scene.free, sum(sum(x.cells) for x in every), sum(x.unknowns for x in every), shortest.steps,
-        shortest.step, sum(x.seconds for x in every),
+        plans, free, sum(sum(x.cells) for x in every), sum(x.unknowns for x in every), shortest.steps, shortest.step,
+        sum(x.seconds for x in every),
     )  # fmt: skip
 
 

@@ -105,7 +105,6 @@ class Case:
     beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
     late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
     late_finer: LateFile | None = None  # of a finer one, which may take its place
-    reach: Reach | None = None  # how far the first line moves, by a pre-run
     _results = 0  # that were begun
     _told: tuple[object, str] | None = None  # a scene, and what it is as a text
     _start: tuple[Network, NetworkResolution, Start] | None = None  # that was looked at last
@@ -142,6 +141,7 @@ class Case:
         # Whether contact of lines with themselves is computed in runs to compare with: where it is asked for, or a line
         # has touched itself in a result.  Before, coarse cells would meet where those of the result do not.
         self.touches_itself = self.flat and bool(self.network.lines[LINE].contact.self)
+        self.reach = dict[str, Reach]()  # how far lines move, by a pre-run
         self.notes: list[tuple[str, str]] = []  # events (kind, text) of the whole of every result
         self._unwanted = threading.Event()  # what runs to compare with still compute
 
@@ -465,7 +465,7 @@ class Case:
             name: Survey.of(scene, resolution.lines[name], models[name], points[name], found[name].values)
             for name, scene in free.items()
         }
-        self.reach = next(iter(surveys.values())).reach
+        self.reach = {name: x.reach for name, x in surveys.items()}
         return surveys
 
     def _surveyed(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,6 +12,7 @@ import hybrid
 from hybrid.accuracy import run_forecast
 from hybrid.accuracy.run_forecast import Seen, _cost_of_a_step, _steps_a_second, _still_to_come
 from hybrid.cli.plan_tables import plan_rows
+from hybrid.scene.read import as_scene
 from hybrid.scene.short_form import LINE, network_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -58,17 +61,32 @@ def test_its_words_are_those_of_the_cable(name: str, own: str) -> None:
         assert said[1][key].startswith(begin), key
 
 
-def test_what_the_first_steps_show_is_in_the_plan() -> None:
+@pytest.mark.parametrize("form", [as_scene, network_of])
+def test_what_the_first_steps_show_is_in_the_plan(form: Callable[[Any], hybrid.Scene]) -> None:
     """Cells that the mesh pre-run grades, and steps, are those of the result; without it they come from tables."""
-    asked = scene("3%")
+    asked = form(scene("3%"))
     hybrid.run(asked)  # compiles what it needs
     plan, guess = hybrid.plan(asked), hybrid.plan(asked, measure=False)
+    ((_, line),) = plan.each_line()
     with hybrid.run(asked) as result:
-        first = result.attributes["cells"] if result.attributes["effort_runs"] == plan.runs - 1 else None
-        assert 0.7 < len(result["steps/t"]) / plan.steps < 1.8
+        first = result.attributes["cells"] if result.attributes["effort_runs"] == line.runs - 1 else None
+        ((_, of_line),) = result.each_line()
+        assert 0.7 < len(of_line["steps/t"]) / plan.steps < 1.8
     assert plan.measured and not guess.measured
-    assert first is None or sum(plan.cells) == first
+    assert first is None or sum(line.cells) == first
     assert plan.most_seconds is not None and plan.most_seconds > plan.seconds > 0.0
+
+
+def test_layers_of_lines_are_in_the_plan() -> None:
+    """Cells beside a float are as short as the bend there: 100 were said of 133."""
+    section = {"length": 150, "mass": 0.8, "diameter": 0.025, "axial_stiffness": 2e6, "bending_stiffness": 20}
+    points = {"top": {"position": [0, 0, 0]}, "low": {"initial_guess": [10, 0, -55], "mass": 900, "volume": 0.86}}
+    floating = [{"kind": "float", "at": 75, "mass": 20, "buoyancy": 420}]
+    line = {"start": "top", "end": "low", "model": "rod", "sections": [section], "attachments": floating}
+    fluid, time = {"fluid": {"density": 1025, "surface": 0}}, {"duration": 1, "step": 0.1}
+    asked = {"environment": fluid, "points": points, "lines": {"one": line}, "time": time}
+    cells = hybrid.run(asked).attributes["cells"]
+    assert hybrid.plan(asked).cells == cells != hybrid.plan(asked, measure=False).cells
 
 
 def test_a_pre_run_that_is_cut_leaves_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,4 +147,4 @@ def test_a_line_that_is_paid_out_from_few_cells_on() -> None:
     """A step of ten cells is mostly what any step costs, so steps of 250 are not 25 times as dear: 8.8 s were said."""
     found = hybrid.plan(EXAMPLES / "rov_descent.yaml", measure=False)
     assert found.payout is not None and found.payout.mean_cells > 10 * sum(found.cells)
-    assert run_forecast._dearer(found) < 0.6 * found.payout.mean_cells / sum(found.cells)
+    assert run_forecast._dearer([found]) < 0.6 * found.payout.mean_cells / sum(found.cells)
