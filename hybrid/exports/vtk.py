@@ -64,9 +64,9 @@ def image(part: Part) -> memoryview:
 
 
 def _obstacles(part: Part, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (nt, n, 3) m of the surfaces of all obstacles, and triangles (m, 3) of points of the cable (nt, ns, 3) and
+    """Points (nt, n, 3) m of the surfaces of all obstacles, and their triangles (m, 3).
 
-    of these behind them.
+    Triangles count the points of the cable (nt, ns, 3) first, and these behind them.
     """
     flat = points.reshape(-1, 3)
     box = np.array([flat.min(axis=0), flat.max(axis=0)])

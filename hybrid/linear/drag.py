@@ -139,10 +139,10 @@ def of_cylinders(
     d: Floats, axes: Floats, drag: tuple[Floats, Floats], current: Floats, u: Floats,
     phases: NDArray[np.complex128] | None,
 ) -> Floats:  # fmt: skip
-    """Linear drag (H, 3, 3) N s/m of cylinders along d (H, 3) with axes (H, 2, 3) across, by a relative velocity of the
+    """Linear drag (H, 3, 3) N s/m of cylinders along d (H, 3) in moving water.
 
-    water with a mean (H, 3) m/s and amplitudes u (F, H, 3).  drag: across and along, (H,) N s^2/m^2; phases: (P, F) of
-    few frequencies.
+    axes: (H, 2, 3) across; current: mean relative velocity (H, 3) m/s, u: its amplitudes (F, H, 3); drag: across and
+    along, (H,) N s^2/m^2; phases: (P, F) of few frequencies.
     """
     un, ut = (u.transpose(1, 0, 2) @ axes.transpose(0, 2, 1)).transpose(1, 0, 2), (u * d).sum(axis=2)
     mean, forth = np.einsum("hi,hmi->hm", current, axes), np.einsum("hi,hi->h", current, d)

@@ -110,8 +110,10 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
 
 
 def _of_wave(there: SmallSea, state: State, wave: Floats, rows_of: RowsOf, still: Floats) -> tuple[Floats, Floats]:
-    """Forces (N+1, 3) N but drag, and velocities (N+1, 3) m/s of the water, by a wave of amplitude 1 m and phase 0;
-    still: both (N+1, 6) without waves."""
+    """Forces (N+1, 3) N but drag, and velocities (N+1, 3) m/s of the water, by a unit wave.
+
+    Of amplitude 1 m and phase 0; still: both (N+1, 6) without waves.
+    """
     both = _amplitudes([still, *(_in_sea(sea, state, rows_of) for sea in there.waves(wave))], wave)
     return both[:, :3], both[:, 3:]
 
@@ -124,9 +126,9 @@ def _in_sea(there: Sea, state: State, rows_of: RowsOf) -> Floats:
 
 
 def water_of_wave(sea: Sea, wave: Floats, places: Floats) -> Floats:
-    """Velocity and acceleration of the water at places (n, 3), and rise of the surface above them, (n, 7) by a wave of
+    """Velocity and acceleration of the water, and rise of the surface, (n, 7) by a unit wave.
 
-    amplitude 1 m and phase 0.
+    Of amplitude 1 m and phase 0, at places (n, 3) m.
     """
     there, found = SmallSea(sea, len(places)), []
     for each in chain([there.still()], there.waves(wave)):  # one at a time: they share their arrays
@@ -170,8 +172,10 @@ def _amplitudes(found: list[Floats], wave: Floats) -> Floats:
 
 
 def half_cells(line: Line, sea: Sea, state: State) -> tuple[np.ndarray, Floats, Floats, Floats, Floats]:
-    """Of every half cell: its node (H,), direction (H, 3), drag across and along it (H,) N s^2/m^2 as far as it is wet,
-    and the current there (H, 3) m/s; bodies at nodes are not among them."""
+    """Node (H,), direction (H, 3), drag (H,) twice, and current (H, 3) m/s of every half cell.
+
+    Drag is across and along it, N s^2/m^2, as far as it is wet; bodies at nodes are not among them.
+    """
     n = line.h.size
     d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
     node = np.concatenate([np.arange(n), np.arange(1, n + 1)])

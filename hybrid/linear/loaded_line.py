@@ -78,8 +78,10 @@ class LoadedLine:
         self.by_drag = bool((carried > own)[self.point_drag > 0.0].any())
 
     def drag_blocks(self, which: np.ndarray, start: bool) -> Floats:
-        """Linear drag (N+1, 3, 3) N s/m of every node, by the motion found last at some frequencies, which stand for
-        all; start: by the water alone."""
+        """Linear drag (N+1, 3, 3) N s/m of every node, by its latest motion.
+
+        which: frequencies that stand for all; start: by the motion of the water alone.
+        """
         relative = math.sqrt(len(self.omegas) / which.size) * self.relative(which, start)
         blocks = np.zeros((self.line.s.size, 3, 3))
         used = (self.cn > 0.0) | (self.ct > 0.0)
@@ -146,9 +148,9 @@ class LoadedLine:
         return self.response_to(self.q, self.turns, self.omegas)
 
     def response_to(self, q: Floats, turns: Floats, omegas: Floats) -> LineResponse:
-        """Amplitudes of what users ask for, in a motion (F, N+1, 5) with turns (F, 2, 3) rad of the frames of its ends,
+        """Amplitudes of the quantities of a result, in a motion q (F, N+1, 5).
 
-        at frequencies (F,) 1/s.
+        turns: (F, 2, 3) rad of the frames of its ends; omegas: (F,) rad/s.
         """
         state = self.linear.state
         l = np.linalg.norm(state.e, axis=1)
@@ -192,9 +194,9 @@ class LoadedLine:
 
     @cached_property
     def bend(self) -> tuple[Floats, Floats, Floats]:
-        """Of every node at rest: length (N+1,) m over which it bends, its curvature (N+1,) 1/m, and two axes across it
+        """Bending length (N+1,) m, curvature (N+1,) 1/m and axes (N+1, 2, 3) of every node at rest.
 
-        (N+1, 2, 3), of which the first is in the plane of the bend, inwards.
+        Both axes are across the line, the first in the plane of the bend, inwards.
         """
         l = np.linalg.norm(self.linear.state.e, axis=1)
         d = self.linear.state.e / l[:, None]
@@ -295,9 +297,9 @@ class LoadedMembers:
         self.blocks = np.zeros((len(rows), 3, 3))
 
     def _by_waves(self, members: Members, rows: Floats) -> tuple[Floats, Floats, Floats]:
-        """Amplitudes at every frequency: velocity of the water (F, n, 3) m/s, force but for drag (F, n, 3) N, rise of
+        """Amplitudes at every frequency of the water at members.
 
-        the surface (F, n) m.
+        Velocity (F, n, 3) m/s, force but for drag (F, n, 3) N, rise of the surface (F, n) m.
         """
         count, n, sea = len(self.omegas), len(rows), members.sea
         water, push, rise = (

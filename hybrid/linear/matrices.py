@@ -284,9 +284,10 @@ def _spin_springs(line: Line) -> Floats:
 
 
 def _by_length(K: sparse.csr_array) -> sparse.csr_array:
-    """A line whose tension makes a torque, with forces and torques by tension from the law of length: A is symmetric
+    """K with forces and torques by tension from the law of length, of which K is symmetric.
 
-    there.  Block rows do not reach the tension of the cell after next (kernels.laws.tension_torque).
+    For a line whose tension makes a torque: block rows do not reach the tension of the cell after next
+    (kernels.laws.tension_torque).
     """
     entries = K.tocoo()
     tension = np.arange(K.shape[0]) % SIZE == 0
@@ -344,9 +345,9 @@ def linear_network(
     solver: NetworkSolver, states: NetworkState, names: Sequence[str], sticks: bool, quick: bool = True,
     touching: TouchingLines | None = None,
 ) -> LinearNetwork:  # fmt: skip
-    """The network of lines, points and bodies that a solver holds about an equilibrium; sticks, quick: as of
+    """The lines, points and bodies of a solver, linear about an equilibrium.
 
-    `linear_line`.  touching: lines that touch each other, or themselves, in it.
+    sticks, quick: as of `linear_line`; touching: lines that touch each other, or themselves, in it.
     """
     lines = tuple(
         linear_line(x, name, state, sticks, quick)

@@ -83,8 +83,10 @@ class LineResponse:
         return covariance_of(np.stack([self.curvature, self.curvature_across], axis=2))
 
     def resolved(self, name: str) -> NDArray[np.bool_]:
-        """Where the standard deviation is at least `OF_LARGEST` of the largest of the line, and what is left out adds
-        at most `ADDED` to it: elsewhere what goes with the square of the motion may be several times as much.
+        """Where the linear response is resolved: what it neglects is small beside it.
+
+        The standard deviation is at least `OF_LARGEST` of the largest of the line, and neglected terms add at most
+        `ADDED` to it; elsewhere terms of second order may be several times as large.
         """
         deviation = self.deviation(name)
         return np.asarray(
@@ -98,9 +100,9 @@ class LineResponse:
             return np.asarray(np.sqrt(spectrum.moment(0) / spectrum.moment(2)))
 
     def most_probable(self, name: str, hours: float = HOURS) -> Floats:
-        """Most probable largest deviation from the mean in so many hours of a Gaussian process; never more than all
+        """Most probable largest deviation from the mean of a Gaussian process in `hours`.
 
-        amplitudes together.  ValueError: hours are no time.
+        At most the sum of all amplitudes.  ValueError: hours are no time.
         """
         _above_zero("hours", hours)
         period = self.period(name)
@@ -109,10 +111,11 @@ class LineResponse:
         return np.minimum(self.deviation(name) * np.sqrt(2.0 * np.log(cycles)), together)
 
     def damage(self, curve: str | Mapping[str, float | str] | Curve, strength: float, hours: float = HOURS) -> Floats:
-        """Fatigue damage (N,) of the tension, with a T-N curve over a strength (N): by Dirlik's law, but of few
+        """Fatigue damage (N,) of the tension in `hours`, by a T-N curve over a strength (N).
 
-        frequencies, whose sum is no normal process, by the cycles that it has.  ValueError: strength or hours are not
-        above 0, or the curve is one of stress; ResultError: cycles cannot be counted without the package rainflow.
+        By Dirlik's law; of few frequencies, whose sum is no normal process, by counted cycles.  ValueError: strength or
+        hours are not above 0, or the curve is one of stress; ResultError: the package rainflow, which counts, is
+        missing.
         """
         found = curve_of(curve)
         _above_zero("strength", strength)

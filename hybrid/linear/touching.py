@@ -337,9 +337,9 @@ def _of_lines(
 def _turning(
     contact: Contact, node_of: np.ndarray, rows: Floats, states: NetworkState, touching: TouchingLines, size: int
 ) -> sparse.csr_array:
-    """(3 n, unknowns) by how much surfaces shift against each other at points as their strands turn
+    """Shift (3 n, unknowns) of surfaces against each other at points as their strands turn.
 
-    (kernels.contact.self_contact_friction).
+    The symbols are of kernels.contact.self_contact_friction.
     """
     r = np.concatenate([x.r for x in states.lines])
     spins = np.concatenate([np.append(x.line.spin != 0, False) for x in touching.solver.lines])

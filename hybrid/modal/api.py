@@ -289,8 +289,10 @@ def _directions(x: LinearLine, part: Floats) -> dict[str, Floats]:
 
 
 def _places(found: _Found, k: int) -> Floats:
-    """A mode at the same places of every line on any mesh, and of points and bodies, by the energy of what moves there:
-    its product with another is about that of the masses."""
+    """A mode at places that are the same on any mesh, scaled by the root of the moving mass.
+
+    Of every line, point and body; its product with another mode is about that over the masses.
+    """
     shape, rows = _Shape(found, k), []
     for x in found.network.lines:
         part, s = shape.parts[x.name], x.line.s

@@ -388,9 +388,9 @@ Answer = Callable[[float, Any], Any]
 def left_out(
     network: LinearNetwork, lines: Sequence[LoadedLine], members: Mapping[int, LoadedMembers], answer: Answer
 ) -> list[LineResponse]:
-    """The response of each line, whose motion is known at all frequencies, with parts by which this changes standard
+    """The response of each line, with the neglected parts of standard deviations and the law of curvature.
 
-    deviations of tension (N,) and curvature (N+1,), and with the shape of the law of curvature.  members: of bodies, by
+    Parts of those of tension (N,) and curvature (N+1,); the motion is known at all frequencies.  members: of bodies, by
     their numbers.
     """
     omegas, step = lines[0].omegas, _step([*lines, *members.values()])

@@ -1,7 +1,6 @@
-"""What cells miss of curvature beside places where contact with the seabed begins or ends, of every output by itself,
+"""Errors of curvature in cells at touchdown, and at ends of the line on the seabed.
 
-and beside ends of the line on the bed: what holds them at another height than the line lies at has the same layers.
-
+Every output is estimated by itself.  An end held at another height than the line lies at has the same layers.
 There the load on the line jumps within a cell, and what answers it is as short as sqrt(EI/T), sqrt(T/k) or, of a stiff
 line, (EI/k)^(1/4).  How far nodes and straight lines between them are off depends on where in its cell the edge lies,
 so that runs on other cells, whose nodes lie otherwise beside it, may agree by chance.  The balance across the bed

@@ -89,9 +89,10 @@ class Observation(ObservedStates):
         return np.where((part > RIGID) | (angle < 1e-6), t, between)
 
     def _borne_by_bending(self, shift: Shift) -> Floats:
-        """Tension (n sides, nb), N, that a catenary has and the rod in its place has not: M^2/(2 EI) of an elastica,
+        """Tension (n sides, nb), N, of a catenary that a rod in its place would bear by bending.
 
-        whose force is that of the catenary but across its tangent in part.  The ends' tension knows it already.
+        M^2/(2 EI) of an elastica, whose force is that of the catenary but across its tangent in part.  The ends'
+        tension has it already.
         """
         out = self._square_of_moment(self.node_moment) * 0.5
         for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
@@ -313,9 +314,9 @@ class Observation(ObservedStates):
 
     @cached_property
     def energies(self) -> dict[str, Floats]:
-        """(nb,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy), stored by the seabed, by
+        """Energies (nb,) J, by name: kinetic, bending, torsion, stretch, potential, of contact.
 
-        contact of the line with itself.
+        potential: of weight and buoyancy; of contact: stored by the seabed, and by contact of the line with itself.
         """
         kinetic, bending, torsion, stretch, potential = self._observed[2]
         if self.batch.turn.size:

@@ -56,7 +56,10 @@ class ObservedStates:
 
     @property
     def _plain(self) -> Self:
-        """As computed.  (An attribute that refers to itself would keep a batch until garbage is searched for.)"""
+        """The states as computed, without corrections.
+
+        An attribute that refers to itself would keep a batch until garbage is collected.
+        """
         return self._corrects or self
 
     def of_line(self, name: str, at: int | slice | NDArray[np.int64]) -> Floats:
@@ -165,9 +168,9 @@ class ObservedStates:
 
     @cached_property
     def _observed(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Moments (N+1, 3, nb) N m, strains (N+1, 3, nb) rad, energies (5, nb) J and bends (N+1, nb) 1/m of what was
+        """Moments, strains, energies and bends of the states as computed.
 
-        computed.
+        (N+1, 3, nb) N m, (N+1, 3, nb) rad, (5, nb) J, and (N+1, nb) 1/m.
         """
         if self._corrects is not None:
             return self._corrects._observed

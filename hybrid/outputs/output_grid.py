@@ -115,8 +115,9 @@ class Grid:
         changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
         hinges: Floats = NO_HINGES,
     ) -> None:  # fmt: skip
-        """loads: arc lengths, m, that cut the line, as of `stretches`; changes: those of them where one section ends
+        """Points s (ns,) m on a mesh with nodes nodes_s (N+1,) m.
 
+        loads: arc lengths, m, that cut the line, as of `stretches`; changes: those of them where one section ends
         and the next begins; after: a point on a cut shows the side after it; kept: those of loads where no force acts;
         hinges: (2 + K, 3) as of `Material`.
         """
@@ -248,9 +249,9 @@ class VaryingGrid(Grid):
         changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
         hinges: Floats = NO_HINGES,
     ) -> None:  # fmt: skip
-        """nodes_s: (nb, N+1) m, nodes of every output; s: (nb, ns) m, its points; zones: of the first; the rest as of
+        """Points s (nb, ns) m on nodes nodes_s (nb, N+1) m of every output.
 
-        `Grid`.
+        zones: of the first output; the rest as of `Grid`.
         """
         super().__init__(nodes_s[0], zones, s[0], loads, changes, after, kept, hinges)
         self._grids = [self.moved(x, at) for x, at in zip(nodes_s, s, strict=True)]

@@ -193,10 +193,10 @@ def _normal(v: Observation, q: Quantity) -> tuple[Floats, Floats]:
 
 
 def nearest(a: Floats, b: Floats, ra: Floats, rb: Floats) -> tuple[float, int, float]:
-    """Least clearance (m) of two polylines of nodes a (n+1, 3) and b (m+1, 3), m, with radii of their chords ra (n,)
+    """Least clearance (m) of two polylines, distance less both radii, and where it is.
 
-    and rb (m,), m: distance less both radii.  Also which chord of a, and which part of it, is nearest.  A single node b
-    is a point.
+    a (n+1, 3), b (m+1, 3): nodes, m, a single node b being a point; ra (n,), rb (m,): radii of their chords, m.
+    Where: which chord of a is nearest, and which part of it.
     """
     if len(b) == 1:
         b = np.concatenate([b, b])

@@ -67,9 +67,9 @@ def _end_rods(view: ObservedStates, out: Floats, spans: Integers) -> None:
 
 
 def _by_moment(view: ObservedStates, at: SpanEnds) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Ends of rods (n,) without an element, whose strain is that of the moment that is given there; and those where the
+    """Ends of rods (n,) whose strain follows from the moment: without an element, and where stiffness changes.
 
-    stiffness changes: the moment is one.
+    The first have no strain of their own; at the second the moment is the same on both sides.
     """
     line = view.line
     bare = line.element[at.node] == 0
@@ -80,9 +80,10 @@ def _by_moment(view: ObservedStates, at: SpanEnds) -> tuple[NDArray[np.bool_], N
 
 
 def bends_without_natural(view: ObservedStates, curvature: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Curvature (ns, outputs) 1/m from what has no stress, at output points; and where it is not known: in catenaries,
+    """Curvature (ns, outputs) 1/m less the natural one, at output points, and where it is unknown.
 
-    which do not know which way their sections are curved, and where a joint takes of the curvature of a rod.
+    Unknown in catenaries, which do not know which way their sections are curved, and where a joint takes a part of a
+    rod's curvature.
     """
     nodes, spans = view.grid.side_nodes, np.array(view.grid.spans).reshape(-1, 3)
     rods = np.array([zone.kind == "rod" for zone in view.grid.parts])
@@ -153,9 +154,9 @@ def _put_layers_back(view: ObservedStates, out: Floats, spans: Integers, rods: N
 
 
 def _take_layers_at_ends(view: ObservedStates, out: Floats) -> list[tuple[EndLayer, Floats]]:
-    """Curvature of catenaries less what of a rod's fades, at ends where that is nothing; the layers, and curvatures
+    """Subtract from catenaries the layer that fades from a rod, at ends without curvature.
 
-    (outputs,) 1/m of the ends without them.
+    Returns the layers, and curvatures (outputs,) 1/m of the ends without them.
     """
     directions, taken = view.bend_directions, []
     for layer in end_layers(view):
@@ -241,9 +242,9 @@ def _beside_spring(view: ObservedStates, node: int, cell: int) -> Floats:
 
 
 def _bend_by_table(line: Line, inner: Integers, side: Integers, moment: Floats, plain: Floats) -> Floats:
-    """Curvature (n, 2, outputs) under moments (n, 2, outputs) N m, on a side of the nodes inner (n,); `plain` where
+    """Curvature (n, 2, outputs) 1/m by the tables of bending, and `plain` where there is no table.
 
-    there is no table.
+    moment: (n, 2, outputs) N m, on a side of the nodes inner (n,).
     """
     out = plain.copy()
     for j, i in enumerate(inner):

@@ -41,11 +41,10 @@ LEAST_SHAPE, LARGEST_SHAPE = 0.1, 1e9
 
 
 class Extreme(NamedTuple):
-    """The largest value in a time: the `most_probable` maximum (MPM), its `median`, and the `fractile` that it does not
-    exceed with `probability` (P90 with 0.9).
+    """The largest value in a time, each number with its interval (low, high) at CONFIDENCE.
 
-    Each has its interval (low, high) at CONFIDENCE.  most_probable: what is exceeded once in that time on average;
-    median: what the largest values of many such times exceed in every other one;
+    most_probable: maximum (MPM), exceeded once in that time on average; median: exceeded by the largest values of half
+    of many such times; fractile: not exceeded with `probability` (P90 with 0.9);
     law: "weibull" or "gumbel", `fitted`: its numbers in words; peaks: that entered the fit; duration: s; beyond: how
     many times the record that is.
     """

@@ -70,8 +70,10 @@ def mean_over_time(t: Floats, x: Floats) -> Floats:
 
 
 def exceedance(t: ArrayLike, x: ArrayLike, above: float | None = None, below: float | None = None) -> Floats:
-    """The part of the time (...) for which histories x (nt, ...) at times t (nt,) s are above a value, or below one;
-    linear between samples."""
+    """Part of the time (...) for which histories are above a value, or below one.
+
+    x: (nt, ...) at times t (nt,) s, linear between samples.
+    """
     times, values = checked(t, x)
     if above is None:
         assert below is not None

@@ -34,9 +34,10 @@ class ArrayDataset:
     """One array with what it says of itself; `valid` until the result is closed."""
 
     def __init__(self, field: Field, dims: tuple[str, ...], values: np.ndarray, grows: bool = False) -> None:
-        """field: named as the array, with its table; dims: of all of the array, the rows of a table first; grows:
+        """Values of an array of a result in memory.
 
-        whether it is a column of a table, to which a run that goes on adds rows.
+        field: named as the array, with its table; dims: of all of the array, the rows of a table first; grows: a
+        column of a table, to which a restarted run adds rows.
         """
         self.field, self.dims, self.values, self.grows, self.valid = field, dims, values, grows, True
 

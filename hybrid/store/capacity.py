@@ -94,8 +94,11 @@ def _inside(x: Stretch, s: Floats) -> np.ndarray:
 
 
 def bound_of_steps(result: StoredResult, errors: tuple[float, float] = (0.0, 0.0)) -> float | None:
-    """The part of the capacity that no step and node exceeds, by the ranges of tension and curvature over all of them,
-    as if they came at once; None: the result has no envelope.  errors: of these ranges, N and 1/m."""
+    """Upper bound of the utilisation of capacity over all steps and nodes.
+
+    By the ranges of tension and curvature over all of them, as if their extremes coincided; None: the result has no
+    envelope.  errors: of these ranges, N and 1/m.
+    """
     names = [f"{GROUP}/{x}" for x in ("tension_min", "tension_max", "curvature_max")]
     if not has_envelope(result) or any(name not in result for name in names):
         return None
@@ -125,11 +128,11 @@ def _largest(result: StoredResult, part: Callable[[Stretch, np.ndarray], Floats]
 def mooring_use(
     result: StoredResult, strength: float, factors: tuple[float, ...], pretension: float | StoredResult
 ) -> tuple[Floats, Floats, Floats]:
-    """Arc lengths (n,) m, and u = (T_pre g_pre + (T - T_pre) g_env)/S at the outputs (nt, n) and of the largest tension
-    of all steps and outputs (n,).
+    """Utilisation of a mooring line by DNV-OS-E301, u = (T_pre g_pre + (T - T_pre) g_env)/S.
 
-    strength: S, N; factors: g_pre, g_env; pretension: T_pre, N, or the result of an equilibrium under it.  DNV-OS-E301
-    (July 2021), Ch.2 Sec.2, as the manual of SIMA 4.8 gives it.  ResultError: a pretension of another line.
+    Returns arc lengths (n,) m, u at the outputs (nt, n), and u of the largest tension of all steps and outputs (n,).
+    strength: S, N; factors: g_pre, g_env; pretension: T_pre, N, or the result of an equilibrium under it.  July 2021,
+    Ch.2 Sec.2, as the manual of SIMA 4.8 gives it.  ResultError: a pretension of another line.
     """
     if not (0.0 < strength < np.inf and len(factors) == 2 and all(0.0 < x < np.inf for x in factors)):
         raise ResultError("mooring\n    expected: a strength (N) above 0, and two factors above 0")

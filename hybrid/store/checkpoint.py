@@ -153,9 +153,9 @@ def check_tables(
     source: h5py.File, groups: Mapping[str, h5py.Group], all_tables: Mapping[str, Mapping[str, Sequence[Field]]],
     at: Checkpoint,
 ) -> None:  # fmt: skip
-    """ResultError unless a file has these tables and no other columns, and a checkpoint their rows; groups: "" and of
+    """Raise ResultError unless a file has exactly these tables, and a checkpoint their rows.
 
-    lines.
+    groups: of the file, "", and of each line; tables with other columns are refused too.
     """
     expected = {}
     for part, tables in all_tables.items():

@@ -159,9 +159,10 @@ def mooring_of_steps(result: StoredResult) -> tuple[float, float, float] | None:
 
 
 def code_of_steps(result: StoredResult, errors: Mapping[str, float] | None = None) -> float | None:
-    """The part that no step and node exceeds, by the ranges of tension and moment over all of them, as if they came at
-    once, at the heights of the outputs; None: the result has not all of them.  errors: of these ranges, by quantity, N,
-    N m and 1/m; one that is not there is not known.
+    """Upper bound of the code check over all steps and nodes, at the heights of the outputs.
+
+    By the ranges of tension and moment over all of them, as if their extremes coincided; None: the result has not all
+    of them.  errors: of these ranges, by quantity, N, N m and 1/m; one that is missing is not known.
     """
     names = [f"{GROUP}/{x}" for x in ("tension_min", "tension_max")]
 

@@ -195,8 +195,10 @@ def extremes_of_outputs(values: Recorded, name: str) -> dict[str, np.ndarray]:
 
 
 def limits_of(values: Recorded | None, envelope: Arrays) -> list[Judged]:
-    """Every limit of bend radius, tension and contact force that sections have, where it was broken most, or nearly: of
-    an envelope and of the outputs; of an output that is no more than a node of it, the node."""
+    """Every limit of bend radius, tension and contact force of sections, at its largest utilisation.
+
+    Over an envelope and the outputs; where an output is a node of the envelope and no more than it, the node.
+    """
     found = {x.limit: x for x in judged(envelope)}
     for name in LIMITED:
         if values is not None and name in values and any(limit in values for limit in LIMITED[name]):

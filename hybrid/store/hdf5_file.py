@@ -188,11 +188,11 @@ def created(path: Path, make: bytes | Callable[[Path], None], many: bool = False
 
 
 def _opened_for_many(path: Path) -> h5py.File:
-    """A file of many datasets, to be written: chunks go to the disk at once, so that a disk that is full is noticed at
-    the write, and what HDF5 knows of a dataset is dropped when that is closed.
+    """A new file of many datasets, without a cache of chunks or of metadata of closed datasets.
 
-    Else the file takes time to close that grows with more than the square of its datasets: 37 s of 27 000.  h5py has
-    no name for that property of HDF5; where it cannot be reached, closing takes its time.
+    Chunks go to the disk at once, so that a full disk is noticed at the write.  With such a cache, closing the file
+    takes time that grows faster than the square of its datasets: 37 s of 27 000.  h5py has no name for that property
+    of HDF5; where it cannot be reached, closing takes its time.
     """
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)

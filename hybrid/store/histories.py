@@ -236,8 +236,10 @@ def bends_of(result: StoredResult, rows: slice | Floats) -> Bends:
 
 
 def slopes(s: Floats, x: Floats) -> Floats:
-    """Derivatives of x (nt, n, 3) along s (n,), second order, at ends too; nothing is taken across a place that comes
-    twice."""
+    """Derivatives of x (nt, n, 3) along s (n,), of second order, at ends too.
+
+    No difference crosses an arc length that stands twice.
+    """
     out = np.zeros_like(x)
     edges = [0, *(np.flatnonzero(np.diff(s) <= 0.0) + 1).tolist(), s.size]
     for a, b in pairwise(edges):

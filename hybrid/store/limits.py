@@ -1,5 +1,7 @@
-"""How near the quantities that a scene asks for came to their limits: over every step where a file knows them, and
-over the outputs."""
+"""Utilisation of the limits of quantities that a scene asks for.
+
+Over the outputs, and over every accepted step where the file has its ranges.
+"""
 
 from __future__ import annotations
 
@@ -164,8 +166,10 @@ def at_every_step(result: StoredResult, name: str, bound: str) -> tuple[float, f
 
 
 def stress_of(result: StoredResult) -> Held | None:
-    """The largest stress as a part of what is allowed, over every accepted step and node and over the outputs, which
-    may lie between nodes; None: there is no limit, or no stress."""
+    """The largest stress as a part of the allowed one.
+
+    Over every accepted step and node, and over the outputs, which may lie between nodes; None: no limit, or no stress.
+    """
     known = _most_stressed(result, False) if has_envelope(result) else None
     if "von_mises" not in result or "max_stress" not in result:
         return known

@@ -60,13 +60,14 @@ class Result(StoredResult):
     def statistics(
         self, names: Sequence[str] | None = None, *, times: Window | None = None, at: Any = None
     ) -> dict[str, moments.Summary]:
-        """Summaries of histories, each of the shape of the quantity at one time: mean, standard deviation, skewness,
-        extremes with their times, period between up-crossings of the mean, significant range, number of cycles.
+        """Summaries of histories, each of the shape of the quantity at one time.
 
+        Mean, standard deviation, skewness, extremes with their times, period between up-crossings of the mean,
+        significant range, number of cycles.
         names: None for end forces, tension, curvature, bending moment, torque, contact force, and what the scene asks
         for, where the result has them at all outputs; times: from and to, s; at: arc lengths, m, None: all output
-        points.  A quantity along the line has a value
-        at each place of `both_sides(name)[0]`: where it jumps, one before and one after.
+        points.  A quantity along the line has a value at each place of `both_sides(name)[0]`: where it jumps, one
+        before and one after.
         """
         found = {}
         asked = usual_names(self) if names is None else [names] if isinstance(names, str) else names
@@ -98,8 +99,11 @@ class Result(StoredResult):
         self, name: str, above: float | None = None, *, below: float | None = None, at: Any = None,
         times: Window | None = None,
     ) -> Floats:  # fmt: skip
-        """The part of the time for which a history is above a value, or below one, in the unit of its quantity; of the
-        shape of the quantity at one time; at, times: as of `statistics`.  ResultError: not one number of the two."""
+        """Part of the time for which a history is above a value, or below one.
+
+        above, below: one of them, in the unit of the quantity; at, times: as of `statistics`.  The answer has the shape
+        of the quantity at one time.  ResultError: both or none is given, or no number.
+        """
         if (above is None) is (below is None):
             raise ResultError("exceedance\n    expected: one of above and below, in the unit of the quantity")
         value = above if below is None else below
@@ -110,11 +114,12 @@ class Result(StoredResult):
         return moments.exceedance(history.t, history.values, above, below)
 
     def utilisation(self) -> dict[str, Judged]:
-        """How near the line came to each limit of its sections over all steps and outputs, by the key of the limit:
+        """Utilisation of each limit of the line's sections over all steps and outputs, by key.
+
         `used` is the part of max_tension or min_bend_radius that was used, None of min_tension and of what is not
         verified; `verdict` is within, broken or not verified, with `why` and `remedy`; at s (m) and t (s).
-
-        ResultError of a result of several lines: each has its own."""
+        ResultError of a result of several lines: each has its own.
+        """
         if self.lines:
             first = next(iter(self.lines))
             raise ResultError(
@@ -124,18 +129,21 @@ class Result(StoredResult):
         return {found.limit: found for found in section_limits(self)}
 
     def mooring(self, strength: float, factors: tuple[float, ...], pretension: Any) -> tuple[Floats, Floats, Floats]:
-        """Utilisation of a mooring line by DNV-OS-E301 (July 2021), (T_pre g_pre + (T - T_pre) g_env)/S: arc lengths
-        (n,) m, at the outputs (nt, n), and of the largest tension over all steps and outputs (n,).
+        """Utilisation of a mooring line by DNV-OS-E301 (July 2021), (T_pre g_pre + (T - T_pre) g_env)/S.
 
+        Returns arc lengths (n,) m, the utilisation at the outputs (nt, n), and that of the largest tension over all
+        steps and outputs (n,).
         strength: S, N; factors: g_pre, g_env, by class and limit state, without default; pretension: T_pre, N, or the
-        result of an equilibrium under it, `hybrid.static` without current.  ResultError: of another line."""
+        result of an equilibrium under it, `hybrid.static` without current.  ResultError: of another line.
+        """
         return mooring_use(self, strength, factors, pretension)
 
     def verdicts(self) -> Verdicts:
-        """What may be said of the result: limits of sections and of quantities are within or broken, an accuracy that
-        was asked for is met or missed, or it is not verified, with the reason and the one thing to do.
+        """Verdicts on limits and on the accuracy, each with its reason and remedy.
 
-        Of several lines each has its own, and the result those of quantities of all."""
+        Limits of sections and of quantities are within or broken, an accuracy that was asked for is met or missed, or
+        they are not verified.  Of several lines each has its own, and the result those of quantities of all.
+        """
         return verdicts_of(self)
 
     def spectrum(

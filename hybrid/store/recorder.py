@@ -63,9 +63,9 @@ class BaseRecorder:
         self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]],
         later: Sequence[Sequence[tuple[str, float, float]]] = (),
     ) -> None:  # fmt: skip
-        """Append outputs at the times (nb,), s, of the fields (nb, ...), with the zones that hold in all of them, or
+        """Append outputs of the fields (nb, ...) at the times (nb,), s.
 
-        in the first; later: those of each of the others, where they differ.
+        zones: of all of these outputs, or of the first; later: of each of the others, where they differ.
         The arrays are kept until they are written.  ResultError when a field is missing, unknown, of another shape, or
         not finite; the outputs before the first that is wrong are kept.
         """

@@ -102,7 +102,7 @@ class Event(NamedTuple):
 
 
 class UnknownName(ResultError, AttributeError):
-    """The file holds nothing of this name.  (An AttributeError too, so that `hasattr` works.)"""
+    """The file holds nothing of this name; an AttributeError too, so that `hasattr` works."""
 
 
 class Attributes(dict[str, Any]):
@@ -171,9 +171,10 @@ class MeshHistory(Sequence[Mesh]):
     """`mesh[i]`: the cells at output i, in the order of s."""
 
     def __init__(self, s: np.ndarray, always: np.ndarray, zones: ZoneHistory, words: np.ndarray | None = None) -> None:
-        """s, always: (K,) nodes that there may be, m, and whether they are there outside of rods as well; words: which
+        """Which of the nodes s (K,) m there are at every output.
 
-        of them there are at every output, as `there` has it; None: all in rods.
+        always: (K,) those outside of rods as well; words: the nodes of every output, as bits of `bits_of`; None: all in
+        rods.
         """
         self._s, self._always, self._zones, self._words = s, always.astype(bool), zones, words
 

@@ -279,8 +279,9 @@ class StoredResult:
         return {name: found[side or "left"]}
 
     def uplift(self, end: str) -> tuple[np.ndarray, np.ndarray]:
-        """Force (nt,) N with which the line lifts what holds its `start` or `end` off the seabed, along the normal of
-        the bed, and the angle (nt,) deg of the pull to the bed; both 0 where the line lies on the bed there.
+        """Uplift (nt,) N at the line's `start` or `end`, and its angle (nt,) deg to the seabed.
+
+        The end force along the normal of the bed, off it; both are 0 where the line lies on the bed there.
         """
         pull, normal = -self[f"reaction_{end}"], self["seabed"][:3]
         if "seabed_ends" in self:

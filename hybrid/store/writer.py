@@ -254,9 +254,9 @@ class Recorder(BaseRecorder):
         self._fixed.clear()
 
     def lay_by(self) -> None:
-        """Close a result in memory that will be a part of another one, and keep its bytes: HDF5 takes 5 MB for a file
+        """Close a result in memory that will be a part of another one, and keep its bytes.
 
-        that is open.  Events may be noted until it is taken.
+        HDF5 uses 5 MB for an open file.  Events may be noted until the bytes are fetched.
         """
         self._leave()
         self._image = image_of(self._file)
@@ -311,8 +311,10 @@ class Recorder(BaseRecorder):
         return np.asarray(self._file[name][()])
 
     def checkpoint(self, content: Callable[[], Mapping[str, Any]]) -> None:
-        """Keep a checkpoint at the last output, written with the next flush; content: makes `program`, `asks`,
-        `resolution` and `state` of it."""
+        """Keep a checkpoint at the last output, written with the next flush.
+
+        content: makes its `program`, `asks`, `resolution` and `state`.
+        """
         if self._packed and self._late is not None:  # which has had no flush since
             assert self._late.checkpoints is not None
             self._late.checkpoints[self._number % 2] = self._packed

@@ -83,8 +83,10 @@ def one_value_of(quantity: str) -> str:
 
 
 class NotAlwaysThere(ResultError):
-    """A quantity of this run has times without a value, such as a touchdown point while nothing touches, or a value
-    that is not verified."""
+    """A quantity of this run has times without a value, or a value that is not verified.
+
+    Such as a touchdown point while nothing touches.
+    """
 
 
 class Collected(NamedTuple):

@@ -173,8 +173,10 @@ class RunStore:
             return None
 
     def save(self, row: Row, values: Mapping[str, np.ndarray]) -> tuple[Row, dict[str, np.ndarray]]:
-        """Store a run, and return it as a later call reads it.  Its JSON is written last, by renaming, so that a stored
-        run is complete; single precision is enough for errors of 1e-4 and takes half the space.
+        """Store a run, and return it as a later call reads it.
+
+        Its JSON is written last, by renaming, so that a stored run is complete; single precision is enough for errors
+        of 1e-4 and halves the space.
         """
         runs = self.folder / "runs"
         half = {name: np.asarray(x, dtype=np.float32) for name, x in values.items()}

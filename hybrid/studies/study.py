@@ -102,9 +102,9 @@ def _cases_in(folder: Path | None) -> list[Path]:
 
 
 def _remove_cases(folder: Path) -> None:
-    """Remove the whole results of a study that begins anew, and snapshots of cases that failed, so that none of the
+    """Remove results of cases, and snapshots of failed ones, of the study that stood in this folder.
 
-    former one is taken for its own.
+    None of them is then read as one of the new study.
     """
     for file in (*_cases_in(folder), *folder.glob("case-*.snapshot.npz")):
         file.unlink()

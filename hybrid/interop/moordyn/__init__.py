@@ -45,10 +45,10 @@ class ImportedDeck:
     notes: tuple[Note, ...]
 
     def files(self, target: str | Path) -> dict[Path, ImportedScene]:
-        """Where scenes are written: to `target` if it names a YAML file and there is one scene, else into the folder
-        `target`, as DECK.line1.yaml, or DECK.yaml if there is one.
+        """The file of each scene.
 
-        SceneError if several scenes are to go into one file.
+        A single scene goes to `target` where that names a YAML file; else scenes go into the folder `target`, as
+        DECK.line1.yaml, or DECK.yaml if there is one.  SceneError if several scenes are to go into one file.
         """
         target, stem = Path(target), Path(self.file).stem
         one = len(self.scenes) == 1

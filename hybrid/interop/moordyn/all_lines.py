@@ -166,9 +166,10 @@ class _SceneMaker(Tables):
         return name
 
     def _clamp(self, end: tuple[str, int, str], starts: bool) -> Triple | None:
-        """Direction of increasing s where a rod that does not turn by itself holds a line, in axes of its body or
+        """Direction of increasing s in which a rod holds an end of a line.
 
-        inertial; None: nothing holds it.  starts: whether the line starts there.
+        In axes of the rod's body, or inertial; None: no rod whose direction is prescribed.  starts: the line starts
+        there.
         """
         kind, id, letter = end
         rod = self.deck.rods.get(id) if kind == "rod" else None
@@ -262,8 +263,10 @@ class _SceneMaker(Tables):
 
 @dataclass(frozen=True)
 class ImportedScene:
-    """A scene: its name (line1, line1+2 of one cable; system of all lines), the IDs of its lines, its text, what is to
-    be known."""
+    """A scene that was read from a deck, with the text of its file.
+
+    name: line1, or line1+2, of one cable; "system" of all lines.  lines: their IDs in the deck.
+    """
 
     name: str
     lines: tuple[int, ...]

@@ -1,5 +1,4 @@
-"""What scenes of one cable and of several lines have in common: the environment, sections, points, the mesh, as YAML
-with the lines of the deck in its comments.
+"""Environment, sections, points and mesh of a deck as YAML; comments name the lines of the deck.
 
 MoorDyn                      hybrid                         because
 Cd, CdAx                     drag.normal, .tangential       both on d and on pi d
