@@ -29,9 +29,12 @@ from hybrid.simulation.stepped import CableState
 from hybrid.simulation.stepped_points import PointState
 from hybrid.simulation.stepping import Simulation
 
-# s: the longest step, and how long a system may be stepped.
-LONGEST_STEP, DURATION = 0.05, 1e7
-POINT_TYPE_FREE, POINT_TYPE_FIXED, POINT_TYPE_COUPLED = 0, 1, -1
+LONGEST_STEP = 0.05  # s
+DURATION = 1e7  # s, for which a system may be stepped
+# Types of points by their numbers in MoorDyn's API.
+POINT_TYPE_FREE = 0
+POINT_TYPE_FIXED = 1
+POINT_TYPE_COUPLED = -1
 BODY_TYPE_COUPLED = -1
 _TYPES = {"free": POINT_TYPE_FREE, "coupled": POINT_TYPE_COUPLED}
 # Of a step: how far the clock of the caller may be from ours.

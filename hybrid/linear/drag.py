@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.state.state import Floats
 
-# Directions and radii of rules for the normal distribution: in a plane, and on axes in space.
-ANGLES, RADII, POINTS = 40, 4, 10
+# Rules of integration for the normal distribution.
+ANGLES = 40  # directions in a plane
+RADII = 4  # a quarter of the radii in a plane
+POINTS = 10  # on each axis in space
 # Standard deviations beyond which a normal velocity is its mean.
 FAR = 30.0
 # Values and weights of a normal law that show the kink of drag; standard deviations from which on the size of a bend is
@@ -24,12 +26,13 @@ FAR = 30.0
 LAW = np.linspace(-6.0, 6.0, 121)
 LAW_PARTS = np.exp(-0.5 * LAW**2) / np.exp(-0.5 * LAW**2).sum()
 BENT = 8.0
-# Frequencies up to which a sum is no normal process; multiples of one frequency up to which they are seen over its
-# period, and the part within which they are such.
-FEW, MULTIPLES, MULTIPLE = 10, 40, 1e-6
-# Phases over a period, of its highest harmonic at least, of several that drift apart; the part of the largest square
-# below which a direction counts as one without motion.
-PHASES, OF_HIGHEST, DRIFTING, STILL = 128, 8, 512, 1e-8
+FEW = 10  # frequencies up to which a sum is no normal process
+MULTIPLES = 40  # highest harmonic of one frequency up to which a sum is sampled over its period
+MULTIPLE = 1e-6  # part within which a frequency is such a harmonic
+PHASES = 128  # samples of a period, at least,
+OF_HIGHEST = 8  # and of a period of its highest harmonic
+DRIFTING = 512  # samples of the phases of frequencies that drift apart
+STILL = 1e-8  # part of the largest mean square below which a direction counts as one without motion
 
 
 @cache

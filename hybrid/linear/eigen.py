@@ -31,9 +31,10 @@ BLOCK_LEFT = 1e-13
 SPENT = 1e-12
 # Of a new vector, how much is left of it beside those before, at least.
 OWN = 0.5
-# So many shifts are tried, each by this part farther off; what a mode may leave of its equations, of their
-# terms and of the largest stiffness.
-SHIFTS, ASIDE, LEFT, NO_FORCE = 4, 1.37e-3, 1e-3, 1e-13
+SHIFTS = 4  # that are tried,
+ASIDE = 1.37e-3  # each by this part farther off
+LEFT = 1e-3  # residual of a mode's equations, of their largest term, at most,
+NO_FORCE = 1e-13  # and of the largest stiffness: round-off
 SEED = 1
 
 

@@ -15,12 +15,14 @@ from hybrid.statistics.fatigue import Curve, curve_of, damage, dirlik_damage
 
 HOURS = 3.0
 # Part of the largest deviation along a line from which one is known: below it what goes with the square of the motion,
-# which is left out, may be several times as much.  Parts that what is left out may add to a deviation: half to three
-# quarters of that come true, which is 3 % here (bench/test_bench_response.py).
-OF_LARGEST, ADDED = 0.2, {"tension": 0.045, "curvature": 0.055}
-# Longest periods in which cycles of few frequencies are counted, values to the shortest period of those that have more
-# than a small part of the power.
-COUNTED, PER_PERIOD, SMALL = 50, 32, 1e-5
+# which is left out, may be several times as much.
+OF_LARGEST = 0.2
+# Parts that what is left out may add to a deviation: half to three quarters of that come true, which is 3 % here
+# (bench/test_bench_response.py).
+ADDED = {"tension": 0.045, "curvature": 0.055}
+COUNTED = 50  # longest periods in which cycles of few frequencies are counted
+PER_PERIOD = 32  # samples of the shortest period that counts
+SMALL = 1e-5  # part of the power below which a frequency does not count
 VARIES = ("position", "tension", "curvature", "curvature_across")
 ALONE = ("tension", "curvature")  # of which notes begin with the quantity and its place
 

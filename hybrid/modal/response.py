@@ -32,11 +32,11 @@ from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
 
-# Rounds of the linear drag, and the relative change of its largest part at which they end.
-ROUNDS, SETTLED, RELAXED = 30, 2e-3, 0.8
-# Of many frequencies one in so many serves for the iteration, and at least so many do: more than those of
-# hybrid.linear.drag, whose sum is no normal process.
-FEWER, LEAST_FREQUENCIES = 4, 12
+ROUNDS = 30  # of the linear drag, at most
+SETTLED = 2e-3  # relative change of its largest part at which they end
+RELAXED = 0.8  # part of the change that a round makes
+FEWER = 4  # of many frequencies one in so many serves for the rounds,
+LEAST_FREQUENCIES = 12  # and at least so many: more than FEW of hybrid.linear.drag, whose sum is no normal process
 # Part by which a run in time may differ before that is told: short runs of a sea differ by as much.
 MOST_APART = 0.15
 

@@ -34,9 +34,11 @@ from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse
 from hybrid.linear.touching import Rest, Touch
 from hybrid.simulation.self_watch import diameters
 
-# Parts of the motion beyond which the line is not linear: share of time that it would be slack; turn of a chord, rad;
-# mean tension by the stretch of swinging, of the standard deviation of tension; length that lifts off or touches down.
-SLACK_SHARE, TURN, STRETCH, LIFTS = 1e-3, 0.2, 0.25, 0.02
+# Parts of the motion beyond which the line is not linear.
+SLACK_SHARE = 1e-3  # of the time, in which it would be slack
+TURN = 0.2  # rad, standard deviation of the turn of a chord
+STRETCH = 0.25  # of the standard deviation of tension: mean tension by the stretch of swinging
+LIFTS = 0.02  # of the length, that lifts off or touches down
 # Part by which a stiffness changes at a point of a table, beyond which it is no small one.
 KINK = 0.1
 # Step, of the length, by which distances to obstacles are differentiated.
@@ -372,9 +374,10 @@ def _between(motion: Floats, cell: np.ndarray, part: Floats) -> Floats:
 # with B the linear drag of a velocity u relative to the water.  To the first order it is what quadratic drag and large
 # turns change, harmonics and all; what they change in turn is left out.  docs/theory.md, 21.
 
-# Parts of times (of fewer, what is found scatters with the phases by more than a quarter), times of each, how many to
-# the shortest period that counts, by a part of the power; loads beyond the last of their power are left out.
-PARTS, TIMES, TO_A_PERIOD, POWER = 4, 256, 8.2, 0.01
+PARTS = 4  # spans of time: of fewer, results scatter with the phases by more than a quarter
+TIMES = 256  # samples of each
+TO_A_PERIOD = 8.2  # samples of the shortest period that counts
+POWER = 0.01  # part of the power beyond which periods do not count, and loads are left out
 # Times of each part where free points, bodies or heavy floats have drag, which alone may damp them: parts must outlast
 # many such decays, else their windows spread what drag leaves out over more frequencies than the resonance answers to.
 RESONANT = 1024

@@ -33,8 +33,11 @@ CLAUSES = {
     "F201": f"DNV-OS-F201 (October 2010), Sec.5 D, combined loading, {NOT_PRINTED}",
 }
 E301, F201 = 0.0, 1.0  # kinds in a row
-# Largest of alpha_c, and between which D/t and of which value beta is.
-MOST_HARDENING, THICK, THIN, BETA = 1.2, 15.0, 60.0, 0.4
+# Of DNV-OS-F201, Sec.5 D: alpha_c = 1 - beta + beta f_u/f_y.
+MOST_HARDENING = 1.2  # largest alpha_c
+THICK = 15.0  # D/t up to which beta is BETA + q_h,
+THIN = 60.0  # and from which it is 0; linear between
+BETA = 0.4
 POISSON = 0.3
 
 

@@ -15,7 +15,9 @@ from hybrid.store.stored_result import StoredResult
 
 # Names in the file: the group, its places (m), and the times (s) between which all accepted steps count.
 GROUP = "envelope"
-SCALE, BEGIN, END = f"{GROUP}/s", f"{GROUP}/begin", f"{GROUP}/end"
+SCALE = f"{GROUP}/s"
+BEGIN = f"{GROUP}/begin"
+END = f"{GROUP}/end"
 # What limits are held against.
 _HELD = (
     ("min_bend_radius", "curvature", "max"), ("max_tension", "tension", "max"), ("min_tension", "tension", "min"),
@@ -37,7 +39,9 @@ NOTHING = 1e-6
 # the tension of what lies on a flat bed without friction.
 PLATEAU = 0.1
 # Verdicts on limits: `verdicts` decides which.
-WITHIN, BROKEN, NOT_VERIFIED = "within", "broken", "not verified"
+WITHIN = "within"
+BROKEN = "broken"
+NOT_VERIFIED = "not verified"
 # Part of a value by which an output at a node may differ from that of its step: sums in another order.
 SAME = 1e-12
 
@@ -277,7 +281,10 @@ def largest_contact(result: StoredResult) -> tuple[str, Extreme] | None:
 # the largest force per length of every step by kind of partner alone; the name is found at the outputs beside it.
 # Where contact began by itself, outputs have no such forces, and partners are those that events name.
 
-OBSTACLES, LINES, ITSELF = "obstacles", "contacts", "the line itself"
+# Groups of these forces by kind of partner, and the partner's name where a line touches itself.
+OBSTACLES = "obstacles"
+LINES = "contacts"
+ITSELF = "the line itself"
 # Kinds of events, of the first contact of two lines and of a line with itself.
 TOUCH = "lines touch"
 TOUCHES_ITSELF = "line touches itself"

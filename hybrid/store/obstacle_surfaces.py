@@ -8,9 +8,15 @@ import numpy as np
 
 from hybrid.store.stored_result import StoredResult
 
-# Points around a round obstacle and along its half spheres.
-AROUND, OVER = 32, 7
-PLANE, ROUND, BOX, TORUS, SHEAVE, MESH = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
+AROUND = 32  # points around a round obstacle
+OVER = 7  # points along its half spheres
+# Kinds of obstacles by their numbers in a file.
+PLANE = 0.0
+ROUND = 1.0
+BOX = 2.0
+TORUS = 3.0
+SHEAVE = 4.0
+MESH = 5.0
 
 
 class Body(NamedTuple):

@@ -9,8 +9,9 @@ import numpy as np
 
 from hybrid.errors import ResultError
 
-# Attribute of a result that is complete and to which more will be added, and what that is.
-PENDING, ERROR_ESTIMATE, FINER_RESULT = "pending", "error estimate", "finer result"
+PENDING = "pending"  # attribute of a complete result to which more will be added; its values are:
+ERROR_ESTIMATE = "error estimate"
+FINER_RESULT = "finer result"
 # Attribute of a result with zones that move: which rods there are at first and why, as JSON.
 RODS_AT_START = "rods_at_start"
 

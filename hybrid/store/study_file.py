@@ -41,7 +41,10 @@ if TYPE_CHECKING:
 
 
 FORMAT = "hybrid-cable study 1"
-OPEN, DONE, FAILED = 0, 1, 2
+# Status of a case.
+OPEN = 0
+DONE = 1
+FAILED = 2
 # Reasons of cases that failed by what is around them, as they begin: the next call computes these again.
 KILLED = "its worker died at every try (out of memory?)"
 NOT_WRITTEN = "its result: "

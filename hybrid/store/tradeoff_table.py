@@ -16,7 +16,11 @@ from typing import TYPE_CHECKING, Any
 
 OURS = "hybrid"
 # What became of a run.  The reference, and the run that shows how converged it is, are rows like others, but no choice.
-DONE, MISSED, FAILED, REFERENCE, CHECK = "done", "missed", "failed", "reference", "check"
+DONE = "done"
+MISSED = "missed"
+FAILED = "failed"
+REFERENCE = "reference"
+CHECK = "check"
 # Of two runs, one asked for a third of the error of the other and both in proportion to what they were asked, the
 # finer is wrong by half of their difference: e and 3e are 2e apart.
 OF_DIFFERENCE = 0.5

@@ -21,8 +21,10 @@ from hybrid.store.tradeoff_table import Row
 from hybrid.studies.runs import RunStore, StudyProgress, level_spec
 from hybrid.studies.tradeoff import force_difference, refuse_peers
 
-# Parts that each level asks for: of the length, of the largest end force, moment and curvature.
-POSITION, TENSION, ALONG = 1e-3, 0.01, 0.05
+# Errors that the levels allow.
+POSITION = 1e-3  # of the length
+TENSION = 0.01  # of the largest end force
+ALONG = 0.05  # of the largest moment and curvature
 LEVELS = {
     "A": {"position": "0.1%", "tension": "1%"},
     "B": {"position": "0.1%", "tension": "1%", "bending_moment": "5%"},

@@ -78,7 +78,10 @@ def read_seafloor(source: Source, row: Row, name: str) -> Seafloor | None:
 # OPTIONS of a deck: what acts on the lines is read, the rest is sorted by what it concerns.
 
 # What MoorDyn takes where a deck gives nothing: measured with MoorDyn 2.7 (bench/test_moordyn_measured.py).
-GRAVITY, DENSITY, BED_STIFFNESS, BED_DAMPING = 9.80665, 1025.0, 3.0e6, 3.0e5
+GRAVITY = 9.80665  # m/s^2
+DENSITY = 1025.0  # kg/m^3, of the water
+BED_STIFFNESS = 3.0e6  # Pa/m
+BED_DAMPING = 3.0e5  # Pa s/m
 
 # Numbers that are read, by the names that versions of MoorDyn know, in lower case; and what each must be at least.
 _READ: dict[str, tuple[str, ...]] = {

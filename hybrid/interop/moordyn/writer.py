@@ -30,9 +30,10 @@ Triple = tuple[float, float, float]
 NO_BED = 1e4  # m under the surface, where a scene has none
 UNDER = 10.0  # m under the surface, where a scene has none
 NO_DIAMETER = 0.01  # m, where a section has none and is in no fluid
-# Of the stability limits of RK4: 2.8 over the highest frequency of stretch, 2 c/l, and of bending, 4/l^2 sqrt(EI/m);
-# 2.8 over the highest rate of its damper, 4 BA/(m l^2).
-STRETCH, BEND, DAMPED = 1.2, 0.6, 0.6
+# Time steps below the limits of stability of RK4, as parts of characteristic times of a segment:
+STRETCH = 1.2  # of l/c; the limit is 1.4, 2.8 over the highest frequency of stretch, 2 c/l
+BEND = 0.6  # of l^2 sqrt(m/EI); the limit is 0.7, 2.8 over the highest frequency of bending, 4/l^2 sqrt(EI/m)
+DAMPED = 0.6  # of m l^2/BA; the limit is 0.7, 2.8 over the highest rate of its damper, 4 BA/(m l^2)
 WRITTEN = "written by hybrid-cable"  # begins the second line, a comment: such a deck may be replaced
 _TOP = (
     "--- LINE TYPES ---\nTypeName Diam Mass/m EA BA EI Cd Ca CdAx CaAx\n"
