@@ -49,7 +49,7 @@ class MoorDynBody:
         self.id, self.points = id, points
         self.r, self.v = np.array(place, float), np.zeros(6)  # m, rad and m/s, rad/s, after the last step
 
-    def at(self, r: Floats, v: Floats) -> dict[str, tuple[Floats, Floats]]:
+    def point_motions(self, r: Floats, v: Floats) -> dict[str, tuple[Floats, Floats]]:
         """Places and velocities of its points where the body is at r (m, rad) and moves with v (m/s, rad/s)."""
         frame, spin = frame_of_angles(r[3:]), spin_of_rates(r[3:], v[3:])
         arms = {name: frame @ place for name, place in self.points.items()}
@@ -145,7 +145,7 @@ class MoorDyn:
         still = np.zeros(6)
         found = {x.name: (np.array(self.deck.points[x.id].place), still[:3]) for x in self.points}
         for body in self.bodies:
-            found |= body.at(body.r, still)
+            found |= body.point_motions(body.r, still)
         return found
 
     def _line(self, id: int) -> MoorDynLine:
@@ -185,7 +185,7 @@ class MoorDyn:
         """Places and velocities of all points that the caller moves."""
         out: dict[str, tuple[Floats, Floats]] = {}
         for k, body in enumerate(self.bodies):
-            out |= body.at(x[6 * k : 6 * k + 6], v[6 * k : 6 * k + 6])
+            out |= body.point_motions(x[6 * k : 6 * k + 6], v[6 * k : 6 * k + 6])
         first = 6 * len(self.bodies)
         for k, name in enumerate(self.coupled):
             at = slice(first + 3 * k, first + 3 * k + 3)

@@ -19,7 +19,7 @@ from hybrid.kernels.run.entry import assembly, workspace_of
 from hybrid.kernels.state.report import FRICTION, MOMENT_A, NET_A, PLANAR, WAVES
 from hybrid.kernels.state.state import FIELDS, Batch, Ends, Floats, Line, Sea, State, batch_of_one, slip_size
 from hybrid.linear.matrices import ANCHOR, rotation
-from hybrid.linear.memory import settle_layers
+from hybrid.linear.memory import load_layers
 from hybrid.model.build import Model
 from hybrid.model.sections import jump_points, output_points
 from hybrid.outputs.probes import Observer
@@ -157,7 +157,7 @@ class LineAtRest:
     def values(self) -> Floats:
         """(W,) of what is wanted."""
         observer = self._observer
-        found = observer.values_of(observer.look(self._output(self.here, self.left(self.here)[1])))
+        found = observer.values_of(observer.observation(self._output(self.here, self.left(self.here)[1])))
         for x in self.wanted:
             if x.over and "s" in observer.dims(x.name):
                 value = x.component(np.asarray(found[x.name][0]))
@@ -239,7 +239,7 @@ class LineAtRest:
             assembly(self._line, self.here.sea, here, self._tried, 0.0, 0.0, self._work)
             batch.report[k] = self._work.report
             if self._tried.layers.size:
-                settle_layers(self._line, here, self._tried, self._work)
+                load_layers(self._line, here, self._tried, self._work)
                 batch.layers[k] = self._tried.layers
         found = self._of_states(batch)
         return self._slopes(found[::2], found[1::2], steps)
@@ -258,7 +258,7 @@ class LineAtRest:
                 groups[moved].append(k)
                 continue
             observer = self._observed(x)
-            values = observer.values_of(observer.look(self._output(*lines[k])))
+            values = observer.values_of(observer.observation(self._output(*lines[k])))
             found[k] = self._results(values, [(observer.s, x.model.line.s)])
         for moved, each in groups.items():
             if len(each) < 2 * MANY or self._near is None:
@@ -284,7 +284,7 @@ class LineAtRest:
             points = np.stack([self._points(x.model) for x, _ in lines])
             observer = observer.on_varied(self.model.line, self.here.sea, self.model.zones, varied["s"], points)
             places = list(zip(points, varied["s"], strict=True))
-        return self._results(observer.values_of(observer.look(batch, varied)), places)
+        return self._results(observer.values_of(observer.observation(batch, varied)), places)
 
     def _looked_at_with(self, x: Beside) -> int | None:
         """Whether a line differs from the one here in what may differ among outputs that are looked at together: 0; 1:
@@ -336,13 +336,13 @@ class LineAtRest:
     def _of_states(self, batch: Batch) -> Floats:
         """(n, W) of outputs of the line."""
         places = [(self._observer.s, self.model.line.s)] * batch.t.size
-        return self._results(self._observer.values_of(self._observer.look(batch)), places)
+        return self._results(self._observer.values_of(self._observer.observation(batch)), places)
 
     def _output(self, x: Beside, report: Floats) -> Batch:
         """This state on a line."""
         ends = self._held_ends(x)
         state = self.state._replace(layers=self.state.layers.copy())
-        settle_layers(x.model.line, ends, state, self._work)
+        load_layers(x.model.line, ends, state, self._work)
         return batch_of_one(0.0, ends, state, report, np.zeros(len(POWERS)), x.sea)
 
     def _held_ends(self, x: Beside) -> Ends:

@@ -378,7 +378,9 @@ class NetworkOthers:
             observer = observer_of(scene, x, True)
             observer = observer.on(line_like(x, self._model.models[l]), x.sea.values, x.zones, x.hinges)
             observer = observer.of(names[name])
-            out[name] = Seen(scene, observer.values_of(observer.look(batch)), np.asarray(observer.s), batch.t.copy())
+            out[name] = Seen(
+                scene, observer.values_of(observer.observation(batch)), np.asarray(observer.s), batch.t.copy()
+            )
         return out
 
 

@@ -153,7 +153,7 @@ def _series_at(part: Part, bends: Bends, s: float, place: str) -> list[Series]:
         series.append(
             Series(place, s, "tension", times, found[k], f"at every output{side}" + _error(part, "tension", s, k))
         )
-    values, share = _about_main_axis(bends.at(np.array([s])).vectors)
+    values, share = _about_main_axis(bends.interpolated(np.array([s])).vectors)
     k = int(np.ptp(values, axis=0).argmax())
     side = _SIDES[k] if values.shape[1] > 1 else ""
     basis = f"about the axis it bends most about, at every output{side}; zones: " + _kinds(part, s)

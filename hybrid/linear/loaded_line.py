@@ -136,7 +136,7 @@ class LoadedLine:
         ends = [by_turn(self.line, self.x, self.x.ends, self.linear.state, k)[0] for k in (0, 1)]
         return tuple(ends)
 
-    def take(self, which: np.ndarray, q: Floats) -> None:
+    def set_motion(self, which: np.ndarray, q: Floats) -> None:
         """Keep the motion (F, N+1, 5) at some frequencies, with that of the ends that are held in it."""
         self.q[which] = q
         for k in (0, 1):

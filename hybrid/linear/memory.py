@@ -57,7 +57,7 @@ def with_layers(line: Line, state: State, sticks: bool) -> Line:
     return line._replace(slip_now=now, slip_at=NO_ADDRESS)
 
 
-def settle_layers(line: Line, ends: Ends, state: State, work: Work) -> None:
+def load_layers(line: Line, ends: Ends, state: State, work: Work) -> None:
     """How far layers slip in a first loading to a state, into its `layers`."""
     if line.slip_law.size:
         for part in (LOADED_FIRST, BEHIND_REST):

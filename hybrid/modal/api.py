@@ -86,7 +86,7 @@ class Modes:
 
 
 @dataclass(frozen=True)
-class _Found:
+class _ModesOnMesh:
     """A network on one mesh, and its modes."""
 
     network: LinearNetwork
@@ -112,7 +112,7 @@ def modes(scene: SceneLike, count: int = 10, near: float | None = None, friction
     asked = as_scene(scene)
     _check(count, near)
     count = int(count)
-    fine, coarse = (_found(asked, cells, count, near, friction) for cells in (1.0, 2.0))
+    fine, coarse = (_modes_on_mesh(asked, cells, count, near, friction) for cells in (1.0, 2.0))
     squares = fine.eigen.squares
     costly = squares > COSTS_NOTHING * max(float(np.abs(squares).max()), 1e-300)
     unstable = squares < -COSTS_NOTHING * float(np.abs(squares).max())
@@ -141,7 +141,7 @@ def _check(count: int, near: float | None) -> None:
         raise SceneError([Complaint("modes", f"{near:g}", "a period > 0, in s", "--near 8")])
 
 
-def _found(asked: Scene, cells: float, count: int, near: float | None, sticks: bool) -> _Found:
+def _modes_on_mesh(asked: Scene, cells: float, count: int, near: float | None, sticks: bool) -> _ModesOnMesh:
     """Modes on the usual mesh (cells 1), or on one whose cells are so many times as long.
 
     They are more than `count`: what nothing holds is told apart from them, such as lines that turn about their axis.
@@ -158,7 +158,7 @@ def _found(asked: Scene, cells: float, count: int, near: float | None, sticks: b
     touched = tuple(dict.fromkeys(obstacle_of(x, rest) for x in touches if x.obstacle))
     together = tuple(dict.fromkeys(name_of(x, rest) for x in touches if not x.obstacle))
     sheaves = tuple(names[k] for k in network.touching.sheaves)
-    return _Found(network, eigen, rest.points, rest.bodies, axes, touched, together, sheaves, rest.tips)
+    return _ModesOnMesh(network, eigen, rest.points, rest.bodies, axes, touched, together, sheaves, rest.tips)
 
 
 def equilibrium_of(asked: Scene, cells: float = 1.0, friction: bool = True) -> Rest:
@@ -174,7 +174,7 @@ def equilibrium_of(asked: Scene, cells: float = 1.0, friction: bool = True) -> R
 class _Shape:
     """One eigenvector, spread over lines, points and bodies."""
 
-    def __init__(self, found: _Found, k: int) -> None:
+    def __init__(self, found: _ModesOnMesh, k: int) -> None:
         network, vector = found.network, found.eigen.vectors[:, k]
         self.found, self.square = found, float(found.eigen.squares[k])
         whole = np.asarray(network.place @ vector)
@@ -288,7 +288,7 @@ def _directions(x: LinearLine, part: Floats) -> dict[str, Floats]:
 # --- how wrong it may be ------------------------------------------------------------------------
 
 
-def _places(found: _Found, k: int) -> Floats:
+def _places(found: _ModesOnMesh, k: int) -> Floats:
     """A mode at places that are the same on any mesh, scaled by the root of the moving mass.
 
     Of every line, point and body; its product with another mode is about that over the masses.
@@ -308,7 +308,7 @@ def _places(found: _Found, k: int) -> Floats:
     return np.concatenate(rows)
 
 
-def _error(fine: _Found, coarse: _Found, k: int) -> float | None:
+def _error(fine: _ModesOnMesh, coarse: _ModesOnMesh, k: int) -> float | None:
     """Error of w as a part of it, by the same mode on half the cells; None: there is none alike."""
     w = math.sqrt(fine.eigen.squares[k])
     shape = _places(fine, k)
@@ -333,7 +333,7 @@ def of_first_length(asked: Scene) -> list[str]:
     return [f"{who} paid out: all of this is of its first length, to which it does not return" for who in paid]
 
 
-def _doubts(found: _Found, unstable: int, free: list[str], chosen: np.ndarray) -> Iterator[str]:
+def _doubts(found: _ModesOnMesh, unstable: int, free: list[str], chosen: np.ndarray) -> Iterator[str]:
     """What limits the modes."""
     if found.eigen.missed is None:
         yield "modes were not counted: whether one is missing between those found is not verified"

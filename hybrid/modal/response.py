@@ -59,7 +59,7 @@ def response(scene: SceneLike, friction: bool = True, check: float | None = None
         expected = "waves, or ends that move as harmonics"
         raise SceneError([Complaint("environment.fluid.waves", "nothing that moves", expected, "add `waves`")])
     run = _Linear(rest, omegas, friction)
-    rounds = run.settle()
+    rounds = run.linearize_drag()
     lines = run.results()
     notes = [
         *of_first_length(asked),
@@ -110,7 +110,7 @@ class _Linear:
         """(q, q) of matrices (6, 6) of the bodies, which are the last of q."""
         return sparse.csc_array(sparse.block_diag([sparse.csc_array((self.first, self.first)), *blocks], format="csc"))
 
-    def settle(self) -> int:
+    def linearize_drag(self) -> int:
         """Iterate the linear drag, first by some of the frequencies; rounds that it took."""
         every = np.arange(len(self.omegas))
         some = every[len(every) % FEWER // 2 :: FEWER] if len(every) >= LEAST_FREQUENCIES * FEWER else every
@@ -153,7 +153,7 @@ class _Linear:
             self.vectors[f] = self.answer(self.omegas[f], right[:, column])
         whole = (P @ self.vectors[which].T).T
         for x, a, b in zip(self.lines, self.network.at[:-1], self.network.at[1:], strict=True):
-            x.take(which, whole[:, a:b].reshape(which.size, -1, SIZE))
+            x.set_motion(which, whole[:, a:b].reshape(which.size, -1, SIZE))
         for b, members in self.members.items():
             members.q[which] = self.vectors[which, self.first + 6 * b : self.first + 6 * b + 6]
 

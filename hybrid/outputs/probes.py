@@ -31,7 +31,7 @@ from hybrid.outputs.quantities import Quantities
 from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.stepper import POWERS
 from hybrid.store.format import Field
-from hybrid.store.records import THERE, there
+from hybrid.store.records import THERE, node_bits
 
 _S, _SX, _X, _E, _EX = ("s",), ("s", "xyz"), ("xyz",), ("edge",), ("edge", "xyz")
 # Of a line that touches nothing; where a section without torsional stiffness becomes catenary.
@@ -356,7 +356,7 @@ class Observer:
         probe = self._probes.get(name.removeprefix("right/").removeprefix(EDGE_ERRORS))
         return probe.dims if probe is not None else ()
 
-    def look_at(self, outputs: Sequence[Output]) -> tuple[Observer, JoinedObservation]:
+    def joined_observation(self, outputs: Sequence[Output]) -> tuple[Observer, JoinedObservation]:
         """Outputs of which each has a line of its own, and what makes values of them; on a line of constant length."""
         within = [x.line.s[[0, -1]] for x in outputs]  # beyond, on the reel: the values of the fairlead
         s, jumps = ([np.clip(x, *ends) for ends in within] for x in (self.s, self.jumps))
@@ -393,7 +393,7 @@ class Observer:
         """Whether criteria are among the fields."""
         return bool(self._criteria)
 
-    def look(self, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})) -> Observation:
+    def observation(self, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})) -> Observation:
         """Outputs as computed, for `values_of`; varied: arrays (nb, ...) of the line, where it is another in each."""
         return Observation(self.line, self.sea, self.grid, batch, varied)
 
@@ -429,7 +429,7 @@ class Observer:
         out |= obstacle_values(self._obstacles, batch.obstacles) | obstacle_force_values(self._touched, plain)
         if self._finest is not None:
             lines = [x.line for x in plain.outputs] if isinstance(plain, JoinedObservation) else [self.line]
-            rows = [there(self._finest, line.s) for line in lines]
+            rows = [node_bits(self._finest, line.s) for line in lines]
             out[THERE] = np.tile(np.stack(rows), (batch.t.size // len(rows), 1))
         if self._with_work:
             energy = sum((out[name] for name in out if name.startswith("energy/")), np.zeros(batch.t.size))

@@ -44,7 +44,7 @@ def restored(view: ObservedStates, out: Floats, spans: Integers, rods: NDArray[n
             continue
         rows = np.arange(spans[k, 2], spans[last, 2] + b - spans[last, 0] + 1)
         K, hn = _stiffness(view, nodes, part), view.of_line("hn", nodes)
-        whole = _whole(view, out, rows, nodes, part, K)
+        whole = _rod_curvature(view, out, rows, nodes, part, K)
         at = view.grid.side_nodes[rows] - a
         curvature = whole[at] * _of_sides(view, spans[k : last + 1], K * hn)
         bare = view.is_end[nodes] & (view.line.element[nodes] == 0)  # by the moment that is given there
@@ -94,7 +94,9 @@ def _of_sides(view: ObservedStates, spans: Integers, whole: Floats) -> Floats:
     return found
 
 
-def _whole(view: ObservedStates, out: Floats, rows: Integers, nodes: Integers, part: Floats, K: Floats) -> Floats:
+def _rod_curvature(
+    view: ObservedStates, out: Floats, rows: Integers, nodes: Integers, part: Floats, K: Floats
+) -> Floats:
     """Curvature (m, nb) of a rod at its nodes, negative where it is against the direction of its chords."""
     bend, direction = _bends(view, rows, nodes)
     element, hn = (view.line.element[nodes] != 0)[:, None], view.of_line("hn", nodes)

@@ -44,7 +44,7 @@ def strains(view: ObservedStates) -> tuple[Floats, list[tuple[EndLayer, Floats]]
     _put_layers_back(view, out, spans, rods)
     for rows, soft, curvature in whole:
         out[rows, 0] = np.where(soft, curvature, out[rows, 0])
-    return out, _take_layers_at_ends(view, out)
+    return out, _subtract_end_layers(view, out)
 
 
 def _end_rods(view: ObservedStates, out: Floats, spans: Integers) -> None:
@@ -153,7 +153,7 @@ def _put_layers_back(view: ObservedStates, out: Floats, spans: Integers, rods: N
         _add_layer(out, rows, there * parts, (directions[rows] * directions[its]).sum(axis=1))
 
 
-def _take_layers_at_ends(view: ObservedStates, out: Floats) -> list[tuple[EndLayer, Floats]]:
+def _subtract_end_layers(view: ObservedStates, out: Floats) -> list[tuple[EndLayer, Floats]]:
     """Subtract from catenaries the layer that fades from a rod, at ends without curvature.
 
     Returns the layers, and curvatures (outputs,) 1/m of the ends without them.

@@ -67,7 +67,7 @@ def _sample(run: NetworkRun, cpu: float) -> RunSample:
     (line,), (state,), solver = run.lines, run.state.lines, run.solver
     model, correction = line.model, line.correction
     batch = line.state_now(0.0, solver.lines[0].ends, state, solver.work[0])
-    seen = line.observer.look(batch)
+    seen = line.observer.observation(batch)
     shift = correction.shift(correction.corrector.sampled[:1], batch) if correction is not None else None
     values = line.observer.values_of(seen, shift=shift)
     missed = edge_errors(seen) if model.line.bits & SEABED else {}

@@ -144,7 +144,7 @@ class OutputsAside:
         """Record all, and look at them (None: nobody does): why going on would make no sense, if so."""
         aside, self.waiting = self.waiting, []
         outputs = [x for _, x in aside]
-        there, seen = observer.look_at(outputs)
+        there, seen = observer.joined_observation(outputs)
         values = there.values_of(seen)
         observer.first_energy = there.first_energy
         zones = [observer.rows_of(x.zones) for x in outputs]

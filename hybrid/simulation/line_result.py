@@ -544,7 +544,7 @@ class LineResult:
             model, first = self.model, self.observer.first_energy
             self.observer = self.observer.on(model.line, model.sea.values, model.zones, self.books.hinges)
             self.observer.first_energy = first
-        return self.observer, self.observer.look(batch), []
+        return self.observer, self.observer.observation(batch), []
 
     def judge(self, t: float | None, sharp: Sequence[float], state: State) -> None:
         """Look at a state for what its mesh does not resolve (an event) and for strain beyond what a section bears."""

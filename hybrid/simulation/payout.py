@@ -376,7 +376,7 @@ class PayingOut:
         there = observer.on_varied(line, model.sea.values, zones[0], varied["s"])
         there.first_energy = observer.first_energy
         e = self._fitting_chords(self.reel, model.line, batch.e, batch.T, varied["h"], varied["ck"])
-        return there, there.look(batch._replace(e=e, h=varied["h"], kb=varied["kb"]), varied), zones[1:]
+        return there, there.observation(batch._replace(e=e, h=varied["h"], kb=varied["kb"]), varied), zones[1:]
 
     def _lines_of(
         self, line: Line, reel: Reel, batch: Batch, moving: tuple[Zone, ...] | None = None

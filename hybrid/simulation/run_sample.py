@@ -174,7 +174,7 @@ def compared_cells(model: Model, fineness: float = 0.0, cells: float = np.inf) -
 
 
 def usual_cells(nodes: np.ndarray) -> float:
-    """The median number of cells of outputs, from the words of `store.records.there` (nt, words)."""
+    """The median number of cells of outputs, from the words of `store.records.node_bits` (nt, words)."""
     bits = np.unpackbits(np.ascontiguousarray(nodes, "<i8").view(np.uint8), axis=1)
     return float(np.median(bits.sum(axis=1))) - 1.0
 

@@ -131,7 +131,7 @@ def _add_to_arrays(contents: ArrayContents, part: Part, done: bool) -> None:
 
 def _add(file: h5py.Group, part: Part, done: bool) -> None:
     _, fields, blocks, others = part
-    _take_back(file)
+    _remove_amendments(file)
     count, named, scales = len(file["t"]), {field.name: field for field in fields}, dict[str, h5d.DatasetID]()
     with_groups = h5p.create(h5p.LINK_CREATE)
     with_groups.set_create_intermediate_group(True)
@@ -172,7 +172,7 @@ def _say_what_is_to_come(attributes: Any, done: bool, fields: Sequence[Field], e
         attributes[AMENDED] = json.dumps({"fields": [x.name for x in fields], "events": events})
 
 
-def _take_back(file: h5py.Group) -> None:
+def _remove_amendments(file: h5py.Group) -> None:
     """Remove what was added while more was to come."""
     added = json.loads(file.attrs.get(AMENDED, "{}"))
     if not added:

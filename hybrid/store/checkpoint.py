@@ -182,7 +182,7 @@ def _check_outputs(within: h5py.Group, fields: Sequence[Field], count: int) -> N
     """
     known, amiss = {field.name for field in fields}, list[str]()
 
-    def look(name: str, data: Any) -> None:
+    def check_dataset(name: str, data: Any) -> None:
         if not isinstance(data, h5py.Dataset) or not data.ndim or data.dims[0].label != "t":
             return
         if name in known and data.shape[0] < count:
@@ -190,7 +190,7 @@ def _check_outputs(within: h5py.Group, fields: Sequence[Field], count: int) -> N
         elif name not in known and not name.startswith(("errors/", f"{GROUP}/")):
             amiss.append(f"{name}, which this program does not write")
 
-    within.visititems(look)
+    within.visititems(check_dataset)
     if amiss:
         detail = f"the result has {'; '.join(amiss)}"
         raise ResultError(

@@ -323,9 +323,9 @@ def partner_of(result: StoredResult, quantity: str, t: float) -> str | None:
         return _most({x: y for x, y in _groups(result).items() if x.startswith(OBSTACLES)}, result, t)
     if quantity != "self_contact":
         return None
-    if result.whole is None:
+    if result.part_of is None:
         return ITSELF
-    whole, name = result.whole
+    whole, name = result.part_of
     mine = [x for x in _groups(whole) if x.startswith(LINES) and name in x.split("/")[1:]]
     found = _most({x: _other(x, name) for x in mine}, whole, t) if mine else _touched(whole, name, t)
     if whole.file is not None:  # in memory they are one

@@ -166,7 +166,7 @@ def bends_at(result: StoredResult, times: Window | None, at: Any) -> Floats:
     """Curvature (nt, n, 2) 1/m about two axes across the mean tangent at the places of `history_of`."""
     a, b = _window(times)
     found = bends_of(result, (result["t"] >= a) & (result["t"] <= b))
-    return (found if at is None else found.at(at)).across()
+    return (found if at is None else found.interpolated(at)).across()
 
 
 def lies_along(result: StoredResult, name: str) -> bool:
@@ -198,7 +198,7 @@ class Bends(NamedTuple):
     vectors: Floats
     tangents: Floats
 
-    def at(self, places: Floats) -> Bends:
+    def interpolated(self, places: Floats) -> Bends:
         """The same at arc lengths (m), those where curvature jumps twice; between output points linear."""
         s, vectors, tangents = [], [], []
         for x in np.atleast_1d(np.asarray(places, float)).tolist():

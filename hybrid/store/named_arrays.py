@@ -78,7 +78,7 @@ def unpack(data: bytes) -> Tree:
         raise ValueError("its digest is another: it was cut off, or has changed")
     split = 16 + int.from_bytes(body[8:16], "little")
     try:
-        found = _whole(json.loads(body[16:split]), memoryview(body)[split:])
+        found = _with_arrays(json.loads(body[16:split]), memoryview(body)[split:])
     except RecursionError as error:
         raise ValueError(str(error)) from None
     if not isinstance(found, dict):
@@ -86,14 +86,14 @@ def unpack(data: bytes) -> Tree:
     return found
 
 
-def _whole(x: Any, arrays: memoryview) -> Any:
+def _with_arrays(x: Any, arrays: memoryview) -> Any:
     """What JSON has read, with its arrays."""
     if isinstance(x, list):
-        return [_whole(value, arrays) for value in x]
+        return [_with_arrays(value, arrays) for value in x]
     if isinstance(x, dict):
         if x.keys() == {ARRAY}:
             return _array(x[ARRAY], arrays)
-        return {name: _whole(value, arrays) for name, value in x.items()}
+        return {name: _with_arrays(value, arrays) for name, value in x.items()}
     if isinstance(x, int) and x.bit_length() > 63:
         raise ValueError("a number has more than 64 bits")
     return x

@@ -73,7 +73,7 @@ class Mesh(NamedTuple):
 THERE = "mesh/there"  # the field of a line whose cells follow the curvature
 
 
-def there(s: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+def node_bits(s: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Bits in words of 64 for places s (K,) m, rising: those that are nodes (N+1,) m.
 
     All nodes are among them, but for those that move with the winch of a line that is paid out.
@@ -115,24 +115,24 @@ class Attributes(dict[str, Any]):
         raise KeyError(name)
 
 
-class Looked(Mapping[str, Any]):
+class OnRequest(Mapping[str, Any]):
     """What datasets say of themselves, by name, looked up when it is asked for, once, while the file is open."""
 
     def __init__(
-        self, data: Mapping[str, Any], look: Callable[[Any], Any], aliases: Mapping[str, str] | None = None
+        self, data: Mapping[str, Any], read: Callable[[Any], Any], aliases: Mapping[str, str] | None = None
     ) -> None:
         """data: by name, of HDF5's own interface; aliases: other names of some of them."""
-        self._data, self._look, self._found = data, look, dict[str, Any]()
+        self._data, self._read, self._known = data, read, dict[str, Any]()
         self._aliases = {alias: name for alias, name in (aliases or {}).items() if name in data}
 
     def __getitem__(self, name: str) -> Any:
         name = self._aliases.get(name, name)
-        if name not in self._found:
+        if name not in self._known:
             data = self._data[name]
             if not data.valid:
                 raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
-            self._found[name] = self._look(data)
-        return self._found[name]
+            self._known[name] = self._read(data)
+        return self._known[name]
 
     def __contains__(self, name: object) -> bool:
         return name in self._data or name in self._aliases
@@ -174,8 +174,7 @@ class MeshHistory(Sequence[Mesh]):
     def __init__(self, s: np.ndarray, always: np.ndarray, zones: ZoneHistory, words: np.ndarray | None = None) -> None:
         """Which of the nodes s (K,) m there are at every output.
 
-        always: (K,) those outside of rods as well; words: the nodes of every output, as bits of `bits_of`; None: all in
-        rods.
+        always: (K,) those outside of rods as well; words: the nodes of every output, of `node_bits`; None: all in rods.
         """
         self._s, self._always, self._zones, self._words = s, always.astype(bool), zones, words
 

@@ -52,8 +52,8 @@ from hybrid.store.records import (
     THERE,
     Attributes,
     Event,
-    Looked,
     MeshHistory,
+    OnRequest,
     UnknownName,
     Zone,
     ZoneHistory,
@@ -121,17 +121,17 @@ class StoredResult:
             self._contents = FileContents(source, summed, self._line)
         try:
             with readable(source):
-                self._look()
+                self._read_contents()
         except BaseException:
             self._contents.close()
             raise
 
-    def _look(self) -> None:
+    def _read_contents(self) -> None:
         contents = self._contents
         self._cache: dict[str, np.ndarray] = {}
         data = contents.data
         self.names, self._groups = tuple(data), contents.groups
-        self._dims, self.units = Looked(data, contents.dims_of), Looked(data, contents.units_of, ALIASES)
+        self._dims, self.units = OnRequest(data, contents.dims_of), OnRequest(data, contents.units_of, ALIASES)
         # Taken once, so that everything read later shows the same moment of a file that grows.
         # t first: the zones of an output are complete before its time is.
         self._rows = {n: contents.length(n) for n in sorted(contents.scales(), key=lambda n: n != "t")}
@@ -329,8 +329,8 @@ class StoredResult:
         return self._line
 
     @property
-    def whole(self) -> tuple[Self, str] | None:
-        """Of a line of several the result of all of them, opened anew, and its name there; None: it is no part."""
+    def part_of(self) -> tuple[Self, str] | None:
+        """The result of all lines, opened anew, and this one's name there; None: it is not a line of several."""
         return (type(self)(self._source), self._line) if self._line else None
 
     @property

@@ -217,7 +217,7 @@ class TradeTable(_Renamed):
             cells = [row.name, status]
             for name, unit in (("position", "m"), ("end_force", "N")):
                 cells += self._error(row, name, unit)
-            cells += [_whole(row.cells), _whole(row.steps), _whole(row.runs), _unit(row.cpu, "s"), mark]
+            cells += [_count(row.cells), _count(row.steps), _count(row.runs), _unit(row.cpu, "s"), mark]
             lines.append("| " + " | ".join(_cell(x) for x in cells) + " |")
         return lines
 
@@ -233,7 +233,7 @@ class TradeTable(_Renamed):
     def _converged(self) -> str:
         """How right the reference is."""
         row, check = self.reference, self.check
-        text = f"Reference: {row.name}, {_whole(row.cells)} cells, {_whole(row.steps)} steps"
+        text = f"Reference: {row.name}, {_count(row.cells)} cells, {_count(row.steps)} steps"
         own = [_unit(x, u) for x, u in ((row.estimate_position, "m"), (row.estimate_end_force, "N")) if x is not None]
         text += f"; its own error estimate is {' and '.join(own)}" if own else "; it has no error estimate"
         if check is not None and check.position is not None:
@@ -279,7 +279,7 @@ def _unit(value: float | None, unit: str) -> str:
     return "" if value is None else f"{value:.3g} {unit}"
 
 
-def _whole(value: int | None) -> str:
+def _count(value: int | None) -> str:
     return "" if value is None else str(value)
 
 

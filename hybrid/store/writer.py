@@ -148,13 +148,13 @@ class Recorder(BaseRecorder):
             return
         file = make()
         if parts:
-            add_parts(file, {name: part._take_image for name, part in parts.items()})
+            add_parts(file, {name: part._pop_image for name, part in parts.items()})
         if path is not None:
             file = created(path, image_of(file), many=bool(parts))
             if parts:
                 hold_metadata(file)
         self._write_to(file, path, tables_of(fields, step_fields))
-        self._take(parts or {})
+        self._move_parts(parts or {})
 
     @classmethod
     def again(
@@ -205,11 +205,11 @@ class Recorder(BaseRecorder):
         if parts:
             hold_metadata(file)
         self._write_to(file, path, tables)
-        self._go_on(at.rows, at.happened)
+        self._resume_after(at.rows, at.happened)
         self._zones, self._number = list(at.zones), at.number + 1
-        self._take(parts or {})
+        self._move_parts(parts or {})
         for name, part in self._parts.items():
-            part._go_on(of_part(name, at.rows), of_part(name, at.happened))
+            part._resume_after(of_part(name, at.rows), of_part(name, at.happened))
         return self
 
     def _write_to(self, file: h5py.File | None, path: Path | None, tables: Mapping[str, Sequence[Field]]) -> None:
@@ -227,7 +227,7 @@ class Recorder(BaseRecorder):
         self._flushed, self._pause = -np.inf, pause(0.0)  # when the file was last written; how long that holds, s
         self.closed = self._broken = False
 
-    def _go_on(self, rows: Mapping[str, int], happened: Mapping[str, int]) -> None:
+    def _resume_after(self, rows: Mapping[str, int], happened: Mapping[str, int]) -> None:
         """Behind rows that are there; happened: events by kind."""
         for table in self._all:
             table.drop()
@@ -239,7 +239,7 @@ class Recorder(BaseRecorder):
         kinds = [plain_text(x) for x in zones["kind"][:][last]]
         self._zones = list(zip(kinds, zones["s_a"][:][last].tolist(), zones["s_b"][:][last].tolist(), strict=True))
 
-    def _take(self, parts: Mapping[str, Recorder]) -> None:
+    def _move_parts(self, parts: Mapping[str, Recorder]) -> None:
         """Write results that were begun in memory into groups of this file."""
         self._parts = dict(parts)
         for name, part in parts.items():
@@ -261,7 +261,7 @@ class Recorder(BaseRecorder):
         self._leave()
         self._image = image_of(self._file)
 
-    def _take_image(self) -> bytes:
+    def _pop_image(self) -> bytes:
         """The bytes of a result that was laid by; they are kept no longer."""
         image, self._image = self._image, b""
         return image

@@ -54,7 +54,7 @@ def compute_open_batches(
     """
     begin = clock.perf_counter()
 
-    def tell(dashboard: str) -> None:
+    def report(dashboard: str) -> None:
         if progress is not None:
             now = counts_of(file.status)
             progress(StudyRunning(file.cases, now["done"], now["failed"], clock.perf_counter() - begin, dashboard))
@@ -65,8 +65,8 @@ def compute_open_batches(
 
     with client_of(workers, scheduler) as client:
         dashboard = str(getattr(client, "dashboard_link", "") or "")
-        tell(dashboard)
-        batches = _Batches(client, file, job_of, lambda: tell(dashboard))
+        report(dashboard)
+        batches = _Batches(client, file, job_of, lambda: report(dashboard))
         try:
             batches.compute(file.open_batches())
         except (OSError, TimeoutError, CancelledError) as error:  # distributed's errors of a lost connection are these

@@ -196,7 +196,7 @@ class RunStore:
                 what = spec.name + (f", {k + 1} of {spec.times}" if spec.times > 1 else "")
                 self.report(what, 0.0)
                 begin = clock.process_time()
-                result = run(scene, progress=self._follow(what))
+                result = run(scene, progress=self._reporter(what))
                 spent.append(clock.process_time() - begin)
         except ComputationError as error:
             if required:
@@ -213,11 +213,11 @@ class RunStore:
         self.computed += 1
         return self.save(row, values)
 
-    def _follow(self, what: str) -> Callable[[Progress], None]:
-        def follow(progress: Progress) -> None:
+    def _reporter(self, what: str) -> Callable[[Progress], None]:
+        def report_fraction(progress: Progress) -> None:
             self.report(what, progress.fraction)
 
-        return follow
+        return report_fraction
 
     def _warm_up(self, spec: RunSpec, scene: LineScene) -> None:
         """Compile and load the kernels of a model; the result of this run is not used."""

@@ -179,12 +179,12 @@ def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monk
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*sets, friction] if friction else sets)
     together = []
 
-    def look_at(observer, outputs):
+    def joined_observation(observer, outputs):
         together.append({output.line.s.size for output in outputs})
-        return looks(observer, outputs)
+        return of_observer(observer, outputs)
 
-    looks = Observer.look_at
-    monkeypatch.setattr(Observer, "look_at", look_at)
+    of_observer = Observer.joined_observation
+    monkeypatch.setattr(Observer, "joined_observation", joined_observation)
     once = hybrid.run(scene)
     assert max(map(len, together)) > 3 and len(together) < 0.1 * once.t.size
     anew = hybrid.run(scene)

@@ -21,7 +21,7 @@ from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, no_sea
 from hybrid.model.resolution import wants_survey
 from hybrid.simulation.run_sample import compared_cells, usual_cells
-from hybrid.store.records import MeshHistory, ZoneHistory, there
+from hybrid.store.records import MeshHistory, ZoneHistory, node_bits
 from hybrid.store.records import Zone as ZoneRow
 
 
@@ -82,7 +82,7 @@ def test_runs_are_compared_by_their_fineness() -> None:
     assert compared_cells(model, 1.5, 22.0) < coarse
     assert compared_cells(model) == 20
     s = np.linspace(0.0, 1.0, 101)
-    words = np.array([there(s, s[::k]) for k in (1, 10, 50)])
+    words = np.array([node_bits(s, s[::k]) for k in (1, 10, 50)])
     assert usual_cells(words) == 10
 
 
@@ -142,7 +142,7 @@ SCENE = {
 def test_mesh_of_a_result_has_the_nodes_of_catenaries_too() -> None:
     """Cells of catenaries follow as those of rods do."""
     s = np.linspace(0.0, 4.0, 9)
-    words = np.array([there(s, s[[0, 1, 4, 6, 8]])])
+    words = np.array([node_bits(s, s[[0, 1, 4, 6, 8]])])
     zones = ZoneHistory(np.array([0, 0]), [ZoneRow("rod", 0.0, 2.0), ZoneRow("catenary", 2.0, 4.0)], 1)
     (mesh,) = MeshHistory(s, np.isin(s, (0.0, 2.0, 4.0)), zones, words)
     assert mesh.s.tolist() == [0.0, 0.5, 2.0, 3.0, 4.0]

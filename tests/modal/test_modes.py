@@ -13,7 +13,7 @@ import hybrid
 from hybrid.cli.commands import app
 from hybrid.linear.eigen import _every, _nearest
 from hybrid.linear.matrices import linear_network
-from hybrid.modal.api import _found, equilibrium_of
+from hybrid.modal.api import _modes_on_mesh, equilibrium_of
 from hybrid.scene.read import as_scene
 
 G = 9.81
@@ -114,7 +114,7 @@ def test_no_mode_of_a_cantilever_without_tension_is_missing(more):
     exact = np.array([1.875104, 4.694091]).repeat(2) ** 2 / 25.0 * math.sqrt(2000.0 / 3.0)
     np.testing.assert_allclose(omega(found), exact, rtol=1e-3)
     assert found.notes == ()
-    assert _found(made, 1.0, 4, None, True).eigen.missed == 0
+    assert _modes_on_mesh(made, 1.0, 4, None, True).eigen.missed == 0
 
 
 def test_twist_of_a_rod():
@@ -383,7 +383,7 @@ def test_the_command(tmp_path, monkeypatch):
     told = CliRunner().invoke(app, ["modes", "sag.yaml", "--count", "2", "--json"])
     (line,) = [x for x in map(json.loads, told.output.splitlines()) if x.get("event", x.get("kind")) == "modes"]
     assert [round(x["period"], 3) for x in line["modes"]] == [2.0, 1.257]
-    assert _found(sag(40), 1.0, 2, None, True).eigen.missed == 0
+    assert _modes_on_mesh(sag(40), 1.0, 2, None, True).eigen.missed == 0
 
 
 def test_a_line_that_is_paid_out_has_those_of_its_first_length():

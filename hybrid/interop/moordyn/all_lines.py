@@ -159,7 +159,7 @@ class _SceneMaker(Tables):
         name = f"body{body.id}" if body is not None else f"{kind}{id}{letter}"
         if name not in self.points:
             self.points[name] = ({}, row)  # in the order of the lines
-            self.points[name] = (self._body_point(body) if body is not None else self._at(end, name, row), row)
+            self.points[name] = (self._body_point(body) if body is not None else self._deck_point(end, name, row), row)
         if bends and kind == "rod" and self._clamp(end, True) is not None:
             why = "the rod holds the direction of a line that bends, which is clamped there and spins freely"
             self.notes.append(note(TAKEN, row, why))
@@ -179,7 +179,7 @@ class _SceneMaker(Tables):
         size = math.hypot(*out) * (1.0 if (letter == "A") != starts else -1.0)
         return (out[0] / size, out[1] / size, out[2] / size) if size else None
 
-    def _at(self, end: tuple[str, int, str], name: str, row: Row) -> dict[str, Any]:
+    def _deck_point(self, end: tuple[str, int, str], name: str, row: Row) -> dict[str, Any]:
         kind, id, _ = end
         thing = self.deck.points[id] if kind == "point" else self.deck.rods[id]
         if isinstance(thing, Point) and thing.kind == "free":

@@ -357,7 +357,7 @@ def _point(source: Source, row: Row, notes: list[Note]) -> Point | None:
         notes.append(note(TAKEN, row, why, "shift ends.end.position, if the platform is elsewhere"))
     area, added = (source.number(row, c, n, least=0.0) for c, n in zip(cells[-2:], ("CdA (m^2)", "Ca"), strict=True))
     place = _triple(source, row, cells[2:5], "X Y Z")
-    return Point(source.whole(row, cells[0], "ID", 1), row, kind, on, place, mass, volume, area, added, force)
+    return Point(source.integer(row, cells[0], "ID", 1), row, kind, on, place, mass, volume, area, added, force)
 
 
 def _body(source: Source, row: Row, notes: list[Note]) -> Body | None:
@@ -368,7 +368,7 @@ def _body(source: Source, row: Row, notes: list[Note]) -> Body | None:
         source, row, row.cells[1], ("fixed", "coupled", "free", "pinned", "coupled pinned", "turbine")
     )
     place, angles = (_triple(source, row, row.cells[i : i + 3], n) for i, n in ((2, "X0 Y0 Z0"), (5, "r0 p0 y0")))
-    return Body(source.whole(row, row.cells[0], "ID", 1), row, kind, place, angles, row.cells[8:14])
+    return Body(source.integer(row, row.cells[0], "ID", 1), row, kind, place, angles, row.cells[8:14])
 
 
 def _rod(source: Source, row: Row, notes: list[Note]) -> Rod | None:
@@ -378,8 +378,8 @@ def _rod(source: Source, row: Row, notes: list[Note]) -> Rod | None:
     kinds = ("fixed", "coupled", "free", "pinned", "coupled pinned", "body", "turbine")
     kind, on = _attachment(source, row, row.cells[2], kinds)
     a, b = (_triple(source, row, row.cells[i : i + 3], n) for i, n in ((3, "Xa Ya Za"), (6, "Xb Yb Zb")))
-    segments = source.whole(row, row.cells[9], "NumSegs", 0)
-    return Rod(source.whole(row, row.cells[0], "ID", 1), row, kind, on, a, b, segments)
+    segments = source.integer(row, row.cells[9], "NumSegs", 0)
+    return Rod(source.integer(row, row.cells[0], "ID", 1), row, kind, on, a, b, segments)
 
 
 # --- lines -------------------------------------------------------------------------------------
@@ -406,8 +406,8 @@ def _line(source: Source, row: Row, notes: list[Note]) -> Line | None:
         why = "output flags of a line; hybrid keeps position, velocity, tension along the whole cable"
         instead = "output.points and output.every say where and how often"
         notes.append(Note(NOT_NEEDED, row.line, f"output flags {cells[6]} of line {cells[0]}", why, instead))
-    count = source.whole(row, segments, "NumSegs", 1)
-    return Line(source.whole(row, cells[0], "ID", 1), row, cells[1], (ends[0], ends[1]), unstretched, count)
+    count = source.integer(row, segments, "NumSegs", 1)
+    return Line(source.integer(row, cells[0], "ID", 1), row, cells[1], (ends[0], ends[1]), unstretched, count)
 
 
 def _end(source: Source, row: Row, cell: str) -> tuple[str, int, str]:
@@ -432,14 +432,14 @@ def _hold_together(source: Source, deck: Deck) -> None:
             expected = f"a name of LINE TYPES: {', '.join(names)}"
             source.complain("line type", line.type, expected, did_you_mean(line.type, names), line.row.line)
         for kind, id, _ in line.ends:
-            _there(source, line.row, kind, id, count[kind])
+            _check_number(source, line.row, kind, id, count[kind])
     things: list[Point | Rod] = [*deck.points.values(), *deck.rods.values()]
     for thing in things:
         if thing.kind.startswith("body"):
-            _there(source, thing.row, "body", thing.on, count["body"])
+            _check_number(source, thing.row, "body", thing.on, count["body"])
 
 
-def _there(source: Source, row: Row, kind: str, id: int, count: int) -> None:
+def _check_number(source: Source, row: Row, kind: str, id: int, count: int) -> None:
     if not 1 <= id <= count:
         expected = f"a {kind} that is there: " + (f"1 to {count}" if count else "there is none")
         fix = "check the columns of this row" if count else f"add its section, {TITLES[_PLURAL[kind]][0]}"

@@ -143,7 +143,7 @@ class Source:
             return math.nan
         return value
 
-    def whole(self, row: Row, cell: str, what: str, least: int) -> int:
+    def integer(self, row: Row, cell: str, what: str, least: int) -> int:
         """A cell as a whole number, not below `least`; `least` after a complaint."""
         if cell.isascii() and cell.isdigit() and len(cell) < 9 and int(cell) >= least:
             return int(cell)

@@ -112,7 +112,7 @@ def pasts_of(source: Source, syrope: set[int], notes: list[Note]) -> dict[int, P
         highest = source.number(row, top, "Tmax (N)", above=0.0)
         past = Past(row, highest, source.number(row, mean, "Tmean (N)", least=0.0))
         for cell in filter(None, re.split(r"[\s,]+", " ".join(ids))):
-            id = source.whole(row, cell, "ID of a line", 1)
+            id = source.integer(row, cell, "ID of a line", 1)
             found[id] = past
             if id not in syrope:
                 notes.append(note(LEFT_OUT, row, f"line {id} is not of a line type with EA = {WORD}..."))

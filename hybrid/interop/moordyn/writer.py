@@ -80,7 +80,7 @@ class _Shape:
     places: Sequence[Sequence[float]]
     nodes: Sequence[float]
 
-    def at(self, s: float) -> Triple:
+    def place_at(self, s: float) -> Triple:
         k = max(i for i in range(len(self.s)) if i == 0 or self.s[i] <= s)
         k = min(k, len(self.s) - 2)
         part = (s - self.s[k]) / (self.s[k + 1] - self.s[k])
@@ -251,7 +251,7 @@ class _Writer:
         if point.kind == "fixed":
             shape = self.shapes[name]
             kind = "Coupled" if point.motion is not None else "Fixed"
-            a = self._moved(shape.at(0.0 if end == "start" else shape.s[-1]))
+            a = self._moved(shape.place_at(0.0 if end == "start" else shape.s[-1]))
         else:
             kind, a = f"Body{1 + list(self.bodies).index(point.body)}", point.place
         return self._rod(kind, a, held.tangent, end)
@@ -275,11 +275,11 @@ class _Writer:
             ahead = behind = ends[1]
             if b != cuts[-1]:
                 both = cable.sections[i], cable.sections[_section_at(bounds, b)]
-                ahead, behind = self._joint(shape.at(b), hung.get(b), both, where)
+                ahead, behind = self._joint(shape.place_at(b), hung.get(b), both, where)
             cells = shape.cells(a, b)
             self._step(cable.sections[i], (b - a) / cells)
             width = cable.sections[i].diameter or NO_DIAMETER
-            self.widths.append((width, min(shape.at(a)[2], shape.at(b)[2])))
+            self.widths.append((width, min(shape.place_at(a)[2], shape.place_at(b)[2])))
             self.lines.append(f"{kinds[i]} {at} {ahead} {_number(b - a)} {cells}")
             at = behind
 
@@ -411,9 +411,9 @@ class _Writer:
             self.notes.append(f"points.{name}.break_at is left out")
         if point.kind == "fixed":
             kind = "Coupled" if point.motion is not None else "Fixed"
-            made = self._point(kind, shape.at(0.0 if end == "start" else shape.s[-1]), _Lump())
+            made = self._point(kind, shape.place_at(0.0 if end == "start" else shape.s[-1]), _Lump())
         elif point.kind == "free":
-            made = self._loose(f"points.{name}", point.end, shape.at(0.0 if end == "start" else shape.s[-1]))
+            made = self._loose(f"points.{name}", point.end, shape.place_at(0.0 if end == "start" else shape.s[-1]))
         else:
             row = (*point.place, 0.0, 0.0, 0.0, 0.0)
             self.points.append(f"Body{1 + list(self.bodies).index(point.body)} {' '.join(map(_number, row))}")
@@ -433,7 +433,7 @@ class _Writer:
 
     def _end(self, name: str) -> str:
         end, shape = getattr(self.scene.ends, name), self.shapes[""]
-        place = shape.at(0.0 if name == "start" else shape.s[-1])
+        place = shape.place_at(0.0 if name == "start" else shape.s[-1])
         kind = "Coupled" if end.prescribed_motion is not None else "Fixed"
         if end.release is not None:
             self.notes.append(f"ends.{name}.release_at is left out")
