@@ -245,9 +245,9 @@ BROKEN = {
     "docstring whose first line is no whole sentence": 186,
     "name from the list of banned words": 174,
     "more than two constants in a line": 125,
-    "constructor above 40 lines": 11,
-    "function above 60 lines": 23,
-    "fmt: skip": 487,
+    "constructor above 40 lines": 8,
+    "function above 60 lines": 20,
+    "fmt: skip": 484,
 }
 # Words that do not say what a thing is or does; the second ones only where they are the whole name.
 BANNED = {"calm", "follow", "found", "haste", "its", "look", "looks", "loudest", "pace", "patience", "said",

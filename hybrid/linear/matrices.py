@@ -360,9 +360,46 @@ def linear_network(
     of_lines -= 3 * sum(j >= 0 for joined in solver.lines for j in joined.joints)
     own = of_lines + len(parts.sheaves)
     size = own + 3 * points + 6 * bodies
-    entries, column = _Entries(), 0
-    extra: list[tuple[int, Floats]] = []  # body, its stiffness by the forces and frames of ends
-    coupling: list[tuple[int, int, Floats]] = []  # line, body, (3, unknowns of the line) by turns of its frame
+    place, extra, coupling = _joined(lines, solver, states, parts.forces, at, (of_lines, own, size))
+    ones = sparse.eye_array(size, format="csr")
+    whole = sparse.csr_array(sparse.vstack([place, ones[own + 3 * points :], ones[of_lines:own]], format="csr"))
+    A = sparse.block_diag([x.stiffness for x in lines], format="csr")
+    M = sparse.block_diag([x.mass for x in lines], format="csr")
+    standing = sparse.block_diag([x.standing for x in lines], format="csr")
+    bodies_alone = _masses(solver, states, own + 3 * points, size)
+    bodies_alone = bodies_alone + whole.T @ parts.mass @ whole
+    M, apart = (sparse.csr_array(place.T @ each @ place) + bodies_alone for each in (M, standing))
+    A = sparse.csr_array(place.T @ A @ place) + _couplings(coupling, at, place, own + 3 * points)
+    A = A + whole.T @ parts.stiffness @ whole
+    A = A + _of_bodies(solver, states, extra, own + 3 * points, size)
+    pull = max(float(np.abs(x.state.T).max()) for x in lines)
+    layers = sparse.csr_array(place.T @ sparse.block_diag([x.by_layers for x in lines], format="csr") @ place)
+    slow = solver.anchor / STATIC_ANCHOR * max(pull / solver.scale, 1.0)
+    return LinearNetwork(
+        lines, at, place, sparse.csc_array(0.5 * (A + A.T)), sparse.csc_array(0.5 * (A - A.T) + layers),
+        sparse.csc_array(0.5 * (M + M.T)), apart, points, bodies, slow,
+        np.asarray(place.T @ _lent(lines, solver)), parts, whole,
+    )  # fmt: skip
+
+
+def _joined(
+    lines: Sequence[LinearLine],
+    solver: NetworkSolver,
+    states: NetworkState,
+    forces: Floats,
+    at: np.ndarray,
+    sizes: tuple[int, int, int],
+) -> tuple[sparse.csr_array, list[tuple[int, Floats]], list[tuple[int, int, Floats]]]:
+    """Unknowns of all lines (rows) by those of the network (columns), whose points and bodies ends share.
+
+    forces: of contact at nodes of all lines, N; at: rows where lines begin; sizes: unknowns of lines, these and those
+    of sheaves, all.  Also of ends on bodies: body, its stiffness by their forces and frames; line, body, (3, unknowns
+    of the line) by turns of the frame.
+    """
+    of_lines, own, size = sizes
+    points, entries, column = len(solver.net), _Entries(), 0
+    extra: list[tuple[int, Floats]] = []
+    coupling: list[tuple[int, int, Floats]] = []
     for l, (x, joined) in enumerate(zip(lines, solver.lines, strict=True)):
         count = x.free.size // SIZE
         free = x.free.reshape(count, SIZE).copy()
@@ -383,7 +420,7 @@ def linear_network(
                 entries.add(rows[c], first + c, 1.0)
                 for d in range(3):
                     entries.add(rows[c], first + 3 + d, shifted[c, d])
-            f = x.net[k] + parts.forces[(at[l] if k == 0 else at[l + 1] - SIZE) // SIZE]
+            f = x.net[k] + forces[(at[l] if k == 0 else at[l + 1] - SIZE) // SIZE]
             extra.append((b, x.held_moment[k] - _hat(f) @ _hat(arm)))
             if x.turned[k].any():
                 coupling.append((l, b, x.turned[k]))
@@ -391,26 +428,7 @@ def linear_network(
         entries.add(own_rows, np.arange(column, column + own_rows.size), np.ones(own_rows.size))
         column += own_rows.size
     assert column == of_lines, (column, of_lines)
-    place = entries.matrix(int(at[-1]), size)
-    ones = sparse.eye_array(size, format="csr")
-    whole = sparse.csr_array(sparse.vstack([place, ones[own + 3 * points :], ones[of_lines:own]], format="csr"))
-    A = sparse.block_diag([x.stiffness for x in lines], format="csr")
-    M = sparse.block_diag([x.mass for x in lines], format="csr")
-    standing = sparse.block_diag([x.standing for x in lines], format="csr")
-    bodies_alone = _masses(solver, states, own + 3 * points, size)
-    bodies_alone = bodies_alone + whole.T @ parts.mass @ whole
-    M, apart = (sparse.csr_array(place.T @ each @ place) + bodies_alone for each in (M, standing))
-    A = sparse.csr_array(place.T @ A @ place) + _couplings(coupling, at, place, own + 3 * points)
-    A = A + whole.T @ parts.stiffness @ whole
-    A = A + _of_bodies(solver, states, extra, own + 3 * points, size)
-    pull = max(float(np.abs(x.state.T).max()) for x in lines)
-    layers = sparse.csr_array(place.T @ sparse.block_diag([x.by_layers for x in lines], format="csr") @ place)
-    slow = solver.anchor / STATIC_ANCHOR * max(pull / solver.scale, 1.0)
-    return LinearNetwork(
-        lines, at, place, sparse.csc_array(0.5 * (A + A.T)), sparse.csc_array(0.5 * (A - A.T) + layers),
-        sparse.csc_array(0.5 * (M + M.T)), apart, points, bodies, slow,
-        np.asarray(place.T @ _lent(lines, solver)), parts, whole,
-    )  # fmt: skip
+    return entries.matrix(int(at[-1]), size), extra, coupling
 
 
 def _lent(lines: Sequence[LinearLine], solver: NetworkSolver) -> Floats:

@@ -214,6 +214,26 @@ class Features(NamedTuple):
     obstacles: Sequence[str] = ()
 
 
+def _parts_of(line: Line, zones: Sequence[Zone], features: Features, recorded: Recorded) -> set[str]:
+    """What a line has, or may have, that probes need."""
+    out = {"torsion"} if line.torsion.size and not line.bits & PLANAR else set()
+    out |= (features.kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
+    out |= {"link"} if holds_twist(line) and not line.bits & PLANAR else set()
+    out |= {"payout"} if features.payout else set()
+    out |= {"obstacles"} if line.bits & OBSTACLES else set()
+    return out | ({"self_contact"} if line.bits & (SELF_CONTACT | (MAY_TOUCH | MAY_MEET) * recorded.work) else set())
+
+
+def _probes_of(parts: set[str], recorded: Recorded) -> dict[str, Probe]:
+    """Probes of what a line has and a run records, by name."""
+    found = {
+        name: p
+        for name, p in PROBES.items()
+        if (not p.needs or parts.intersection(p.needs.split())) and (recorded.only is None or name in recorded.only)
+    }
+    return found | (recorded.quantities.probes() if recorded.quantities is not None else {})
+
+
 class Observer:
     """Fields and values for one run: what its line has, on its output grid."""
 
@@ -227,85 +247,69 @@ class Observer:
         recorded: Recorded,
     ) -> None:
         s, jumps = points
-        loads, finest, only, criteria = features.loads, features.finest, recorded.only, recorded.criteria
-        self._finest = finest
+        self._finest = features.finest
         self._hinges = features.hinges.copy()
-        self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(features.changes)
+        self._cuts, self._changes = tuple(sorted({*features.loads, *jumps})), tuple(features.changes)
         near = NEAR * line.s[-1]
-        self._unloaded = tuple(x for x in jumps if all(abs(x - y) > near for y in loads))
+        self._unloaded = tuple(x for x in jumps if all(abs(x - y) > near for y in features.loads))
         self.jumps = np.array(jumps, float)
         self._place(line, sea, zones, s)
-        has = {"torsion"} if line.torsion.size and not line.bits & PLANAR else set()
-        has |= (features.kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
-        has |= {"link"} if holds_twist(line) and not line.bits & PLANAR else set()
-        has |= {"payout"} if features.payout else set()
-        has |= {"obstacles"} if line.bits & OBSTACLES else set()
-        has |= {"self_contact"} if line.bits & (SELF_CONTACT | (MAY_TOUCH | MAY_MEET) * recorded.work) else set()
-        self._probes = {
-            name: p
-            for name, p in PROBES.items()
-            if (not p.needs or has.intersection(p.needs.split())) and (only is None or name in only)
-        }
         self._touched = tuple(features.obstacles)
         self._obstacles = self._touched if line.moved.size else ()
-        self.quantities = recorded.quantities
-        may_be_nan: tuple[str, ...] = MAY_BE_NAN
-        if self.quantities is not None:
-            self._probes |= self.quantities.probes()
-            may_be_nan += tuple(self.quantities.wanted)
-        self._errors = recorded.errors
-        self._edges = tuple(x for x in MISSED if recorded.edges and x in self._probes)
+        self._with_work, self._errors, self.quantities = recorded.work, recorded.errors, recorded.quantities
         self.first_energy: float | None = None  # J, at the first output
-        self._with_work = recorded.work
-        sizes = {"s": s.size, "xyz": 3, "edge": 2}
-        fields = [
+        self.gauges = np.array(recorded.gauges, float).reshape(-1, 2)
+        self._probes = _probes_of(_parts_of(line, zones, features, recorded), recorded)
+        self._edges = tuple(x for x in MISSED if recorded.edges and x in self._probes)
+        self._criteria = [f"criteria/{name}" for name, _ in recorded.criteria]
+        only = recorded.only
+        right = [x for x in self._probes if x in SIDED and (only is None or f"right/{x}" in only)]
+        self._right = right if self.jumps.size else []
+        fields = self._fields_of_probes()
+        fields += self._after_jumps(fields, {name: f"right/{name}" for name in self._right})
+        fields += [Field(f"work/{x}", "J", WORK[x]) for x in works_of(line) if recorded.work]
+        fields += [
+            Field(name, "", f"largest since the last output: {text}", (s.size,), _S)
+            for name, (_, text) in zip(self._criteria, recorded.criteria, strict=True)
+        ]
+        self.fields = (*fields, *self._fields_of_errors(), *self._fields_beside_the_line())
+
+    def _fields_of_probes(self) -> list[Field]:
+        sizes = {"s": self.s.size, "xyz": 3, "edge": 2}
+        may_be_nan = {*MAY_BE_NAN, *(self.quantities.wanted if self.quantities is not None else ())}
+        return [
             Field(name, p.unit, p.description, tuple(sizes[x] for x in p.dims), p.dims, p.frame, name in may_be_nan)
             for name, p in self._probes.items()
         ]
-        right = [f for f in fields if f.name in SIDED and (only is None or f"right/{f.name}" in only)]
-        right = right if self.jumps.size else []
-        fields += [
-            replace(f, name=f"right/{f.name}", shape=self.jumps.shape, dims=("right/s",),
-                    description=f"{f.description}, just after the point") for f in right
-        ]  # fmt: skip
-        self._right = [f.name for f in right]
-        if recorded.work:
-            fields += [Field(f"work/{x}", "J", WORK[x]) for x in works_of(line)]
-        self._criteria = [f"criteria/{name}" for name, _ in criteria]
-        fields += [
-            Field(name, "", f"largest since the last output: {text}", (s.size,), _S)
-            for name, (_, text) in zip(self._criteria, criteria, strict=True)
+
+    def _after_jumps(self, fields: Sequence[Field], names: Mapping[str, str]) -> list[Field]:
+        """Values just after places where fields jump; names: of these, by that of the field."""
+        found = [f for f in fields if f.name in names]
+        words = [f"{f.description}, just after the point" for f in found]
+        return [
+            replace(f, name=names[f.name], shape=self.jumps.shape, dims=("right/s",), description=text)
+            for f, text in zip(found, words, strict=True)
         ]
-        if recorded.errors:
-            fields += [
-                Field(
-                    f"errors/model/{name}",
-                    unit,
-                    f"{text} by bending that is left out",
-                    (s.size,) * len(dims),
-                    dims,
-                )
-                for name, (unit, text, dims) in MODEL_ERRORS.items()
-            ]
-            sided = {f"errors/model/{name}": f"errors/model/right_{name}" for name in SIDED_ERRORS if self.jumps.size}
-            fields += [
-                replace(f, name=sided[f.name], shape=self.jumps.shape, dims=("right/s",),
-                        description=f"{f.description}, just after the point") for f in fields if f.name in sided
-            ]  # fmt: skip
-        fields += [
-            Field(
-                EDGE_ERRORS + x, PROBES[x].unit, f"error of {x.replace('_', ' ')} by cells beside edges of contact",
-                (s.size,), _S,
-            ) for x in self._edges
-        ]  # fmt: skip
-        self.gauges = np.array(recorded.gauges, float).reshape(-1, 2)
-        if len(self.gauges):
-            fields.append(elevation_field(self.gauges))
+
+    def _fields_of_errors(self) -> list[Field]:
+        fields = [
+            Field(f"errors/model/{x}", unit, f"{text} by bending that is left out", (self.s.size,) * len(dims), dims)
+            for x, (unit, text, dims) in MODEL_ERRORS.items()
+            if self._errors
+        ]
+        sided = SIDED_ERRORS if self.jumps.size else ()
+        fields += self._after_jumps(fields, {f"errors/model/{x}": f"errors/model/right_{x}" for x in sided})
+        words = {x: f"error of {x.replace('_', ' ')} by cells beside edges of contact" for x in self._edges}
+        return fields + [Field(EDGE_ERRORS + x, PROBES[x].unit, words[x], (self.s.size,), _S) for x in self._edges]
+
+    def _fields_beside_the_line(self) -> list[Field]:
+        """Waves at gauges, obstacles and their forces, and which nodes there are."""
+        fields = [elevation_field(self.gauges)] if len(self.gauges) else []
         fields += obstacle_fields(self._obstacles) + obstacle_force_fields(self._touched)
-        if finest is not None:
+        if self._finest is not None:
             text = "which of the nodes mesh/s there are: bit k % 64 of word k // 64"
-            fields.append(Field(THERE, "", text, (-(-finest.size // 64),), ("word",), dtype="int64"))
-        self.fields = tuple(fields)
+            fields.append(Field(THERE, "", text, (-(-self._finest.size // 64),), ("word",), dtype="int64"))
+        return fields
 
     def on(self, line: Line, sea: Sea, zones: Sequence[Zone], hinges: Floats) -> Observer:
         """The same fields of a line whose zones, or ends, have changed; hinges: as of `Grid`."""

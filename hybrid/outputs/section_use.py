@@ -270,6 +270,24 @@ NONE: Mapping[str, Quantity] = MappingProxyType({})
 NO_ROWS: Mapping[str, tuple[int, int]] = MappingProxyType({})
 
 
+def _fill(row: Floats, reached: Floats, q: Quantity, seabed: bool, rows: list[Floats]) -> None:
+    """Enter a quantity of one line into its row, and the path that it keeps clear of into `rows`."""
+    row[k.TO_TOUCHDOWN] = q.ends_at(seabed) == "touchdown"
+    if q.reference is not None:
+        reached[k.REFERENCE : k.REFERENCE + 2] = q.reference
+    if q.kind == "azimuth":
+        reached[k.REFERENCE] = q.middle
+    along = q.direction or q.normal
+    if along is not None:
+        row[k.DIRECTION : k.DIRECTION + 3] = np.array(along, float) / np.linalg.norm(along)
+    if q.normal is not None:
+        row[k.IS_PLANE], row[k.POINT : k.POINT + 3] = 1.0, q.point
+    elif q.kind == "clearance":
+        more = chords_of(np.array(q.path or (q.point,), float), 0.5 * q.diameter)
+        row[k.PATH], row[k.PATH_END] = len(rows), len(rows) + len(more)
+        rows += [*more]
+
+
 class StepQuantities:
     """Ranges of the quantities of one line."""
 
@@ -297,20 +315,7 @@ class StepQuantities:
                 row[k.COUNTED], row[k.OF_PATH] = 1.0, q.line != line
                 row[k.KIND] = k.CHORDS if name in shown else k.CLEARANCE
                 continue
-            row[k.TO_TOUCHDOWN] = q.ends_at(seabed) == "touchdown"
-            if q.reference is not None:
-                reached[k.REFERENCE : k.REFERENCE + 2] = q.reference
-            if q.kind == "azimuth":
-                reached[k.REFERENCE] = q.middle
-            along = q.direction or q.normal
-            if along is not None:
-                row[k.DIRECTION : k.DIRECTION + 3] = np.array(along, float) / np.linalg.norm(along)
-            if q.normal is not None:
-                row[k.IS_PLANE], row[k.POINT : k.POINT + 3] = 1.0, q.point
-            elif q.kind == "clearance":
-                more = chords_of(np.array(q.path or (q.point,), float), 0.5 * q.diameter)
-                row[k.PATH], row[k.PATH_END] = len(rows), len(rows) + len(more)
-                rows += [*more]
+            _fill(row, reached, q, seabed, rows)
         self.path = np.array(rows).reshape(-1, k.PATH_ROW)
         whole, begin = whole_scene(scene)
         ends = np.cumsum([x.length for x in whole.cable.sections])

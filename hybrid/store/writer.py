@@ -19,6 +19,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import Any, NamedTuple
@@ -96,6 +97,18 @@ class Late(NamedTuple):
     templates: Path | None
 
 
+def _new_file(header: Header, before: Tree | None, outputs: int | None, templates: Path | None) -> h5py.File:
+    """A file in memory with all of a header, and without outputs; its arguments are those of `Recorder`."""
+    points, shape = np.size(header.grid_s), [field for field, _ in header.fixed]
+    with_checkpoints = before is not None
+    file = in_memory(template(points, header.fields, header.step_fields, shape, outputs, with_checkpoints, templates))
+    write_attributes(file, header.attributes)
+    write_texts(file, {name: made(text) for name, text in header.texts.items()})
+    write_fixed(file, np.asarray(header.grid_s, dtype=float), header.fixed)
+    write_before(file, before)
+    return file
+
+
 class Recorder(BaseRecorder):
     """Writes one result file; a context manager that closes it with the right status.
 
@@ -124,26 +137,17 @@ class Recorder(BaseRecorder):
     ) -> None:
         fields, step_fields, fixed, before = header.fields, header.step_fields, header.fixed, mode.before
         check_names(fields, step_fields, fixed)
-        texts = {name: made(text) for name, text in header.texts.items()}
+        header = header._replace(texts={name: made(text) for name, text in header.texts.items()})
         self._memory = target if isinstance(target, io.BytesIO) else None
         path = None if isinstance(target, io.BytesIO) else Path(target).expanduser().resolve()
         if path is not None:
             check_target(path, overwrite)
 
-        def make() -> h5py.File:
-            points, shape = np.size(header.grid_s), [field for field, _ in fixed]
-            file = in_memory(template(points, fields, step_fields, shape, outputs, before is not None, templates))
-            write_attributes(file, header.attributes)
-            write_texts(file, texts)
-            write_fixed(file, np.asarray(header.grid_s, dtype=float), fixed)
-            write_before(file, before)
-            return file
-
+        make = partial(_new_file, header, before, outputs, templates)
         if mode.late and path is not None:
             self._write_to(None, path, tables_of(fields, step_fields))
             self._unseen = mode.unseen
-            held = HeldValues(header._replace(texts=texts))
-            self._late = Late(held, make, {} if before is not None else None, before, templates)
+            self._late = Late(HeldValues(header), make, {} if before is not None else None, before, templates)
             self._flushed = monotonic()
             return
         file = make()

@@ -125,33 +125,15 @@ def _taken(
     memory: the history under a name and its summary, for the next thing that is taken of it.
     """
     name, at = kept.quantity, None if kept.at is None else np.atleast_1d(np.asarray(kept.at, float))
-    if take in ("max", "min") and at is None and kept.times is None and f"envelope/{name}_{take}" in result:
-        farther = farthest(result, name, take)
-        worst = np.nan if farther is None else farther.value
-        return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(worst)
     if take in ("max", "min") and at is None and kept.times is None:
-        known = at_every_step(result, name, "largest" if take == "max" else "smallest")
+        known = _over_steps(result, name, take)
         if known is not None:
-            return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(known[0])
+            return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(known)
     if take == "utilisation":
         limit = LIMIT_OF[name]
-        judged = next((x for x in section_limits(result) if x.limit == limit), None)
-        if judged is None:
-            raise ResultError(f"no section has a {limit}, which {name} would be held against")
-        if judged.used is None:
-            raise NotAlwaysThere(f"utilisation of {limit} {judged.not_verified}")
-        return Variable("", f"{WORDS[take]} {limit}, every step", (), {}), np.asarray(judged.used)
+        return Variable("", f"{WORDS[take]} {limit}, every step", (), {}), np.asarray(_utilisation(result, name, limit))
     if take == "damage":
-        assert kept.curve is not None
-        s, damage = result.damage(kept.curve, strength=kept.strength, section=kept.section, times=kept.times, at=at)
-        if few := too_far_apart(result, float(s[np.argmax(damage)]), kept.times):
-            raise NotAlwaysThere(few)
-        text = f"fatigue damage by {kept.curve}"
-        if at is None:
-            along = "s" if kept.line is None else f"{own}_s"
-            return Variable("", text, (along,), {along: ("m", s)}), damage
-        dims, places = _places(own, s)
-        return Variable("", text, dims, places), damage if dims else damage[0]
+        return _damage(result, own, kept, at)
     if at is not None and not lies_along(result, name):
         raise ResultError(f"'{name}' has no value at an arc length")
     history = memory.get((own, "history")) or history_of(result, name, kept.times, at)
@@ -196,6 +178,39 @@ def _taken(
     memory[own, "summary"] = summary
     variable = Variable(unit if other is None else other, text, dims, places)
     return _placed(variable, getattr(summary, attribute))
+
+
+def _over_steps(result: Result, name: str, take: str) -> float | None:
+    """The largest or smallest value over every step, NaN without one; None: the result knows that of outputs only."""
+    if f"envelope/{name}_{take}" in result:
+        farther = farthest(result, name, take)
+        return np.nan if farther is None else farther.value
+    known = at_every_step(result, name, "largest" if take == "max" else "smallest")
+    return None if known is None else known[0]
+
+
+def _utilisation(result: Result, name: str, limit: str) -> float:
+    """The used part of a limit of sections, over every step."""
+    judged = next((x for x in section_limits(result) if x.limit == limit), None)
+    if judged is None:
+        raise ResultError(f"no section has a {limit}, which {name} would be held against")
+    if judged.used is None:
+        raise NotAlwaysThere(f"utilisation of {limit} {judged.not_verified}")
+    return judged.used
+
+
+def _damage(result: Result, own: str, kept: Kept, at: Floats | None) -> tuple[Variable, Floats]:
+    """Fatigue damage along the line, or at the arc lengths `at`, m."""
+    assert kept.curve is not None
+    s, damage = result.damage(kept.curve, strength=kept.strength, section=kept.section, times=kept.times, at=at)
+    if few := too_far_apart(result, float(s[np.argmax(damage)]), kept.times):
+        raise NotAlwaysThere(few)
+    text = f"fatigue damage by {kept.curve}"
+    if at is None:
+        along = "s" if kept.line is None else f"{own}_s"
+        return Variable("", text, (along,), {along: ("m", s)}), damage
+    dims, places = _places(own, s)
+    return Variable("", text, dims, places), damage if dims else damage[0]
 
 
 def _places(own: str, s: Floats) -> tuple[tuple[str, ...], dict[str, tuple[str, Floats]]]:

@@ -102,10 +102,15 @@ def trade(
                 scene.title, target, scene.length, largest, position, end_force, tuple(rows), tuple(notes),
                 (*store.facts, *_measured(store, repeat, command)), store.total - len(rows),
             )  # fmt: skip
-            table = judged(table, limits)
-            table = replace(table, rows=tuple(sorted(table.rows, key=lambda row: _order(row, kinds))))
-            table.write(store.folder, "trade.png")
-            plot_trade(table, store.folder / "trade.png", overwrite=True)  # the folder is of this program
+            table = _written(judged(table, limits), kinds, store.folder)
+    return table
+
+
+def _written(table: TradeTable, kinds: Sequence[str], folder: Path) -> TradeTable:
+    """The table with its rows in order, as it is written into the folder of a study."""
+    table = replace(table, rows=tuple(sorted(table.rows, key=lambda row: _order(row, kinds))))
+    table.write(folder, "trade.png")
+    plot_trade(table, folder / "trade.png", overwrite=True)  # the folder is of this program
     return table
 
 
