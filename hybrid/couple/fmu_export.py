@@ -27,9 +27,11 @@ from hybrid.store.selection import check_target, write_atomically
 SCENE, INTERFACE = "scene.yaml", "interface.json"
 # What a unit can do, beside what pythonfmu3 says of it.
 ABILITIES = {
-    "canGetAndSetFMUState": True, "canSerializeFMUState": False, "canHandleVariableCommunicationStepSize": True,
+    "canGetAndSetFMUState": True,
+    "canSerializeFMUState": False,
+    "canHandleVariableCommunicationStepSize": True,
     "needsExecutionTool": True,
-}  # fmt: skip
+}
 
 
 def export_fmu(scene: SceneLike, path: str | Path, *, name: str | None = None, overwrite: bool = True) -> Path:
@@ -58,9 +60,7 @@ def export_fmu(scene: SceneLike, path: str | Path, *, name: str | None = None, o
         token = hashlib.sha256((text + (folder / SCENE).read_text(encoding="utf-8")).encode()).hexdigest()[:16]
         script = folder / f"hybrid_{model}_{token}.py"
         script.write_text(_SCRIPT.format(model=model), encoding="utf-8")
-        made = builder.build_FMU(
-            script, folder / "made", [folder / SCENE, folder / INTERFACE, *files], **ABILITIES
-        )  # fmt: skip
+        made = builder.build_FMU(script, folder / "made", [folder / SCENE, folder / INTERFACE, *files], **ABILITIES)
         write_atomically({target: made.read_bytes()}, overwrite)
     return target
 

@@ -112,9 +112,10 @@ class MoorDyn:
         moved = {id for id, body in self.deck.bodies.items() if body.kind == "coupled"}
         rows = [b.row for id, b in self.deck.bodies.items() if id in moved and b.has_loads]
         rows += [
-            p.row for p in self.deck.points.values()
+            p.row
+            for p in self.deck.points.values()
             if p.has_loads and (p.kind == "coupled" or (p.kind == "body" and p.on in moved))
-        ]  # fmt: skip
+        ]
         expected = "no mass, volume or drag on what the caller moves; its force is that of the lines"
         fix = "write 0 there, and count the weight, lift and drag in the program that calls"
         if rows:

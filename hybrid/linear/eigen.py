@@ -192,9 +192,11 @@ def _below(network: LinearNetwork, square: float) -> int | None:
     A = network.stiffness - square * network.mass - sparse.diags_array(network.tensions)
     try:
         factors = splu(
-            sparse.csc_array(A), permc_spec="NATURAL",
-            diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False},
-        )  # fmt: skip
+            sparse.csc_array(A),
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True, "Equil": False},
+        )
     except RuntimeError:
         return None
     if not np.array_equal(factors.perm_r, factors.perm_c):

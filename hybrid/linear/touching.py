@@ -176,7 +176,7 @@ def touching_parts(
                     stiffness = stiffness + G.T @ sparse.diags_array(np.repeat(spring, 3)) @ G
     return TouchingParts(
         sparse.csr_array(stiffness), M.matrix(size, size), C.matrix(size, size), forces, tuple(touches), tuple(sheaves)
-    )  # fmt: skip
+    )
 
 
 # --- bodies and sheaves -------------------------------------------------------------------------
@@ -194,7 +194,7 @@ def _pressed(x: JoinedLine, state: State) -> Floats:
     if count:
         grip_obstacles(
             x.line._replace(bits=x.line.bits & ~FRICTION), x.sea, np.zeros_like(state.r), state, state.grip, now
-        )  # fmt: skip
+        )
     return now.reshape(x.line.s.size, count, EACH)[:, :, FORCE_OF : FORCE_OF + 3]
 
 
@@ -252,7 +252,7 @@ def _on_obstacles(
         depth = 0.5 * rows[k, ONSET_OF] - gaps[k, i]
         yield Touch(
             (l, k), True, force[i], along(n) @ shifts, depth, across(n) @ shifts if rubs else shifts[:0], travel
-        )  # fmt: skip
+        )
 
 
 def _spring(solver: NetworkSolver, touch: Touch) -> Floats:

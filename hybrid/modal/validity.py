@@ -103,8 +103,8 @@ def _kinks(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     line = x.line
     tables = (
         ("tension", line.law, line.law_table[:, [TENSION, STRAIN]], found.mean_tension, found.middle, "N"),
-        ("curvature", line.bend_law, line.bend_table[:, :MOMENT + 1], found.mean_curvature, found.s, "1/m"),
-    )  # fmt: skip
+        ("curvature", line.bend_law, line.bend_table[:, : MOMENT + 1], found.mean_curvature, found.s, "1/m"),
+    )
     for name, law, table, mean, places, unit in tables:
         deviation = found.deviation(name)
         for i in range(len(law)):

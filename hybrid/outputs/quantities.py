@@ -46,9 +46,9 @@ class Quantities:
         # nodes (nb, m+1, 3) m and radii of cells (m,) m of other lines in the outputs that are looked at, by name
         self.others: dict[str, tuple[Floats, Floats]] = {}
         # (n, 2) m, of the excursions in their order; NaN until there is a touchdown
-        self.first = np.array([
-            q.reference or (np.nan, np.nan) for q in self.wanted.values() if q.kind == "touchdown_excursion"
-        ]).reshape(-1, 2)  # fmt: skip
+        self.first = np.array(
+            [q.reference or (np.nan, np.nan) for q in self.wanted.values() if q.kind == "touchdown_excursion"]
+        ).reshape(-1, 2)
         # (n,) deg, from which azimuths are within half a turn, in their order; NaN until there is a pull
         self.turns = np.array([q.middle for q in self.wanted.values() if q.kind == "azimuth"])
 

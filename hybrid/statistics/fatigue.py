@@ -121,9 +121,11 @@ def turning_points(x: ArrayLike) -> Floats:
 
 
 def damage(
-    x: ArrayLike, curve: str | Mapping[str, float | str] | Curve, scale: float = 1.0,
+    x: ArrayLike,
+    curve: str | Mapping[str, float | str] | Curve,
+    scale: float = 1.0,
     thickness: float = REFERENCE_THICKNESS,
-) -> Floats:  # fmt: skip
+) -> Floats:
     """Miner's sum (...) of histories x (nt, ...); scale: MPa, or part of the strength, per unit of x."""
     law, values = curve_of(curve), np.asarray(x, float)
     if not np.all(np.isfinite(values)) or values.ndim == 0:

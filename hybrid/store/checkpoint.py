@@ -150,9 +150,11 @@ def _has_rows(file: h5py.File, point: Checkpoint) -> bool:
 
 
 def check_tables(
-    source: h5py.File, groups: Mapping[str, h5py.Group], all_tables: Mapping[str, Mapping[str, Sequence[Field]]],
+    source: h5py.File,
+    groups: Mapping[str, h5py.Group],
+    all_tables: Mapping[str, Mapping[str, Sequence[Field]]],
     at: Checkpoint,
-) -> None:  # fmt: skip
+) -> None:
     """Raise ResultError unless a file has exactly these tables, and a checkpoint their rows.
 
     groups: of the file, "", and of each line; tables with other columns are refused too.

@@ -257,10 +257,12 @@ class Table:
 
     def add_row(self, row: Sequence[Any]) -> None:
         """Let one row of numbers and texts wait."""
-        self.add([
-            np.array([cut(x, int(f.dtype[1:])) if f.dtype.startswith("S") else x], f.dtype)
-            for f, x in zip(self.fields, row, strict=True)
-        ])  # fmt: skip
+        self.add(
+            [
+                np.array([cut(x, int(f.dtype[1:])) if f.dtype.startswith("S") else x], f.dtype)
+                for f, x in zip(self.fields, row, strict=True)
+            ]
+        )
 
     def write(self) -> None:
         """Write the waiting rows to all datasets but the scale."""

@@ -28,8 +28,9 @@ USUAL: dict[str, tuple[str, tuple[str, ...]]] = {
     "curvature": ("curvature", ("max",)),
 }
 AT_REST: dict[str, tuple[str, tuple[str, ...]]] = {
-    "tension": ("tension", ("max", "min", "profile")), "curvature": ("curvature", ("max",)),
-}  # fmt: skip
+    "tension": ("tension", ("max", "min", "profile")),
+    "curvature": ("curvature", ("max",)),
+}
 # Of a summary, and its unit; none: that of the quantity.
 OF_SUMMARY = {
     "mean": ("mean", None), "deviation": ("standard_deviation", None), "skewness": ("skewness", ""),
