@@ -21,9 +21,10 @@ from hybrid.kernels.machine.compile import inner, kernel
 COLUMNS = 6  # of a row of X_i
 TRIPLE = 3 * COLUMNS  # numbers of X_i
 WIDE = 13  # of a block row before elimination (kernels.march.assembly_plane)
-# Numbers kept of a block for another right-hand side, and where they begin: rows over the block before, three of (dT, dr),
-# the pivot block, three rows of three, and the size of the law of length; K comes first.
-KEPT, LOWER, PIVOT, SIZE_AT = 23, 4, 13, 22
+KEPT = 23  # numbers kept of a block for another right-hand side; K comes first,
+LOWER = 4  # then rows over the block before, three of (dT, dr),
+PIVOT = 13  # the pivot block, three rows of three,
+SIZE_AT = 22  # and the size of the law of length
 
 
 @inner
@@ -255,8 +256,9 @@ def solve_backward_planar(plane, X, x):
 
 @kernel
 def solve_again_planar(plane, X, b, x):
-    """As `block_elimination.solve_again` for a cable in a plane: b and x (N+1, 5) are of space, what b has across the
-    plane is not read, and x has nothing there and no spin.
+    """As `block_elimination.solve_again` for a cable in a plane.
+
+    b and x (N+1, 5) are of space: what b has across the plane is not read, and x has nothing there and no spin.
     """
     solve_forward_planar(plane, X, b, x)
     return solve_backward_planar(plane, X, x)

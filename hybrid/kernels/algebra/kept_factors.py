@@ -171,9 +171,10 @@ def carry_block(X, W, x, i, o, n, begin, solved):
 
 @inner
 def prepare_sweep(X, W, M, begin, n):
-    """Fill M (N+1, SWEEP), n = N, with what `sweep` takes of the rows from `begin` on, but for the first and the last: the rows
+    """Fill M (N+1, SWEEP), n = N, with what `sweep` reads of the rows from `begin` on.
 
-    of (x_{i-1}, dr_{i-2}, dpsi_{i-2}) as the solved pivot block has them.  Worth its time for five sweeps and more.
+    But for the first and the last row: the rows of (x_{i-1}, dr_{i-2}, dpsi_{i-2}) as the solved pivot block has them.
+    Worth its time for five sweeps and more.
     """
     for i in range(max(begin, 1), n):
         F, m = X[(n + 1) * ROW + i * KEPT :], M[i]

@@ -43,23 +43,41 @@ from hybrid.kernels.machine.compile import inner
 SAME_PLACE = 1e-6  # diameters between sample points that are the same
 NEAREST = 0.13  # diameters from a place to the nearest of sample points that are a quarter of a diameter apart
 FOLLOWED = 4.0  # diameters that the foot of a point may go in a step without losing its travel
-# Friction of a point of contact: force on strand p (N); direction of sliding; its stiffness (N/m); the coefficient where
-# it slides, else 0; travel along and across strand p (m).
-HELD, SLIDING, GIVES, SLIDES, TRAVEL = 0, 3, 6, 7, 8
-# And of the iteration before in the same try: number of the try; its point, as piece and place in it, and the piece of
-# the foot; what the surfaces were shifted by (m); 1 where that has turned back, and friction is taken as viscous.
-TRY, WHO, WHOSE, BEFORE, TURNS_BACK = 10, 11, 12, 13, 16
-# What the change of friction by the shape needs: shift of the surfaces along n (m); change of y' in the step (m), turn of
-# both strands in it (rad); n x travel from before (m); how a turn of y'..
-SHUT, OPENS, TURNED, ASIDE, ABOUT, LEANS = 17, 18, 21, 24, 27, 30
+# Columns of the friction of a point of contact.
+HELD = 0  # 3, force on strand p, N
+SLIDING = 3  # 3, direction
+GIVES = 6  # its stiffness, N/m
+SLIDES = 7  # coefficient where it slides, else 0
+TRAVEL = 8  # 2, along and across strand p, m
+# And of the iteration before in the same try.
+TRY = 10  # number of the try
+WHO = 11  # its point, as piece and place in it,
+WHOSE = 12  # and the piece of the foot
+BEFORE = 13  # 3, shift of the surfaces, m
+TURNS_BACK = 16  # 1 where that has turned back, and friction is taken as viscous
+# What the change of friction by the shape needs.
+SHUT = 17  # shift of the surfaces along n, m
+OPENS = 18  # 3, change of y' in the step, m
+TURNED = 21  # 3, turn of both strands in it, rad
+ASIDE = 24  # 3, n x travel from before, m
+ABOUT = 27  # 3, turn of the axes along and across about n by a change of y'
+LEANS = 30  # slope of strand p along n
 HOLD = 31
-# How a point turns with one of its four cells: chord; what the cell has become longer in the step, a vector (m); inverse
-# of its length (1/m); its part in the turn, times b; its spin in the step (rad); 1 where it has one.
-CHORD, LONGER, INVERSE, SHARE, SPUN, SPINS = 0, 3, 6, 7, 8, 9
+# How a point turns with one of its four cells.
+CHORD = 0  # 3
+LONGER = 3  # 3, what the cell has become longer in the step, m
+INVERSE = 6  # of its length, 1/m
+SHARE = 7  # its part in the turn, times b
+SPUN = 8  # its spin in the step, rad
+SPINS = 9  # 1 where it has one
 ARM = 10
 SHRINKS = 0.9  # part to which a shift falls that goes to none; one that falls by less slides indeed
-# What is kept of it from step to step: piece; arc lengths of the point and of its foot (m); travel (m); spring (N/m).
-PIECE, AT, FOOT, TRAVELLED, KEPT_SPRING = 0, 1, 2, 3, 5
+# What is kept of it from step to step.
+PIECE = 0
+AT = 1  # arc length of the point, m
+FOOT = 2  # and of its foot, m
+TRAVELLED = 3  # 2, m
+KEPT_SPRING = 5  # N/m
 GRIP = 6
 
 

@@ -28,7 +28,7 @@ from hybrid.kernels.machine.compile import inner
 # Distances, in diameters, at which the force of contact begins and becomes infinite: strands stay 0.94 to 1.02 apart.
 OUTER, INNER = 1.05, 0.85
 STICKS = 100.0  # spring of friction per length, of size/D^2: the force of contact has 50 to 200
-WITHIN, FIRST, LAST = 0, 1, 2  # kinds of nodes
+WITHIN, FIRST, LAST = range(3)  # kinds of nodes
 FOOT_STEPS = 30  # of Newton's method with bisection: it needs about 4
 FOOT_TOLERANCE = 1e-14
 
@@ -76,9 +76,9 @@ def slope(before, after, v):
 
 @inner
 def foot(kind, r, q, x):
-    """Where x is nearest to piece q, 0 <= v <= 1, and -1 or 1 where that is its beginning or its end without being a
+    """Where x is nearest to piece q, 0 <= v <= 1, and whether that is an end of the piece.
 
-    smallest distance of the curve, else 0.
+    -1, 1: its beginning or its end, without being a smallest distance of the curve; else 0.
     """
     before, after = end_slopes(kind, r, q)
     bend = sub(after, before)
@@ -129,11 +129,22 @@ def barrier(d, width, size):
     )
 
 
-# A point of contact, one row of numbers: its pieces; weights of the nodes of x and of y; n; what the law leaves across
-# n and along it; y'/d; weights of y'; phi'; 1/c, 0 where the foot stays at an end of the cable; u; d, m; spring of its
-# friction, N/m; v of the foot.
-P, Q, WX, WY, NORMAL, ALONG, ACROSS, SLOPE, RATES, FORCE, FOLLOWS = 0, 1, 2, 5, 8, 11, 12, 13, 16, 19, 20
-PLACE, DISTANCE, SPRING, FOOT_PLACE = 21, 22, 23, 24
+# Columns of a point of contact.
+P = 0  # piece,
+Q = 1  # and that of its foot
+WX = 2  # 3, weights of the nodes of x
+WY = 5  # 3, and of y
+NORMAL = 8  # 3, n
+ALONG = 11  # what the law leaves along n
+ACROSS = 12  # and across it
+SLOPE = 13  # 3, y'/d
+RATES = 16  # 3, weights of y'
+FORCE = 19  # phi'
+FOLLOWS = 20  # 1/c, 0 where the foot stays at an end of the cable
+PLACE = 21  # u
+DISTANCE = 22  # d, m
+SPRING = 23  # of its friction, N/m
+FOOT_PLACE = 24  # v of the foot
 POINT = 25
 
 

@@ -100,9 +100,10 @@ WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itsel
 
 
 class ContactCounts(NamedNumbers, number=np.int64):
-    """Stale: the tree is of other positions; remeshed: the grips are of other cells; looks: sample points, and parts of
+    """Sizes, flags and counts of the search for pairs.
 
-    pieces, that were looked at in the try; products: of GMRES in it.
+    stale: the tree is of other positions; remeshed: the grips are of other cells; looks: sample points, and parts of
+    pieces, that were searched in the try; products: of GMRES in it.
     """
 
     points: int

@@ -16,9 +16,11 @@ from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS
 from hybrid.kernels.laws.sheaves import turn_along
 from hybrid.kernels.machine.compile import called, inner
 
-# GMRES leaves a part of its first residual: of what Newton's method leaves of the correction, its size in diameters, a
-# hundredth, at most LARGEST_LEFT; no less than SOLVED, and than LEAST_LEFT diameters.
-SOLVED, LARGEST_LEFT, PART_LEFT, LEAST_LEFT = 1e-7, 1e-3, 0.01, 1e-11
+# GMRES leaves a part of its first residual: PART_LEFT of the part that Newton's method leaves of the correction.
+SOLVED = 1e-7  # at least this part
+LARGEST_LEFT = 1e-3  # part, at most
+PART_LEFT = 0.01
+LEAST_LEFT = 1e-11  # diameters, at least
 
 
 @inner

@@ -43,7 +43,11 @@ ENDS = (
 # Cosine of the largest angle, 1 rad, between cells of a bend that has a shape: beyond, its cells cannot tell how near
 # the parts beside it are, within so many cells of it.
 SHARPEST, BESIDE = 0.5403, 8
-MEETS, NEARS, PARTS, HIDES = 1, 2, 4, 8  # bits of what `watch_itself` returns
+# Bits of what `watch_itself` returns.
+MEETS = 1
+NEARS = 2
+PARTS = 4
+HIDES = 8
 UNBENT = 1  # in place of the address of `watch_itself`, while the line is not bent so far
 
 
@@ -70,10 +74,11 @@ OF_0_6 = 11  # numbers of Nearest in checkpoints of 0.6
 
 
 class Ahead(NamedNumbers):
-    """What is asked of the search, -1: nothing, 1: whether contact has to begin, WIDER: whether it may end; s, from the state
+    """What is asked of the search for parts that may touch, and its answer.
 
-    on, in which cells move at its velocities, 0: those of the step count; whether parts are near each other; whether a
-    bend hides that; the node of that bend, -1: none was found, and the cells beside it.
+    asked: -1: nothing, 1: whether contact has to begin, WIDER: whether it may end; seconds: from the state on, in which
+    cells move at its velocities, 0: those of the step count; then whether parts are near each other, whether a bend
+    hides that, the node of that bend, -1: none was found, and the cells beside it.
     """
 
     asked: float
@@ -229,9 +234,9 @@ def fill_parents(tree):
 
 @inner
 def runs_on(tree, a, b, turned):
-    """Whether no two points of what follows from box a to box b, which are the same or neighbours, are nearer than
+    """Whether the line runs on from box a to box b, which are the same or neighbours.
 
-    `turned` of the line between them.
+    Then no two points of it are nearer than `turned` of the line between them.
     """
     size, along = 0.0, 0.0
     for k in range(3):
@@ -327,9 +332,9 @@ def note_near(before, state, itself, i, j, clearance):
 
 @inner
 def compare_cells(line, ends, before, state, itself, i, j):
-    """Keep the pair of cells i < j if they were nearer in the step than all before, and are no neighbours; and whether
+    """Keep the pair of cells i < j if it was nearer in the step than all before.
 
-    any are near.
+    Neighbours do not count; also keeps whether any are near.
     """
     r = state.r
     p, q = get3(r, i), get3(r, j)
@@ -432,9 +437,9 @@ def note_found(found, t):
 
 @inner
 def note_asked(found, ahead):
-    """Bits of what is asked: whether contact has to begin, may end, and whether a bend hides that, which is told once
+    """Bits of the answer: contact has to begin, may end, or a bend hides that.
 
-    until it has not for ENDS steps.
+    The last is reported once, until no bend has hidden it for ENDS steps.
     """
     hidden, told = ahead.is_hidden > 0.0 and ahead.is_near == 0.0, found.hidden < ENDS
     found.hidden = 0.0 if hidden else min(found.hidden + 1.0, ENDS)
@@ -450,10 +455,10 @@ def note_asked(found, ahead):
 
 @kernel
 def watch_itself(table):
-    """Look how near the line comes to itself in the step that led to its state; MEETS: surfaces have met; where that is
+    """Search how near the line came to itself in the step that led to its state.
 
-    asked, NEARS: contact has to begin; PARTS: it may end; HIDES: a bend without a shape hides which.
-
+    MEETS: surfaces have met; where that is asked, NEARS: contact has to begin; PARTS: it may end; HIDES: a bend without
+    a shape hides which.
     The states of the job have changed places after the step, as in kernels.run.network_run.
     """
     job = read(table)

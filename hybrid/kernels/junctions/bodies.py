@@ -32,29 +32,40 @@ from hybrid.kernels.algebra.rotations import (
 from hybrid.kernels.laws.members import members_change, members_force
 from hybrid.kernels.machine.compile import inner
 
-# Of a state: origin (m) and frame, velocity, algorithmic and true acceleration, the same three of the rotation.
-PLACE, FRAME, V, A, VD, W, WA, WD, STATE = 0, 3, 12, 15, 18, 21, 24, 27, 30
-# Of a body: mass and damping matrices (6 x 6), weight less buoyancy upwards (N) and its arm (N m), height at which it
-# floats (m), stiffness of heave, roll and pitch, force and moment on it (inertial), number of pieces of its members,
-# which follow (kernels.laws.members).
-MASS, DAMPING, LIFT, ARM, LEVEL, STIFFNESS, FORCE, MOMENT, PIECES, NUMBERS = 0, 36, 72, 73, 76, 77, 80, 83, 86, 87
-# Worked in: displacement, rotation vector, frame at the start of the step, correction, force and moment of all but the
-# lines, and of the lines; kinetic and potential energy (J), powers of the lines, of damping and of what is given (W),
-# the same before the step, and their work (J); a spring against turns in the equations alone (N m/rad).
-U, N, START, X, OWN, LINES, KINETIC, POTENTIAL, POWER, BEFORE, DONE, SPRING = (
-    0,
-    3,
-    6,
-    15,
-    21,
-    27,
-    33,
-    34,
-    35,
-    38,
-    41,
-    44,
-)
+# Numbers of a state; the motion of the origin, m, then that of the rotation, rad.
+PLACE = 0  # 3, origin, m
+FRAME = 3  # 9
+V = 12  # 3, velocity
+A = 15  # 3, algorithmic acceleration
+VD = 18  # 3, true acceleration
+W = 21  # 3, the same of the rotation
+WA = 24  # 3
+WD = 27  # 3
+STATE = 30
+# Numbers of a body.
+MASS = 0  # 36, matrix
+DAMPING = 36  # 36, matrix
+LIFT = 72  # weight less buoyancy upwards, N
+ARM = 73  # 3, of it, N m
+LEVEL = 76  # height at which it floats, m
+STIFFNESS = 77  # 3, of heave, roll and pitch
+FORCE = 80  # 3, on it (inertial), N
+MOMENT = 83  # 3, on it (inertial), N m
+PIECES = 86  # number of pieces of its members, which follow (kernels.laws.members)
+NUMBERS = 87
+# Numbers that are worked in.
+U = 0  # 3, displacement, m
+N = 3  # 3, rotation vector
+START = 6  # 9, frame at the start of the step
+X = 15  # 6, correction
+OWN = 21  # 6, force and moment of all but the lines
+LINES = 27  # 6, of the lines
+KINETIC = 33  # energy, J
+POTENTIAL = 34  # energy, J
+POWER = 35  # 3, of the lines, of damping and of prescribed loads, W
+BEFORE = 38  # 3, the same before the step
+DONE = 41  # 3, their work, J
+SPRING = 44  # against turns in the equations alone, N m/rad
 WORK = 45
 # The spring of a body at first, as a part of its stiffest turn.  A turn that nothing holds would else follow the
 # round-off of moments; one that is held as softly as 1e-4 of the stiffest converges by four digits an iteration still.
@@ -250,10 +261,10 @@ def hold_turns(work, A, at):
 
 @inner
 def adapt_springs(work, strength, turn, most):
-    """Springs after a correction: stronger where a body was to turn by more than ten times `most`, rad, which is as far
+    """The strength of springs that hold bodies, after a correction by a turn, rad.
 
-    as it may, so that what hardly resists does not keep all else from moving; where it turns by little, weaker, down to
-    strength 1.  Returns the strength.
+    Stronger where a body was to turn by more than ten times `most`, rad, which is as far as it may, so that what hardly
+    resists does not keep all else from moving; where it turns by little, weaker, down to strength 1.
     """
     new = strength
     if turn > 10.0 * most:

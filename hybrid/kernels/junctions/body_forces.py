@@ -52,8 +52,13 @@ from hybrid.kernels.state.obstacle_rows import PLACE as CENTRE
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.job import read
 
-# Of a node that touches a body: line, node, slot of the body, P (3 x 6), Q (6 x 9).
-OF_LINE, OF_NODE, OF_SLOT, BY_BODY, BY_NODES, TOUCHED = 0, 1, 2, 3, 21, 75
+# Columns of a node that touches a body.
+OF_LINE = 0
+OF_NODE = 1
+OF_SLOT = 2  # slot of the body
+BY_BODY = 3  # P (3 x 6)
+BY_NODES = 21  # Q (6 x 9)
+TOUCHED = 75
 # Responses of a body: to the columns of P, to unit forces on it.
 EACH_BODY = 12
 ORIGIN = (0.0, 0.0, 0.0)

@@ -43,18 +43,15 @@ from hybrid.kernels.laws.tension_torque import couples, rest_strain
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.state.report import STIFFNESS_DAMPING
 
-# Numbers of an end: G, A, a, the moment M, what goes into the balance of nodes and of the spin, [d]x G/l and d.G, and
-# where tension makes a torque what the moment gets by tension, and the length of the cell by the turn.
-BY_TURN, BY_CHORD, BY_SPIN, MOMENT, FORCE_BY_TURN, SPIN_BY_TURN, BY_TENSION, LENGTH_BY_TURN = (
-    0,
-    9,
-    18,
-    21,
-    24,
-    33,
-    36,
-    39,
-)
+# Numbers of an end.
+BY_TURN = 0  # 9, G
+BY_CHORD = 9  # 9, A
+BY_SPIN = 18  # 3, a
+MOMENT = 21  # 3, M, N m
+FORCE_BY_TURN = 24  # 9, [d]x G/l, into the balance of nodes
+SPIN_BY_TURN = 33  # 3, d.G, into the balance of the spin
+BY_TENSION = 36  # 3, of the moment, where tension makes a torque,
+LENGTH_BY_TURN = 39  # 3, and of the length of the cell
 ANSWER = 42
 # Numbers of a seat: frame of the end in axes of its point or body, and whether it turns with that: 0, or one of these.
 TURNS, SEAT = 9, 10

@@ -30,10 +30,16 @@ from hybrid.kernels.junctions.carried_frames import (
 )
 from hybrid.kernels.machine.compile import inner
 
-# Columns of D: of the shift of the start, of the turn there, of the turn at the end.
-SHIFT, TURN, END_TURN, COLUMNS = 0, 3, 6, 9
-# Numbers of a functional: of block i, of block i+1, of r_{i+2}, what is left when all are zero, of q.
-NEXT, AFTER, LEFT, OF = 5, 10, 13, 14
+# Columns of D.
+SHIFT = 0  # 3, of the start
+TURN = 3  # 3, of the start
+END_TURN = 6  # 3, of the end
+COLUMNS = 9
+# Numbers of a functional, behind those of block i (5).
+NEXT = 5  # 5, of block i+1
+AFTER = 10  # 3, of r_{i+2}
+LEFT = 13  # what is left when all are zero
+OF = 14  # of q
 FUNCTIONAL = OF + COLUMNS
 
 

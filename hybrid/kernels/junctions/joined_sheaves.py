@@ -138,9 +138,9 @@ def turn_one(job, j, change):
 
 @inner
 def turn_along_all(job, count, with_left):
-    """Put the first `count` sheaves into corrections that were found without them; with_left: with what is out of
+    """Put the first `count` sheaves into corrections that were found without them.
 
-    balance at them.
+    with_left: with their residual torques.
     """
     carried, j = read(job.tables[0]).sea.carried, 0
     for k in range(carried.shape[0]):

@@ -1,7 +1,6 @@
-"""Winches that hold a tension, of lines with an end that moves by what pulls there: their lengths are unknowns beside those
+"""Winches that hold a tension, of lines with an end on a point or body that moves.
 
-of all lines, points and bodies (kernels.reel.winch has the symbols).
-
+Their lengths are unknowns beside those of all lines, points and bodies (kernels.reel.winch has the symbols).
 The rotor is out of balance by  a = I dc/dt + B(c) + T - P,  which grows with the length L by  a_L  with all else still, and
 falls with the tension before the fairlead.  z is how the corrections x answer to 1 m of L, bodies that lines touch among
 them; then  dL = (p x - a) / (a_L - p z),  with p x the change of that tension.  Sheaves and contact answer with these, too.
@@ -34,9 +33,9 @@ def waits(line_job):
 
 @inner
 def draw_along(job, count, with_left):
-    """Put the first `count` winches into corrections that were found without them; with_left: with what is out of
+    """Put the first `count` winches into corrections that were found without them.
 
-    balance at them.
+    with_left: with their residual torques.
     """
     w = 0
     for l in range(job.tables.shape[0]):

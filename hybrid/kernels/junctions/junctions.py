@@ -44,8 +44,11 @@ from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.job import read
 
 START, END = 0, 1
-# Columns of S: the tension, shift and turn of the start, of the end, and the right-hand side; its rows: as the first.
-TENSION, AT, RIGHT, HANDED = 0, (1, 7), 13, 14
+# Columns of S; its rows are as the first of them.
+TENSION = 0  # of the start
+AT = (1, 7)  # shift and turn (3 each) of the start, of the end
+RIGHT = 13  # right-hand side
+HANDED = 14
 
 
 @inner
@@ -350,8 +353,10 @@ def gather_right_sides(system, m):
 
 @inner
 def shift_of(joint, tensions, points, arm, gap, clamped, A, m, q, o):
-    """Shift of an end with what is still to go beside it; without that it goes into q from o on, and its turn from
-    o + 3 on where it is clamped."""
+    """Shift of an end by the correction m of its point or body and its gap.
+
+    Without the gap it goes into q from o on, and its turn from o + 3 on where it is clamped.
+    """
     at = first_unknown(joint, tensions, points)
     s = (A[at, m], A[at + 1, m], A[at + 2, m])
     if joint >= points:

@@ -35,15 +35,32 @@ JOINT = 12.0
 # Steps that lines which may touch look ahead, and of the mean diameter how far apart they are near at least: contact acts
 # from there on.
 AHEAD, LEAST_APART = 3.0, 0.05
-# Of `pairs`: lines; whether they have met, 1, or are near, 2, or neither, 0; 1: contact begins where they are near; 1: their
-# boxes overlap.
-A, B, HAVE_MET, ASKS, CLOSE, WATCHED = 0, 1, 2, 3, 4, 5
+# Columns of `pairs`.
+A = 0  # lines
+B = 1
+HAVE_MET = 2  # 1: they have met, 2: they are near, 0: neither
+ASKS = 3  # 1: contact begins where they are near
+CLOSE = 4  # 1: their boxes overlap
+WATCHED = 5
 MET, NEAR = 1, 2
-# Of `room`: how far apart they were, m; M_a - M_b and R_a + R_b at that time; when they met, s, and where, m.
-APART, WAY, SPREAD, TIME, AT, OTHER, ROOM = 0, 1, 4, 5, 6, 7, 8
-# Of `moved`: M, R of a line; its box in the last step, and AHEAD more, wider by its radius, m; whether it is beside another
-# one in that; the mean displacement of the last step, and the largest deviation from it; its widest diameter.
-MEAN, DEVIATION, LOW, HIGH, BESIDE, LAST, LAST_DEVIATION, WIDEST, MOVED = 0, 3, 4, 7, 10, 11, 14, 15, 16
+# Columns of `room`.
+APART = 0  # distance, m
+WAY = 1  # 3, M_a - M_b at that time, m
+SPREAD = 4  # R_a + R_b at that time, m
+TIME = 5  # when they met, s
+AT = 6  # where, m
+OTHER = 7
+ROOM = 8
+# Columns of `moved`.
+MEAN = 0  # 3, M of a line, m
+DEVIATION = 3  # R of it, m
+LOW = 4  # 3, its box in the last step and AHEAD more, wider by its radius, m
+HIGH = 7  # 3
+BESIDE = 10  # whether it is beside another one in that
+LAST = 11  # 3, mean displacement of the last step, m
+LAST_DEVIATION = 14  # largest deviation from it, m
+WIDEST = 15  # diameter, m
+MOVED = 16
 
 
 class LinesJob(NamedTuple):

@@ -39,7 +39,10 @@ from hybrid.kernels.step.job import read
 from hybrid.kernels.step.newton import ASKED, FINISH, GAIN, PREPARE, REST
 
 KEPT, LATEST = 0, 1  # of `pushes` and `times`: of the state now, and where the try has led
-MET, MET_S, MET_OTHER = 0, 1, 2  # of `meetings`: when two lines met first, s (nan: never), and at which arc lengths, m
+# Columns of `meetings`.
+MET = 0  # when two lines met first, s (nan: never)
+MET_S = 1  # at which arc lengths, m
+MET_OTHER = 2
 MEETING = 3
 
 

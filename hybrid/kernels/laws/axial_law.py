@@ -33,9 +33,11 @@ from hybrid.kernels.state.state import WORKING
 # power lost, W; creep.
 FIRST, LAST, DYNAMIC, PER_TENSION, RELAXATION = range(WORKING)
 K1, K2, HIGHEST, CREEP, LOADED, SHIFT, LOSS, CREPT = range(WORKING + 1, WORKING + 9)
-# Shapes of working curves: T/peak over the part of the way from the strain without tension to the peak.  That by a
-# stiffness is straight, with k1 its stiffness, N.
-LINEAR, BY_STIFFNESS, QUADRATIC, EXPONENTIAL = 1.0, 2.0, 3.0, 4.0
+# Shapes of working curves: T/peak over the part of the way from the strain without tension to the peak.
+LINEAR = 1.0
+BY_STIFFNESS = 2.0  # straight, with k1 its stiffness, N
+QUADRATIC = 3.0
+EXPONENTIAL = 4.0
 # Part of the peak below which a working curve goes on straight: that of a square has no stiffness without tension.
 STRAIGHT = 1e-3
 # Columns of Line.law_table: strain; tension, N; energy per length from the first point on, J/m.
@@ -147,9 +149,9 @@ def fast_of_chord(line, state, i, peak):
 
 @inner
 def rest_and_kept(line, state, i, peak, fast):
-    """Strain at rest under the mean tension of a cell; and what of the tension `fast` (N) above that the fast spring
+    """Strain at rest under the mean tension of a cell, and what the fast spring keeps of `fast`.
 
-    does not give up when the mean tension grows, over the growth.
+    fast: N, tension above the mean; kept: what is not given up when the mean tension grows, over the growth.
     """
     at, _, _ = rest_at(line.law, line.law_table, i, state.slow[i], peak)
     E, b = stiffness_at(line.law, i, state.slow[i])
@@ -200,9 +202,9 @@ def crept(law, i, t):
 
 @inner
 def sliding_power(line, state, i, fast):
-    """Power per length, W/m, that a cell with a dynamic stiffness loses as its mean tension follows its tension; fast: N,
+    """Power per length, W/m, that a cell with a dynamic stiffness loses.
 
-    its elastic tension above the mean one.
+    Its mean tension follows its tension; fast: N, its elastic tension above the mean one.
     """
     mean = state.slow[i]
     _, c, _ = rest_at(line.law, line.law_table, i, mean, 0.0)
@@ -212,10 +214,10 @@ def sliding_power(line, state, i, fast):
 
 @kernel
 def follow_law(line, old, new, work, dt, t):
-    """Linearise the laws of all cells about new.T, after a step of dt (s) from `old`; dt = 0: at rest, new.slow becomes T;
+    """Linearise the laws of all cells about new.T, after a step of dt (s) from `old`.
 
-    dt < 0: new.slow stays as it is.  t: s, the time of `new`.  Writes line.ck, what is written of line.law, new.slow,
-    new.peak, energy and work.
+    dt = 0: at rest, new.slow becomes T; dt < 0: new.slow stays as it is.  t: s, the time of `new`.  Writes line.ck, what
+    is written of line.law, new.slow, new.peak, energy and work.
     """
     law, table, energy, lost = line.law, line.law_table, 0.0, 0.0
     for i in range(line.h.shape[0]):

@@ -76,9 +76,9 @@ def bend_under(table, law, i, M):
 
 @kernel
 def shares_of_stiffness(line, i, x):
-    """Of the element at node i, bent by the size x (rad): secant and (tangent - secant) of its stiffness without bend,
+    """Secant, tangent less secant, and energy of the element at node i, bent by the size x (rad).
 
-    and its energy over that of the stiffness without bend.
+    As parts of its stiffness without bend, the energy of that of this stiffness.
     """
     law, table = line.bend_law, line.bend_table
     low = 0.0
@@ -126,9 +126,9 @@ def curvature_under(line, i, side, M):
 
 @kernel
 def parts_without_spring(line, i, a, b):
-    """Of the element at an end of a line, bent by a, b (rad): the part of its bend that is not that of an angular
+    """The part of the bend a, b (rad) of an end's element that is not of its angular spring.
 
-    spring, and the part of a small change of it.
+    Also that part of a small change of the bend.
     """
     x = math.sqrt(a * a + b * b)
     if slips(line, i) and give_of_spring(line, i) > 0.0 and x > 0.0:

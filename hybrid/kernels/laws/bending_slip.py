@@ -55,12 +55,16 @@ from hybrid.kernels.state.report import BENDING_SLIP, LOST_WORK
 # Columns of Line.slip_law, EACH of a layer: K0, N m2; m0, N m, below 0 of an elastic one; mT, m; KT, m2.  K0, KT 0: none (as
 # behind the last).  Behind those of a clamp with an angular spring, where there is none, m0 is its give, rad/(N m).
 STIFFNESS, MOMENT, PER_TENSION, STIFFENING, EACH = range(5)
-# Columns of Line.slip_now, EACH of a layer: p at the start of the step, 1/m; `most`, N m; K, N m2.  State.layers has KEPT.
-FROM, MOST, STIFF, KEPT = 0, 2, 3, 2
+# Columns of Line.slip_now, EACH of a layer.
+FROM = 0  # 2, p at the start of the step, 1/m
+MOST = 2  # N m
+STIFF = 3  # K, N m2
+KEPT = 2  # columns of a layer in State.layers
 # What `follow_slip` is asked for: before a march, in motion or at rest; behind a step, an equilibrium.
 IN_MOTION, LOADED_FIRST, BEHIND_STEP, BEHIND_REST = range(4)
-# Iterations of the bend beside a spring, the part of it that is round-off, and the shortest step towards it.
-MOST_TIMES, ROUND_OFF, SHORTEST = 60, 1e-15, 1e-6
+MOST_TIMES = 60  # iterations of the bend beside a spring
+ROUND_OFF = 1e-15  # part of the bend
+SHORTEST = 1e-6  # step towards it, as a part
 
 
 @inner
@@ -77,8 +81,10 @@ def layered(line, i, j):
 
 @inner
 def trial(line, i, j, x, y, hn):
-    """Moment of layer j (its first column) at node i under the bend x, y of a length hn, as if it stuck: two components,
-    its size, and the part that is left."""
+    """Moment of layer j at node i under the bend x, y of a length hn, as if it stuck.
+
+    j: its first column.  Two components, their size, and the part of them that friction holds.
+    """
     K, one = line.slip_now[i, j + STIFF], 1.0 / hn
     a, b = K * (x * one - line.slip_now[i, j + FROM]), K * (y * one - line.slip_now[i, j + FROM + 1])
     size, most = math.sqrt(a * a + b * b), line.slip_now[i, j + MOST]

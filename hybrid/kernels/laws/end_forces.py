@@ -139,9 +139,9 @@ def force_of_beam(layer, p0, slope, h):
 
 @inner
 def force_of_layer(layer, p0, p1, slope, h):
-    """Force at a support at a depth p0, with the next node at p1, and the part of the layer that is there: from 0,
+    """Force at a support at a depth p0, with the next node at p1, and the part of its layer.
 
-    where the line leaves the bed at the support, to 1.
+    The part is from 0, where the line leaves the bed at the support, to 1.
     """
     w, a0, a1 = layer.w, max(p0, 0.0), max(p1, 0.0)
     low, high, lies, free, V = 0.0, h, h, 0.0, 0.0
@@ -166,9 +166,10 @@ def force_of_layer(layer, p0, p1, slope, h):
 
 @inner
 def force_at_support(line, sea, ends, state, k, x, found):
-    """Force (N) along the normal of the bed with which a line presses on a support; x: its place; found: without the
+    """Force (N) along the normal of the bed with which a line presses on a support.
 
-    layer at the support, which is right where cells are short against it, and where the line does not lie.
+    x: its place; found: without the layer at the support, which is right where cells are short against it, and where
+    the line does not lie.
     """
     count = line.h.shape[0]
     c, i, inward = k * (count - 1), k * count, 1 - 2 * k

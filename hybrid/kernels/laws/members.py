@@ -21,9 +21,16 @@ from typing import Any, NamedTuple
 from hybrid.kernels.algebra.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.kernels.machine.compile import inner
 
-# Of a piece: middle (m) and direction in axes of the body, coefficients, wetted part, velocity and acceleration of the
-# water.
-MIDDLE, ALONG, CN, CT, CM, WET, WATER, PUSH, PIECE = 0, 3, 6, 7, 8, 9, 10, 13, 16
+# Columns of a piece; places and directions in axes of the body, motion of the water.
+MIDDLE = 0  # 3, m
+ALONG = 3  # 3, direction
+CN = 6  # coefficients of drag across,
+CT = 7  # and along,
+CM = 8  # and of inertia
+WET = 9  # wetted part
+WATER = 10  # 3, its velocity, m/s
+PUSH = 13  # 3, its acceleration, m/s2
+PIECE = 16
 
 
 @inner

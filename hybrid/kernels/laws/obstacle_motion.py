@@ -155,9 +155,10 @@ def unswept(carried, k, x):
 
 @inner
 def way_with(carried, k, x, u):
-    """Way of the surface of obstacle k under a node that has gone by u to x: the mean of that from where the node was and
+    """Way of the surface of obstacle k under a node that has gone by u to x.
 
-    of that to where it is, which has no part across a surface that turns under a node at rest.
+    The mean of that from where the node was and of that to where it is, which has no part across a surface that turns
+    under a node at rest.
     """
     x0 = sub(x, u)
     return scale(0.5, add(sub(swept(carried, k, x0), x0), sub(x, unswept(carried, k, x))))
@@ -165,8 +166,9 @@ def way_with(carried, k, x, u):
 
 @inner
 def way_along(carried, k, q, x, u):
-    """Way of a node along what goes with obstacle k: its travel q before the step, which turns with the obstacle, and
+    """Travel of a node against obstacle k after a step.
 
-    what it has moved against the obstacle since; x: where it is, u: its displacement in the step.
+    Its travel q before the step, which turns with the obstacle, and its motion against the obstacle since; x: where it
+    is, u: its displacement in the step.
     """
     return add(mat_vec(row9(carried, k, SWEEP), q), sub(x, swept(carried, k, sub(x, u))))

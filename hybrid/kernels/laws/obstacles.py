@@ -143,9 +143,9 @@ def reach_of(sea, k, i, e):
 
 @inner
 def normal_force(line, sea, moves, k, i, x, v, e, cv):
-    """What obstacle k presses on node i at x with: N, whether it touches, n, curvature, and how N changes with x, and with
+    """Force N with which obstacle k presses on node i at x, and its derivatives.
 
-    the places of the neighbours before and after.
+    N, whether it touches, n, curvature, and how N changes with x, and with the places of the neighbours before and after.
     """
     reach = reach_of(sea, k, i, e)
     if is_far(sea, k, x, reach):

@@ -43,7 +43,9 @@ NUMBERS = PART + 1
 # Columns of State.soil: z and P at the end of the last step; z0 and P0 of the branch it is on; which (UP, DOWN, else that of
 # first penetration); w.
 DEPTH, PRESSES, TURN, TURN_P, BRANCH, SLID = range(6)
-UP, FIRST, DOWN = -1.0, 0.0, 1.0
+UP = -1.0  # branches
+FIRST = 0.0
+DOWN = 1.0
 SHALLOW = 0.1  # z/D below which Nc falls with the root of z
 MOST_HALVINGS = 60  # of the depth that bears a pressure
 DEEP_FLOW = 9.0  # of su: soil that flows round a line sideways, however deep it lies

@@ -40,9 +40,15 @@ from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import relative_rotation, turns_freely
 from hybrid.kernels.machine.compile import inner, kernel
 
-# Columns of Work.couple, of the element at a node: kb p; how Q answers to chord and spin of the cell after it, and
-# (with a minus sign) of the cell before it; kb; Q; rate of twist, 1/s.
-AXIS, AFTER, SPIN_AFTER, BEFORE, SPIN_BEFORE, STIFF, TORQUE, RATE = 0, 3, 6, 7, 10, 11, 12, 13
+# Columns of Work.couple, of the element at a node.
+AXIS = 0  # 3, kb p
+AFTER = 3  # 3, how Q answers to the chord
+SPIN_AFTER = 6  # and spin of the cell after it,
+BEFORE = 7  # 3, and (with a minus sign) to the chord
+SPIN_BEFORE = 10  # and spin of the cell before it
+STIFF = 11  # kb
+TORQUE = 12  # Q
+RATE = 13  # of twist, 1/s
 COUPLES = 14
 # Of Line.torsion, and of State.turn, as kernels.march.zone_torque has them.
 ZONE_FIRST, ZONE_LAST, ZONE_COMPLIANCE, ZONE_FREE, ZONE_TAU = range(5)

@@ -20,8 +20,11 @@ _NUMBERS = bool, int, float, complex, np.bool_, np.number
 
 
 def key_of(value: Any) -> Any:
-    """Of an array the type of its numbers, its dimensions and flags; of other tuples than those that are kept by
-    reference their class and their parts; else the class.  TypeError: it is nothing that a kernel takes."""
+    """The type of an argument of a kernel.
+
+    Of an array the type of its numbers, its dimensions and flags; of other tuples than those that are kept by reference
+    their class and their parts; else the class.  TypeError: it is nothing that a kernel takes.
+    """
     kind: Any = type(value)
     if isinstance(value, NamedNumbers):
         if value.shape != (len(kind._fields),) or not value.flags.c_contiguous:

@@ -24,9 +24,10 @@ class Table:
     """The arguments of one kernel, by the names of its NamedTuple; `numbers` is what the kernel gets."""
 
     def __init__(self, example: Any, room: NDArray[np.int64] | None = None) -> None:
-        """example: with the types that all values have, or a function that makes it, called once in all: whatever
+        """A table of the addresses of values with the types of an example.
 
-        kernels write must then be bound; room: for the numbers, None: of its own.
+        example: a value, or a function that makes one and is called once in all: whatever kernels write must then be
+        bound; room: for the numbers, None: of its own.
         """
         self.numbers: NDArray[np.int64]
         if callable(example):
@@ -194,9 +195,10 @@ class Packed:
     """
 
     def __init__(self, blank: Callable[[int], Any], given: Sequence[str] = ()) -> None:
-        """blank: makes one for a number of cells, of which its shapes are linear functions; given: fields that are none
+        """Room for values of a tuple of arrays in one block of numbers.
 
-        of the block, but given whenever one is made.
+        blank: makes one for a number of cells, of which its shapes are linear functions; given: fields that are none of
+        the block, but given whenever one is made.
         """
         two, three = blank(2), blank(3)
         self._make, self._given = two._make, tuple(given)
@@ -237,9 +239,10 @@ class Packed:
         return value
 
     def _plan(self, cells: int) -> Any:
-        """Size of the block; of each field its shape and offset there, or pattern and where its numbers begin; numbers
+        """The layout of a block for a number of cells.
 
-        in a block at address 0, and which of them are addresses.
+        Size; of each field its shape and offset, or pattern and where its numbers begin; numbers in a block at address
+        0, and which of them are addresses.
         """
         places: list[Any] = []
         numbers: list[int] = []

@@ -13,8 +13,10 @@ from typing import Any
 
 
 class _Function:
-    """A function that numba hears of when it is needed: making hundreds of its dispatchers takes as long as all kernels
-    take to load."""
+    """A function whose dispatcher numba makes when it is needed.
+
+    Making hundreds of dispatchers takes as long as all kernels take to load.
+    """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.py_func = function

@@ -1,5 +1,7 @@
-"""How numba compiles kernels: what it is told, and what is done in another way than its own.  Imported when the first kernel
-has to be compiled (kernels.machine.kept_code).  Tried with numba 0.62.0 and 0.68.1."""
+"""How numba compiles kernels: its options, and what is done in another way than its own.
+
+Imported when the first kernel has to be compiled (kernels.machine.kept_code).  Tried with numba 0.62.0 and 0.68.1.
+"""
 
 from __future__ import annotations
 

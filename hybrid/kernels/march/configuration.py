@@ -31,8 +31,10 @@ def carry_director(plane, space, a, e, en):
 
 @inner
 def measure(e, T, x):
-    """Size of a Newton correction x: largest shift, largest turn of a chord or spin and its cell, largest change of
-    tension, and the largest tension."""
+    """Size of a Newton correction x, and the largest tension.
+
+    Largest shift, largest turn of a chord or spin and its cell, largest change of tension.
+    """
     n = e.shape[0]
     shift, turn, pull, big, where = 0.0, 0.0, 0.0, 0.0, -1
     for i in range(n + 1):

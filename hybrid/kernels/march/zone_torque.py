@@ -34,14 +34,17 @@ from hybrid.kernels.state.state import Floats, Line, Torsion, no_torsion
 
 # Parts of `pass_torque`.
 BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
-TURN, TORQUE, POWER = 0, 1, 2  # columns of State.turn
+# Columns of State.turn.
+TURN = 0
+TORQUE = 1
+POWER = 2
 FIRST, LAST, COMPLIANCE, FREE, TAU = range(5)  # columns of Line.torsion
 LOAD, HOLD = 0, 1  # rows of Torsion.passed
-# Iterations for which the answers to torques serve: they are mostly those of torsion, which does not change, and torques
-# themselves are those of the configuration, so that this touches convergence alone.  They are found anew in a step that
-# takes more than so many iterations, and where cv has changed by more than that part of it: round-off of the length of
-# steps does not count.
-SERVES, ITERATIONS, SAME_STEP = 96, 3, 1e-3
+# The answers to torques are mostly those of torsion, which does not change, and torques themselves are those of the
+# configuration, so that answers touch convergence alone.
+SERVES = 96  # iterations for which they serve,
+ITERATIONS = 3  # unless a step takes more than so many,
+SAME_STEP = 1e-3  # or cv has changed by more than this part of it: round-off of the length of steps does not count
 # Torsion.known: cv of the answers, iterations they have served, whether the march keeps its factors now, whether it
 # always does, iterations of this step.
 OF_CV, SERVED, KEEPS_NOW, KEEPS_ALWAYS, OF_STEP = range(5)
@@ -77,9 +80,9 @@ def carry(a, d, dn):
 
 @inner
 def find_turn(line, ends, state, slope, a, b):
-    """Turn (rad, less than half a turn) of the frame after the cells a to b - 1, its slopes by their chords, and
+    """Turn (rad, less than half a turn) of the frame after the cells a to b - 1, and its slopes.
 
-    those by the directions of ends that hold the zone.
+    By the chords of these cells, and by the directions of ends that hold the zone.
     """
     director, d = frame_before(line, ends, state, a)
     none = (0.0, 0.0, 0.0)
@@ -223,9 +226,9 @@ def report_end_moments(line, ends, state, report):
 
 @inner
 def solve_columns(line, work, joined):
-    """How the line answers to each torque, and to a torque on each cell that is held meanwhile; joined: its end is, to
+    """Response of the line to each torque, and to a torque on each cell that is held meanwhile.
 
-    a point (kernels.junctions.joined_lines), and is held there.
+    joined: its end is joined to a point (kernels.junctions.joined_lines), and is held there.
     """
     torsion, n = work.torsion, line.h.shape[0]
     zones = line.torsion.shape[0]

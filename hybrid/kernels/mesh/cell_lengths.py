@@ -233,9 +233,9 @@ def lower_at_edge(line, sea, state, zones, i, dt, finer):
 
 @inner
 def foresee_edge(line, sea, state, zones, stay, i, time):
-    """Raise the ratio of base cells over the way that a contact edge in cell i goes in `time`, s: the stiffness of
+    """Raise the ratio of base cells over the way that a contact edge in cell i goes in `time`, s.
 
-    rods takes so long to come, and the edge would be there before them.
+    The stiffness of rods takes so long to come, and the edge would be there before them.
     """
     kinds, s, n = zones.kinds, line.s, line.h.shape[0]
     low = max(state.T[i], kinds.floor[i], 1e-300)
@@ -358,9 +358,10 @@ def plan_base_cell(zones, p, begin, size, unit):
 
 @inner
 def plan_cells(line, sea, state, zones, dt, finer):
-    """Places of the finest mesh where nodes should be into zones.plan; whether some are needed at once, or many
+    """Enter into zones.plan which places of the finest mesh should be nodes.
 
-    may go; dt: s, of the step before, which the next one is taken to be as long as; finer: fineness.
+    Returns whether some are needed at once, or many may go; dt: s, of the step before, which the next one is assumed to
+    be as long as; finer: fineness.
     """
     at_once = find_wanted(line, sea, state, zones, dt, finer)
     begin, p = 0, 0

@@ -16,7 +16,10 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import rows
 from hybrid.kernels.state.state import FIELDS, HALF, MEAN, POINT, ROD, SHARED, Field, blank_line
 
-WEIGHT, B_1, KAPPA_1 = 0, 1, 4  # columns of a row; of B and kappa the first of three
+# Columns of a row.
+WEIGHT = 0
+B_1 = 1  # first of three
+KAPPA_1 = 4  # first of three
 FIRST = 7
 # Fields that follow from one number per length of the same name, column FIRST on; and those of bodies.
 PER_LENGTH = tuple(name for name, field in FIELDS.items() if field.rule in (MEAN, HALF, ROD, SHARED))

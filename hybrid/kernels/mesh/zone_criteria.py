@@ -88,8 +88,11 @@ TWISTED = 0.5
 FORESEEN = 2.0
 # Part of a layer beyond which its tension counts; part of a change of tension within that by which it may be wrong.
 SHOWS, BY_TENSION = 0.37, 0.25
-# What may sit at a node: nothing, a jump of bending stiffness, a point load, at an end a hinge that results know.
-SMOOTH, STEP, LOAD, HINGE = 0, 1, 2, 3
+# What may sit at a node.
+SMOOTH = 0  # nothing
+STEP = 1  # a jump of bending stiffness
+LOAD = 2  # a point load
+HINGE = 3  # at an end, a hinge that results know
 
 
 @inner

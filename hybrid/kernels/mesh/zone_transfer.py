@@ -27,7 +27,10 @@ from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import ROTARY
 from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
 
-CARRIED, CLAMPED, NOTHING = 2, 1, 0
+# How the frame at an end of a zone goes on.
+CARRIED = 2
+CLAMPED = 1
+NOTHING = 0
 
 
 class Match(NamedTuple):

@@ -129,9 +129,9 @@ def curvature_at(line, ends, state, reel, j):
 
 @inner
 def flow_through_middle(line, ends, state, reel, k):
-    """Speed of the middle of cell k against its material times the curvature there, rad/s; beyond the last cell, that
+    """Speed of the middle of cell k against its material times the curvature there, rad/s.
 
-    of the material at a clamp that is the fairlead.
+    Beyond the last cell, that of the material at a clamp that is the fairlead.
     """
     n, g, c = line.h.shape[0], growing(line, reel), reel.numbers.rate
     if k < g:
@@ -273,9 +273,9 @@ def power_of_flow(line, ends, state, reel):
 
 @inner
 def damped_stretch_work(line, state, i, h):
-    """Energy per length, N, that cell i of length h takes up when its unstretched length grows and its ends stay, but
+    """Energy per length, N, that cell i of length h takes up as its unstretched length grows.
 
-    for that of the tension of damping, which is part of `power_of_flow`.
+    Its ends stay; without that of the tension of damping, which is part of `power_of_flow`.
     """
     _, l, _ = chord(get3(state.e, i))
     if not line.ck[i] > 0.0:

@@ -386,9 +386,9 @@ def iterate(table):
 
 @kernel
 def iterate_with_others(table):
-    """The same of a line that one Newton solves with others: the length is corrected with all of these
+    """The same of a line that one Newton solves with others.
 
-    (kernels.junctions.joined_winches), and then changes.
+    The length is corrected with all of these (kernels.junctions.joined_winches), and then changes.
     """
     return ride_and_wind(read(table), True)
 

@@ -39,9 +39,9 @@ def turn_at(line, ends, state, i):
 
 @inner
 def bend_that_came(line, state, reel, turn, i, k):
-    """Twice the energy, J, that a change k of its stiffness (N m) and one of its strain without load make of the element
-    at node i, turned by `turn`, rad; reel.before: of the line before.
+    """Twice the energy, J, that changes of stiffness and strain without load add at node i.
 
+    k: N m, change of stiffness; turn: rad, of the element; reel.before: of the line before.
     With x the strain now and d what it was more before:  (kb + k) x^2 - kb (x + d)^2 = k x^2 - kb (2 x + d) d.
     """
     before = reel.before[i]

@@ -74,7 +74,10 @@ class ReelStage(NamedNumbers):
 # What may be asked: to be corrected with the lines; to take its change.
 WAITS, MOVES = 1.0, 2.0
 # Columns of `Reel.flow`.
-LENGTH_OF, FLOW, STRAIN_OF, TURN_FLOW = 0, 1, 2, 5
+LENGTH_OF = 0
+FLOW = 1
+STRAIN_OF = 2  # 3
+TURN_FLOW = 5  # 3
 FLOWS = 8
 
 
@@ -121,9 +124,9 @@ def blank_reel(
     cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Winch | None = None,
     layer: Floats | None = None, columns: bool = False, damped: bool = False, slips: int = 0,
 ) -> Reel:  # fmt: skip
-    """A reel of a line of so many cells; columns: whether such a winch needs another right-hand side; damped: see `flow`;
+    """A reel of a line of so many cells.
 
-    slips: layers that do.
+    columns: whether such a winch needs another right-hand side; damped: see `flow`; slips: layers that do.
     """
     z = np.zeros
     numbers = ReelNumbers(changed=-np.inf)

@@ -148,11 +148,11 @@ def softness(line, state, winch, X):
 
 @inner
 def answer_of_cell(line, state, winch, X, W, columns, c, at):
-    """The same of any cell c, behind nodes that ride or with the fairlead at the start: how the tension before node
+    """The same of any cell c, behind nodes that ride or with the fairlead at the start.
 
-    `at` answers to its length, N/m, and the change of that tension in the equations eliminated in X, N.  X has room for
-    the factors of another right-hand side; columns: (3, N+1, 5), of which the first keeps what `lengthen_cell` adds to
-    the right-hand sides.
+    How the tension before node `at` answers to its length, N/m, and the change of that tension in the equations
+    eliminated in X, N.  X has room for the factors of another right-hand side; columns: (3, N+1, 5), of which the first
+    keeps what `lengthen_cell` adds to the right-hand sides.
     """
     forward, column, x = columns[0], columns[1], columns[2]
     n = line.h.shape[0]

@@ -1,6 +1,4 @@
-"""The compiled entries to all that needs the march of one line, and what Python asks of them: a step, a static solve,
-
-the block rows of a configuration.
+"""Compiled entries to the march of one line: a step, a static solve, block rows of a configuration.
 
 One kernel for each kind of line, so that neither is compiled for a scene that does not have it.  Networks call it by its
 address: what stands around the solver is compiled once for both kinds, and beside them (simulation.first_use).  Both get

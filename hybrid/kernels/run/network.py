@@ -100,8 +100,10 @@ from hybrid.kernels.watch.extremes import first_strains, note_extremes
 
 JUNCTIONS = 5
 call_solver, call_touch, call_meet, call_spin = caller((0, 0, 0.0, 0)), caller(0), caller(0), caller(0)
-# Where cv and ca of the task are among the numbers of a job, whose first field it is.
-TASK_CV, TASK_CA, TASK_DT = Task._fields.index("cv"), Task._fields.index("ca"), Task._fields.index("dt")
+# Places among the numbers of a job, whose first field is its task.
+TASK_CV = Task._fields.index("cv")
+TASK_CA = Task._fields.index("ca")
+TASK_DT = Task._fields.index("dt")
 
 
 @inner
@@ -124,10 +126,10 @@ def ask_sheaves(system, phase):
 
 @inner
 def march_lines(system, given, steps):
-    """March all lines: force on each point into `net`, N, that on bodies into `work`; given: what ends have to go is;
+    """March all lines: force on each point into `net`, N, that on bodies into `work`.
 
-    steps: whether this is an iteration of a step, of which lines that are paid out know (kernels.reel.payout.iterate).
-
+    given: the shifts of ends are known; steps: whether this is an iteration of a step, of which lines that are paid out
+    know (kernels.reel.payout.iterate).
     Returns -1 or a line that failed, and its bad node.
     """
     tables, joints, seats, arms, net, work = (
@@ -163,9 +165,9 @@ def march_lines(system, given, steps):
 
 @inner
 def size_up(tables, ca):
-    """Size of a correction: largest shift as a part of the line's reach, turn and its line and cell, and what Newton
+    """Size of a correction, over all lines.
 
-    compares with its tolerance.
+    Largest shift as a part of the line's reach, turn and its line and cell, and what Newton compares with its tolerance.
     """
     shift, turn, size, worst, where = 0.0, 0.0, 0.0, 0, -1
     for l in range(tables.shape[0]):
@@ -185,9 +187,9 @@ def size_up(tables, ca):
 
 @inner
 def correct_torques(tables, cv):
-    """Corrections of lines with the torque through their catenary zones, which changes with them; their ends stay where
+    """Corrections of lines with the torque through their catenary zones, which changes with them.
 
-    the correction has put them.
+    Ends stay where the correction has put them.
     """
     for l in range(tables.shape[0]):
         job = read(tables[l])
@@ -413,9 +415,9 @@ def book_system_step(table):
 
 @inner
 def predict_step(system, task, t):
-    """Predict a step to t (s) of all lines and bodies: its task and scheme, whether something turns too far, and by how
+    """Predict a step to t (s) of all lines and bodies.
 
-    much (rad), its line (-1: a body) and cell.
+    Its task and scheme, whether something turns too far, and by how much (rad), its line (-1: a body) and cell.
     """
     safe, rho = 1.0, task.rho
     if system.touch != 0:

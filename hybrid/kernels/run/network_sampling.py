@@ -34,9 +34,14 @@ from hybrid.kernels.state.obstacle_rows import ENDED, TURNED
 from hybrid.kernels.step.job import read
 from hybrid.kernels.step.sampling import SAME_TIME, frame_between, hermite, parabola, sample_head, sample_state
 
-# Of a sample of a body: origin (m), frame, velocity, angular velocity (in its axes), force and moment of its lines, kinetic
-# and potential energy, work of the lines, of damping and of loads.
-SAMPLE_PLACE, SAMPLE_AXES, SAMPLE_V, SAMPLE_W, SAMPLE_LINES, SAMPLE_ENERGIES, SAMPLE_DONE = 0, 3, 12, 15, 18, 24, 26
+# Numbers of a sample of a body.
+SAMPLE_PLACE = 0  # 3, origin, m
+SAMPLE_AXES = 3  # 9, frame
+SAMPLE_V = 12  # 3, m/s
+SAMPLE_W = 15  # 3, in its axes, 1/s
+SAMPLE_LINES = 18  # 6, force and moment of its lines
+SAMPLE_ENERGIES = 24  # 2, kinetic and potential, J
+SAMPLE_DONE = 26  # 3, work of the lines, of damping and of loads, J
 BODY_SAMPLE = 29
 
 

@@ -89,8 +89,16 @@ from hybrid.kernels.watch.tangents import (
     stay_held,
 )
 
-# Tangents of a body: of its place, its turn (inertial, rad), the rates of both as in its state, and n of the step.
-TURN_OF, V_OF, A_OF, VD_OF, W_OF, WA_OF, WD_OF, N_OF, TANGENTS = 3, 6, 9, 12, 15, 18, 21, 24, 27
+# Numbers of the tangents of a body, behind those of its place (3).
+TURN_OF = 3  # 3, turn (inertial), rad
+V_OF = 6  # 3, rates of both, as in its state
+A_OF = 9  # 3
+VD_OF = 12  # 3
+W_OF = 15  # 3
+WA_OF = 18  # 3
+WD_OF = 21  # 3
+N_OF = 24  # 3, n of the step
+TANGENTS = 27
 SMALL_TURN = 1e-3
 
 
@@ -504,9 +512,10 @@ def follow_in_plane(table):
 
 @kernel
 def correct_beside(table):
-    """Corrections of tangents of a state as it is, by the factors of it: of the number asked[0], in what the lines and
+    """Correct tangents of a state as it is, by its factors; returns 0.
 
-    bodies of the run work with; -1: what the lines of the run leave over is found.  Returns 0.
+    Of the number asked[0], in what the lines and bodies of the run work with; -1: residuals of the lines of the run are
+    found.
     """
     net = read_tangents(table)
     system, p, cv, ca = read_system(net.even), net.asked[0], net.by[0], net.by[1]

@@ -240,10 +240,14 @@ class Moves(NamedTuple):
     fairlead: Floats  # (2, FAIRLEAD) of ends on a body that moves as is said above, below
 
 
-# Of `Moves.fairlead`: whether the end is at a body that moves, and turns with it or freely; its place there; its frame,
-# in axes of the body where it turns with it, else inertial.
-RIDES, PLACE_THERE, SEAT_THERE, FAIRLEAD = 0, 1, 4, 13
-NOT_ON_BODY, TURNS_FREELY, TURNS_WITH_BODY = 0.0, 1.0, 2.0
+# Numbers of `Moves.fairlead`.
+RIDES = 0  # NOT_ON_BODY, TURNS_FREELY or TURNS_WITH_BODY
+PLACE_THERE = 1  # 3, on a body that moves, m
+SEAT_THERE = 4  # 9, frame: in axes of the body where it turns with it, else inertial
+FAIRLEAD = 13
+NOT_ON_BODY = 0.0
+TURNS_FREELY = 1.0
+TURNS_WITH_BODY = 2.0
 
 
 class Sea(NamedTuple):
@@ -396,9 +400,9 @@ def obstacles_now(sea: Sea, state: State) -> Floats:
 
 
 def state_in(batch: Batch, k: int, line: Line) -> State:
-    """The state of a line at output k, in arrays of its own; algorithmic accelerations and friction are not known, and
+    """The state of a line at output k, in arrays of its own.
 
-    mean tensions are taken for those of a line at rest.
+    Algorithmic accelerations and friction are not known, and mean tensions are those of a line at rest.
     """
     state = state_for(line)
     state.turn[:] = batch.turn[k] if batch.turn.size else 0.0
@@ -462,10 +466,11 @@ def blank_state(
     n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False, obstacles: int = 0,
     sheaves: bool = False, peak: bool = False, layers: int = 0, soil: bool = False,
 ) -> State:  # fmt: skip
-    """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions;
+    """A state of zeros with room for `n_cells` cells.
 
-    wake: phases of vortices; obstacles: of which one moves; sheaves: one of them turns freely; peak: highest mean
-    tensions; layers: that slip; soil: what nodes remember of the bed.
+    zones: those that a torque passes through; slow: mean tensions; wake: phases of vortices; obstacles: of which one
+    moves; sheaves: one of them turns freely; peak: highest mean tensions; layers: that slip; soil: what nodes remember
+    of the bed.
     """
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros

@@ -39,9 +39,9 @@ PREPARE, LIMIT, TOUCH, FINISH, REST, RADIUS, GAIN, FIND = range(8)
 call_contact = caller(0.0)
 call_reel = caller(0)
 
-OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
+OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = range(6)  # errors.Outcome, as kernels see it
 CUT_SHORT = -1  # a step that is taken though Newton has not converged in the iterations it may take (Task.cut)
-STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = 0, 1, 2, 3, 4
+STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = range(5)
 
 
 # Newton stops when the next correction, predicted from the last two by quadratic

@@ -57,9 +57,10 @@ THROUGH = 2.0 * LARGEST_STEP_TURN
 
 
 class States(NamedTuple):
-    """The states before and after a step; was, now: (N+1, 4) a push out of the plane before and after it, empty where
+    """The states before and after a step.
 
-    there is none (kernels.laws.out_of_plane).
+    was, now: (N+1, 4) a push out of the plane before and after it, empty where there is none
+    (kernels.laws.out_of_plane).
     """
 
     old: State

@@ -32,9 +32,10 @@ from hybrid.kernels.state.state import Floats
 
 # Points of a cell at which the bed presses, where its load on nodes is found.
 POINTS = 12
-# Newton's method ends where w changes by less than this part of its range, which shows in no curvature; every so many
-# rounds it goes half the way, since beside a hard bed it may swing between two answers; at most so many.
-CHANGE, HALF, ROUNDS = 1e-9, 6, 40
+# Newton's method:
+CHANGE = 1e-9  # it ends where w changes by less than this part of its range, which shows in no curvature
+HALF = 6  # every so many rounds it goes half the way, since beside a hard bed it may swing between two answers
+ROUNDS = 40  # at most
 # Rows of work, and how many.
 W, SINKS, TENSION, STIFFNESS, LOAD, MAIN, BELOW, SECOND, PER_LENGTH, PER_PIVOT, FIRST, RIGHT, WORK = range(13)
 

@@ -287,9 +287,10 @@ def take_layer_at_end(line, state, books, k):
 
 @inner
 def put_layers_back(line, ends, state, books):
-    """Curvature as outputs have it (outputs.strains) into strains[:, BENT]: of rods with what joints take of it, of
+    """Enter curvature as outputs have it (outputs.strains) into strains[:, BENT].
 
-    catenaries without what fades at their ends.  At joints themselves that of the side of the catenary into strains[:, 0].
+    Of rods with what joints take of it, of catenaries without what fades at their ends.  At joints themselves that of
+    the side of the catenary into strains[:, 0].
     """
     n, bent = line.h.shape[0], books.strains
     for i in range(n + 1):
@@ -361,10 +362,9 @@ def at_rod_end(line, ends, state, books, i, side, passed):
 
 @inner
 def note_rod_end(line, ends, state, books, i, passed, t):
-    """Curvature, moment and torque where a rod has no element: those of the moment that is given, at a joint none but
+    """Curvature, moment and torque where a rod has no element: those of the given moment.
 
-    the torque `passed` of the zone beside it, N m.
-
+    At a joint none but the torque `passed` of the zone beside it, N m.
     Where the rod is curved without load and a moment is given, the curvature is the largest that both can have.
     """
     n = line.h.shape[0]

@@ -31,21 +31,37 @@ from hybrid.kernels.watch.pipes import note_pipes
     TOUCHDOWN_EXCURSION, LAYBACK, CLEARANCE,
 ) = range(12)  # fmt: skip
 CHORDS = 12  # none of a scene: chords of a line for another one
-# Columns of `asked`: kind, end (0, 1), unit direction or normal (3), whether layback goes to the touchdown point, a
-# point of the plane (3), whether it is one, range of arc lengths, m, NaN: all of the line, first and last row of `path`;
-# 1 where the end is joined to a point that nothing else is at, whose pull is what Newton left; 1 where the first row of
-# `path` has the number of chords behind it, -1 where there is no room for them; 1 where the arc length is that of `path`.
-KIND, END, DIRECTION, TO_TOUCHDOWN, POINT, IS_PLANE, FIRST, LAST, PATH, PATH_END, IDLE, COUNTED, OF_PATH = 0, 1, 2, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16  # fmt: skip
+# Columns of `asked`.
+KIND = 0
+END = 1  # 0, 1
+DIRECTION = 2  # 3, unit direction or normal
+TO_TOUCHDOWN = 5  # whether layback goes to the touchdown point
+POINT = 6  # 3, of the plane, m
+IS_PLANE = 9  # whether there is one
+FIRST = 10  # range of arc lengths, m, NaN: all of the line
+LAST = 11
+PATH = 12  # first and last row of `path`
+PATH_END = 13
+IDLE = 14  # 1 where the end is joined to a point that nothing else is at, whose force is what Newton left
+COUNTED = 15  # 1 where the first row of `path` has the number of chords behind it, -1 where there is no room for them
+OF_PATH = 16  # 1 where the arc length is that of `path`
 ASKED = 17
-# Columns of `reached`: smallest, largest, when, s; arc length where a clearance was, m; the place x, y, m, from which
-# excursions count, or the azimuth, deg, from which azimuths are within half a turn, NaN: not known; the cell that was
-# nearest last.
-SMALLEST, LARGEST, TIMES, PLACES, REFERENCE, NEAREST = 0, 1, 2, 4, 6, 8
+# Columns of `reached`.
+SMALLEST = 0
+LARGEST = 1
+TIMES = 2  # 2, when, s
+PLACES = 4  # 2, arc length where a clearance was, m
+REFERENCE = 6  # 2, place x, y, m, from which excursions count, or azimuth, deg, near the others; NaN: not known
+NEAREST = 8  # the cell that was nearest last
 REACHED = 9
 # The first azimuth is above it, deg, and at most a turn more: lines along an axis are far from both bounds.
 LEAST_AZIMUTH = -170.0
-# Rows of `path`: first point (3), chord (3), its square, radius around it, m, arc length at which it begins, its length, m.
-CHORD, SQUARE, RADIUS, BEGINS, SPANS = 3, 6, 7, 8, 9
+# Columns of `path`, behind the first point (3), m.
+CHORD = 3  # 3, m
+SQUARE = 6  # of its length, m2
+RADIUS = 7  # around it, m
+BEGINS = 8  # arc length at which it begins, m
+SPANS = 9  # its length along the line, m
 PATH_ROW = 10
 
 

@@ -30,8 +30,11 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.compile import inner, kernel
 
-# Columns of books.strains: curvature of elements, that of results; c and d of above.
-RAW, BENT, C, D = 0, 3, 4, 5
+# Columns of books.strains.
+RAW = 0  # curvature of elements
+BENT = 3  # curvature of results
+C = 4  # c and d of above
+D = 5
 WHOLE = 1.0 - 1e-9  # p from which on a rod has all of its stiffness
 LINE = 2  # first row of books.hinges of pieces of the line
 EI, END, GJ = range(3)  # columns of these
@@ -153,9 +156,9 @@ def get_solved(bent, i):
 
 @kernel
 def restore_rod(line, ends, state, books, a, b):
-    """Into column BENT the curvature of the rod from node a to b with all of its stiffness; of joints into RAW as well:
+    """Enter into column BENT the curvature of the rod from node a to b with all of its stiffness.
 
-    on the side of the catenary it is the same.
+    Of joints into RAW as well: on the side of the catenary it is the same.
     """
     bent, pieces, h, n = books.strains, books.hinges, line.h, line.h.shape[0]
     for i in range(a, b + 1):

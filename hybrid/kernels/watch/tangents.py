@@ -73,9 +73,9 @@ def put_other(plane, space, line, here, rates, spin, h, there):
 
 @inner
 def carried_apart(old, new, other_old, other_new, c):
-    """By how much the director of cell c, carried to the other line before the step and along with it, is spun against
+    """Spin, rad, between two ways to carry the director of cell c to the other line.
 
-    the one that is carried along with the line and to the other one behind the step, rad.
+    To it before the step and along with it, against along with the line and to the other one behind the step.
     """
     a, to = get3(old.a1, c), get3(other_new.e, c)
     one = carry_director(None, 1, a, get3(old.e, c), get3(other_old.e, c))
@@ -185,9 +185,9 @@ def predict_other(job, other, s, there_old, u):
 
 @inner
 def damped_more(line, other, here, there, now, longer, c):
-    """By how much more the length of cell c lags behind as it stretches, m by the number, without rounding; longer: by
+    """Change of the lag of cell c's length behind its stretching, m by the number, without rounding.
 
-    how much its chord is longer.
+    longer: by how much its chord is longer.
     """
     if not line.bits & STIFFNESS_DAMPING or not line.ck[c] > 0.0:
         return 0.0
@@ -225,9 +225,10 @@ def largest_correction(x):
 
 @inner
 def note_left(r, T, before_r, before_T, wanted, now, sizes):
-    """Keep how large tangents are, and what the last of two or three corrections leaves of them; r, T: its sizes, those
+    """Keep how large tangents are, and what the last of two or three corrections leaves of them.
 
-    of the one before.  Tangents converge by equal parts; forces at ends are those before the last correction.
+    r, T: its sizes, those of the one before.  Tangents converge by equal parts; forces at ends are those before the last
+    correction.
     """
     for i in range(now.r.shape[0]):
         for k in range(3):
@@ -345,9 +346,9 @@ def end_other(plane, space, job, other, s, new, there_old, there, report):
 
 @inner
 def keep_own(plane, space, job, s, old, new):
-    """What the equations of the line of the run leave over at the end of a step, and whether it began where the one
+    """Keep the residuals of the line of the run at the end of a step.
 
-    before had ended.
+    Also whether the step began where the one before had ended.
     """
     found = job.found
     for i in range(old.a.shape[0]):

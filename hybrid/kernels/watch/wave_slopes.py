@@ -17,9 +17,12 @@ from hybrid.kernels.laws.water import LAST, calm_below, cos_sin, exp_of_small
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.state import LANES
 
-# Columns of slopes: of velocity, 1/s, xx, xy, yy, xz, yz; of acceleration, 1/s2, the same; of S by x, y, z, and of the
-# elevation by x and y.
-VELOCITY, ACCELERATION, DEPTH, ELEVATION, SLOPES = 0, 5, 10, 13, 15
+# Columns of slopes.
+VELOCITY = 0  # 5, of velocity, 1/s: xx, xy, yy, xz, yz
+ACCELERATION = 5  # 5, of acceleration, 1/s2, the same
+DEPTH = 10  # 3, of S by x, y, z
+ELEVATION = 13  # 2, of the elevation by x and y
+SLOPES = 15
 # Rows of the room for LANES nodes: x, y, S, elevation, its slopes, the ten sums; then cosine and sine of each component.
 SUMS, PHASES = 6, 16
 
