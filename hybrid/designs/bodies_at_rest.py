@@ -91,9 +91,10 @@ class BodiesAtRest:
         return out
 
     def stiffness_besides(self, stiffness: sparse.csc_array) -> sparse.csc_array:
-        """What the matrix of the network (q, q) leaves out of its bodies, the last of q: water around members that is
+        """Stiffness (q, q) of bodies, the last of q, that the matrix of the network leaves out.
 
-        another where they go, and a spring against turns that nothing holds, as Newton's method has it.
+        Water around members that is another where they go, and a spring against turns that nothing holds, as Newton's
+        method has it.
         """
         first = stiffness.shape[0] - 6 * self.count
         blocks = [sparse.csc_array((first, first))]

@@ -125,10 +125,10 @@ class Equilibria:
         self._places: dict[str, Places] = {}  # cells of the first: others would make results jump
 
     def at(self, x: Floats, cells: float = 1.0, moving: Iterable[str] | None = None) -> Point:
-        """Equilibria with values (n,) of unknowns; cells: how many times as long as usual; moving: cases that are run,
+        """Equilibria with values (n,) of unknowns.
 
-        others are foretold (`Motions.at`); None: all.
-
+        cells: how many times as long as usual; moving: cases that are run, others are foretold (`Motions.at`); None:
+        all.
         SceneError: a scene may not have these; ComputationError: there is no equilibrium, or a result is not there in
         it, such as `touchdown` of a line that does not lie on the bed.
         """

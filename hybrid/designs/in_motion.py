@@ -181,9 +181,10 @@ class Motion:
         self, scene: Scene, wanted: Sequence[Wanted], course: Course, base: Motion | None = None,
         finer: bool = False, smooth: bool = False, begun: Callable[..., None] | None = None,
     ) -> None:  # fmt: skip
-        """course, finer, begun: as of `replay`; smooth: extremes are those of parabolas in time and along the line,
+        """A run of a scene in the steps of a course.
 
-        at whose nodes there are outputs.
+        course, finer, begun: as of `replay`; smooth: extremes are those of parabolas in time and along the line, at
+        whose nodes there are outputs.
         """
         self.course, self.smooth = course, smooth
         self._smooth: dict[Wanted, Floats] = {}  # extremes of parabolas, where they have been asked for
@@ -213,9 +214,9 @@ class Motion:
         return [x.at for x in wanted if x.at is not None and np.isfinite(x.at)]
 
     def beside(self, seen: Mapping[str, Seen], wanted: Sequence[Wanted]) -> Floats:
-        """The same results of other outputs, by line, in these steps, of a scene with another number, of all peaks in
+        """The same results of other outputs, by line, of a scene with another number.
 
-        turn: extremes are where they are in this run.  Unfollowed: there are others.
+        In these steps, of all peaks in turn: extremes are where they are in this run.  Unfollowed: there are others.
         """
         other = copy(self)
         other._cables, other._t = {k: x.scene.cable for k, x in seen.items()}, {k: x.t for k, x in seen.items()}

@@ -60,10 +60,10 @@ class Peak(NamedTuple):
 
 
 def _peak(s: Floats, values: Floats, sign: float, jumps: Sequence[float]) -> Peak:
-    """Where values (n,) at nodes s, m, are largest (sign 1) or least (-1): at the top of the parabola through the node
+    """Where values (n,) at nodes s, m, are largest (sign 1) or least (-1).
 
-    that is and its neighbours.  Its place goes from node to node, and its value has no kink there.  No parabola goes
-    through jumps, m, where a value may be two.
+    At the top of the parabola through that node and its neighbours: its place goes from node to node, and its value has
+    no kink there.  No parabola goes through jumps, m, where a value may be two.
     """
     k = int((sign * values).argmax())
     near = [abs(x - at) <= SAME_PLACE * s[-1] for x in s[max(k - 1, 0) : k + 2] for at in jumps]
@@ -91,8 +91,9 @@ class LineAtRest:
         self, scene: LineScene, model: Model, state: State, wanted: Sequence[Wanted], free: Sequence[int] = (),
         frames: Frames = NO_FRAMES,
     ) -> None:  # fmt: skip
-        """wanted: results; free: ends (0, 1) that are joined to free points or bodies; frames: of those that turn with
+        """Results of a line at rest in a state.
 
+        wanted: results; free: ends (0, 1) that are joined to free points or bodies; frames: of those that turn with
         them.  SceneError: the line has no result of that name, or they have no derivative.
         """
         self.model, self.state, self.wanted, self._free = model, state, tuple(wanted), list(free)
@@ -287,9 +288,10 @@ class LineAtRest:
         return self._results(observer.values_of(observer.observation(batch, varied)), places)
 
     def _looked_at_with(self, x: Beside) -> int | None:
-        """Whether a line differs from the one here in what may differ among outputs that are looked at together: 0; 1:
+        """In what a line differs from the one here.
 
-        and in where its nodes are; None: in more.
+        0: in what may differ among outputs that are observed together; 1: and in the places of its nodes; None: in
+        more.
         """
         line, here, model = x.model.line, self.model.line, self.model
         if x.sea is not self.here.sea or self._observer.quantities is not None:
@@ -407,9 +409,9 @@ def _turned(frames: Floats, turns: Floats) -> Floats:
 
 
 def steps_along(state: State, q: Floats, turns: Floats | None = None) -> Floats:
-    """(P,) how many times movements q (P, N+1, 5), turns (P, 2, 3), are taken so that chords and tensions change by a
+    """Factors (P,) of movements q (P, N+1, 5), turns (P, 2, 3).
 
-    part ALONG.
+    With them chords and tensions change by a part ALONG.
     """
     chord = np.linalg.norm(np.diff(q[:, :, 1:4], axis=1), axis=2) / np.linalg.norm(state.e, axis=1)
     tension = np.abs(q[:, :, 0]) / max(float(np.abs(state.T).max()), 1e-300)

@@ -33,8 +33,9 @@ class History(NamedTuple):
 
 
 class Measurements(NamedTuple):
-    """wanted: case and result of each; rows (M,): which of these each number is; values (M,) and deviations (M,) in the
+    """Measured numbers (M,), and which results of which cases they are.
 
+    wanted: case and result of each; rows (M,): which of these each number is; values (M,) and deviations (M,) in the
     units of results; None: they are not stated.  places: of each case and line, arc lengths (m,), m, and places (m, 3),
     NaN where not measured; histories: what was measured over time.
     """

@@ -30,9 +30,9 @@ TANGENT = 0.5  # and of tangents of one number (bench/test_bench_tangents.py: of
 
 
 class Peaks(NamedTuple):
-    """Of a result its value, of an extreme all peaks, the largest first: when and where each is, values (m,), slopes
+    """The value of a result, or of an extreme all its peaks, the largest first.
 
-    (m, n).  least: whether it is the least that is asked for.
+    where: when and where each is; values (m,), slopes (m, n); least: whether the least is asked for.
     """
 
     where: tuple[Any, ...]
@@ -124,9 +124,9 @@ class Motions:
                 values[rows] = [x.values[0] for x in self._foretold(point, case)]
 
     def at_peaks(self, point: OfMotion, case: str, k: int, peaks: Peaks) -> Floats:
-        """Values (m,) of the result k of a case at places and times of peaks of another run; of a case that was not run
+        """Values (m,) of the result k of a case at places and times of peaks of another run.
 
-        those that are foretold of these.
+        Of a case that was not run those that are foretold of these.
         """
         if case in point.runs:
             return point.runs[case].at_peaks([self._of[case][k]], [peaks.where])

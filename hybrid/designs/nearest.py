@@ -40,9 +40,9 @@ class Space(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Residuals (M,) at a point, and what makes their derivatives (M, n); stopped: why a search went no further, where
+    """Residuals (M,) at a point, and what makes their derivatives (M, n).
 
-    a step that should have led nearer could not be computed.
+    stopped: why a search ended, where a step that should have led nearer could not be computed.
     """
 
     point: Point

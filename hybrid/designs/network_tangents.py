@@ -98,9 +98,10 @@ class NetworkOthers:
         self, system: Network, scenes: Sequence[tuple[Network, Network | None]], steps: Sequence[float],
         lines: Mapping[str, Resolution], more: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
-        """system: of the run; scenes: with more of each number by a step, and with less (None: it is not looked at);
+        """Tangents of a run, by scenes whose numbers differ by a step.
 
-        lines: how finely, by name; more: arc lengths of outputs beside nodes, of one line; None: as the scene asks.
+        system: of the run; scenes: with more of each number by a step, and with less (None: it is not computed); lines:
+        how finely, by name; more: arc lengths of outputs beside nodes, of one line; None: as the scene asks.
         """
         self._system, self._more = system, more
         self._scenes, self._steps, self._resolution = list(scenes), list(steps), NetworkResolution(lines)
@@ -339,9 +340,9 @@ class NetworkOthers:
     # --- what is found ----------------------------------------------------------------------------------
 
     def results(self, names: Mapping[str, Sequence[str]]) -> list[tuple[Mapping[str, Seen], ...]]:
-        """Results by name at all outputs of lines, of the scene itself, then of every number of the scenes with more of
+        """Results by name at all outputs of lines.
 
-        it, and with less.  Unfollowed.
+        Of the scene itself, then of every number of the scenes with more of it, and with less.  Raises Unfollowed.
         """
         run = self._run
         if run.model is not self._model or (self._found != [run.steps, 0]).any():

@@ -81,9 +81,9 @@ def reach(problem: Problem, start: Floats | None = None) -> Rows:
 
 
 def reached(problem: Problem, start: Floats) -> Point:
-    """The values nearest to keeping all constraints that are found: from a start, and where that does not do, from
+    """The values nearest to keeping all constraints that a search finds.
 
-    others between the bounds.
+    From a start and, where that does not do, from others between the bounds.
     """
     space, best = problem.space, reach(problem, start)
     if kept(problem, best.point) or problem.moves or not np.isfinite(space.high - space.low).all():
@@ -231,9 +231,9 @@ class _Search:
         return self._here
 
     def _tried(self, step: Floats) -> tuple[Point | None, float]:
-        """The point after a step, and by how much it is better than where it is now; None: there is no equilibrium,
+        """The point after a step, and its gain over the present one.
 
-        no such scene, or what is minimised is no number.
+        None: there is no equilibrium, no such scene, or what is minimised is no number.
         """
         space = self._problem.space
         try:
@@ -338,9 +338,9 @@ class _Search:
         self._hessian = B + np.outer(y, y) / float(s @ y) - np.outer(B @ s, B @ s) / bent
 
     def _like(self, point: Point, row: int, slopes: Floats) -> Floats:
-        """Of the peaks of a result the slopes (n,) that are most like others: where another peak has become the
+        """Of the peaks of a result the slopes (n,) that are most like others.
 
-        largest, theirs differ without any curvature.
+        Where another peak has become the largest, slopes of the largest differ without any curvature.
         """
         peaks = point.peaks(row)
         each = point.slopes[[row]] if peaks is None else peaks.slopes

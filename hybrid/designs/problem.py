@@ -48,9 +48,9 @@ class Constraint(NamedTuple):
         return part if self.side == 0 else max(self.side * part, 0.0)
 
     def evened(self, value: float) -> tuple[float, float]:
-        """A number that is 0 at the bound, about as far from it as `off`, and its slope by the value: the logarithm of
+        """A number that is 0 at the bound, about as far from it as `off`, and its slope.
 
-        what is positive, which changes more evenly with lengths.
+        By the value; the logarithm of what is positive, which changes more evenly with lengths.
         """
         if self.bound > 0.0 and value > 0.0:
             return float(np.log(value / self.bound)), 1.0 / value
@@ -164,9 +164,10 @@ class Problem(NamedTuple):
         }  # fmt: skip
 
     def moving(self, point: Point, x: Floats) -> set[str]:
-        """Cases of which a search has to know the motion with values x of unknowns: those with a target, a limit that
+        """Cases of which a search has to know the motion with values x of unknowns.
 
-        may be near by what a point and the last run of the case foretell, and those of what is minimised.
+        Those with a target, with a limit that may be near by what a point and the last run of the case foretell, and
+        those of what is minimised.
         """
         equilibria, spoken = self.equilibria, self.objective.rows if self.objective is not None else []
         cases = {equilibria.wanted[k][0] for k in spoken}
@@ -353,9 +354,9 @@ def _has_places(asked: OfEquilibrium) -> bool:
 
 
 def _pieces(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, scene: AnyScene) -> Iterable[str]:
-    """The results that a limit holds: of all of a line one for each section, whose largest values change evenly where
+    """The results that a limit holds, of all of a line one for each section.
 
-    the largest of all jumps from one to another.
+    Their largest values change evenly where the largest of all jumps from one to another.
     """
     whole = _result(task, at, asked, take, scene)
     count = len(cable_of(scene, asked.line).sections)

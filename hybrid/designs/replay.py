@@ -105,10 +105,9 @@ def replay(
     scene: Scene, course: Course, finer: bool = False, more: Sequence[float] | None = None,
     each_step: bool = False, begun: Callable[..., None] | None = None,
 ) -> Result:  # fmt: skip
-    """A run into memory, in the steps and on the nodes of a course; finer: on nodes as the scene has them, cells and
+    """A run into memory, in the steps and on the nodes of a course.
 
-    steps half as long.
-
+    finer: on nodes as the scene has them, cells and steps half as long.
     more, each_step: as of `with_outputs`; begun: as of `Course.record`.
     SceneError, ComputationError: as of `hybrid.run`.
     """

@@ -27,8 +27,11 @@ AT_REST = "factors of the equilibrium"  # the way to derivatives of one
 
 
 class Derivative(NamedTuple):
-    """What one result answers to one number: value of the result, of the number, derivative in their units, elasticity
-    (per cent by per cent; NaN where one of them is 0), the error of the derivative, and the way to it."""
+    """The derivative of one result by one number.
+
+    Value of the result, of the number, derivative in their units, elasticity (per cent by per cent; NaN where one of
+    them is 0), the error of the derivative, and the way to it.
+    """
 
     of: str
     by: str

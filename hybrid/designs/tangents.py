@@ -79,9 +79,9 @@ def has_two_sides(keys: Iterable[str], number: float) -> bool:
 
 
 class Tangent(NamedTuple):
-    """Of a line by a number: tangents of its state, of the spin of its cells, sizes (kernels.watch.tangent_job), and by
+    """Tangents of a line by a number, whose other line has more of it by a step.
 
-    how much the number of the other line is more.
+    Of its state, of the spin of its cells; sizes (kernels.watch.tangent_job), and that step.
     """
 
     rate: State

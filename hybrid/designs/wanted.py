@@ -157,10 +157,9 @@ def peaks(history: Floats, over: str, where: Any) -> list[Any]:
 
 
 def smoothed(history: Floats, over: str, cut: NDArray[np.bool_]) -> Floats:
-    """Of every output and place the extreme of parabolas through it and its neighbours in time and place, but for
+    """Extremes of parabolas through every output and place and its neighbours.
 
-    these places (places,), where a value may be two.
-
+    In time and place, but for these places (places,), where a value may be two.
     Outputs and places count as evenly spaced there.  The largest of all changes evenly, as an extreme goes from one to
     the next: between two it is that of either parabola.
     """

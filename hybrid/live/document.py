@@ -94,8 +94,11 @@ class Document:
             raise Refused(f"{target.name} is a link to {to}, which is outside {self.folder}: take another name")
 
     def look(self) -> str:
-        """Look at the file: "" as it was; "taken" its new text is the text now; "differs" it has another text, and so
-        has this; "gone" it is not there."""
+        """Compare with the file on disk.
+
+        "": as it was; "taken": its new text is the text now; "differs": it has another text, and so has this; "gone":
+        it is not there.
+        """
         if self.path is None:
             return ""
         stamp = stamp_of(self.path)

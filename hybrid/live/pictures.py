@@ -246,7 +246,7 @@ def _marks(result: Result, outputs: list[int]) -> list[list[dict[str, Any]]]:
     out: list[list[dict[str, Any]]] = [[] for _ in outputs]
 
     def mark(name: str, symbol: str, colour: str, places: np.ndarray) -> None:
-        """places: (outputs, n, 3)"""
+        """Add markers of a name at places (outputs, n, 3)."""
         for k, at in enumerate(places):
             at = at[np.isfinite(at).all(axis=1)]
             if len(at):

@@ -39,9 +39,9 @@ from hybrid.scene.motion import EndMotion, MotionTerms
 
 
 def pieces_of(body: FreeBody, density: float) -> tuple[Floats, Floats]:
-    """Numbers (n, PIECE) of the pieces of all members in a fluid of a density (kg/m3), and the sizes (n, 3) of each:
+    """Numbers (n, PIECE) of the pieces of all members in a fluid, and their sizes (n, 3).
 
-    added mass across it (kg), length (m), diameter (m).
+    density: kg/m3, of the fluid; sizes: added mass across a piece (kg), length (m), diameter (m).
     """
     rows, sizes = [], []
     for x in body.members:
@@ -100,9 +100,9 @@ class Members:
         return M
 
     def stir(self, t: float, row: Floats, dt: float, out: Floats) -> None:
-        """Write wetness and water at t (s; infinity: without waves) into `out` (n, PIECE), of a body that a row of a
+        """Write wetness and water at t (s; infinity: without waves) into `out` (n, PIECE).
 
-        state has dt (s) before.
+        row: of a state, that the body has dt (s) before.
         """
         self._sea.at(t)
         self._state[:], self._asked[:, 0] = row, (dt, np.isfinite(t))

@@ -65,10 +65,10 @@ def brought(held: Held, tangent: Triple) -> Floats:
 
 
 def untwisted(start: Held, end: Held) -> tuple[Held, Held]:
-    """Both ends with material axes: what is not given is that of a line without twist, bent the short way from tangent
+    """Both ends with material axes, of a line without twist where they are not given.
 
-    to tangent.  (First shapes of lines are far from where they come to rest, and may be folded.)  Tangents that are
-    nearly opposite know no such way: they stay as they are.
+    It is bent the short way from tangent to tangent: first shapes of lines are far from where they come to rest, and
+    may be folded.  Tangents that are nearly opposite have no such way: they stay as they are.
     """
     a, b = (np.array(x[0], float) / np.linalg.norm(x[0]) for x in (start, end))
     if a @ b < OPPOSITE or (start[1] is not None and end[1] is not None):

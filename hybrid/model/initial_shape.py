@@ -331,10 +331,9 @@ def softness(line: Line, cable: Material) -> Floats:
 
 
 def frames(scene: LineScene, e: Floats, line: Line, cable: Material) -> tuple[Floats, Floats]:
-    """First directors (N+2, 3) of the start, all cells and the end, carried without twist from the start, and the turns
+    """First directors (N+2, 3) of the start, all cells and the end, and turns (K,) rad.
 
-    (K,) rad of catenary zones that a torque passes through.
-
+    Directors are carried without twist from the start; turns are of catenary zones that a torque passes through.
     An end whose `normal` is given fixes the material frame there; a clamp without one holds the twist that the initial
     shape has.  Where both ends fix it, and a torque passes from one to the other, there is a twist to close, less than
     half a turn; it is spread over the line as one torque spreads it, and so are the `turns` by which one end is twisted
@@ -518,9 +517,10 @@ SHARPEST_START = np.radians(150.0)
 def first_state(
     scene: LineScene, line: Line, cable: Material, sea: Surroundings, scale: float, shape: Hanging | None
 ) -> tuple[State, str, EndConditions]:
-    """The state that a computation begins with, the name of its shape, and the ends; scale: N, its tensions where
+    """The state that a computation begins with, the name of its shape, and the ends.
 
-    nothing is known of them; shape: an elastic catenary, None: the first nodes of the scene.
+    scale: N, its tensions where nothing is known of them; shape: an elastic catenary, None: the first nodes of the
+    scene.
     """
     start = state_for(line)
     if shape is not None:

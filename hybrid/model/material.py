@@ -133,9 +133,9 @@ class Material:
 
     @property
     def mean_bending(self) -> Floats:
-        """(K,) N m2, mean EI of both axes, of a table its steepest, of layers while they stick: of models that do not
+        """(K,) N m2, mean EI of both axes, of a table its steepest, of layers while they stick.
 
-        know how a section lies, or how far it bends (catenaries, criteria).
+        For models that do not know how a section lies, or how far it bends (catenaries, criteria).
         """
         layers = [sum(x[0] for x in row if x[1] >= 0.0) for row in self.layers]
         stuck = np.array(layers) if any(layers) else 0.0
@@ -178,9 +178,9 @@ class Material:
 
     @property
     def weakest_bending(self) -> Floats:
-        """(K,) N m2, EI about the weaker axis, of a table its flattest: over the shortest length, which a mesh has to
+        """(K,) N m2, EI about the weaker axis, of a table its flattest.
 
-        resolve, it bends.
+        With it a line bends over the shortest length, which a mesh has to resolve.
         """
         return self._of_tables(min, np.asarray(self.B[:, :2].min(axis=1)))
 

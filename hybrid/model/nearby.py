@@ -216,9 +216,10 @@ def nearby_clamped(
     resolution: NetworkResolution,
     without: int,
 ) -> tuple[Model, Floats] | None:
-    """The model of a line of `system`, and its seats (2, SEAT), zeros where an end turns with nothing; None: its cells
+    """The model of a line of `system` and its seats (2, SEAT); None: its cells are others.
 
-    are others.  model, of, without: as of `nearby`, of the line with the points that it carries; bodies: the free ones.
+    Seats are zeros where an end turns with nothing.  model, of, without: as of `nearby`, of the line with the points
+    that it carries; bodies: the free ones.
     """
     first = first_lines(system, bodies, resolution)
     directions, carried = first.directions(name), system.carried(name)

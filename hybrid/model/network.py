@@ -160,8 +160,11 @@ class NetworkModel:
         return [*stops, *(x for body in self.bodies for x in body.breaks)]
 
     def body_numbers(self, t: float) -> Floats:
-        """(B, NUMBERS or, with pieces of members, more) of the free bodies at t (s), where they are first; behind them
-        those of points, zeros; a turn that nothing holds has an inertia, which nothing feels."""
+        """Numbers (B, NUMBERS or, with pieces of members, more) of the free bodies at t (s).
+
+        Where they are first; behind them those of points, zeros; a turn that nothing holds has an inertia, which
+        nothing feels.
+        """
         out = np.zeros((len(self.body_places), max((x.numbers.size for x in self.bodies), default=NUMBERS)))
         for row, body in zip(out, self.bodies, strict=False):
             row[: body.numbers.size] = body.numbers
@@ -277,9 +280,10 @@ def _kept_in_plane(system: Network, models: Sequence[Model], joints: Sequence[tu
 
 
 def first_places(system: Network, made: Sequence[BodyModel]) -> tuple[tuple[str, ...], Floats, Floats]:
-    """Names of the free points at which lines turn freely, their places (P, 3) m, and (B, STATE) of bodies and of the
+    """Names and places (P, 3) m of free points at which lines turn freely, and states (B, STATE).
 
-    points behind them, not turned yet, where the scene has them first.  made: the free bodies.
+    States are of bodies and, behind them, of points, not turned yet, where the scene has them first.  made: the free
+    bodies.
     """
     rigid = system.rigid
     points = np.zeros((len(rigid), STATE))
@@ -313,9 +317,10 @@ def bodies_of(system: Network) -> tuple[BodyModel, ...]:
 
 
 def _leave_own_bodies(system: Network, models: Sequence[Model]) -> NDArray[np.int64]:
-    """Which free bodies carry obstacles (M,), none: empty; a line meets the shape of a body that it is fixed to only
+    """Which free bodies carry obstacles (M,), none: empty.
 
-    beyond its way out of that, straight towards its other end.
+    A line meets the shape of a body that it is fixed to only beyond its way out of that, straight towards its other
+    end.
     """
     surfaces, numbers = list(system.surfaces), list(system.free_bodies)
     for model, line in zip(models, system.lines.values(), strict=True):
@@ -344,8 +349,10 @@ def _leave_own_bodies(system: Network, models: Sequence[Model]) -> NDArray[np.in
 
 
 def _on_obstacles(system: Network, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
-    """The models with obstacles as stiff as the pull of all lines, points and bodies asks for: a line that is cut lies
-    on them as it does in one piece."""
+    """The models with obstacles as stiff as the pull of all lines, points and bodies asks for.
+
+    A line that is cut lies on them as it does in one piece.
+    """
     pulls = [pull_on_obstacles(system.scene_of(name, system.carried(name))) for name in system.lines]
     for body in bodies:
         row = np.zeros(NUMBERS)
@@ -541,9 +548,9 @@ class FirstLines:
 
 
 def balanced_places(system: Network, model: NetworkModel) -> tuple[Floats, Floats] | None:
-    """Places (P, 3) m of the free points and (B, STATE) of the bodies at which elastic catenaries balance there; None:
-    they are not found.
+    """Places (P, 3) m of free points and (B, STATE) of bodies at which elastic catenaries balance.
 
+    None: they are not found.
     All loads but contact, bending and what the current does; bodies do not turn.  The energy of the lines is convex in
     the places, so that Newton's method with shortened steps finds them from anywhere.
     """

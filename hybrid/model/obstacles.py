@@ -293,9 +293,9 @@ FLAT_EDGE, STRAIGHT, SHARP = 1e-5, 1e-4, np.radians(40.0)
 
 
 class Facets(NamedTuple):
-    """A surface: boxes (B, BOX_ROW) and facets (F, FACET); the smallest radius of what is round on it, 0 where an edge
+    """A surface of triangles: boxes (B, BOX_ROW) and facets (F, FACET).
 
-    is sharp, and half of how thick it is on average (volume over surface), m.
+    rounding: m, smallest radius, 0 where an edge is sharp; then half of its mean thickness (volume over surface), m.
     """
 
     boxes: Floats

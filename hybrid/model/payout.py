@@ -89,9 +89,9 @@ class PayoutPlan:
     begun: Floats  # (N+1,) m, nodes at t = 0
 
     def count(self, length: float) -> int:
-        """Material nodes of a line of that length, m, that has been paid out monotonically: the last cell is between
+        """Material nodes of a line of that length, m, that has been paid out monotonically.
 
-        its limits.
+        Its last cell is between its limits.
         """
         begins = length - self.layer[0]  # of the layer
         n = int(np.searchsorted(self.nodes, begins))
@@ -211,9 +211,10 @@ class PayoutPlan:
         return on_base, on_base.line(layout, like.bits, like.plane, like.moved)
 
     def at_winch(self, count: int, reach: float) -> np.ndarray:
-        """(N,) bool, cells that are rod where zones move: those that change, and as many before them as may be taken in
+        """(N,) bool, cells at the winch that are rod where zones move.
 
-        before others are rod; reach: m, what that is, if it is more than a few cells.
+        Those that change, and as many before them as may be taken in before others are rod; reach: m, the length of
+        these, if it is more than a few cells.
         """
         cells = count + self.layer.size - 1
         begins = min(count - 1 - FEWEST_CELLS, int(np.searchsorted(self.nodes, self.nodes[count - 1] - reach)))

@@ -304,9 +304,9 @@ def tension_scale(scene: LineScene, sections: Sequence[Section], bending: bool, 
 
 
 def wave_step(line: Line, scale: float) -> float:
-    """The shortest time, s, in which a wave passes a catenary cell, 0 without catenaries: of tension, or, where a cell
+    """The shortest time, s, in which a wave passes a catenary cell, 0 without catenaries.
 
-    does not stretch, across the line under the tension `scale`, N.
+    A wave of tension, or, where a cell does not stretch, across the line under the tension `scale`, N.
     """
     cells = line.spin == 0
     mass = 0.5 * (line.mass[:-1] + line.mass[1:] - line.point_mass[:-1] - line.point_mass[1:])
