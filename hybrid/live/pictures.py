@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +11,13 @@ import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, HybridError, SceneError
 from hybrid.kernels.machine.compile import is_warm
-from hybrid.model.model_costs import with_model
 from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import plan
 from hybrid.model.resolution import model_is_free
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import located_in, read_text, scene_text
+from hybrid.scene.read import located_in, read_text
 from hybrid.simulation.case_at_rest import CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
-from hybrid.simulation.network_run import static_system
 from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.reader import Result, written_result
 from hybrid.view.along import along
@@ -76,25 +73,17 @@ def equilibrium(scene: Scene, made: Any) -> Result:
     It is looked for as `hybrid static` does, from the scene alone: from the last picture Newton's method might find
     another one, where there are several.
     """
-    target, at_rest = MemoryTarget(), _lines_at_rest if scene.line_names else _cable_at_rest
-    at_rest(scene, made, target)
-    return written_result(target)
-
-
-def _lines_at_rest(scene: Any, made: Any, target: MemoryTarget) -> None:
-    static_system(scene, target, partial(scene_text, scene))
-
-
-def _cable_at_rest(scene: Any, made: Any, target: MemoryTarget) -> None:
-    check_motions(scene)
-    if model_is_free(scene, moves=False):
-        scene = with_model(scene, "rod")
+    for name in scene.lines:
+        check_motions(scene.scene_of(name))
+    update: dict[str, Any] = {"errors": False}
     if isinstance(scene.output.points, int):
-        points = min(max(sum(made.cells) + 1, LEAST_POINTS), MOST_POINTS)
-        output = scene.output.model_copy(update={"points": points, "errors": False})
-        scene = scene.model_copy(update={"output": output})
-    case = CaseAtRest(scene)
+        cells = max(sum(line.cells) for _, line in made.each_line())
+        update["points"] = min(max(cells + 1, LEAST_POINTS), MOST_POINTS)
+    case = CaseAtRest(scene.model_copy(update={"output": scene.output.model_copy(update=update)}))
+    case.scene = case.with_models({name: "rod" for name, x in case.lines.items() if model_is_free(x, moves=False)})
+    target = MemoryTarget()
     case.record(NetworkResolution.of(case.lines), target)
+    return written_result(target)
 
 
 def _begin_to_compile(scene: Scene, compiling: Callable[[], None]) -> None:

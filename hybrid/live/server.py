@@ -28,9 +28,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from hybrid.live.session import Session
-from hybrid.scene.network_scene import Network
 from hybrid.scene.read import LARGEST_SCENE
-from hybrid.scene.schema import LineScene
+from hybrid.scene.root import form_of
 
 # Bytes of a message: a scene, twice as long in JSON at worst, and what stands around it.
 LARGEST_MESSAGE = 2 * LARGEST_SCENE + 65_536
@@ -190,8 +189,8 @@ def _content(name: str) -> bytes:
 
 @cache
 def _schemas() -> dict[str, object]:
-    """The JSON schemas of a scene of one cable and of several lines, for completion and help."""
-    return {"cable": LineScene.model_json_schema(), "lines": Network.model_json_schema()}
+    """The JSON schemas of the two forms of a scene, for completion and help."""
+    return {"cable": form_of({}).model_json_schema(), "lines": form_of({"lines": {}}).model_json_schema()}
 
 
 def listen(port: int = 0) -> socket.socket:

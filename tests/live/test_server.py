@@ -26,7 +26,8 @@ from hybrid.live.pictures import picture_of
 from hybrid.live.server import LARGEST_MESSAGE, Guard, listen, make_app
 from hybrid.live.session import Session
 from hybrid.model.plan import plan
-from hybrid.scene.read import read_text
+from hybrid.scene.read import as_scene, read_text, scene_text
+from hybrid.scene.short_form import network_of
 
 
 @pytest.fixture(scope="module")
@@ -259,11 +260,22 @@ time: {duration: 4}
 """
 
 
+@pytest.mark.parametrize("form", [as_scene, network_of])
 @pytest.mark.parametrize("model, kind", [("", "rod"), ("model: catenary\n", "catenary")])
-def test_a_scene_that_names_no_model_is_shown_as_the_plan_has_it(model: str, kind: str) -> None:
-    picture, result = picture_of(TWO_SECTIONS + model, "", lambda: None)
+def test_a_scene_that_names_no_model_is_shown_as_the_plan_has_it(model: str, kind: str, form: Any) -> None:
+    scene = form(read_text(TWO_SECTIONS + model)[0])
+    picture, result = picture_of(scene_text(scene), "", lambda: None)
+    ((_, line),) = plan(scene).each_line()
     assert result is not None and {zone[0] for zone in picture["frame"]["lines"][0]["zones"]} == {kind}
-    assert {zone.kind for zone in plan(read_text(TWO_SECTIONS + model)[0]).zones} == {kind}
+    assert {zone.kind for zone in line.zones} == {kind}
+
+
+def test_a_named_line_is_drawn_at_as_many_points_as_a_cable() -> None:
+    """A point for each cell as far as a screen shows them apart, whatever the file of a run would keep."""
+    points = "points: {a: {position: [0, 0, 0]}, b: {position: [25, 0, 0]}}\noutput: {points: 11}\nlines:\n  one:"
+    one = f"{points} {{start: a, end: b, mesh: {{cells: 150}}, sections: [{{length: 30, mass: 7, diameter: 0.1}}]}}\n"
+    picture, _ = picture_of(one, "", lambda: None)
+    assert picture["problems"] == [] and len(picture["frame"]["lines"][0]["s"]) == 151
 
 
 def test_several_lines_are_drawn(page: Page) -> None:
