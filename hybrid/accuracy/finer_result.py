@@ -153,9 +153,9 @@ class Replacement:
         self._new: Target | None = None  # complete, and not settled
 
     def finer(self, record: Callable[[Target], T]) -> T:
-        """Record a finer result, which is then to be settled; one that fails leaves nothing, and one that is stopped
+        """Record a finer result, which is then to be settled.
 
-        nothing that nobody goes on with.
+        One that fails leaves nothing, and one that is stopped leaves only what can be restarted.
         """
         new = io.BytesIO() if isinstance(self.target, io.BytesIO) else beside(self.target)
         self._new = new

@@ -105,9 +105,9 @@ def uncertain_by_vibrations(
 
 
 def lost_by_lines(asked: Any, result: Samples) -> Mapping[str, LostBy]:
-    """By line and quantity, what steps of a result make of free vibrations; empty where none is left, or it is not
+    """By line and quantity, the loss of free vibrations by the steps of a result.
 
-    known.
+    Empty where none is left, or it is not known.
     """
     if any(x.touches for x in result.values()):
         return {}
@@ -237,9 +237,9 @@ class Vibrations:
         return out
 
     def lost(self, breaks: list[float], quiet: float, times: Floats, radius: float) -> Mapping[str, LostBy]:
-        """By line and quantity; breaks: s, at which something in a motion begins or ends before it is quiet; times: s,
+        """By line and quantity, the loss of free vibrations in steps that end at `times`, s.
 
-        ends of steps; radius: of the time scheme.
+        breaks: s, at which something in a motion begins or ends before it is quiet; radius: of the time scheme.
         """
         duration = float(times[-1])
         fits = self.w * quiet <= 2.0 * pi * MOST_PERIODS
@@ -335,9 +335,9 @@ def _harmonic_until(quiet: float, o: float, w: Floats, unit: Floats, duration: f
 
 
 def _drags(x: LoadedLine, part: Floats, forced: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Of drag across and along half cells, and of bodies: N s^2/m^2 (n,), squares of modes (n, m), m^2, and of forced
+    """Drag across and along half cells, and of bodies, with squares of modes and velocities.
 
-    velocities (n,), m^2/s^2; forced: (F, N+1, 3) m/s.
+    N s^2/m^2 (n,); of modes (n, m), m^2, and of forced velocities (n,), m^2/s^2; forced: (F, N+1, 3) m/s.
     """
     shift, d = part.reshape(-1, SIZE, part.shape[1])[:, 1:4], x.d[:, None]
     modes, moves = np.moveaxis(shift, 2, 1)[x.node], np.moveaxis(forced, 0, 1)[x.node]  # (half cells, .., 3)

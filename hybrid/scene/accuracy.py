@@ -134,9 +134,9 @@ def of_length(text: str) -> str | dict[str, str]:
 
 
 def of_unnamed_model(accuracy: Accuracy, stressed: bool) -> Accuracy:
-    """The same, of a line that is rod although nobody has named it so: `all` asks for curvature where that is held
+    """The same, of a line that is rod although its scene does not name a model.
 
-    against a stress, and else for none.
+    `all` asks for curvature where that is held against a stress, and else for none.
     """
     if accuracy.all is None or accuracy.curvature is not None:
         return accuracy

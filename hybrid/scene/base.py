@@ -257,9 +257,10 @@ def _points_somewhere(value: tuple[float, float, float]) -> tuple[float, float, 
 
 @dataclass(frozen=True)
 class Before:
-    """What is done to a value before it is read: as pydantic's BeforeValidator, which looks at the function's signature
+    """What is done to a value before it is read, as by pydantic's BeforeValidator.
 
-    anew wherever such a value stands, a fifth of the time that it takes to build a scene's tables.
+    That one inspects the function's signature anew wherever such a value stands, a fifth of the time that it takes to
+    build a scene's tables.
     """
 
     function: Callable[[Any], Any]

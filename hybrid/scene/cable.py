@@ -123,9 +123,9 @@ class AddedMass(Table):
 
 
 class Vortices(Table):
-    """Vortex-induced vibration across line and flow: lift whose phase locks in to the motion, within a range of
+    """Vortex-induced vibration across line and flow, by lift whose phase locks in to the motion.
 
-    frequencies; in motion only, and in space.
+    It locks in within a range of frequencies; in motion only, and in space.
     """
 
     lift: Positive = Field(default=1.2, description="lift coefficient Cv: 1/2 density x diameter x Cv x |u|^2 [-]")
@@ -431,9 +431,10 @@ class Section(Table):
 
     @property
     def strain_limit(self) -> float:
-        """Strain that is borne, where the section stretches: max_strain, or without one the last of a table, or what
+        """Strain that is borne, where the section stretches.
 
-        STRONGEST over its cross-section makes of it, if that is less than usual and not below LEAST_STRAIN.
+        max_strain, or without one the last of a table, or what STRONGEST over its cross-section makes of it, if that is
+        less than usual and not below LEAST_STRAIN.
         """
         if self.max_strain is not None:
             return self.max_strain

@@ -174,9 +174,10 @@ def _damped(section: Section) -> bool:
 
 
 def _damped_otherwise(tables: Tables) -> Iterator[Place]:
-    """Sections with damping in proportion to stiffness where the stiffness is not constant, tension makes a torque, or
+    """Sections with damping in proportion to stiffness where that is not implemented.
 
-    the line is clamped to what turns by the moments of its lines.
+    The stiffness is not constant, tension makes a torque, or the line is clamped to what turns by the moments of its
+    lines.
     """
     cable: Cable | None = tables.get("cable")
     sections = [section for _, section in _sections(tables)]

@@ -1,6 +1,6 @@
-"""Whether prescribed motions can be computed: they start from rest, are smooth, no faster than a cable can follow,
-and resolved by the time step.
+"""Whether prescribed motions can be computed.
 
+They start from rest, are smooth, no faster than a cable can follow, and resolved by the time step.
 Files are read only if a scene has one, and numpy is imported only then.
 """
 

@@ -1,5 +1,6 @@
-"""Motion of a vessel in waves: amplitudes and phases (RAO, a CSV table or a dataset of Capytaine), and the harmonics of
-a point of the vessel.
+"""Motion of a vessel in waves by its RAOs, and the harmonics of a point of the vessel.
+
+RAOs are a CSV table or a dataset of Capytaine.
 
     symbol   meaning                                                           unit
     A, w, k  amplitude, angular frequency, wave vector of a wave               m, 1/s, 1/m

@@ -323,8 +323,10 @@ def complaint_of(root: Node, finding: Finding, at_key: bool) -> Complaint:
 
 
 def _find(root: Node, path: Place, at_key: bool) -> tuple[Place, Node, Spot | None, bool]:
-    """Where a path leads: the path with keys as they are written, the value and its place (that of the key, if the
-    key is what is wrong; else of the table it is missing from), and whether it is missing."""
+    """Where a path leads: the path as it is written, the value, its place, and whether it is missing.
+
+    The place is that of the key, if the key is what is wrong; of a missing value that of its table.
+    """
     node, place, at = root, root.place, list(path)
     for i, part in enumerate(path):
         inside = node.value

@@ -48,16 +48,21 @@ Part = Annotated[NonNegative, Field(le=1.0)]
 
 
 class LateralSoil(Table):
-    """Resistance of the soil beside the cable: pu y/ym up to pu, y the elastic travel of friction and ym its most, with
-    pu = min(3 su + unit_weight z + wedge su z/D, 9 su) x min(z, D), API's clay on the height that lies in the soil."""
+    """Resistance of the soil beside the cable, API's clay on the height that lies in the soil.
+
+    It is pu y/ym up to pu, y the elastic travel of friction and ym its most, with
+    pu = min(3 su + unit_weight z + wedge su z/D, 9 su) x min(z, D).
+    """
 
     unit_weight: NonNegative = Field(default=0.0, description="submerged weight of the soil per volume [N/m^3]")
     wedge: NonNegative = Field(default=0.5, description="J, how the resistance grows with the depth, z/D [-]")
 
 
 class Soil(Table):
-    """Clay: penetration, suction and repenetration, each towards its ultimate resistance, of the penetration z of the
-    centreline and the diameter D of the cable (Randolph and Quiggin)."""
+    """Clay: penetration, suction and repenetration, each towards its ultimate resistance (Randolph and Quiggin).
+
+    They follow from the penetration z of the centreline and the diameter D of the cable.
+    """
 
     shear_strength: Positive = Field(description="undrained shear strength at the bed, without depth [Pa]")
     gradient: NonNegative = Field(default=0.0, description="by how much it grows per metre of depth [Pa/m]")

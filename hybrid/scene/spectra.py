@@ -84,8 +84,10 @@ class JonswapWaves(Spectrum):
 
 
 class PiersonMoskowitzWaves(Spectrum):
-    """Irregular waves of a fully grown sea: the spectrum of Pierson and Moskowitz, by its height and one period (ISSC,
-    Bretschneider)."""
+    """Irregular waves of a fully grown sea: the spectrum of Pierson and Moskowitz.
+
+    Its height and one period define it (ISSC, Bretschneider).
+    """
 
     kind: Literal["pierson_moskowitz"] = Field(
         default="pierson_moskowitz", description="the spectrum of a fully grown sea (ISSC, Bretschneider)"

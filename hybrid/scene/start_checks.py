@@ -96,9 +96,9 @@ def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Find
 
 
 class Apart(NamedTuple):
-    """Two ends that are farthest from each other: distance [m] and time [s]; the one that moves, where it is then, by
+    """Two ends when they are farthest from each other.
 
-    which key of its motion.
+    Distance [m] and time [s]; the end that moves, where it is then, by which key of its motion.
     """
 
     distance: float
@@ -175,8 +175,10 @@ def equilibrium_exists(
 
 
 def net_weight(environment: Environment, cable: Cable, ends: Ends) -> tuple[float, float]:
-    """Weight of cable, attachments and bodies under water less the lift of forces on the ends, and the sum of
-    all magnitudes: N, positive downwards."""
+    """Net weight under water, and the sum of all magnitudes, N, positive downwards.
+
+    Of cable, attachments and bodies, less the lift of forces on the ends.
+    """
     gravity, density = environment.gravity, environment.fluid.density if environment.fluid is not None else 0.0
     widths = [s.diameter or 0.0 for s in cable.sections]
     masses = [(s.mass * s.length, math.pi / 4 * d * d * s.length) for s, d in zip(cable.sections, widths, strict=True)]

@@ -1,5 +1,6 @@
-"""Steady waves of finite height: the stream function by a Fourier series that meets the conditions at the surface
-(Rienecker and Fenton 1981).
+"""Steady waves of finite height by the stream function (Rienecker and Fenton 1981).
+
+Its Fourier series meets the conditions at the surface.
 
     symbol   meaning                                                                        unit
     H, d, T  height from trough to crest, depth, period                                     m, m, s

@@ -35,8 +35,10 @@ Names = Annotated[tuple[Text, ...], Field(min_length=1)]
 
 
 class Range(Table):
-    """Values of a key of the scene: a list, evenly spaced from one to another, or between two bounds in a sample; none
-    where a table of cases has them."""
+    """Values of a key of the scene.
+
+    A list, evenly spaced from one to another, or between two bounds in a sample; none where a table of cases has them.
+    """
 
     key: Text | None = Field(
         default=None, description="key of the scene, such as cable.sections[0].mass; absent: the name of the variable"

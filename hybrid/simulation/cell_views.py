@@ -42,8 +42,11 @@ class CellViews:
     """Two sets of arrays (sides k = 0, 1) with room for the most cells, and views of them for a number of cells."""
 
     def __init__(self, owner: OneOfMany, most: int, marked: int, at: FollowingPlaces) -> None:
-        """most: cells at most; marked: nodes of them beside which extremes are kept on both sides; at: numbers of the
-        run (kernels.run.following_run)."""
+        """Views of a line whose cells follow the curvature.
+
+        most: cells at most; marked: nodes of them beside which extremes are kept on both sides; at: numbers of the run
+        (kernels.run.following_run).
+        """
         assert owner.switching is not None and owner.model.layout is not None
         self._owner, self._switching, self._at = owner, owner.switching, at
         base, some = int(owner.model.layout.rod.size), owner.envelope is not None

@@ -575,9 +575,9 @@ class Diagnostics:
             self._obstacles(batch)
 
     def _obstacles(self, batch: Batch) -> None:
-        """A line that lies deep in an obstacle or has passed through it, cells that do not follow its radius, and cells
+        """Report lines deep in an obstacle or through it, and cells too long for it.
 
-        between whose nodes it may pass.
+        Cells do not follow its radius, or it may pass between their nodes.
         """
         line, sea = self._model.line, self._model.sea
         longest = np.maximum(np.append(line.h, 0.0), np.append(0.0, line.h))

@@ -59,9 +59,9 @@ def energy_gains_text(tries: int) -> str:
 
 
 def slack_steps_text(tried: float, taken: float, waves: float) -> str:
-    """Text of the event of a catenary that is slack in a step of `tried`, and not in one of `taken`; waves: the time
+    """Text of the event of a catenary that is slack in a step of `tried`, and not in one of `taken`.
 
-    in which a wave passes its shortest cell, s.
+    s; waves: the time in which a wave passes its shortest cell, s.
     """
     return (
         f"a catenary loses its tension here in a step of {tried:.4g} s, and keeps it in one of {taken:.4g} s: the step "

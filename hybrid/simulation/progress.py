@@ -234,8 +234,10 @@ _AT_ONCE = [0]  # how many sections are entered in which a signal is raised when
 
 @contextmanager
 def interrupts() -> Iterator[Callable[[], bool]]:
-    """Catch Ctrl-C and SIGTERM as a flag, so that a run ends between two steps and its file is complete, and a study
-    ends between two runs with its table written.  Gives the flag; may be nested: the inner one hears a signal first.
+    """Catch Ctrl-C and SIGTERM as a flag, which is yielded.
+
+    A run then ends between two steps and its file is complete, and a study ends between two runs with its table
+    written.  May be nested: the inner one gets a signal first.
 
     A second one, `IMPATIENT` s later, is raised at once, as in a long compilation or search of an equilibrium.  A
     signal for which nothing was raised, because the run ended or failed first, goes to the handler from before.

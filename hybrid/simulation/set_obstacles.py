@@ -19,9 +19,9 @@ Course = tuple[Triple, Triple | None, Triple]  # where an obstacle is to be, how
 
 
 class ObstacleState(NamedTuple):
-    """Where an obstacle is (3,) m, its rotation (3, 3) since t = 0, and what all lines do to it, inertial: force (3,)
+    """Place (3,) m of an obstacle, its rotation (3, 3) since t = 0, and the load of all lines.
 
-    N, and moment (3,) N m about its place.
+    Inertial: force (3,) N, and moment (3,) N m about its place.
     """
 
     position: Floats

@@ -137,8 +137,9 @@ class Bounds(NamedTuple):
 
 
 def kinks_at(joints: NDArray[np.int64], bends: Floats, lengths: Floats) -> Floats:
-    """Angles (J, nb), rad, of joints beyond the larger bend on their sides; bends: (N+1, nb) 1/m at nodes, 2 tan(x/2)
-    over lengths (N+1,) m for an angle x.
+    """Angles (J, nb), rad, of joints beyond the larger bend on their sides.
+
+    bends: (N+1, nb) 1/m at nodes, 2 tan(x/2) over lengths (N+1,) m for an angle x.
     """
     turn = 2.0 * np.arctan(0.5 * bends[joints] * lengths[joints, None])
     return np.asarray(turn - np.maximum(bends[joints - 1], bends[joints + 1]) * lengths[joints, None])

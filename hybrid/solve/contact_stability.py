@@ -35,9 +35,10 @@ FINER = 4
 
 
 def contact_stiffness(contact: Contact) -> tuple[NDArray[np.int64], Floats]:
-    """Nodes (n, 6) of the points of contact looked at last, three of each piece, and the second derivatives of their
+    """Nodes (n, 6) of the latest points of contact, and their stiffness (n, 18, 18), N/m.
 
-    energies by the places of these nodes (n, 18, 18), N/m: kernels.contact.self_contact_law.
+    Three nodes of each piece; second derivatives of energies by the places of these nodes
+    (kernels.contact.self_contact_law).
     """
     rows = contact.points[: contact.counts.points]
     n, slope = rows[:, NORMAL : NORMAL + 3], rows[:, SLOPE : SLOPE + 3]

@@ -134,8 +134,10 @@ ON_BED = "on the seabed"
 
 
 def rubs_on(line: Line, sea: Sea, held: np.ndarray, state: State) -> list[str]:
-    """On what with friction a line lies, in words, at other nodes than ends (2,) that are held, which no friction
-    moves."""
+    """On what with friction a line lies, in words.
+
+    At other nodes than ends (2,) that are held, which no friction moves.
+    """
     free, found = np.ones(line.s.size, bool), []
     free[[0, -1]] = held == 0
     bed = line.bits & SEABED and (sea.friction.any() or (sea.soil.size and sea.soil[LATERAL] > 0.0))
@@ -170,9 +172,9 @@ def behind_obstacles(line: Line, sea: Sea, state: State) -> Iterator[tuple[int, 
 
 
 def obstacles_left(line: Line, sea: Sea, start: State, state: State) -> Iterator[tuple[int, int, bool]]:
-    """Obstacles that a line touches at its start and in a state not, or on the other side; the node that is nearest at
+    """Obstacles that a line touches at its start, and in a state not, or on the other side.
 
-    the start; and whether it touches the other side.
+    With the node that is nearest at the start, and whether it touches the other side.
     """
     rows, touched = sea.obstacles, on_obstacles(line, sea, state)
     gaps = distances(sea, start.r)

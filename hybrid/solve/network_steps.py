@@ -53,9 +53,10 @@ class NetworkSteps:
         shortest: float = 0.0,
         most_turn: float = np.inf,
     ) -> None:
-        """rho: spectral radius of the scheme; outputs: s, their times, which increase; largest, shortest: s, of steps
+        """Steps of a network up to its outputs.
 
-        that follow their errors; 0: none do; most_turn: rad, by which an end that is moved may turn in a step.
+        rho: spectral radius of the scheme; outputs: s, their times, which increase; largest, shortest: s, of steps that
+        follow their errors; 0: none do; most_turn: rad, by which an end that is moved may turn in a step.
         """
         self.outputs = np.array(outputs, float)
         self.most_rows = one_line.ROWS  # steps that wait to be logged

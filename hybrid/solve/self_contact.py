@@ -46,9 +46,9 @@ STIFFNESS, TENSION = 0.16, 0.02
 def left_over(
     line: Line, sea: Sea, ends: Ends, state: State, force: Floats, anchor: float, work: Work
 ) -> tuple[float, Floats]:
-    """Largest force, N, that is left over at a node which nothing holds, contact included; forces (2, 3) N of contact
+    """Largest residual force, N, at a node which nothing holds, and contact forces (2, 3) N on end nodes.
 
-    on the end nodes.  force: (N+1, 3) N, of contact; work: of the line, with u = 0, whose report becomes that of the
+    Contact included.  force: (N+1, 3) N, of contact; work: of the line, with u = 0, whose report becomes that of the
     state without contact.
     """
     rows = block_rows(line)
@@ -213,9 +213,10 @@ class SelfContact(ContactBooks):
     """Contact of one line with itself; `table` and `call` are for the job of a run."""
 
     def __init__(self, line: Line, width: Floats, bending: Floats, tension_scale: float, friction: float = 0.0) -> None:
-        """width: (N,) m, diameters of cells; bending: (N,) N m2, their stiffness, 0: none; tension_scale: N; friction:
+        """Contact of one line with itself.
 
-        its coefficient.
+        width: (N,) m, diameters of cells; bending: (N,) N m2, their stiffness, 0: none; tension_scale: N; friction: its
+        coefficient.
         """
         strand = strand_of(line, width, bending, tension_scale)
         contact = contact_of_strands([strand], friction)

@@ -118,9 +118,9 @@ class SharedContact(ContactBooks):
     # --- of states at rest ---------------------------------------------------------------------------
 
     def rest_energy(self, works: Sequence[Work]) -> float:
-        """Energy, J, of contact of the states that the jobs lead from, at rest; works: of all lines.  Infinite: lines
+        """Energy, J, of contact of the states that the jobs lead from, at rest.
 
-        are in each other.
+        works: of all lines.  Infinite: lines are in each other.
         """
         for k in self.lines:
             works[k].u[:] = 0.0
