@@ -40,9 +40,10 @@ UNITS = {
 
 # Lowest modes that are looked at, to a line; of several lines at most so many in all.
 MODES, MOST_MODES = 12, 48
-# A motion is integrated by Gauss's rule of so many points, in at least as many pieces as it has periods of a vibration
-# and as few as these; modes with more periods than MOST_PERIODS are left out: a ramp that is so long leaves nothing.
-GAUSS, FEWEST_PIECES, MOST_PERIODS = 8, 8, 200
+# A motion is integrated by Gauss's rule, in at least as many pieces as it has periods of a vibration.
+GAUSS = 8  # points of the rule
+FEWEST_PIECES = 8  # at least
+MOST_PERIODS = 200  # modes with more are left out: a ramp that is so long leaves nothing
 # w^2 below this part of the largest found is that of a motion that nothing holds.
 HELD = 1e-8
 # Times at which amplitudes are followed as they die; rate of that, of the velocity of a harmonic and its drag.
@@ -52,9 +53,9 @@ CLOSE = 1.0
 # An error by steps that this makes is worth a word where it exceeds what is asked, and the error figure so many times;
 # where nothing is asked, this part of the largest value.
 TIMES_THE_FIGURE, PART = 1.5, 0.01
-# Times that are looked at, at most; of longer runs some of theirs, from so many at a time; and places, beside those at
-# which a mode is largest.
-ROWS, BLOCK, PLACES = 20_000, 2000, 40
+ROWS = 20_000  # times at most; of longer runs some of theirs,
+BLOCK = 2000  # so many at a time
+PLACES = 40  # beside those at which a mode is largest
 
 
 class Lost(NamedTuple):

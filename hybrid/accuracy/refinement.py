@@ -25,9 +25,9 @@ MOST_OF_MODEL, OF_MODEL = 0.5, 0.25
 MOST_FINER = 3.0
 # Factor on cells or steps where the error is met in parts and missed in total.
 A_LITTLE = 0.8
-# Times the processor time of its last run beyond which an accuracy says what it will cost, and the kind of event; less
-# than the last, in s, is not worth a word.
-COSTLY, COSTLY_ACCURACY, LITTLE = 4.0, "costly accuracy", 0.5
+COSTLY = 4.0  # times the processor time of its last run, from which on an accuracy announces what it will cost
+COSTLY_ACCURACY = "costly accuracy"  # kind of that event
+LITTLE = 0.5  # s, below which no cost is announced
 # s of processor time that a finer run will take, from which on the errors of the result before it are written first.
 WORTH_WRITING = 2.0
 END_FORCE = next(iter(END_FORCES.values()))

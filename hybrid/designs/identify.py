@@ -20,9 +20,9 @@ from hybrid.kernels.state.state import Floats
 UNKNOWN = 1.0
 # What parts of a combination count, and are alike.
 PART, ALIKE = 0.05, 0.03
-# Singular values, as parts of the largest, that are 0; where no deviation is stated, by parts of the largest number,
-# below which unknowns stay; part of the sum of squares that is worth a step.
-SINGULAR, LEAST, GAIN = 1e-6, 1e-4, 1e-7
+SINGULAR = 1e-6  # singular values, as parts of the largest, that are 0
+LEAST = 1e-4  # where no deviation is stated, part of the largest number below which unknowns stay
+GAIN = 1e-7  # part of the sum of squares that is worth a step
 CONFIDENCE, DOUBT = 0.95, 0.005
 # Readings one after another from which on it is judged whether they are independent.
 FEWEST = 8

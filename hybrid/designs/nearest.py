@@ -16,9 +16,10 @@ from hybrid.kernels.state.state import Floats
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
 
-# Rounds at most, and residuals below which all are met; a number changes by this part of itself a round at most, and a
-# step that does not lead nearer is halved so often.
-ROUNDS, MET, STEP, HALVED = 40, 1e-8, 0.3, 6
+ROUNDS = 40  # at most
+MET = 1e-8  # residuals below which all are met
+STEP = 0.3  # part of itself by which a number changes in a round, at most
+HALVED = 6  # times that a step is halved which does not lead nearer
 # Part of the sum of squares below which nothing is gained any more; singular values, as parts of the largest, below
 # which a combination of unknowns stays what it is.
 GAIN, SINGULAR = 1e-9, 1e-9

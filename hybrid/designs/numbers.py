@@ -20,10 +20,12 @@ from hybrid.scene.yaml_source import Node, Unreadable, from_text
 
 AnyScene = TypeVar("AnyScene", bound=Scene)
 PART = re.compile(r"[^.\[\]]+")
-# Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.  Lengths are
-# changed by less: a place that is at a node would see the cell to one side of it as much as that to the other.  So are
-# diameters, on which it depends how deep a line lies in obstacles.
-OF_NUMBER, OF_LENGTH, LENGTH = 1e-4, 1e-5, re.compile(r"\b(length|diameter)$")
+# Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.
+# Lengths are changed by less: a place that is at a node would see the cell to one side of it as much as that to the
+# other.  So are diameters, on which it depends how deep a line lies in obstacles.
+OF_NUMBER = 1e-4
+OF_LENGTH = 1e-5
+LENGTH = re.compile(r"\b(length|diameter)$")
 # Coordinates: what they are depends on where the origin is.  Where the bed and obstacles are counts in parts of how
 # deep a line lies in them: they are changed by this part, coordinates by this part of the longest line.
 PLACE = re.compile(r"(position\[\d\]|centre\[\d\]|\.z|\.surface|\.at\[\d\]|\.depth\[\d+\]\[\d+\])$")

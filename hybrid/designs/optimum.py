@@ -19,8 +19,9 @@ from hybrid.designs.problem import Constraint, Objective, Problem, Within
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 
-# Parts of a bound's size within which an unknown is at it; steps of one search, and searches.
-AT_BOUND, ITERATIONS, SEARCHES = 1e-6, 60, 3
+AT_BOUND = 1e-6  # part of a bound's size within which an unknown is at it
+ITERATIONS = 60  # steps of one search
+SEARCHES = 3
 # Part of slopes that no limit holds up, below which a search is not begun once more.
 HELD = 1e-4
 # How many times what the slopes tell what is minimised counts at most, and the part of it that it counts at least: a
@@ -36,13 +37,14 @@ FIRST_STEP, SHORTEST = 0.2, 1e-6
 ACCEPTED, TRUSTED = 0.1, 0.7
 # Part of a step by which one by other slopes differs that is tried anew.
 ALIKE = 0.05
-# A box is made narrower by SHRUNK, where there is no equilibrium by CUT; a step has to come so much nearer to limits
-# as can be, but for the part NEARER.
-SHRUNK, CUT, NEARER = 0.4, 0.2, 0.3
+SHRUNK = 0.4  # factor on a box that is made narrower
+CUT = 0.2  # and where there is no equilibrium
+NEARER = 0.3  # part that a step may miss of coming as near to limits as can be
 # Parts of its size by which an unknown has moved from where it began from which on it may have run off.
 FAR = 0.3
-# Curvature of the model at first; what a part of a limit counts at first, and at most.
-CURVATURE, PENALTY, MOST_PENALTY = 1e-2, 2.0, 1e6
+CURVATURE = 1e-2  # of the model at first
+PENALTY = 2.0  # what a part of a limit counts at first,
+MOST_PENALTY = 1e6  # and at most
 
 
 class Price(NamedTuple):

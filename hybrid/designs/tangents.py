@@ -44,10 +44,11 @@ from hybrid.model.build import Model
 from hybrid.model.plane import in_space, planar
 from hybrid.scene.schema import LineScene
 
-# Part of a number by which the scene of the other line differs: rounding by it is as much as what both sides differ by,
-# 1e-6 of forces at anchors (bench/test_bench_tangents.py).  Of coordinates, of lengths: what moves a line far moves
-# nodes into contact and out of it.
-PART, OF_PLACES, OF_LENGTHS = 2.5e-6, 1e-7, 1e-8
+# Parts of a number by which the scene of the other line differs: rounding by PART is as much as what both sides differ
+# by, 1e-6 of forces at anchors (bench/test_bench_tangents.py).
+PART = 2.5e-6
+OF_PLACES = 1e-7  # of coordinates: what moves a line far moves nodes into contact and out of it
+OF_LENGTHS = 1e-8  # of lengths, for the same reason
 PLACE, LENGTH = re.compile(r"(position\[\d\]|\.z|\.surface)$"), re.compile(r"(\blength|\.at(\[\d\])?)$")
 # Phases of waves round the motion more than other numbers do, and waves move a line less than these.
 OF_WAVES, WAVE = 4e-6, re.compile(r"\bwaves\b")

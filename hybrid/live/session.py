@@ -18,9 +18,9 @@ from hybrid.live.workers import Run, Workers
 from hybrid.store.hdf5_file import is_held, is_result
 from hybrid.store.reader import Result, open_result
 
-# s between two looks at the scene file, and at a result; s after which a file that is not there is gone, and not about
-# to be replaced by an editor that saves.
-WATCH, FOLLOW, GONE = 0.02, 0.2, 1.0
+WATCH = 0.02  # s, between two looks at the scene file,
+FOLLOW = 0.2  # s, and at a result
+GONE = 1.0  # s, after which a missing file is gone, and not about to be replaced by an editor that saves
 WATCH_NAMED = 0.1  # s between two looks at the files that a scene names
 # Messages that wait for a browser that does not read: it is let go, and gets everything when it comes back.
 MOST_WAITING = 500
@@ -422,8 +422,10 @@ def session_of(path: Path | None, workers: Workers | None = None) -> Session:
 
 # Outputs of a result file as the page plays them, those of a running computation as they come.
 
-# Frames that a page holds, points along a line in each, and lines from which on they are fewer.
-MOST_FRAMES, POINTS, FEW_POINTS, MANY_LINES = 400, 121, 41, 8
+MOST_FRAMES = 400  # that a page holds
+POINTS = 121  # along a line in each,
+FEW_POINTS = 41  # and where there are many lines
+MANY_LINES = 8
 # Of the time between two looks at most this part goes into reading a file that grows.
 SHARE = 0.2
 

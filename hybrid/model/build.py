@@ -286,9 +286,11 @@ LEAST_WEIGHT = 1e-3  # of the weight in air: a cable that floats bends under wha
 # to that: it is more likely that a stiffness is in another unit.
 TWIST, MOST_FOR_TWIST = 0.25, 5000
 FEWEST_CELLS = 4  # of a zone, however little is asked
-# Of rods whose cells follow the curvature: base cells without a mesh, and with one that does not say how many; the
-# shortest cell over (EI/w)^(1/3); most cells in a base cell.
-FOLLOWING_BASE, FOLLOWING_CELLS, FOLLOWING_CELL, MOST_FOLLOWING = 24, 60, 0.125, 4096
+# Of rods whose cells follow the curvature.
+FOLLOWING_BASE = 24  # base cells without a mesh,
+FOLLOWING_CELLS = 60  # and with one that does not say how many
+FOLLOWING_CELL = 0.125  # shortest cell over (EI/w)^(1/3)
+MOST_FOLLOWING = 4096  # cells in a base cell
 
 
 def given_zones(scene: LineScene, layout: Layout) -> np.ndarray:

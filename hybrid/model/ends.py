@@ -419,13 +419,25 @@ def _rotation(axis: Floats, angle: float) -> Floats:
 #
 # The laws are those of laws.end_motion.driven_position and driven_frame, which move the end within compiled steps.
 
-# Columns of a path: begin and end (s), position and velocity at both (m, m/s), frame at the begin, rotation vector.
-FROM, TO, AT, SPEED, THERE, SPEED_THERE, FRAME, TURN = 0, 1, 2, 5, 8, 11, 14, 23
+# Columns of a path.
+FROM = 0  # begin, s
+TO = 1  # end, s
+AT = 2  # 3, position at the begin, m
+SPEED = 5  # 3, velocity there, m/s
+THERE = 8  # 3, position at the end, m
+SPEED_THERE = 11  # 3, velocity there, m/s
+FRAME = 14  # 9, at the begin
+TURN = 23  # 3, rotation vector
 PATH = 26
-# Columns of what is known of its velocities: whether the last one followed from the places; of a window, its steps, how
-# far the places and the velocities given go in it (m); how far both are apart and go in all windows (m), their number;
-# whether it was said that they contradict each other.
-IMPLIED, STEPS, GONE, SAID, APART, WAY, WINDOWS, TOLD = 0, 1, 2, 5, 8, 9, 10, 11
+# Columns of what is known of its velocities.
+IMPLIED = 0  # whether the last one followed from the places
+STEPS = 1  # of a window
+GONE = 2  # 3, how far the places go in it, m
+SAID = 5  # 3, and how far the velocities that are given, m
+APART = 8  # how far both are apart in all windows, m
+WAY = 9  # how far they go in all windows, m
+WINDOWS = 10  # their number
+TOLD = 11  # whether it was reported that they contradict each other
 RECORD = 12
 # Steps over which places and velocities are compared: a motion that begins or changes within one is none of it.
 WINDOW = 4

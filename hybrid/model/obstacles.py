@@ -91,10 +91,12 @@ from hybrid.scene.obstacles import (
 )
 from hybrid.scene.schema import LineScene
 
-# As parts of the diameter of a line: how deep it lies in an obstacle under what the scene asks for, where it follows
-# its radius and where it touches it at a point; how deep it goes where it hits one; the onset of contact; the elastic
-# travel of friction.
-DEPTH, DEPTH_AT_POINT, DEPTH_AT_IMPACT, ONSET, TRAVEL = 0.02, 0.05, 0.125, 0.01, 0.01
+# Parts of the diameter of a line.
+DEPTH = 0.02  # how deep it lies in an obstacle under what the scene asks for, where it follows its radius,
+DEPTH_AT_POINT = 0.05  # and where it touches it at a point
+DEPTH_AT_IMPACT = 0.125  # how deep it goes where it hits one
+ONSET = 0.01  # of contact
+TRAVEL = 0.01  # elastic, of friction
 # Cells to the radius of an obstacle where the program places them, and the most cells that this makes of a line.
 CELLS_PER_RADIUS, MOST_CELLS = 4.0, 2000
 
@@ -287,9 +289,9 @@ def courses_of(scene: LineScene, rows: Floats, waves: Floats, ramp: float, eleva
 
 # Surfaces of triangles of obstacles as arrays for kernels.laws.facets: normals of their features, a tree of boxes.
 
-# rad: what turns by less at an edge is flat, as coordinates of single precision are; edges whose directions differ by
-# less are one; what turns by more is a sharp edge, not a part of something round.
-FLAT_EDGE, STRAIGHT, SHARP = 1e-5, 1e-4, np.radians(40.0)
+FLAT_EDGE = 1e-5  # rad; what turns by less at an edge is flat, as coordinates of single precision are
+STRAIGHT = 1e-4  # rad; edges whose directions differ by less are one
+SHARP = np.radians(40.0)  # what turns by more is a sharp edge, not a part of something round
 
 
 class Facets(NamedTuple):

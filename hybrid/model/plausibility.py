@@ -23,9 +23,9 @@ from hybrid.scene.waves import GivenWaves
 G = 9.81  # m/s^2
 # Fluids, kg/m^3: gases, and liquids from oil to heavy brine.
 GASES, LIQUIDS = (0.05, 10.0), (500.0, 2500.0)
-# Friction on a seabed: chain in gravel reaches 1.  Current, m/s: the fastest tidal streams reach 8 m/s in narrows, and
-# above 5 m/s nothing is moored.  Gravity, m/s^2, of Jupiter, and of a model in a centrifuge none is known here.
-ROUGHEST, FASTEST, HEAVIEST = 2.0, 5.0, 30.0
+ROUGHEST = 2.0  # friction on a seabed: chain in gravel reaches 1
+FASTEST = 5.0  # m/s, current: tidal streams reach 8 m/s in narrows, and above 5 m/s nothing is moored
+HEAVIEST = 30.0  # m/s^2, gravity of Jupiter; of a model in a centrifuge none is known here
 # Pa, shear strength a metre below the bed of the softest mud that bears anything.
 SOFTEST_SOIL = 100.0
 # Significant wave height, m: the largest measured by a buoy is 19 m.  Depth of the sea, m: the deepest is 10.9 km.
@@ -47,10 +47,13 @@ SLOWEST_WAVE, SLOWEST_UNSAID = 10.0, 60.0
 # Own length, m, whose weight in air a line bears at least: hoses bear some 100 m, umbilicals and chains 400 to 3000 m,
 # ropes 5 km and more, and a thousandth of that where it is in kN.
 SHORTEST_BORNE = 5.0
-# Strain at rest that no line bears that is denser than fibres, kg/m^3, and in which tension runs faster, m/s, than in
-# hoses and rubber: chains, wire ropes and armoured cables break at 0.5 to 2 %.  Fibre ropes are lighter, and bear 3 to
-# 40 %.  Own length, m, that no rope bears: wire bears 20 km, polyester 45 km, the strongest fibres in ropes 150 km.
-STRAINED, DENSEST_FIBRE, FAST_WAVE, LONGEST_BORNE = 0.01, 1500.0, 1000.0, 200e3
+# Strain at rest that no line bears that is denser than fibres, and in which tension runs faster than in hoses and
+# rubber: chains, wire ropes and armoured cables break at 0.5 to 2 %.  Fibre ropes are lighter, and bear 3 to 40 %.
+# Own length, m, that no rope bears: wire bears 20 km, polyester 45 km, the strongest fibres in ropes 150 km.
+STRAINED = 0.01
+DENSEST_FIBRE = 1500.0  # kg/m^3
+FAST_WAVE = 1000.0  # m/s
+LONGEST_BORNE = 200e3
 # Diameters of the smallest bend: a line is bent by no less than half of one about itself; steel pipes bear 250 without
 # yielding, cables and umbilicals 5 to 60, and 5000 where it is in mm.
 SHARPEST, MILDEST = 0.5, 2000.0

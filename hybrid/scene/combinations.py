@@ -25,8 +25,10 @@ from hybrid.scene.waves import StreamFunctionWaves
 Tables = Mapping[str, Any]
 # Why a pair is refused: it cannot be, or nobody has worked it out.  Several lines are refused what one cable is.
 Kind = Literal["physics", "not worked out"]
-# Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
-USE, SYSTEM, LINE = "use", "system", "line"
+# Beside the tables.
+USE = "use"  # what is to be done with the scene
+SYSTEM = "system"  # of a line of several the scene of all of them
+LINE = "line"  # and its name
 Use = Literal["", "response", "derivatives"]
 LEAVE_OUT = "leave it out"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"

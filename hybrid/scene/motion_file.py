@@ -20,7 +20,9 @@ from hybrid.scene.base import Finding
 
 Array = NDArray[np.float64]
 
-SHIFT_COLUMNS, ROTATION_COLUMNS, ANGLE_COLUMNS = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")
+SHIFT_COLUMNS = ("x", "y", "z")
+ROTATION_COLUMNS = ("rx", "ry", "rz")  # rotation vector
+ANGLE_COLUMNS = ("roll", "pitch", "yaw")
 COLUMNS = "t,x,y,z or t,rx,ry,rz or t,roll,pitch,yaw, or t,x,y,z with rx,ry,rz or roll,pitch,yaw"
 # deg, by which an angle may change from row to row: more could be a turn the other way.
 LARGEST_CHANGE = 90.0

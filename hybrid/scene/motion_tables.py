@@ -205,9 +205,11 @@ class Motion(Table):
 
 # Where what is driven is, as far as tables say it (travel, velocity and harmonic motion), and when it is farthest.
 
-# Times of a period at which a distance is looked at, spread by the golden section; and of a run at most.  What they
-# miss of the largest distance is some 0.5 % of an amplitude: what is found there is true all the same.
-PER_PERIOD, MOST_TIMES, GOLDEN = 48, 4000, 0.5 * (math.sqrt(5.0) - 1.0)
+# Times at which a distance is looked at, spread by the golden section.  What they miss of the largest distance is some
+# 0.5 % of an amplitude: what is found there is true all the same.
+PER_PERIOD = 48  # of a period
+MOST_TIMES = 4000  # of a run
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 def shift(motion: Motion | None, t: float) -> Triple:

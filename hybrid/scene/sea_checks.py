@@ -34,9 +34,10 @@ SAME_DEPTH = 1e-6
 _WAVES: Place = ("environment", "fluid", "waves")
 
 
-# Densities of fluids, kg/m^3: what has a surface is a liquid, from liquefied gas to the heaviest mud; over a seabed
-# there is a liquid or air; else anything from the air at 50 km to mercury.
-LIQUIDS, AIR, FLUIDS = (400.0, 3000.0), (0.5, 2.0), (5e-4, 14_000.0)
+# Densities of fluids, kg/m^3.
+LIQUIDS = (400.0, 3000.0)  # what has a surface: from liquefied gas to the heaviest mud
+AIR = (0.5, 2.0)  # over a seabed there is a liquid or air
+FLUIDS = (5e-4, 14_000.0)  # else anything from the air at 50 km to mercury
 # Sea water in g/cm^3 or t/m^3, which is no usual air, and what it is to be in kg/m^3.
 SEA_WATER_IN_GRAMS, WATER = (1.02, 1.03), (950.0, 1100.0)
 

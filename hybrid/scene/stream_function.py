@@ -29,9 +29,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 # Depths of more lengths are deep: cosh is exp to 1e-11.
 DEEP = 2.0
-# Steps to the height, as a part of it; iterations of Newton's method, and the change (lengths in d) at which they end.
+# Steps to the height, as parts of it.
 FIRST_STEP, LEAST_STEP = 0.25, 1.0 / 64
-ITERATIONS, SETTLED, FAR = 15, 1e-11, 1e4
+ITERATIONS = 15  # of Newton's method
+SETTLED = 1e-11  # change (lengths in d) at which they end
+FAR = 1e4  # size of the unknowns (lengths in d) from which they have failed
 # Part of the first harmonic that the last ones may have: of a wave of half the depth, twice as long, 20 leave 0.9 %.
 FADED = 0.02
 # An imaginary step so small that its square vanishes.

@@ -122,8 +122,9 @@ def note_departures(
 # neighbours.
 # The ends stay where they are, so a line without a knot becomes one chord (K. Koniaris and M. Muthukumar, 1991).
 
-# Directions in which crossings are counted; how often what is left is drawn straight anew; fewest crossings of a knot.
-DIRECTIONS, ROUNDS, FEWEST = 500, 5, 3
+DIRECTIONS = 500  # in which crossings are counted
+ROUNDS = 5  # how often what is left is drawn straight anew
+FEWEST = 3  # crossings of a knot
 # Part of a chord or triangle by which one that passes beside it counts as passing through.
 BESIDE = 1e-9
 AWAY = 100.0  # times as far from the middle as they are, to which the ends are led

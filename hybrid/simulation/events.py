@@ -76,7 +76,11 @@ def slack_steps_text(tried: float, taken: float, waves: float) -> str:
 COLLAPSE = "steps collapse"
 # Steps so short, one after the other, after which a run that is only to be compared with is given up.
 GIVE_UP = 10 * MANY
-GAIN, TURN, NEWTON, ERROR = "gain", "turn", "newton", "error"
+# What shortened a step.
+GAIN = "gain"
+TURN = "turn"
+NEWTON = "newton"
+ERROR = "error"
 # What cuts steps, and what to do about it.
 CAUSES = {
     GAIN: ("energy that contact puts in", "shorter cells there"),

@@ -28,8 +28,9 @@ from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_sample import Outputs, reach_of
 
-# Cells and steps so many times as long as those of the first result; places at which it is looked at.
-CELLS, STEPS, POINTS = 2.0, 4.0, 201
+CELLS = 2.0  # so many times as long as those of the first result
+STEPS = 4.0  # so many times as long as those of the first result
+POINTS = 201  # places at which it is compared
 # Periods of a stationary irregular motion that the pre-run follows: what 98 % of its outputs ask for is known by then.
 PERIODS = 100
 # Part of the outputs of an irregular motion whose curvature cells must show.  With 1 (the largest) the ten storms of

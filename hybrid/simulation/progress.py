@@ -23,7 +23,11 @@ from hybrid.kernels.machine.compile import is_warm
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import Resolution
 
-PRE_RUN, ESTIMATION, RESULT, REFINEMENT = "mesh pre-run", "error estimation", "result", "refinement"
+# Passes of a computation.
+PRE_RUN = "mesh pre-run"
+ESTIMATION = "error estimation"
+RESULT = "result"
+REFINEMENT = "refinement"
 
 CONTACT = "contact"
 COMPILING = "compiling the kernels for this machine (first use only, up to two minutes) ..."

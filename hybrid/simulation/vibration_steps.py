@@ -17,9 +17,9 @@ from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import LineScene
 from hybrid.store.named_arrays import matched
 
-# Periods of the vibration over which its amplitude is found, which are those from one look at it to the next; what
-# else a force does in this time is a polynomial of this degree.  Of fewer steps nothing is known.
-SEEN, DEGREE, FEWEST = 2.0, 3, 12
+SEEN = 2.0  # periods of the vibration over which its amplitude is found, and from one look at it to the next
+DEGREE = 3  # of the polynomial that stands for what else a force does in this time
+FEWEST = 12  # steps; of fewer nothing is known
 # It counts as gone below this part of what would be shown at its begin: the errors of what is damped do not show.
 GONE = 0.5
 

@@ -49,9 +49,9 @@ TOUCHING = 0.01
 BEHIND = 0.05
 # Product of mean normals from which on two places of an obstacle are on opposite sides; of its radius, for differences.
 OPPOSITE, NORMAL_STEP = 0.25, 1e-5
-# Of half of how thick an obstacle is: how deep in it the straight way of a place has come that has passed through it.
-# Golden sections of that way; places that are looked at in a cell.
-PASSED, SECTIONS, PLACES = 0.8, 24, 4
+PASSED = 0.8  # of half the thickness of an obstacle: depth that the straight way of a place has which passed through it
+SECTIONS = 24  # golden sections of that way
+PLACES = 4  # that are looked at in a cell
 
 
 def lowest_tension(line: Line, sea: Sea, state: State) -> tuple[float, int]:
