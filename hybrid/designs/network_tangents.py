@@ -396,7 +396,7 @@ def refuse_system(run: NetworkRun) -> None:
         what
         | {
             "lines start as they are placed": found is None and len(model.body_places) > 0,
-            "lines touch each other": (found is not None and found.settled) or run.shared is not None,
+            "lines touch each other": (found is not None and found.settled) or run.contact.shared is not None,
             "zones move": run.zones is not None, "line is paid out": run.payout is not None,
             "connections may break": bool(run.failures.all),
             "a line is clamped to what turns with it": bool(model.seats[:, :, TURNS].any()),

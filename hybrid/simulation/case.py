@@ -416,7 +416,7 @@ class Case:
             for line in run.lines:
                 line.recorder.close("", "")
         for line in run.lines:
-            if line.contact is not None or (self.flat and run.came_near_itself):
+            if line.contact is not None or (self.flat and run.contact.came_near_itself):
                 self.near_themselves.add(line.name)
         cpu = clock.thread_time() - begin
         return {x.name: self._compared_line(x, run, cpu, judged=points is None) for x in run.lines}
@@ -438,7 +438,7 @@ class Case:
             resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
             resolution.every, False, errors, resolution.zones * line.model.length if moves and self.flat else 0.0,
             notes, rows, found.steps, found.catenary if moves else np.zeros(0), doubt_of_line(line),
-            run.lets_touch if self.flat else self.touches_itself, self.places[name],
+            run.contact.lets_touch if self.flat else self.touches_itself, self.places[name],
             extremes=extremes_about(held, self.points[name].s), rods=tuple(sorted(found.rods)),
         )  # fmt: skip
 

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hybrid.errors import ComputationError
+from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
-from hybrid.kernels.state.report import SELF_CONTACT
+from hybrid.kernels.state.report import OBSTACLES, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.initial_shape import GIVEN
@@ -127,3 +128,16 @@ def _holds_turns(x: JoinedLine) -> bool:
 
 def _link(x: JoinedLine, state: State) -> float:
     return float(link_of(x.line, x.ends, state.r, state.e, state.a1, state.turn)[LINK])
+
+
+def refuse_start_in_obstacles(model: Model, state: State, key: str = "initial") -> None:
+    """SceneError: a line that begins where the scene has it is deep in an obstacle; key: of its start."""
+    line, sea = model.line, model.sea.at(0.0)
+    if not line.bits & OBSTACLES:
+        return
+    met = cells_met(sea.carried, line.s) if sea.carried.size else None
+    within = depths_in_obstacles(sea, state.r, line.s, met)
+    which, node = (int(x) for x in np.unravel_index(np.argmax(within), within.shape))
+    if within[which, node] > 1.0:
+        given = f"a shape that is in obstacle {model.sea.names[which]} at s = {line.s[node]:.6g} m"
+        raise SceneError([Complaint(key, given, "a start outside of obstacles", "move it, or the obstacle")])

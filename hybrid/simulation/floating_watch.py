@@ -1,13 +1,16 @@
-"""Events where what floats is pulled under water, and where a body that counts as submerged rises out of it."""
+"""Bodies and floats at outputs: pulled under water, out of it, in each other, out of the plane of the lines."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ComputationError, SceneError
+from hybrid.errors import ComputationError, Outcome, SceneError
+from hybrid.kernels.junctions.bodies import FRAME, V
+from hybrid.kernels.junctions.bodies import PLACE as BODY_PLACE
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import distances, put_obstacles
 from hybrid.kernels.run.network_sampling import SAMPLE_AXES, SAMPLE_PLACE
@@ -27,67 +30,137 @@ from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.network import NetworkModel, build_system
 from hybrid.scene.attachments import sphere_diameter
 from hybrid.scene.network_scene import Network
+from hybrid.scene.plane import OUT
 from hybrid.scene.points import FixedPoint, FreePoint
+from hybrid.simulation.parts import Part
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.run_points import Sampled, times
 from hybrid.simulation.run_start import equilibrium_of_system
+from hybrid.solve.joined import LineFailed
 
-Tell = Callable[[float, float, float, str, str], None]
 # Of the height of a point: what it must be below the surface to be under water, beyond round-off.
 UNDER = 1e-3
 # An event follows another where a point is so many times deeper.
 DEEPER = 3.0
 
 
-def note_dry_bodies(system: Network, model: NetworkModel, seen: Sampled, dry: set[str], tell: Tell) -> None:
-    """An event where a body that counts as submerged has risen out of the water; dry: names of those told already."""
-    fluid = system.environment.fluid
-    if fluid is None or fluid.surface is None:
-        return
-    for k, body in enumerate(model.bodies):
-        given = system.free_bodies[body.name]
-        if not given.volume or body.name in dry:
-            continue
-        arm = times(seen.frame(k), np.array(given.centre_of_buoyancy, float))
-        centre = seen.bodies[:, k, SAMPLE_PLACE:SAMPLE_AXES] + arm
-        above = centre[:, 2] - fluid.surface
-        if (above > 0.0).any():
-            first = int((above > 0.0).argmax())
-            dry.add(body.name)
-            text = f"body {body.name}: the centre of its volume is {above[first]:.4g} m above the surface, but"
-            text += " all of its buoyancy still lifts it"
-            tell(float(seen.t[first]), 0.0, 0.0, "body out of water", text)
+class FloatingWatch(Part):
+    """Events where a body is out of the water, what floats is pulled under, or bodies are in each other."""
 
+    name = "floating"
 
-def note_pulled_under(
-    system: Network, model: NetworkModel, seen: Sampled, depths: dict[str, float], tell: Tell, *, moves: bool
-) -> None:
-    """An event where a point that floats by itself is wholly below the surface, and where it is much deeper.
+    def __init__(self, run: RunOfLines, moves: bool) -> None:
+        """moves: whether outputs are of a motion, in waves; else of an equilibrium."""
+        self._run, self._moves = run, moves
+        self.dry: set[str] = set()  # bodies that have been said to be out of the water
+        self.overlaps: set[str] = set()  # and what has been said to be in each other
+        self.under: dict[str, float] = {}  # depth (m) of points at the last event of each
 
-    depths: m, by name, that the last event of each has told; they are kept up to date.  moves: whether `seen` is of a
-    motion, in waves; else of an equilibrium.
-    """
-    fluid = system.environment.fluid
-    if fluid is None or fluid.surface is None:
-        return
-    level = fluid.surface
-    for name in _floating(system, level):
-        point = system.points[name]
-        assert isinstance(point, FreePoint)
-        r, pull = _held(system, model, seen, name)
-        eta = level + (_elevations(model.models[0].sea.values, r, seen.lines[0].sea_now) if moves else 0.0)
-        height = _height(point)
-        depth = eta - r[:, 2] - 0.5 * height
-        for k in np.flatnonzero(depth > UNDER * height):
-            if name in depths and depth[k] <= DEEPER * depths[name]:
+    def checkpoint(self) -> dict[str, Any]:
+        """What has been said."""
+        return {"dry": sorted(self.dry), "under": dict(self.under), "overlaps": sorted(self.overlaps)}
+
+    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """In files of an earlier program nothing was said of what is pulled under or overlaps."""
+        return {"dry": saved["dry"], "under": saved.get("under", {}), "overlaps": saved.get("overlaps", [])}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """That has been said.  ValueError: it has names that the run does not have."""
+        dry, under, overlaps, system = saved["dry"], saved["under"], saved["overlaps"], self._run.system
+        if not (isinstance(dry, list) and set(dry) <= set(system.bodies)):
+            raise ValueError("dry: names of bodies were expected")
+        if not (isinstance(overlaps, list) and all(isinstance(x, str) for x in overlaps)):
+            raise ValueError("overlaps: what is in each other was expected")
+        if not (isinstance(under, dict) and set(under) <= set(system.points)):
+            raise ValueError("under: names of points were expected")
+        self.dry, self.overlaps = set(dry), set(overlaps)
+        self.under = {name: float(depth) for name, depth in under.items()}
+
+    def at_output(self, seen: Sampled) -> None:
+        """Look at outputs.  LineFailed where a body has left the plane of the lines and is to stay in it."""
+        self._note_dry_bodies(seen)
+        self._note_overlaps(seen)
+        self._note_pulled_under(seen)
+        self._keep_in_plane()
+
+    def _event(self, t: float, kind: str, text: str) -> None:
+        self._run.recorder.event(float(t), 0.0, 0.0, kind, text)
+
+    def _note_dry_bodies(self, seen: Sampled) -> None:
+        """An event where a body that counts as submerged has risen out of the water."""
+        system = self._run.system
+        fluid = system.environment.fluid
+        if fluid is None or fluid.surface is None:
+            return
+        for k, body in enumerate(self._run.model.bodies):
+            given = system.free_bodies[body.name]
+            if not given.volume or body.name in self.dry:
                 continue
-            text = f"point {name}: its top is {depth[k]:.3g} m below the surface, although it floats by itself"
-            text += f": its buoyancy less its weight is {_net(system, point):.4g} N at most"
-            if moves:
-                text += f", and its lines pull it down by {pull[k]:.4g} N"
-            else:
-                text += _at_surface(system, point, name, r[k], level - 0.5 * height)
-            tell(float(seen.t[k]), 0.0, 0.0, "pulled under", text)
-            depths[name] = float(depth[k])
+            arm = times(seen.frame(k), np.array(given.centre_of_buoyancy, float))
+            centre = seen.bodies[:, k, SAMPLE_PLACE:SAMPLE_AXES] + arm
+            above = centre[:, 2] - fluid.surface
+            if (above > 0.0).any():
+                first = int((above > 0.0).argmax())
+                self.dry.add(body.name)
+                text = f"body {body.name}: the centre of its volume is {above[first]:.4g} m above the surface, but"
+                self._event(seen.t[first], "body out of water", f"{text} all of its buoyancy still lifts it")
+
+    def _note_pulled_under(self, seen: Sampled) -> None:
+        """An event where a point that floats by itself is wholly below the surface, and where it is much deeper."""
+        system, model = self._run.system, self._run.model
+        fluid = system.environment.fluid
+        if fluid is None or fluid.surface is None:
+            return
+        level = fluid.surface
+        for name in _floating(system, level):
+            point = system.points[name]
+            assert isinstance(point, FreePoint)
+            r, pull = _held(system, model, seen, name)
+            waves = _elevations(model.models[0].sea.values, r, seen.lines[0].sea_now) if self._moves else 0.0
+            height = _height(point)
+            depth = level + waves - r[:, 2] - 0.5 * height
+            for k in np.flatnonzero(depth > UNDER * height):
+                if name in self.under and depth[k] <= DEEPER * self.under[name]:
+                    continue
+                text = f"point {name}: its top is {depth[k]:.3g} m below the surface, although it floats by itself"
+                text += f": its buoyancy less its weight is {_net(system, point):.4g} N at most"
+                if self._moves:
+                    text += f", and its lines pull it down by {pull[k]:.4g} N"
+                else:
+                    text += _at_surface(system, point, name, r[k], level - 0.5 * height)
+                self._event(seen.t[k], "pulled under", text)
+                self.under[name] = float(depth[k])
+
+    def _note_overlaps(self, seen: Sampled) -> None:
+        """An event for each pair of bodies, or body and obstacle or bed, that are in each other."""
+        lines = zip(self._run.model.models, seen.lines, strict=True)
+        found = next(((x, batch) for x, batch in lines if x.line.bits & OBSTACLES), None)
+        if found is None or not found[0].sea.values.carried.size or not found[0].sea.values.carried[:, RIDES].any():
+            return
+        x, batch = found
+        sea, names = x.sea.values, x.sea.names
+        for k, t in enumerate(batch.t.tolist()):
+            rows = sea.obstacles.copy()
+            if batch.obstacles.size:
+                put_obstacles(rows, sea.carried, batch.obstacles[k])
+            for pair, deep in _overlaps(sea._replace(obstacles=rows), names, bool(x.line.bits & SEABED)):
+                if (key := " in ".join(pair)) not in self.overlaps:
+                    self.overlaps.add(key)
+                    text = f"body {pair[0]} is {deep:.3g} m deep in {pair[1]}: lines touch the shapes of bodies, but"
+                    self._event(t, KIND_OF_EVENT, f"{text} bodies touch neither each other nor obstacles nor the bed")
+
+    def _keep_in_plane(self) -> None:
+        """LineFailed where a body has left the plane of the lines, by its place or its turn, and is to stay in it."""
+        run, model = self._run, self._run.model
+        if (normal := model.models[0].kept_in) is None:
+            return
+        first = model.models[0].start.r[0]
+        for k, (row, begun) in enumerate(zip(run.state.bodies, model.body_places, strict=True)):
+            out = abs(float((row[BODY_PLACE:FRAME] - first) @ normal)) / model.models[0].length
+            R, R0 = (x[FRAME:V].reshape(3, 3) for x in (row, begun))
+            if max(out, float(np.abs(R @ R0.T @ normal - normal).max())) > OUT:
+                names = [*(body.name for body in model.bodies), *model.rigid]
+                raise LineFailed(-1, Outcome.LEFT_PLANE, run.t, None, f"{names[k]} leaves it")
 
 
 def _floating(system: Network, level: float) -> list[str]:
@@ -167,28 +240,6 @@ KIND_OF_EVENT, BED = "bodies overlap", "the seabed"
 # Parts of an axis, and along the flat of a box to each of its sides, at which a body is looked at; of the smaller
 # radius, how deep one is in another.
 PARTS, DEEP = np.linspace(-1.0, 1.0, 9), 0.05
-
-
-def note_overlaps(model: NetworkModel, seen: Sampled, told: set[str], tell: Tell) -> None:
-    """An event for each pair of bodies, or body and obstacle or bed, that are in each other.
-
-    told: what has been said, to which they are added.
-    """
-    lines = zip(model.models, seen.lines, strict=True)
-    found = next(((x, batch) for x, batch in lines if x.line.bits & OBSTACLES), None)
-    if found is None or not found[0].sea.values.carried.size or not found[0].sea.values.carried[:, RIDES].any():
-        return
-    x, batch = found
-    sea, names = x.sea.values, x.sea.names
-    for k, t in enumerate(batch.t.tolist()):
-        rows = sea.obstacles.copy()
-        if batch.obstacles.size:
-            put_obstacles(rows, sea.carried, batch.obstacles[k])
-        for pair, deep in _overlaps(sea._replace(obstacles=rows), names, bool(x.line.bits & SEABED)):
-            if (key := " in ".join(pair)) not in told:
-                told.add(key)
-                text = f"body {pair[0]} is {deep:.3g} m deep in {pair[1]}: lines touch the shapes of bodies, but bodies"
-                tell(t, 0.0, 0.0, KIND_OF_EVENT, f"{text} touch neither each other nor obstacles nor the bed")
 
 
 def _overlaps(sea: Sea, names: Sequence[str], bed: bool) -> Iterator[tuple[tuple[str, str], float]]:

@@ -22,6 +22,7 @@ from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.shared_contact import SharedContact
 
 if TYPE_CHECKING:  # a line that is not paid out does without
     from hybrid.simulation.payout import PayingOut
@@ -65,13 +66,19 @@ class HasPlanes(Protocol):
     def of(self, k: int) -> HasPlane | None: ...
 
 
+class HasContact(Protocol):
+    """Contact of lines."""
+
+    shared: SharedContact | None  # of lines with each other
+    watch: LinesWatch | None  # over lines between which no contact is computed
+
+
 class OfRun(Protocol):
     """And of the run of all lines (simulation.network_run)."""
 
     solver: NetworkSolver
     loop: NetworkSteps
     model: NetworkModel
-    watch: LinesWatch | None
 
     @property
     def t(self) -> float: ...
@@ -81,6 +88,8 @@ class OfRun(Protocol):
     def payout(self) -> object: ...
     @property
     def planes(self) -> HasPlanes | None: ...
+    @property
+    def contact(self) -> HasContact: ...
     @property
     def asks_quantities(self) -> bool: ...
     def adopt_cells(self, number: int, model: Model, work: Work) -> None: ...
@@ -230,6 +239,7 @@ def ends_alone(batches: Sequence[Batch]) -> Batch:
 
 def by_itself(run: OfRun, number: int) -> bool:
     """Whether nothing but its own steps knows of the cells of a line, in a run whose solver is attached."""
-    line, watched = run.lines[number], run.watch is not None and run.watch.is_needed
+    line, watch = run.lines[number], run.contact.watch
+    watched = watch is not None and watch.is_needed
     alone = number in run.solver.lone and not run.solver.mixes and not watched
     return alone and line.contact is None and line.correction is None

@@ -1,33 +1,213 @@
-"""Lines of several that are joined to nothing and lie in a plane: each is computed in it, as one cable is.
+"""Lines that are joined to nothing and lie in a plane: each is computed in it, until it leaves it.
 
-What a line does there, leaves and comes back to is watched by the object that watches one cable
-(simulation.plane_monitor).  The model that a run has of a line is one in the plane for as long as it is computed there.
+Everything in a plane that could leave it does so by itself in space, if something pushes it; in a plane nothing can.
+So a small push is carried along with the motion (laws.out_of_plane).  When it grows, an event says so, and a motion
+that nobody wants in a plane whatever comes goes on in space, with that push.  A line that has come back goes on in the
+plane, and what it is still off it becomes the push.  The model that a run has of a line is one in the plane for as long
+as it is computed there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.errors import IN_SPACE
+from hybrid.errors import IN_SPACE, PUSHED
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import OBSTACLES, PLANAR, SELF_CONTACT
-from hybrid.kernels.state.state import Floats, Line
+from hybrid.kernels.state.state import Floats, Line, State
+from hybrid.kernels.step.accept import GROWN
 from hybrid.model.build import Model
-from hybrid.model.plane import in_space, planar
+from hybrid.model.network import NetworkModel
+from hybrid.model.plane import in_space, leaves_plane, planar, untwist
 from hybrid.simulation.line_result import LineResult
-from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
-from hybrid.simulation.run_contact import renew_solver
+from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines, change_lines
 from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stability import on_nodes, scaled, seed
 from hybrid.store.named_arrays import matched
 
 TOUCHES = "where it may touch"
+# Of the length: how far the push displaces a cable that goes on in space: a hundred times what an equilibrium may be
+# out of the plane, and nothing that anybody would see.
+HANDED_ON = 1e-6
+# Of the length: how far from its plane a line in space is back in it.
+BACK = 1e-7
+# Of the length: a push that was real and is larger is given its size anew: linear equations no longer hold.
+FARTHEST = 1e-4
+# Angle, rad, through which sections of rods may then be turned against those of a line without twist.
+UNTWISTED = 1e-2
+
+NO_NODES: Floats = np.zeros(0)
+Note = Callable[[int, str, str], None]
+
+
+class CarriesPush(Protocol):
+    """What makes the steps of a line, and carries a push out of its plane along with them."""
+
+    @property
+    def clock(self) -> Clock: ...
+    @property
+    def push(self) -> Floats: ...
+    def carry(self, pushes: tuple[Floats, Floats]) -> None: ...
+
+
+class PlaneMonitor:
+    """Watches a motion in a plane, for as long as it is in one."""
+
+    def __init__(self, insists: bool) -> None:
+        """insists: whether the scene asks for two dimensions."""
+        self.insists = insists
+        self.speed = 0.0  # m/s, of a push when it is given; 0: none is carried along
+        self.real = False  # whether the push is what a line that has come back was off its plane
+        self._s: Floats = NO_NODES  # m, nodes that it is carried on
+        self._across: Floats = np.zeros((0, 4))  # of a line that comes back, m, s
+        self.comes_back = False  # whether a line that has left its plane may go on in it later
+        self.home: Floats | None = None  # (3, 3) plane that has been left once
+
+    def begin(self, model: Model, state: State, note: Note) -> Model:
+        """The model that the motion begins with, in the plane if it is in one; what leaves the plane is noted."""
+        if model.plane is None:
+            return model
+        if not self.insists and leaves_plane(model.plane, state, model.length):
+            text = f"the equilibrium found leaves the plane of the scene: {IN_SPACE}"
+            out = np.abs((state.r - state.r[0]) @ model.plane[2])
+            note(int(np.argmax(out)), "out of plane", text)
+            return replace(model, plane=None)
+        plane = model.plane
+        model = replace(model, line=planar(model.line, plane))
+        n = plane[2]
+        for x, origin in ((state.r, state.r[0].copy()), (state.e, np.zeros(3))):  # what Newton's tolerance has left
+            x -= np.outer((x - origin) @ n, n)
+        untwist(model.line, model.ends.values, model.cable.held_tangent, state)
+        self.speed = model.length / model.time_scale
+        return model
+
+    def attach(self, run: CarriesPush, line: Line) -> None:
+        """Carry the push along with a (new) line of a run, in proportion to s."""
+        away = self.comes_back and self.home is not None and not self.speed
+        run.clock.near_plane = BACK * line.s[-1] if away else 0.0
+        if not self.speed:
+            run.carry((NO_PUSH, NO_PUSH))
+        elif not np.array_equal(line.s, self._s):
+            push = on_nodes(run.push, self._s, line.s) if self._s.size else seed(line.s, self.speed)
+            self._give(run, push, line.s)
+
+    def take(self, line: Line) -> None:
+        """Go on with other cells, to which the run has carried the push."""
+        if self.speed:
+            self._s = line.s
+
+    def _give(self, run: CarriesPush, push: Floats, s: Floats) -> None:
+        started = float(run.clock.push_start) if self._s.size else 0.0
+        run.carry((push, np.zeros_like(push)))
+        self._s, run.clock.push_start = s, started
+
+    def renew(self, run: CarriesPush) -> None:
+        """Give the push anew: it has died."""
+        run.push[:] = seed(self._s, self.speed)
+        run.clock.push_start, self.real = 0.0, False
+
+    def must_leave(self, run: CarriesPush, note: Note) -> bool:
+        """Whether the motion has to go on in space, after a step in which the push had grown too large."""
+        grown = float(run.clock.push_grown)
+        fast = "faster than the step can follow" if np.isinf(grown) else f"by a factor of {grown:.0f}"
+        text = f"a small push out of the plane has grown {fast}: the cable would leave the plane"
+        where = int(np.argmax(np.abs(scaled(run.push, 1.0, self._s)[:, 0])))
+        if self.insists:
+            note(where, "out of plane", f"{text}; dimension: 2 keeps it there, `dimension: 3` does not")
+            self.speed = 0.0
+            run.carry((NO_PUSH, NO_PUSH))
+            return False
+        if self.home is None:
+            back = f"; in the plane again where it is within {BACK:g} of its length" if self.comes_back else ""
+            note(where, "out of plane", f"{text}; {PUSHED} {HANDED_ON:g} of its length{back}")
+        return True
+
+    def leave(self, model: Model, run: CarriesPush, state: State) -> Model:
+        """The model in space; the state gets the push."""
+        assert self.speed and model.plane is not None
+        known = self.real and bool(np.abs(run.push[:, 0]).max() < FARTHEST * model.length)
+        x = run.push.copy() if known else scaled(run.push, HANDED_ON * model.length, self._s)
+        n = model.plane[2]
+        held = np.flatnonzero(model.ends.values.held) * (model.line.s.size - 1)
+        x[held] = 0.0
+        for array, column in ((state.r, 0), (state.v, 1), (state.a, 2), (state.vd, 3)):
+            array += x[:, column, None] * n
+        state.e[:] += np.diff(x[:, 0])[:, None] * n
+        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+        a = state.a1 - np.einsum("ij,ij->i", state.a1, d)[:, None] * d
+        size = np.linalg.norm(a, axis=1)[:, None]
+        state.a1[:] = np.where(size > 0.0, a / np.where(size > 0.0, size, 1.0), state.a1)
+        self.leave_as_it_is(model.plane)
+        return replace(model, line=in_space(model.line), plane=None)
+
+    def leave_as_it_is(self, plane: Floats) -> None:
+        """Go on in space without the push: other lines move this one out of its plane, if anything does."""
+        self.speed, self._s, self.home, self.real = 0.0, NO_NODES, plane, False
+
+    def come_back(self, model: Model, run: CarriesPush, state: State) -> Model | None:
+        """The model in the plane, and the state projected on it; None: its rods are twisted.
+
+        What was across the plane becomes the push when the run has the model (`push_on`).
+        """
+        assert self.home is not None
+        n, line = self.home[2], planar(model.line, self.home)
+        twisted = state.a1.copy()
+        flat = replace(model, line=line, plane=self.home)
+        across = [(state.r - state.r[0]) @ n, state.v @ n, state.a @ n, state.vd @ n]
+        state.r[:] -= np.outer(across[0], n)
+        for x in (state.e, state.v, state.a, state.vd):
+            x -= np.outer(x @ n, n)
+        untwist(line, model.ends.values, model.cable.held_tangent, state)
+        if self._is_twisted(model, np.linalg.norm(state.a1 - twisted, axis=1)):
+            return None
+        for spins in (state.w, state.wa, state.wd):
+            spins[:] = 0.0
+        self.speed, self.real, self._across = model.length / model.time_scale, True, np.column_stack(across)
+        return flat
+
+    @staticmethod
+    def _is_twisted(model: Model, angle: Floats) -> bool:
+        """Whether turns of sections by these angles (N,) rad matter: M Theta/(2 T) is beyond BACK of the length."""
+        line = model.line
+        between = line.element * np.abs(np.diff(angle, prepend=0.0, append=0.0))
+        torque = float((line.kb[:, 2] * between).max())
+        return bool(angle.max() > UNTWISTED or torque * np.pi > 2.0 * model.tension_scale * BACK * model.length)
+
+    def push_on(self, run: CarriesPush, model: Model) -> None:
+        """Carry along what was across the plane; about where that comes to HANDED_ON of the length it leaves again."""
+        self._give(run, self._across, model.line.s)
+        least = BACK * model.length / model.time_scale
+        speeds = np.maximum(np.abs(self._across[:, 1]), least)
+        begun = BACK * GROWN / HANDED_ON  # by how much a push that was given at the start would have grown by now
+        run.clock.push_start = 0.5 * float(model.line.mass @ speeds**2) / begun**2
+
+    def checkpoint(self, run: CarriesPush) -> dict[str, Any] | None:
+        """The push, its energy when it was given, and whether it is of a line that has come back."""
+        if not self.speed:
+            return None
+        pair, energy = np.array([run.push, run.push]), float(run.clock.push_start)
+        return {"pair": pair, "unit": self.speed, "energy": energy, "led": True, "real": self.real}
+
+    def restore(self, saved: Mapping[str, Any], run: CarriesPush) -> None:
+        """Go on as `checkpoint` has written; ValueError where that cannot be."""
+        if not saved["unit"] > 0.0:
+            raise ValueError("a push of no size")
+        self.speed, self.real = saved["unit"], saved["real"]
+        run.push[:] = saved["pair"][int(saved["led"])]
+        run.clock.push_start = saved["energy"]
+
+
+def same_plane(a: Floats | None, b: Floats | None) -> bool:
+    """Whether two planes (3, 3) have the same normal, of either sense."""
+    return a is not None and b is not None and bool(abs(abs(float(a[2] @ b[2])) - 1.0) < 1e-12)
 
 
 class LonePlane:
@@ -74,8 +254,10 @@ class LonePlane:
         self.monitor.attach(self, solver.lines[self._number].line)
 
 
-class LonePlanes:
+class LonePlanes(Part):
     """Which lines of a run are computed in a plane."""
+
+    name, wants = "planes", b.LEAVES_PLANE | b.PUSH_DIED | b.NEARS_PLANE
 
     def __init__(self, run: RunOfLines, counts: b.Counts, insists: bool) -> None:
         """counts: of its steps; insists: whether the scene asks for two dimensions."""
@@ -104,7 +286,7 @@ class LonePlanes:
         model, plane = self._run.model.models[k], self._lines[k].plane
         return replace(model, plane=None) if plane is None else _in(model, plane)
 
-    def begin(self) -> None:
+    def place(self) -> None:
         """Lines that begin in their planes are computed there, from states that lie in them exactly."""
         for k, x in self._lines.items():
             if self._may(k):
@@ -112,8 +294,8 @@ class LonePlanes:
                     self._run.model.models[k], self._run.state.lines[k], partial(self._note, k)
                 ).plane
 
-    def put_lines(self) -> None:
-        """Before another solver: lines in planes, but for those that touch, or lie in no plane, now."""
+    def fit_lines(self) -> None:
+        """Lines go into their planes, but for those that touch, or lie in no plane, now."""
         changes = {}
         for k, x in self._lines.items():
             model, may = self._run.model.models[k], self._may(k)
@@ -131,8 +313,8 @@ class LonePlanes:
                 changes[k] = partial(_as_computed, plane=plane, flat=x.plane is not None)
         change_lines(self._run, changes)
 
-    def attach(self, solver: NetworkSolver) -> None:
-        """Steps are made by another solver, with lines as of `put_lines`."""
+    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
+        """Steps are made by another solver, with lines as of `fit_lines`."""
         for x in self._lines.values():
             x.attach(solver)
 
@@ -173,7 +355,7 @@ class LonePlanes:
             if x.plane is None and (model := x.monitor.come_back(self._model(k), x, self._run.state.lines[k])):
                 x.plane, back[k] = model.plane, model
         if left or back:
-            renew_solver(self._run, "where a line leaves its plane, or comes back to it")
+            self._run.renew_solver("where a line leaves its plane, or comes back to it")
         for k, model in back.items():
             self._lines[k].monitor.push_on(self._lines[k], model)
 
@@ -185,10 +367,11 @@ class LonePlanes:
         for k, x in self._lines.items():
             push = None if x.plane is None else x.monitor.checkpoint(x)
             found[names[k]] = {"plane": x.plane, "home": x.monitor.home, "push": push}
-        return found
+        return {"planes": found}
 
-    def restore_planes(self, saved: Mapping[str, Any]) -> None:
-        """Lines are in the planes of a checkpoint, before there is a solver.  ValueError: they have none."""
+    def restore_cells(self, saved: Mapping[str, Any]) -> bool:
+        """Lines are in the planes of a checkpoint.  ValueError: they have none."""
+        saved = saved["planes"]
         if not isinstance(saved, Mapping):
             raise ValueError("planes: a table with names of lines was expected")
         for k, x in self._lines.items():
@@ -203,11 +386,12 @@ class LonePlanes:
                 if mine["push"] is not None:
                     model = self._run.model.models[k]
                     x.monitor.speed = model.length / model.time_scale
+        return False  # lines are as `fit_lines` makes them
 
-    def restore_pushes(self, saved: Mapping[str, Any]) -> None:
+    def restore(self, saved: Mapping[str, Any]) -> None:
         """Carry along what a checkpoint says, with the solver that there is now.  ValueError: that cannot be."""
         for k, x in self._lines.items():
-            mine = saved.get(self._run.model.names[k])
+            mine = saved["planes"].get(self._run.model.names[k])
             if mine is not None and mine["push"] is not None:
                 pair = np.zeros((2, *x.push.shape))
                 push = {"pair": pair, "unit": 0.0, "energy": 0.0, "led": True, "real": False}

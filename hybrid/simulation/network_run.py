@@ -17,11 +17,9 @@ import numpy as np
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
-from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Moves, Work, state_for
-from hybrid.kernels.step.accept import MANY
 from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
 from hybrid.model.failure import Weakness
@@ -30,28 +28,15 @@ from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on, output_ti
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.network_scene import Network
-from hybrid.scene.plane import OUT
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import (
-    COLLAPSE,
-    CUTS,
-    GIVE_UP,
-    TOUCH_EACH_OTHER,
-    TOUCHES_ITSELF,
     Sink,
-    collapse_text,
-    count_iterations,
-    energy_gains_text,
-    note_cut,
-    note_iterations,
-    note_slack,
 )
-from hybrid.simulation.failure import Stopped, explanation, first_remedy, touch_text, write_snapshot
-from hybrid.simulation.floating_watch import note_dry_bodies, note_overlaps, note_pulled_under
-from hybrid.simulation.line_result import FORCE_COLUMNS, WAITING, LineResult, LineStep, Wanted
-from hybrid.simulation.lines_contact import LinesWatch, shared_of
-from hybrid.simulation.lines_contact_start import note_crossings
+from hybrid.simulation.failure import write_snapshot
+from hybrid.simulation.floating_watch import FloatingWatch
+from hybrid.simulation.line_result import FORCE_COLUMNS, WAITING, LineResult, Wanted
 from hybrid.simulation.lone_planes import LonePlanes
+from hybrid.simulation.parts import EVERY_STEP, Parts
 from hybrid.simulation.progress import RESULT, ProgressReporter, at_once
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import kept_resolution, other_program, refused, require_same
@@ -62,30 +47,23 @@ from hybrid.simulation.run_checkpoint import (
     restore,
 )
 from hybrid.simulation.run_contact import (
-    AT_START,
-    begin_between,
-    begin_contact,
-    begin_where_near,
-    end_contact,
-    gives_up_contact,
+    RunContact,
     refuse_within_itself,
-    tell_meetings,
-    tell_passages,
 )
+from hybrid.simulation.run_cuts import Cuts
 from hybrid.simulation.run_failures import Failures
 from hybrid.simulation.run_file import Cable, CableFile, LinesFile
-from hybrid.simulation.run_of_lines import change_loads_of_lines, loaded_as, with_loads_of
-from hybrid.simulation.run_points import Rotations, Sampled
-from hybrid.simulation.run_quantities import RunQuantities
+from hybrid.simulation.run_of_lines import WatchedLines, change_loads_of_lines, loaded_as, with_loads_of
+from hybrid.simulation.run_points import Sampled
+from hybrid.simulation.run_quantities import Rotations, RunQuantities
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, joined_lines, named
 from hybrid.simulation.run_zones import RunZones, Start, managers_for, start_at_rest, zones_as_placed
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
-from hybrid.solve.joined import LineFailed, NetworkState, NetworkTaken
+from hybrid.solve.joined import LineFailed, NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.run import MOST_SAMPLED, ROWS, Tried
-from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.store.array_contents import Target
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.format import Text
@@ -153,7 +131,6 @@ class NetworkRun:
         self.changes: Sequence[LoadChange[Network]] = [
             replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < self.end
         ]
-        self.lets_touch, self.came_near_itself = recording.touches, False
         self.criterion, me = (
             criterion,
             proxy(self),
@@ -215,14 +192,11 @@ class NetworkRun:
         if self._begins:
             for line in self.lines:
                 line.diagnostics.begin()
-        self.shared: SharedContact | None = None  # contact of lines with each other
+        self.contact = RunContact(me, recording.touches, target is not None)
         self.planes = LonePlanes(me, self.loop.counts, system.dimension == 2) if planes and moves else None
-        self.met: set[tuple[int, int]] = set()  # lines that have been said to touch
-        self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
-        self.passed: set[tuple[int, int]] = set()  # and those that have been said to
-        self.let_pass: set[tuple[int, int]] = set()  # of lines that may meet, those between which it is not computed
         shaken = zip(scenes.items(), self.resolution.lines.values(), strict=True)
-        self.vibrations = VibrationsOfLines({name: VibrationSteps(scene, x) for (name, scene), x in shaken})
+        steps = {name: VibrationSteps(scene, x) for (name, scene), x in shaken}
+        self.vibrations = VibrationsOfLines(steps, self.loop.clock)
         self.quantities = RunQuantities(system, self.file.of_quantities(scenes))
         if moves:
             self.quantities.keep_ranges(self.lines)
@@ -232,11 +206,12 @@ class NetworkRun:
         self._fitted: tuple[object, ...] | None = None  # what steps are attached to that have come to a stop
         self._moved: list[Moves] = []  # by which ends move in compiled steps
         self._loaded = np.nan  # and `loaded`, of the loads that act there on bodies
-        self.dry: set[str] = set()  # bodies that have been said to be out of the water
-        self.overlaps: set[str] = set()  # and what has been said to be in each other
-        self.under: dict[str, float] = {}  # depth (m) of points that have been said to be pulled under it
-        self.failures = Failures(me)
+        self.failures, self.cuts, self.floating = Failures(me), Cuts(me, target is None), FloatingWatch(me, moves)
         self.zones = RunZones(me, managers, self.payout) if managers and moves else None
+        self.parts = Parts(
+            x for x in (self.planes, WatchedLines(me), self.contact, self.cuts, self.zones, self.payout, self.failures,
+                        self.vibrations, self.quantities, self.rotations, self.floating) if x is not None
+        )  # fmt: skip
         self.loaded = 0.0  # s, loads that have stopped by then act no more
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
@@ -298,13 +273,18 @@ class NetworkRun:
         return found
 
     @property
+    def span(self) -> tuple[float, float]:
+        """Arc lengths (m) of its events."""
+        return self.file.span
+
+    @property
     def noted(self) -> Sink:
         """What notes events of the whole run."""
         return self.file.noted
 
     def note(self, kind: str, text: str, **more: float) -> None:
         """Note an event of the whole run, now."""
-        self.noted.event(self.t, *self.file.span, kind, text, **more)
+        self.noted.event(self.t, *self.span, kind, text, **more)
 
     def _go_on(self, source: Path) -> Recorder:
         """Be where the checkpoint of a result is, and write behind its rows; ResultError: that cannot be."""
@@ -360,8 +340,7 @@ class NetworkRun:
 
     def gather_events(self) -> None:
         """Record the events of the lines, in the result of the system with their names, as they happened."""
-        tell_meetings(self)
-        tell_passages(self)
+        self.contact.tell()
         self.file.gather()
 
     def _output(self) -> None:
@@ -379,34 +358,18 @@ class NetworkRun:
         states = [line.sampled(count) for line in self.lines]
         seen = Sampled(states, self.loop.body_samples[:count])
         self.file.save(seen)
-        note_dry_bodies(self.system, self.model, seen, self.dry, self.recorder.event)
-        note_overlaps(self.model, seen, self.overlaps, self.recorder.event)
-        note_pulled_under(self.system, self.model, seen, self.under, self.recorder.event, moves=self.moves)
-        self._keep_in_plane()
+        for look in self.parts.at_output:
+            look(seen)
         for line, x in zip(self.lines, states, strict=True):
             line.output(x)
-
-    def _keep_in_plane(self) -> None:
-        """LineFailed where a body has left the plane of the lines, by its place or its turn, and is to stay in it."""
-        normal, first = self.model.models[0].kept_in, self.model.models[0].start.r[0]
-        for k, (row, begun) in enumerate(zip(self.state.bodies, self.model.body_places, strict=True)):
-            if normal is None:
-                return
-            out = abs(float((row[PLACE:FRAME] - first) @ normal)) / self.model.models[0].length
-            R, R0 = (x[FRAME:V].reshape(3, 3) for x in (row, begun))
-            if max(out, float(np.abs(R @ R0.T @ normal - normal).max())) > OUT:
-                names = [*(body.name for body in self.model.bodies), *self.model.rigid]
-                raise LineFailed(-1, Outcome.LEFT_PLANE, self.t, None, f"{names[k]} leaves it")
 
     def _close(self, status: str, message: str) -> None:
         """Close all, with the events of the lines in the result of the points too."""
         for line in self.lines:
             line.finish(self.t, status)
         self.gather_events()
-        if status == "complete":
-            count_iterations(self.loop.clock, self.loop.counts, self.file.span[1], self.noted)
-        if self.shared is not None and (tries := self.shared.given_up):
-            self.note("steps cut", energy_gains_text(tries))
+        for part in self.parts:
+            part.finish(status)
         self.file.close(status, message)
 
     # --- what is computed ---------------------------------------------------------------------------
@@ -414,7 +377,7 @@ class NetworkRun:
     def record_equilibrium(self) -> None:
         """Record the equilibrium that was found."""
         assert self.found is not None
-        self._note_partners()
+        self.contact.note_partners()
         try:
             self.solver = solver = self.found.solver
             if not self.found.settled:
@@ -422,8 +385,8 @@ class NetworkRun:
             self._make_room(solver)
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, solver.anchor)  # what nothing holds has no report without its springs
-            self.watch_lines()
-            self._look_for_overlaps()
+            self.contact.watch_lines()
+            self.contact.look_for_overlaps()
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
                 line.note_equilibrium(x, state, None, self.found, self.turned)
                 if line.correction is not None:
@@ -480,25 +443,12 @@ class NetworkRun:
         for body, row in zip(self.model.bodies, bodies, strict=False):
             body.take_added_mass(row)
 
-    def _note_partners(self) -> None:
-        """Lines know whether they may touch others."""
-        for line in self.lines:
-            line.shares = self.model.touching is not None and line.number in self.model.touching.lines
-
     def make_solver(self) -> None:
         """A solver for the model as it is."""
-        self._note_partners()
-        if self.planes is not None:
-            self.planes.put_lines()
-        self.quantities.follow(self.model)
-        own = {line.number: line.contact for line in self.lines if line.shares and line.contact is not None}
-        contacts, shared = [line.touch_itself(self.t) for line in self.lines], shared_of(self.model, rubs=True)
-        if shared is not None and self.shared is not None and shared.lines == self.shared.lines:
-            other = self.payout is not None or (self.zones is not None and self.zones.follow_curvature)
-            shared.restore(self.shared.checkpoint(self.t), self.t, remeshed=other)
-        elif shared is not None and (own or self.shared is not None):
-            shared.take(self.shared, own, self.t)
-        self.shared = shared
+        self.contact.note_partners()
+        for part in self.parts:
+            part.fit_lines()
+        contacts, shared = self.contact.of_lines(any(part.remeshes for part in self.parts))
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         for line, x in zip(self.lines, lines, strict=True):
             line.held = np.minimum(x.ends.held, 1)
@@ -507,36 +457,12 @@ class NetworkRun:
         self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared, self.resolution.tolerance)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
-        if self.planes is not None:
-            self.planes.attach(self.solver)
-        if self.payout is not None:
-            self.payout.bind(self.solver)
-        if self.watch is not None:
-            tell_passages(self)
-        self.watch_lines()
-        if self.zones is not None:
-            self.zones.look_ahead()
+        for follow in self.parts.follow:
+            follow(self.model, self.solver)
         if self.loop.controlled:
             self.solver.allowed[:] = self.resolution.allowed
         self.loop.stir(self.model.members_of(self.solver.bodies))
         self._moved, self._loaded = [], np.nan
-
-    def watch_lines(self) -> None:
-        """Look from now on which lines overlap without contact, beside those that are known to."""
-        if self.target is None:
-            return
-        self.watch = LinesWatch(self.system, self.model, self.passed, self.loop.clock, self.let_pass)
-        if self.watch.is_needed:
-            self.loop.watch(*self.watch.attach(self.solver.line_tables))
-        else:
-            self.loop.watch_nothing()  # its tables are of the watch before, which is gone
-
-    def _look_for_overlaps(self) -> None:
-        """Look which lines overlap without contact in the first state."""
-        if self.watch is not None and self.watch.is_needed:
-            self.solver.look_at(self.state)
-            self.passed |= self.watch.begin(self.system)
-        note_crossings(self)
 
     def _make_room(self, solver: NetworkSolver) -> None:
         """Room for samples of the lines and bodies as they are."""
@@ -577,25 +503,19 @@ class NetworkRun:
         time = self.system.require_time()
         if self.found is None:
             begin_as_placed(self.model, self.scenes, self.state, [line.events for line in self.lines])
-        if self.planes is not None:
-            self.planes.begin()
+        for part in self.parts:
+            part.place()
         self.make_solver()
-        if self.found is None:
-            refuse_within_itself(self.model, self.solver.lines, self.state, True, AT_START)
-        elif not self.found.settled:
-            refuse_within_itself(self.model, self.solver.lines, self.state, True)
-        begin_where_near(self)
+        for part in self.parts:
+            part.balance()
         for point, text in blended_of_lines(self.system):
             if text:
                 self.noted.event(0.0, *self.file.place(point), "motion blended in", text)
         for kind, text in self._notes:
             self._note(kind, text)
-        self._settle(self.solver)
-        self._look_for_overlaps()
-        if self.watch is not None and self.watch.near() and begin_between(self):
-            self._settle(self.solver)
-        if self.zones is not None:
-            self.zones.begin()
+        self.balance()
+        for part in self.parts:
+            part.begin()
         if self.system.environment.waves is not None:
             text = "waves act on lines and points, not on the body, which has no members"
             for body in (x for x in self.model.bodies if x.members is None):
@@ -618,7 +538,8 @@ class NetworkRun:
         self.gather_events()
         self._between = True
         self.loop.set_quota(LOOK if self.loop.counts.asks else ROWS)
-        self.vibrations.begin(self.loop.clock)
+        for begin in self.parts.at_stop:
+            begin()
         self.keep()
         self._logged = self._spent()
 
@@ -630,30 +551,32 @@ class NetworkRun:
         end = self.end if until is None else until
         given = [*(m.ends.breaks for m in self.model.models), self.model.breaks]
         self._jumps = sorted({x for each in given for x in each if x < end})
-        self._breaks = sorted({*self._jumps, *(x for x in self.failures.times if x < end)})
+        self._breaks = sorted({*self._jumps, *(x for part in self.parts for x in part.breaks if x < end)})
         outputs = [x for x in self.times if x < end] if self.system.output.exact else []
         last = self.times[-1] if until is None else until
         steps = [x for x in self.resolution.one.ends if x < end]
         if self.loop.controlled:
-            grown = [*self.vibrations.begins, *(x for scene in self.scenes for x in ramp_ends(scene))]
+            grown = [*self.parts.begins, *(x for scene in self.scenes for x in ramp_ends(scene))]
             steps += [x for x in grown if x < end]
         return apart([*outputs, *steps, last, *self._breaks], self.t, self.resolution.one.step)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
         """Steps to `stop` (s), with what is due there; look: called there, and about ten times a second."""
-        vibrations, clock = self.vibrations, self.loop.clock
-        while vibrations.due < stop - SAME_STOP * self.resolution.one.step:
-            self._go_to(vibrations.due, look)
+        while (due := self.parts.due) < stop - SAME_STOP * self.resolution.one.step:
+            self._go_to(due, look)
             self.write_log()
-            vibrations.judge(clock)
+            for part in self.parts:
+                if part.due == due:
+                    part.at_due()
         self._go_to(stop, look)
-        vibrations.begin(clock)
+        for begin in self.parts.at_stop:
+            begin()
 
     def _go_to(self, stop: float, look: Callable[[], None]) -> None:
-        """The same, whatever vibrates."""
+        """The same, with nothing due on the way."""
         loop, step = self.loop, self.resolution.one.step
-        if loop.controlled and self.payout is not None:
-            self.payout.limit_step()
+        for begin in self.parts.begin_leg if loop.controlled else ():
+            begin()
         even = self.system.output.exact or bool(self.resolution.one.ends) or not falls_on(stop, self._breaks, step)
         steps = equal_steps(self.leg, self.t, stop, step, even)
         self.leg = steps[:2]
@@ -690,7 +613,7 @@ class NetworkRun:
     def _steps_differ(self) -> bool:
         """Whether steps are not all the same, so that each stop has a say in their lengths."""
         one = self.resolution.one
-        return bool(self.loop.controlled or self.vibrations.begins or self.system.output.exact or one.ends)
+        return bool(self.loop.controlled or self.parts.begins or self.system.output.exact or one.ends)
 
     def _fitting(self) -> tuple[object, ...]:
         """What compiled steps are attached to: where it is the same, and they have come to a stop, they go on."""
@@ -706,10 +629,8 @@ class NetworkRun:
     def _run_attached(self) -> int:
         """The same of steps that are attached to what there is."""
         code = self.loop.go()
-        if self.zones is not None:
-            self.zones.sync()
-        if self.payout is not None:
-            self.payout.sync()
+        for sync in self.parts.sync:
+            sync()
         self.state, self.other = self.loop.states
         return code
 
@@ -724,7 +645,7 @@ class NetworkRun:
             if code == b.TRYING:
                 self._prepare(float(loop.clock.try_end))
             elif code == b.TRIED:
-                self._judge_zones()
+                self._judge()
             elif code == b.FAILED:
                 self._failed_step()
             else:
@@ -732,7 +653,7 @@ class NetworkRun:
                     self.write_log()
                 if code == b.STEPPED:
                     self.ends_of_now()
-                    self._after_step(step)
+                    self._after_step()
                 if loop.controlled or self.t >= loop.clock.until:
                     self.leg = (self.leg[0], int(loop.counts.leg_part))
                 arrived = self.t >= stop and loop.counts.phase != b.SAMPLE
@@ -750,17 +671,13 @@ class NetworkRun:
         """Steps lead from the state of now, with ends that move as they do now."""
         loop, solver = self.loop, self.solver
         loop.counts.asks = 0
-        if self.failures.all:
-            loop.counts.asks |= b.ASK_STEPS
         if loop.attach(solver, self.state, self.other):
             for line, old, new in zip(self.lines, self.state.lines, self.other.lines, strict=True):
                 line.attach(solver, (old, new), loop.clock, loop.counts)
-        if self.zones is not None:
-            self.zones.attach(loop)
-        if self.payout is not None:
-            self.payout.attach(loop)
+        for attach in self.parts.attach:
+            attach(loop)
         for line in self.lines:
-            line.lets_touch = self.lets_touch
+            line.lets_touch = self.contact.lets_touch
             if line.correction is not None:
                 line.correction.set_torque()
         moves = [model.ends.moves() for model in self.model.models]
@@ -773,8 +690,8 @@ class NetworkRun:
 
     def _prepare(self, t: float) -> None:
         """Ends, loads and zones as they are at the end of a try, t (s)."""
-        if self.zones is not None:
-            self.zones.prepare(t)
+        for prepare in self.parts.prepare:
+            prepare(t)
         for line, model in zip(self.lines, self.model.models, strict=True):
             model.ends.at(t)
             model.sea.at(t)
@@ -782,13 +699,10 @@ class NetworkRun:
         self.model.load_bodies(t, self.solver.bodies, self.loaded)
         self.model.stir(t, self.state.bodies, t - self.t, self.solver.bodies)
 
-    def _judge_zones(self) -> None:
-        """After a try: lines may get more rod, with which it is made again."""
-        assert self.zones is not None
-        clock = self.loop.clock
-        last = bool(0.5 * clock.tried_dt < clock.shortest)
+    def _judge(self) -> None:
+        """After a try: it may have to be made again, with other lines."""
         self._go_back(True)
-        if self.zones.wants_more_rod(self.loop.tried, float(clock.try_end), last):
+        if any([part.wants_retry() for part in self.parts]):
             self.loop.try_again()
         self._go_back(False)
 
@@ -796,12 +710,12 @@ class NetworkRun:
         """No shorter step is left to try: contact is given up, or the run ends.  LineFailed."""
         dt = float(self.loop.clock.tried_dt)
         self._go_back(True)
-        if not gives_up_contact(self, dt):
+        if not any([part.gives_up(dt) for part in self.parts]):
             if not self.stepped_outside:  # else the step may be taken back
                 self._record_last()
             for line in self.lines:
                 line.write_down()  # what stopped the run before comes first
-            raise self._stopped(self.solver, self.loop.tried, dt)
+            raise self.cuts.stopped(self.solver, self.loop.tried, dt)
         self._go_back(False)
         self.loop.try_whole()
 
@@ -832,52 +746,28 @@ class NetworkRun:
         now = self._spent()
         cpu = np.linspace(self._logged, now, len(rows) + 1)[1:]
         self._logged = now
-        self.vibrations.log(rows[:, :, FORCE_COLUMNS])
+        for log in self.parts.log:
+            log(rows[:, :, FORCE_COLUMNS])
         for k, line in enumerate(self.lines):
             line.log(np.column_stack([rows[:, k], cpu]))
 
-    def _after_step(self, step: float) -> None:
-        """What a step has flagged, zones, contact that begins or ends, and what breaks; step: s, the usual one."""
-        loop, t = self.loop, self.t
-        solver = self.solver
-        if self.planes is not None:
-            self.planes.note_step()
-        for line, new, old, work in zip(self.lines, self.state.lines, self.other.lines, solver.work, strict=True):
-            if seen := int(loop.seen[line.number]):
-                line.look_at_itself(solver, seen, t, self.last_step, new)
-            if line.books.counts.notices:
-                line.watch(LineStep(t, new, old, work.report, line.books))
-        if self.zones is not None:
-            self.zones.accepted(self.last_step)
-        if self.planes is not None:
-            self.planes.after_step()
-        if any(line.nears_itself for line in self.lines):
-            begin_contact(self)
-        if loop.counts.notices & b.LINES_NEAR:
-            begin_between(self)
-        if parted := [line.number for line in self.lines if line.parts_itself and not line.shares]:
-            end_contact(self, parted)
-        self._note_cuts(int(loop.counts.notices))
-        if self.zones is not None:
-            self.zones.adapt()
-        if self.payout is not None:
-            self.payout.accepted()
-        if self.failures.all and self.failures.due(step):
-            self._restart_loose()
+    def _after_step(self) -> None:
+        """What parts note of a step, and change after it."""
+        notices = int(self.loop.counts.notices) | EVERY_STEP
+        for wants, note in self.parts.note_step:
+            if wants & notices:
+                note()
+        for wants, change in self.parts.after_step:
+            if wants & notices:
+                change()
 
     def release(self, weakness: Weakness, why: str) -> None:
         """Let ends of lines go now, between two steps; why: for the event.  LineFailed."""
         self.failures.release(weakness, why)
-        self._restart_loose()
-
-    def _restart_loose(self) -> None:
-        """Go on after something has come loose."""
-        self.restart_steps()
-        self.other = self.state.copy()
 
     def restart_steps(self) -> None:
         """Loads, or what holds the lines, are others now: accelerations jump."""
-        self._settle(self.solver)
+        self.balance()
         self.loop.restart()
 
     def _arrive(self, stop: float, step: float) -> None:
@@ -953,9 +843,9 @@ class NetworkRun:
         content: dict[str, Any] = {"t": self.t, "dt": float(self.loop.clock.tried_dt), "outcome": outcome.name}
         return write_snapshot(self.target, content | self.file.snapshot(self.state))
 
-    def _settle(self, solver: NetworkSolver) -> None:
-        """Accelerations and tensions that are consistent with positions, velocities and loads."""
-        step = self.resolution.one.step if self.moves else 1.0
+    def balance(self) -> None:
+        """Accelerations and tensions that are consistent with positions, velocities and loads.  LineFailed."""
+        step, solver = self.resolution.one.step if self.moves else 1.0, self.solver
         accelerations: list[Floats] = []
         for line, model in zip(self.lines, self.model.models, strict=True):
             accelerations.append(model.ends.acceleration(self.t, 1e-3 * step))
@@ -964,73 +854,43 @@ class NetworkRun:
             line.books.velocity[:] = model.ends.velocity
         self.model.load_bodies(self.t, solver.bodies, self.loaded)
         self.model.stir(self.t, self.state.bodies, 0.0, solver.bodies)
+        lengthening: dict[int, Floats] = {}
         with ExitStack() as stack:
-            lengthening = stack.enter_context(self.payout.forces_on()) if self.payout is not None else {}
+            for forces_on in self.parts.forces_on:
+                lengthening |= stack.enter_context(forces_on())
             taken = solver.consistent_accelerations(self.state, accelerations, self.t, lengthening)
         if taken.outcome != Outcome.OK:
-            raise self._stopped(solver, taken, 0.0)
+            raise self.cuts.stopped(solver, taken, 0.0)
 
-    def _stopped(self, solver: NetworkSolver, taken: NetworkTaken, dt: float) -> LineFailed:
-        """Why no step leads on."""
-        if taken.line < 0:
-            detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
-            if dt == 0.0:
-                detail = "no accelerations are consistent with the shape and the loads"
-            return LineFailed(-1, taken.outcome, self.t, None, detail + self._touching)
-        k, tried = taken.line, Tried(taken.outcome, taken.iterations, taken.correction, taken.where)
-        line, model, before = self.lines[k], self.model.models[k], self.other.lines[k] if dt else self.state.lines[k]
-        x = Stopped(
-            model,
-            self.state.lines[k],
-            before,
-            self.loop.clock,
-            self.loop.counts,
-            tried,
-            dt,
-            float(line.books.clock.wave_step),
-            line.manager is not None,
-            max(solver.joints[k]) < 0,
-            touch_text(line.contact, model) or self._touching,
-        )
-        s = float(model.line.s[x.node])
-        return LineFailed(k, taken.outcome, self.t, s, explanation(x), first=first_remedy(x))
+    # --- other lines in mid-motion --------------------------------------------------------------------
 
-    @property
-    def _touching(self) -> str:
-        """What touches now, a line itself or another one, for the text of a failure; empty: nothing."""
-        pairs = self.shared.points_between() if self.shared is not None else []
-        if any(a != b for (a, _), (b, _) in pairs):
-            return TOUCH_EACH_OTHER
-        own = (line.contact for line in self.lines)
-        return TOUCHES_ITSELF if pairs or any(x is not None and x.touches for x in own) else ""
+    def renew_solver(self, after: str) -> None:
+        """Another solver in mid-motion, for lines that have changed; after: what, for the text of a failure."""
+        self.gather_events()  # in the order in which they happen
+        bodies, work = self.solver.bodies.copy(), self.solver.body_work.copy()
+        self.make_solver()
+        self.solver.bodies[:], self.solver.body_work[:] = bodies, work
+        self.renew_other()
+        self.evaluate_forces(after)
 
-    def _note_cuts(self, flags: int) -> None:
-        """Events of steps that were cut; flags: of the last (kernels.state.books)."""
-        loop, clock = self.loop, self.loop.clock
-        if flags & b.COLLAPSES:
-            self._tell_collapse()
-        if flags & b.STEPS_CUT:
-            turned = self.lines[loop.turned_line]
-            note_cut(clock, float(clock.most_turn), turned.model.length, turned.events, loop.controlled)
-        if flags & b.STEPS_SLACK:
-            slack = self.lines[loop.slack_line]
-            s = float(slack.model.line.s[int(loop.counts.slack_cell)])
-            note_slack(clock, float(slack.books.clock.wave_step), s, slack.events)
-        if flags & b.ITERATIONS_CUT:
-            note_iterations(clock, loop.counts, self.file.span[1], self.noted)
+    def go_on_as_attached(self, after: str) -> None:
+        """Go on with the same solver and states, for lines that have changed; after: as of `renew_solver`."""
+        self.gather_events()
+        turns = self.loop.turns
+        self.evaluate_forces(after)
+        self.solver.take_turns(turns)
+        self.loop.stand_after_change()
 
-    def _tell_collapse(self) -> None:
-        """Steps have become so short that the run may not end: an event; one to be compared with stops."""
-        count, clock = self.loop.counts, self.loop.clock
-        number, where = self.loop.last_cut
-        line = self.lines[max(number, 0)]
-        s = float(line.model.line.s[min(max(where, 0), line.model.line.s.size - 1)]) if number >= 0 else 0.0
-        cuts, tiny = {cause: int(getattr(count, name)) for cause, name in CUTS.items()}, int(count.tiny_steps)
-        text = collapse_text(tiny, self.last_step, float(clock.longest), cuts, s, self._touching)
-        if tiny == MANY:
-            line.events.event(self.t, s, s, COLLAPSE, text, value=self.last_step)
-        if self.target is None and tiny >= GIVE_UP:
-            raise LineFailed(line.number, Outcome.COLLAPSED, self.t, s, text)
+    def evaluate_forces(self, after: str) -> None:
+        """The forces of the state of now; after: as of `renew_solver`.  LineFailed: there are none."""
+        for line, model in zip(self.lines, self.model.models, strict=True):
+            model.ends.at(self.t)
+            model.sea.at(self.t)
+            line.books.velocity[:] = model.ends.velocity  # a try has moved them on
+        self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
+        taken = self.solver.forces_in_motion(self.state, self.t)
+        if taken.outcome != Outcome.OK:
+            raise LineFailed(taken.line, taken.outcome, self.t, None, after)
 
 
 def line_scenes(system: Network, model: NetworkModel) -> dict[str, LineScene]:

@@ -126,6 +126,13 @@ def mesh_tree(model: Model) -> Tree:
     return {"s": s, "zones": [[x.kind, x.s_a, x.s_b] for x in zones]}
 
 
+def of_line(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """What a checkpoint has of a line, whatever it is worth."""
+    lines = saved.get("lines")
+    line = lines.get(name) if isinstance(lines, Mapping) else None
+    return line if isinstance(line, Mapping) else {}
+
+
 def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
     """The zones of a checkpoint, of an older version too: that had no cells that follow, or one largest curvature, or
 

@@ -1,40 +1,47 @@
-"""Lines of a system that touch themselves: from when on, and what the equilibrium of those that ask for it is like."""
+"""Contact of lines of a run: from when on it is computed of which lines, and until when."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.errors import Complaint, Outcome, SceneError
-from hybrid.kernels.state.books import ZONES
-from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT_ENERGY
+from hybrid.errors import Complaint, SceneError
+from hybrid.kernels.contact.self_contact_law import OUTER
+from hybrid.kernels.junctions.lines_distance import JOINT
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT, SELF_CONTACT_ENERGY, SELF_FRICTION
+from hybrid.kernels.state.state import Line
+from hybrid.model.build import Model
+from hybrid.model.lines_contact import touching_among
 from hybrid.model.network import NetworkModel
-from hybrid.model.self_reach import touching, touching_no_more
+from hybrid.model.self_reach import contact_bits, touching, touching_no_more
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.contact_equilibrium import contact_of
-from hybrid.simulation.lines_contact import PASSED, pair_text
-from hybrid.simulation.lines_contact_equilibrium import energy_between, touches_alone
-from hybrid.simulation.lines_contact_start import (
-    GIVEN_UP,
-    given_up,
-    given_up_text,
-    lines_near,
-    touch_each_other,
-    touching_now,
-)
+from hybrid.simulation.lines_contact import PASSED, LinesWatch, pair_text, shared_of
+from hybrid.simulation.lines_contact_equilibrium import crossings, energy_between, touches_alone
+from hybrid.simulation.old_checkpoints import of_line
+from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines, change_lines
 from hybrid.simulation.self_watch import deepest_text, diameters
-from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
+from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.store.envelope import meeting_text
 
+Pair = tuple[int, int]
 # Diameters by which ways from a joint to where lines that lie along each other meet differ at most.
 ALONG = 2.0
 # Where lines are that are said to be within themselves.
 WITHOUT_CONTACT, AT_START = "in the equilibrium without contact", "at the start"
+# Kinds of events: contact between lines begins by itself; it is given up because no step leads on with it.
+BEGINS, GIVEN_UP = "contact begins", "contact given up"
 
 
 def refuse_within_itself(
@@ -81,174 +88,390 @@ def _refuse_within_others(
     raise SceneError([Complaint("contact", given, expected, fix)])
 
 
-def begin_where_near(run: RunOfLines) -> None:
-    """Contact is computed from now on of lines that are near themselves in the state from which a run begins."""
-    step = run.resolution.one.step
-    for line, state in zip(run.lines, run.state.lines, strict=True):
-        line.nears_itself = line.is_near_itself(run.t, state, step)
-    begin_contact(run)
+class RunContact(Part):
+    """Contact of the lines of a run, with themselves and with each other."""
 
+    name = "contact"
+    wants = b.IS_BENT | b.MEETS_ITSELF | b.NEARS_ITSELF | b.PARTS_ITSELF | b.HIDES_ITSELF | b.LINES_NEAR
 
-def begin_contact(run: RunOfLines) -> None:
-    """Contact is computed from now on of lines that have come near themselves; those within themselves go on without.
+    def __init__(self, run: RunOfLines, lets_touch: bool, watches: bool) -> None:
+        """lets_touch: whether contact begins by itself where lines come near themselves, else that is only noticed;
 
-    Nothing moves; energy that contact has at once is booked as that of a change of zones.
-    """
-    near = [line for line in run.lines if line.nears_itself]
-    run.came_near_itself |= bool(near)
-    if not run.lets_touch:
+        watches: whether lines that pass through each other are told of.
+        """
+        self._run, self.lets_touch, self._watches = run, lets_touch, watches
+        self.came_near_itself = False  # whether a line has
+        self.shared: SharedContact | None = None  # of lines with each other
+        self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
+        self._met: set[Pair] = set()  # lines that have been said to touch
+        self._passed: set[Pair] = set()  # and to pass through each other
+        self._let_pass: set[Pair] = set()  # of lines that may meet, those between which it is not computed
+
+    # --- solvers --------------------------------------------------------------------------------------
+
+    def note_partners(self) -> None:
+        """Lines know whether they may touch others."""
+        among = self._run.model.touching
+        for line in self._run.lines:
+            line.shares = among is not None and line.number in among.lines
+
+    def of_lines(self, remeshed: bool) -> tuple[list[SelfContact | None], SharedContact | None]:
+        """Contact of the lines as they are, of each with itself and of all, which goes on with what there was.
+
+        remeshed: whether cells may be others than before.
+        """
+        run = self._run
+        own = {line.number: line.contact for line in run.lines if line.shares and line.contact is not None}
+        contacts, shared = [line.touch_itself(run.t) for line in run.lines], shared_of(run.model, rubs=True)
+        if shared is not None and self.shared is not None and shared.lines == self.shared.lines:
+            shared.restore(self.shared.checkpoint(run.t), run.t, remeshed=remeshed)
+        elif shared is not None and (own or self.shared is not None):
+            shared.take(self.shared, own, run.t)
+        self.shared = shared
+        return contacts, shared
+
+    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
+        """Look in the steps of another solver which lines pass through each other."""
+        if self.watch is not None:
+            self._tell_passages()
+        self.watch_lines()
+
+    def watch_lines(self) -> None:
+        """Look from now on which lines overlap without contact, beside those that are known to."""
+        if not self._watches:
+            return
+        run = self._run
+        self.watch = LinesWatch(run.system, run.model, self._passed, run.loop.clock, self._let_pass)
+        if self.watch.is_needed:
+            run.loop.watch(*self.watch.attach(run.solver.line_tables))
+        else:
+            run.loop.watch_nothing()  # its tables are of the watch before, which is gone
+
+    # --- the start ------------------------------------------------------------------------------------
+
+    def look_for_overlaps(self) -> None:
+        """Look which lines overlap without contact in the first state, and which the search for it has let cross."""
+        run = self._run
+        if self.watch is not None and self.watch.is_needed:
+            run.solver.look_at(run.state)
+            self._passed |= self.watch.begin(run.system)
+        for a, c in crossings(run.system, run.model, run.found.state) if run.found is not None else ():
+            one, two = run.model.names[a], run.model.names[c]
+            text = (
+                f"lines {one} and {two} cross on the way from their first shapes to this equilibrium: no contact "
+                f"between them is asked for, and none is computed in it; contact: {{between: [[{one}, {two}]]}} keeps "
+                "them apart"
+            )
+            run.recorder.event(0.0, 0.0, 0.0, PASSED, text)
+
+    def balance(self) -> None:
+        """Contact is computed from now on of lines that are near themselves where the run begins."""
+        run = self._run
+        if run.found is None:
+            refuse_within_itself(run.model, run.solver.lines, run.state, True, AT_START)
+        elif not run.found.settled:
+            refuse_within_itself(run.model, run.solver.lines, run.state, True)
+        step = run.resolution.one.step
+        for line, state in zip(run.lines, run.state.lines, strict=True):
+            line.nears_itself = line.is_near_itself(run.t, state, step)
+        self._begin_alone()
+
+    def begin(self) -> None:
+        """Likewise of lines that are near each other there."""
+        self.look_for_overlaps()
+        if self.watch is not None and self.watch.near() and self._begin_between():
+            self._run.balance()
+
+    # --- checkpoints ----------------------------------------------------------------------------------
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Which lines touch because they have come near, what has been said, and where lines stick."""
+        run = self._run
+        among = run.model.touching if run.system.contact is None else None
+        found: dict[str, Any] = {"between": [list(x) for x in among.pairs] if among is not None else []}
+        said = {"passed": self._passed, "met": self._met, "let_pass": self._let_pass}
+        found |= {name: sorted(list(x) for x in pairs) for name, pairs in said.items()}
+        return found if self.shared is None else found | {"contact": self.shared.checkpoint(run.t)}
+
+    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """In files of an earlier program lines met no others."""
+        return {key: saved.get(key, []) for key in ("between", "passed", "met", "let_pass")}
+
+    def restore_joints(self, saved: Mapping[str, Any]) -> bool:
+        """Lines touch themselves and each other."""
+        near = [x.number for x in self._run.lines if "self_contact" in of_line(saved, x.name) and not x.touches]
+        self._let_touch(near)
+        between = _pairs(saved["between"])
+        if between:
+            self._touch_each_other(between)
+        return bool(near or between)
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """That has been said, and lines stick where they did."""
+        self._passed, self._met, self._let_pass = (_pairs(saved[x]) for x in ("passed", "met", "let_pass"))
+        if len(self._run.lines) > 1:
+            self.watch_lines()  # what has met since has not
+        if self.shared is not None:
+            self.shared.restore(saved["contact"], self._run.t)
+
+    # --- steps ----------------------------------------------------------------------------------------
+
+    def after_step(self) -> None:
+        """Contact begins or ends of lines that have come near themselves or each other, or are apart again."""
+        run = self._run
+        if any(line.nears_itself for line in run.lines):
+            self._begin_alone()
+        if run.loop.counts.notices & b.LINES_NEAR:
+            self._begin_between()
+        if parted := [line.number for line in run.lines if line.parts_itself and not line.shares]:
+            self._end_alone(parted)
+
+    def _begin_alone(self) -> None:
+        """Contact is computed from now on of lines that have come near themselves; those within themselves go on
+
+        without.  Nothing moves; energy that contact has at once is booked as that of a change of zones.
+        """
+        run = self._run
+        near = [line for line in run.lines if line.nears_itself]
+        self.came_near_itself |= bool(near)
+        if not self.lets_touch:
+            for line in near:
+                line.watch_itself_no_more(run.solver)
+            return
+        begun = []
         for line in near:
-            line.watch_itself_no_more(run.solver)
-        return
-    begun = []
-    for line in near:
-        x, line.nears_itself = run.solver.lines[line.number], False
-        model = run.model.models[line.number]
-        energy = contact_of(model).energy_of(x.line, x.ends, run.state.lines[line.number])
-        watch = line.envelope.itself
-        if math.isfinite(energy):
-            begun.append(line.number)
-            watch.begins(run.t, model, line.events.event)
-            continue
-        watch.waits()
-        if run.steps:  # what is so at the start is told with the equilibrium
-            line.meets_itself(run.t, run.last_step)
-    if begun:
-        let_touch(run, begun)
-        _go_on(run, begun, "where contact of the line with itself begins")
+            x, line.nears_itself = run.solver.lines[line.number], False
+            model = run.model.models[line.number]
+            energy = contact_of(model).energy_of(x.line, x.ends, run.state.lines[line.number])
+            watch = line.envelope.itself
+            if math.isfinite(energy):
+                begun.append(line.number)
+                watch.begins(run.t, model, line.events.event)
+                continue
+            watch.waits()
+            if run.steps:  # what is so at the start is told with the equilibrium
+                line.meets_itself(run.t, run.last_step)
+        if begun:
+            self._let_touch(begun)
+            self._go_on(begun, "where contact of the line with itself begins")
+
+    def _end_alone(self, numbers: Sequence[int]) -> None:
+        """Contact is computed no longer of lines of these numbers, until they come near themselves again."""
+        self._let_touch(numbers, touch=False)
+        self._go_on(numbers, "where contact of the line with itself ends")
+
+    def _let_touch(self, numbers: Iterable[int], touch: bool = True) -> None:
+        """Lines touch themselves, or no longer; the solver has still to follow."""
+        run = self._run
+        frictions = {k: run.lines[k].scene.contact.friction for k in numbers}
+        change_lines(
+            run, {k: partial(touching, friction=x) if touch else touching_no_more for k, x in frictions.items()}
+        )
+
+    def _go_on(self, numbers: Sequence[int], after: str) -> None:
+        """Another solver, for lines of these numbers that touch themselves, or each other, now, or no longer.
+
+        The energy of contact that comes or goes so is booked.
+        """
+        run = self._run
+        if run.zones is not None:
+            run.zones.go_on()
+            return
+        before = [float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in numbers]
+        run.renew_solver(after)
+        for k, energy in zip(numbers, before, strict=True):
+            run.lines[k].books.work[0, b.ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
+
+    # --- lines with each other ------------------------------------------------------------------------
+
+    def _begin_between(self) -> bool:
+        """Contact is computed from now on of lines that have come near each other; whether any begins."""
+        pairs = self._lines_near()
+        if not pairs:  # they are let pass
+            self._tell_passages()
+            self.watch_lines()
+            return False
+        now = self._run.model.touching.pairs if self._run.model.touching is not None else []
+        self._change_pairs({*now, *pairs}, "where contact of lines with each other begins")
+        return True
+
+    def _lines_near(self) -> list[Pair]:
+        """Lines, two each, between which contact begins now, after an event; others that are near are let pass.
+
+        These are lines that already are in each other, or in themselves, or are pressed on each other beside what both
+        are joined to: legs that leave it by a narrow angle.
+        """
+        run, begun = self._run, []
+        found = self.watch.near() if self.watch is not None else []
+        run.gather_events()  # in the order in which they happen
+        for a, c, s, other in found:
+            if not _may_begin(run, (a, c)):
+                self._let_pass.add((a, c))
+                continue
+            begun.append((a, c))
+            one, two = run.model.names[a], run.model.names[c]
+            text = (
+                f"lines {one} and {two} come near each other, at s = {s:.4g} m of {one} and s = {other:.4g} m of "
+                f"{two}: contact between them is computed from here on, and steps take longer; contact: "
+                "{between: []} switches it off"
+            )
+            run.recorder.event(run.t, 0.0, 0.0, BEGINS, text)
+        return begun
+
+    def _change_pairs(self, pairs: Iterable[Pair], after: str) -> None:
+        """These lines, two each, touch each other from now on, and no others."""
+        run = self._run
+        numbers = set(run.model.touching.lines) if run.model.touching is not None else set()
+        self._touch_each_other(pairs)
+        numbers |= set(run.model.touching.lines) if run.model.touching is not None else set()
+        self._go_on(sorted(numbers), after)
+
+    def _touch_each_other(self, pairs: Iterable[Pair]) -> None:
+        """Models of which these lines touch each other, two each, and no others; the solver has to follow."""
+        run = self._run
+        before, among = run.model.touching, touching_among(run.system, run.model.scenes, pairs)
+        now = among.lines if among is not None else ()
+
+        def change(line: Line, scene: LineScene, touches: bool) -> Line:
+            if touches and among is not None:
+                return among.bits(line)
+            return line._replace(bits=(line.bits & ~(SELF_CONTACT | SELF_FRICTION)) | contact_bits(scene))
+
+        changes = {}
+        for k in {*now, *(before.lines if before is not None else ())}:
+            changes[k] = partial(change, scene=run.model.scenes[run.model.names[k]], touches=k in now)
+        change_lines(run, changes)
+        run.model = replace(run.model, touching=among)
+
+    # --- given up -------------------------------------------------------------------------------------
+
+    def gives_up(self, dt: float) -> bool:
+        """No step of dt (s) leads on: contact that began by itself is computed no longer; whether there was any."""
+        run, numbers = self._run, []
+        for line in run.lines:
+            contact = line.contact
+            if contact is None or not (contact.touches and line.model.line.bits & MAY_TOUCH):
+                continue
+            s, other, text = _given_up(contact, line.model, dt)
+            line.events.event(run.t, s, other, GIVEN_UP, text)
+            line.envelope.itself.waits()
+            numbers.append(line.number)
+        if numbers:
+            self._end_alone(numbers)
+        return self._gives_up_pairs(dt) or bool(numbers)
+
+    def _gives_up_pairs(self, dt: float) -> bool:
+        """The same of lines that touch each other because they have come near: those that touch now are let pass."""
+        run, touches = self._run, self._touching_now()
+        if not touches:
+            return False
+        assert run.model.touching is not None and self.shared is not None
+        text = (
+            f"no step leads on with contact of lines, down to {dt:.3g} s: {pair_text(self.shared, run.model)}; it is "
+            "computed no longer, and they pass through each other; shorter cells there would do"
+        )
+        run.gather_events()
+        run.note(GIVEN_UP, text)
+        alone = {a for a, c in touches if a == c}
+        pairs = run.model.touching.pairs
+        passing = {x for x in pairs if x in touches or alone & set(x)}
+        self._let_pass |= passing
+        self._change_pairs([x for x in pairs if x not in passing], "where contact of lines with each other ends")
+        return True
+
+    def _touching_now(self) -> set[Pair]:
+        """Lines whose contact began by itself, two each, that touch in the state that was looked at last; a line that
+
+        touches itself beside others, twice.
+        """
+        if self.shared is None or self._run.system.contact is not None:
+            return set()
+        return {(min(a, c), max(a, c)) for (a, _), (c, _) in self.shared.points_between()}
+
+    # --- what is told ---------------------------------------------------------------------------------
+
+    def tell(self) -> None:
+        """An event for every two lines that have met, with contact or without, when they do first."""
+        run, shared = self._run, self._run.solver.shared
+        for a, c, t, s, other in sorted(shared.met() if shared is not None else (), key=lambda x: x[2]):
+            if (a, c) in self._met:
+                continue
+            self._met.add((a, c))
+            text = meeting_text(run.model.names[a], run.model.names[c], s, other)
+            run.recorder.event(t, 0.0, 0.0, "lines touch", text)
+        self._tell_passages()
+
+    def _tell_passages(self) -> None:
+        """An event for every two lines that have met without contact, when they do first.
+
+        Of lines that lie along each other from what both are joined to there is nothing to tell, as at the start.
+        """
+        if (watch := self.watch) is None:
+            return
+        run = self._run
+        for a, c, t, s, other in sorted(watch.met(), key=lambda x: x[2]):
+            if (a, c) in self._passed:
+                continue
+            self._passed.add((a, c))
+            if _side_by_side(run.model, run.state, watch.joined, (a, c), (s, other)):
+                continue
+            one, two = run.model.names[a], run.model.names[c]
+            text = (
+                f"lines {one} and {two} pass through each other: no contact between them is computed, and at "
+                f"s = {s:.4g} m of {one} and s = {other:.4g} m of {two} their centrelines are nearer than the mean of "
+                f"their diameters; contact: {{between: [[{one}, {two}]]}} keeps them apart"
+            )
+            run.recorder.event(t, 0.0, 0.0, PASSED, text)
 
 
-def end_contact(run: RunOfLines, numbers: Sequence[int]) -> None:
-    """Contact is computed no longer of lines of these numbers, until they come near themselves again."""
-    let_touch(run, numbers, touch=False)
-    _go_on(run, numbers, "where contact of the line with itself ends")
+def _pairs(saved: Any) -> set[Pair]:
+    """Numbers of lines, two each.  ValueError: that cannot be."""
+    if not (isinstance(saved, list) and all(isinstance(x, list) and len(x) == 2 for x in saved)):
+        raise ValueError("passed, met, between: pairs of numbers of lines were expected")
+    return {(int(a), int(c)) for a, c in saved}
 
 
-def begin_between(run: RunOfLines) -> bool:
-    """Contact is computed from now on of lines that have come near each other; whether any begins."""
-    pairs = lines_near(run)
-    if not pairs:  # they are let pass
-        tell_passages(run)
-        run.watch_lines()
-        return False
-    now = run.model.touching.pairs if run.model.touching is not None else []
-    _change_pairs(run, {*now, *pairs}, "where contact of lines with each other begins")
-    return True
+def _may_begin(run: RunOfLines, pair: Pair) -> bool:
+    """Whether two lines are in each other nowhere, nor in themselves, nor touch by ends that are joined to the same.
 
-
-def _change_pairs(run: RunOfLines, pairs: Iterable[tuple[int, int]], after: str) -> None:
-    """These lines, two each, touch each other from now on, and no others."""
-    numbers = set(run.model.touching.lines) if run.model.touching is not None else set()
-    touch_each_other(run, pairs)
-    numbers |= set(run.model.touching.lines) if run.model.touching is not None else set()
-    _go_on(run, sorted(numbers), after)
-
-
-def _go_on(run: RunOfLines, numbers: Sequence[int], after: str) -> None:
-    """Another solver, for lines of these numbers that touch themselves, or each other, now, or no longer.
-
-    The energy of contact that comes or goes so is booked.
+    Ends that are held, or moved, are joined to one thing where they would touch each other.
     """
-    if run.zones is not None:
-        run.zones.go_on()
-        return
-    before = [float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in numbers]
-    renew_solver(run, after)
-    for k, energy in zip(numbers, before, strict=True):
-        run.lines[k].books.work[0, ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
-
-
-def gives_up_contact(run: RunOfLines, dt: float) -> bool:
-    """No step of dt (s) leads on: as `gives_up_contact`, of all lines that touch themselves."""
-    numbers = []
-    for line in run.lines:
-        contact = line.contact
-        if contact is None or not (contact.touches and line.model.line.bits & MAY_TOUCH):
-            continue
-        s, other, text = given_up(contact, line.model, dt)
-        line.events.event(run.t, s, other, GIVEN_UP, text)
-        line.envelope.itself.waits()
-        numbers.append(line.number)
-    if numbers:
-        end_contact(run, numbers)
-    return _gives_up_pairs(run, dt) or bool(numbers)
-
-
-def _gives_up_pairs(run: RunOfLines, dt: float) -> bool:
-    """The same of lines that touch each other because they have come near: those that touch now are let pass."""
-    touches = touching_now(run)
-    if not touches:
+    among = touching_among(run.system, run.model.scenes, [pair])
+    assert among is not None
+    model = replace(run.model, touching=among)
+    energy, shared = energy_between(model, run.solver.lines, run.solver.bodies.copy(), run.state)
+    if not math.isfinite(energy):
         return False
-    run.gather_events()
-    run.note(GIVEN_UP, given_up_text(run, dt))
-    assert run.model.touching is not None
-    alone = {a for a, b in touches if a == b}
-    pairs = run.model.touching.pairs
-    passing = {x for x in pairs if x in touches or alone & set(x)}
-    run.let_pass |= passing
-    _change_pairs(run, [x for x in pairs if x not in passing], "where contact of lines with each other ends")
-    return True
+    joined = dict(zip(among.lines, among.joined.tolist(), strict=True))
+    models, r = run.model.models, [x.r for x in run.state.lines]
+    wide = OUTER * float(max(diameters(models[k]).max() for k in pair))
+    return not any(
+        a != c and joined[a][e] == joined[c][f] and (joined[a][e] or math.dist(r[a][-e], r[c][-f]) <= wide)
+        for (a, i), (c, j) in shared.points_between()
+        for e in _ends_beside(models[a], i)
+        for f in _ends_beside(models[c], j)
+    )
 
 
-def let_touch(run: RunOfLines, numbers: Iterable[int], touch: bool = True) -> None:
-    """Give a run models of lines that touch themselves, or no longer; its solver has still to follow."""
-    frictions = {k: run.lines[k].scene.contact.friction for k in numbers}
-    change_lines(run, {k: partial(touching, friction=x) if touch else touching_no_more for k, x in frictions.items()})
+def _ends_beside(model: Model, node: int) -> list[int]:
+    """Which ends of a line, 0 or 1, are near a node."""
+    s, reach = model.line.s, JOINT * float(diameters(model).max())
+    return [k for k in (0, 1) if abs(float(s[node] - s[-k])) <= reach]
 
 
-def renew_solver(run: RunOfLines, after: str) -> None:
-    """Another solver in mid-motion, for lines that have changed; after: what, for the text of a failure."""
-    run.gather_events()  # in the order in which they happen
-    bodies, work = run.solver.bodies.copy(), run.solver.body_work.copy()
-    run.make_solver()
-    run.solver.bodies[:], run.solver.body_work[:] = bodies, work
-    run.renew_other()
-    evaluate_forces(run, after)
-
-
-def go_on_as_attached(run: RunOfLines, after: str) -> None:
-    """Go on with the same solver and states in mid-motion, for lines that have changed; after: as of `renew_solver`."""
-    run.gather_events()
-    turns = run.loop.turns
-    evaluate_forces(run, after)
-    run.solver.take_turns(turns)
-    run.loop.stand_after_change()
-
-
-def evaluate_forces(run: RunOfLines, after: str) -> None:
-    """The forces of the state of now; after: as of `renew_solver`.  LineFailed: there are none."""
-    for line, model in zip(run.lines, run.model.models, strict=True):
-        model.ends.at(run.t)
-        model.sea.at(run.t)
-        line.books.velocity[:] = model.ends.velocity  # a try has moved them on
-    run.model.load_bodies(run.t, run.solver.bodies, run.loaded)
-    taken = run.solver.forces_in_motion(run.state, run.t)
-    if taken.outcome != Outcome.OK:
-        raise LineFailed(taken.line, taken.outcome, run.t, None, after)
-
-
-def tell_meetings(run: RunOfLines) -> None:
-    """An event for every two lines that have met, when they do first."""
-    told = run.met
-    shared: SharedContact | None = run.solver.shared
-    for a, b, t, s, other in sorted(shared.met() if shared is not None else (), key=lambda x: x[2]):
-        if (a, b) in told:
-            continue
-        told.add((a, b))
-        text = meeting_text(run.model.names[a], run.model.names[b], s, other)
-        run.recorder.event(t, 0.0, 0.0, "lines touch", text)
-
-
-def _side_by_side(run: RunOfLines, joined: NDArray[np.int64], a: int, b: int, s: float, other: float) -> bool:
-    """Whether two lines that met at s and other (m) of them lay along each other all the way from a common joint.
+def _side_by_side(
+    model: NetworkModel, state: NetworkState, joined: NDArray[np.int64], pair: Pair, where: tuple[float, float]
+) -> bool:
+    """Whether two lines that met at these arc lengths (m) lay along each other all the way from a common joint.
 
     They did where both places are as far from it along the lines, and one of the lines is straight up to there.
     """
-    width = max(float(diameters(run.model.models[k]).max()) for k in (a, b))
-    for m, k in ((m, k) for m in (0, -1) for k in (0, -1) if joined[a, m] == joined[b, k]):
+    (a, c), (s, other) = pair, where
+    width = max(float(diameters(model.models[k]).max()) for k in pair)
+    for m, k in ((m, k) for m in (0, -1) for k in (0, -1) if joined[a, m] == joined[c, k]):
         ways, bows = [], []
-        for line, at, tip in ((a, s, m), (b, other, k)):
-            nodes, r = run.model.models[line].line.s, run.state.lines[line].r
+        for line, at, tip in ((a, s, m), (c, other, k)):
+            nodes, r = model.models[line].line.s, state.lines[line].r
             place = [np.interp(at, nodes, r[:, j]) for j in range(3)]
             ways.append(abs(at - float(nodes[tip])))
             bows.append(ways[-1] - float(np.linalg.norm(place - r[tip])))
@@ -257,23 +480,17 @@ def _side_by_side(run: RunOfLines, joined: NDArray[np.int64], a: int, b: int, s:
     return False
 
 
-def tell_passages(run: RunOfLines) -> None:
-    """An event for every two lines that have met without contact, when they do first.
-
-    Of lines that lie along each other from what both are joined to there is nothing to tell, as at the start.
-    """
-    if (watch := run.watch) is None:
-        return
-    for a, b, t, s, other in sorted(watch.met(), key=lambda x: x[2]):
-        if (a, b) in run.passed:
-            continue
-        run.passed.add((a, b))
-        if _side_by_side(run, watch.joined, a, b, s, other):
-            continue
-        one, two = run.model.names[a], run.model.names[b]
-        text = (
-            f"lines {one} and {two} pass through each other: no contact between them is computed, and at s = {s:.4g} m "
-            f"of {one} and s = {other:.4g} m of {two} their centrelines are nearer than the mean of their diameters; "
-            f"contact: {{between: [[{one}, {two}]]}} keeps them apart"
-        )
-        run.recorder.event(t, 0.0, 0.0, PASSED, text)
+def _given_up(contact: SelfContact, model: Model, dt: float) -> tuple[float, float, str]:
+    """Where, between two arc lengths (m), contact lets no step of dt (s) lead on, and the text of the event."""
+    p, q = contact.deepest
+    s, other = sorted((float(model.line.s[p]), float(model.line.s[q])))
+    nodes = model.line.s[[p, q]]
+    cells = float(model.cable.bending_length(1e-9 * model.tension_scale / model.length)[model.cable.piece(nodes)].min())
+    if not cells > 0.0:
+        cells = 0.5 * float(min(model.line.h[min(p, model.cells - 1)], model.line.h[min(q, model.cells - 1)]))
+    where = deepest_text(contact, model) if contact.least_distance < float("inf") else ""
+    text = (
+        f"no step leads on with contact of the line with itself, down to {dt:.3g} s: {where}; it is not computed until "
+        f"these are apart, and they may pass through each other; cells of at most {cells:.2g} m there would do"
+    )
+    return s, other, text

@@ -6,23 +6,31 @@ end of a line and its clamp goes with the clamp, and the twist of catenary zones
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from hybrid.kernels.junctions.bodies import DONE, SPRING, W
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.zone_torque import TURN, torsion_energy
+from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import NO_TURN, State
 from hybrid.model.build import Model
 from hybrid.model.failure import Weakness, after_failure, weaknesses
+from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_steps import NetworkSteps
 
 SAME_TIME = 1e-6  # of a step: a time so near is now
 
 
-class Failures:
+class Failures(Part):
     """What may break in a run, and what has."""
+
+    name = "failures"  # a force may be too large after any step
 
     def __init__(self, run: RunOfLines) -> None:
         self._run = run
@@ -30,17 +38,22 @@ class Failures:
         self.broken: list[int] = []  # numbers in `all`, in the order in which they broke
 
     @property
-    def times(self) -> list[float]:
+    def breaks(self) -> list[float]:
         """Times (s) at which something breaks by itself."""
         return [x.time for k, x in enumerate(self.all) if np.isfinite(x.time) and k not in self.broken]
 
-    def due(self, step: float) -> bool:
-        """Break what is to break now, after a step; whether anything did.  step: s, the usual one."""
-        found = False
+    def attach(self, loop: NetworkSteps) -> None:
+        """Steps ask where something may break."""
+        if self.all:
+            loop.counts.asks |= b.ASK_STEPS
+
+    def after_step(self) -> None:
+        """Break what is to break now; the run goes on from there."""
+        found, near = False, SAME_TIME * self._run.resolution.one.step
         for k, x in enumerate(self.all):
             if k in self.broken:
                 continue
-            if x.time <= self._run.t + SAME_TIME * step:
+            if x.time <= self._run.t + near:
                 self._break(k, f"at t = {self._run.t:.6g} s (break_at.time)")
                 found = True
             elif np.isfinite(x.tension) and (force := self._force(x)) > x.tension:
@@ -48,12 +61,19 @@ class Failures:
                 why = f"after the first step in which its force, {force:.6g} N, is {limit}"
                 self._break(k, why)
                 found = True
-        return found
+        if found:
+            self._go_on()
 
     def release(self, weakness: Weakness, why: str) -> None:
         """Break now what a program outside lets go; why: for the event."""
         self.all = (*self.all, weakness)
         self._break(len(self.all) - 1, why)
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Accelerations jump, and there is room for the next state."""
+        self._run.restart_steps()
+        self._run.renew_other()
 
     def _force(self, x: Weakness) -> float:
         """Force of the ends on their point, N."""
@@ -61,12 +81,28 @@ class Failures:
                    if (line, k) not in self._run.model.loose]  # fmt: skip
         return float(np.linalg.norm(sum((r[f : f + 3] for r, f in reports), np.zeros(3))))
 
-    def again(self, broken: list[int]) -> None:
+    def checkpoint(self) -> dict[str, Any]:
+        """What broke."""
+        return {"broken": [*self.broken]}
+
+    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """In files of an earlier program nothing broke."""
+        return {"broken": saved.get("broken", [])}
+
+    def restore_joints(self, saved: Mapping[str, Any]) -> bool:
         """Be as after what broke in an earlier part of the run.  ValueError: nothing of the kind may break."""
-        if not all(isinstance(k, int) and 0 <= k < len(self.all) for k in broken) or len(set(broken)) < len(broken):
+        broken = saved["broken"]
+        if not isinstance(broken, list) or len(set(broken)) < len(broken):
+            raise ValueError("broken: numbers of what has broken were expected")
+        if not all(isinstance(k, int) and 0 <= k < len(self.all) for k in broken):
             raise ValueError("broken: numbers of what may break were expected")
         for k in broken:
             self._part(k)
+        return False  # each has been given a solver
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """That alone is broken."""
+        self.broken = [*saved["broken"]]
 
     def _break(self, k: int, why: str) -> None:
         run, x = self._run, self.all[k]

@@ -30,8 +30,8 @@ from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.result_file import STEP_FIELDS, mesh_fields, places_of_elevation, result_recorder
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.run_points import Rotations, Sampled, fields_of, gauges_of, values_of
-from hybrid.simulation.run_quantities import RunQuantities, fields_of_pairs, values_of_pairs
+from hybrid.simulation.run_points import Sampled, fields_of, gauges_of, values_of
+from hybrid.simulation.run_quantities import Rotations, RunQuantities, fields_of_pairs, values_of_pairs
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.store.array_contents import ArrayRecorder, MemoryTarget, Target

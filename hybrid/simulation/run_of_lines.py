@@ -23,15 +23,14 @@ from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
-from hybrid.simulation.line_of_run import HasPlanes
-from hybrid.simulation.line_result import LineResult
-from hybrid.simulation.lines_contact import LinesWatch
+from hybrid.simulation.line_of_run import HasContact, HasPlanes
+from hybrid.simulation.line_result import LineResult, LineStep
+from hybrid.simulation.parts import Part
 from hybrid.simulation.zone_switching import on_layout
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.shared_contact import SharedContact
 from hybrid.store.array_contents import ArrayRecorder
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
@@ -73,14 +72,7 @@ class RunOfLines(Protocol):
     resolution: NetworkResolution
     loaded: float  # s, loads that have stopped by then act no more
     rest: Floats  # bodies when the motion began
-    shared: SharedContact | None  # contact of lines with each other
-    watch: LinesWatch | None  # over lines between which no contact is computed
-    met: set[tuple[int, int]]  # lines that have been said to touch
-    passed: set[tuple[int, int]]  # and to pass through each other
-    let_pass: set[tuple[int, int]]  # of lines that may meet, those between which contact is not computed
     found: LinesAtRest | None
-    lets_touch: bool  # whether contact begins by itself where lines come near themselves
-    came_near_itself: bool  # whether one has
 
     @property
     def zones(self) -> MovingZones | None: ...
@@ -92,10 +84,16 @@ class RunOfLines(Protocol):
     def planes(self) -> HasPlanes | None: ...
 
     @property
+    def contact(self) -> HasContact: ...
+
+    @property
     def recorder(self) -> Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder: ...
 
     @property
     def noted(self) -> Sink: ...
+
+    @property
+    def span(self) -> tuple[float, float]: ...
 
     def note(self, kind: str, text: str, **more: float) -> None: ...
 
@@ -126,7 +124,11 @@ class RunOfLines(Protocol):
 
     def restart_steps(self) -> None: ...
 
-    def watch_lines(self) -> None: ...
+    def balance(self) -> None: ...
+
+    def renew_solver(self, after: str) -> None: ...
+
+    def go_on_as_attached(self, after: str) -> None: ...
 
     def gather_events(self) -> None: ...
 
@@ -142,6 +144,24 @@ def change_lines(run: RunOfLines, changes: Mapping[int, Callable[[Line], Line]])
         if run.zones is not None:
             run.zones.change_line(k, change)
     run.model = replace(run.model, models=tuple(models))
+
+
+class WatchedLines(Part):
+    """What steps have flagged of lines: how near they are to themselves, and what is doubtful about them."""
+
+    name = "lines"
+
+    def __init__(self, run: RunOfLines) -> None:
+        self._run = run
+
+    def note_step(self) -> None:
+        """Look at it.  LineFailed where going on would make no sense."""
+        run, solver = self._run, self._run.solver
+        for line, new, old, work in zip(run.lines, run.state.lines, run.other.lines, solver.work, strict=True):
+            if seen := int(run.loop.seen[line.number]):
+                line.look_at_itself(solver, seen, run.t, run.last_step, new)
+            if line.books.counts.notices:
+                line.watch(LineStep(run.t, new, old, work.report, line.books))
 
 
 # Other loads and other motions of points and bodies from some time of a run of several lines on.

@@ -6,7 +6,7 @@ a winch Python changes the line, and the system gets another solver.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -23,10 +23,10 @@ from hybrid.kernels.state.state import Floats, state_for
 from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.failure import winch_text
+from hybrid.simulation.parts import Part
 from hybrid.simulation.payout import Before, PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.payout_zones import PaidZones, moving_zones
-from hybrid.simulation.run_contact import renew_solver
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.joined import LineFailed, NetworkState
 
@@ -35,8 +35,10 @@ if TYPE_CHECKING:
     from hybrid.solve.network_steps import NetworkSteps
 
 
-class RunPayout:
+class RunPayout(Part):
     """The lengths of all lines of a run that are paid out."""
+
+    name = "payout"  # a winch may come to its end after any step
 
     def __init__(self, run: RunOfLines) -> None:
         """Of a run whose model is that of t = 0; it gets lines with the nodes that a winch makes."""
@@ -56,12 +58,22 @@ class RunPayout:
         found = tuple(models.get(k, x) for k, x in enumerate(run.model.models))
         run.model = replace(run.model, models=found)
 
+    @property
+    def remeshes(self) -> bool:
+        """Nodes enter and leave at a winch."""
+        return True
+
+    @property
+    def changed(self) -> Collection[int]:
+        """Numbers of the lines."""
+        return self.lines.keys()
+
     # --- steps ------------------------------------------------------------------------------------
 
-    def bind(self, solver: NetworkSolver) -> None:
+    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """A solver finds forces with the lengths of now, of the state of now."""
         for k, x in self.lines.items():
-            x.layout = self._run.model.models[k].layout
+            x.layout = model.models[k].layout
             x.table.bind(**self._job(solver, k))
             numbers = x.table.numbers
             joined = solver.lines[k].joints[x.plan.side] >= 0
@@ -119,8 +131,8 @@ class RunPayout:
                 stack.enter_context(x.forces_on())
             yield {k: x.lengthening for k, x in self.lines.items()}
 
-    def accepted(self) -> None:
-        """After a step and its outputs: nodes enter and leave.  LineFailed: a winch has come to its end."""
+    def after_step(self) -> None:
+        """Nodes enter and leave.  LineFailed: a winch has come to its end."""
         run, changed = self._run, []
         for k, x in self.lines.items():
             if x.at_its_end:
@@ -134,9 +146,9 @@ class RunPayout:
         if changed and run.zones is not None:
             run.zones.go_on("where a node enters or leaves at a winch")
         elif changed:
-            touching = () if run.shared is None else run.shared.lines
+            touching = () if run.contact.shared is None else run.contact.shared.lines
             before = {k: float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in {*changed, *touching}}
-            renew_solver(run, "where a node enters or leaves at a winch")
+            run.renew_solver("where a node enters or leaves at a winch")
             for k, energy in before.items():
                 run.lines[k].books.work[0, b.ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
 
@@ -172,8 +184,8 @@ class RunPayout:
                 before = Before(run.state.lines[k], run.t, run.loop.clock, books.tension)
                 books.work[0, b.ZONES] += self.lines[k].end(before, model.line, model.ends.at(run.t))
 
-    def limit_step(self) -> None:
-        """Of steps that follow the motion: the next one is no longer than the laws of the lengths allow."""
+    def begin_leg(self) -> None:
+        """The next step is no longer than the laws of the lengths allow."""
         for x in self.lines.values():
             x.limit_step()
 
@@ -188,11 +200,11 @@ class RunPayout:
 
     def checkpoint(self) -> dict[str, Any]:
         """What the next steps depend on, by line."""
-        return {self._run.lines[k].name: x.checkpoint() for k, x in self.lines.items()}
+        return {"payout": {self._run.lines[k].name: x.checkpoint() for k, x in self.lines.items()}}
 
-    def restore(self, saved: Mapping[str, Any]) -> None:
+    def restore_cells(self, saved: Mapping[str, Any]) -> bool:
         """Give lines the cells and the reels of a checkpoint.  ValueError: they are none of them."""
-        run, states = self._run, [*self._run.state.lines]
+        run, states, saved = self._run, [*self._run.state.lines], saved["payout"]
         for k, x in self.lines.items():
             model = x.restore(saved[run.lines[k].name], run.model.models[k])
             if k in self.zones:
@@ -201,8 +213,9 @@ class RunPayout:
             states[k] = state_for(model.line)
             run.lines[k].take_cells(model, extremes=False)
         run.state = NetworkState(states, run.state.bodies)
+        return True
 
-    def lengthen(self) -> None:
-        """The lines as they are at the time of the run."""
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """The lines are as long as at the time of the run."""
         for x in self.lines.values():
             x.lengthen()

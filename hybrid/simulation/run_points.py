@@ -147,35 +147,6 @@ def values_of(system: Network, model: NetworkModel, seen: Sampled) -> dict[str, 
     return values
 
 
-class Rotations:
-    """Roll, pitch and yaw of bodies and points that go on from output to output, beyond half a turn."""
-
-    def __init__(self, system: Network, model: NetworkModel) -> None:
-        """They begin within half a turn of what the scene gives for bodies, and of 0 for points."""
-        begin = {f"points/{name}/rotation": np.zeros(3) for name in model.rigid}
-        for name, body in system.bodies.items():
-            given = body.initial_rotation if isinstance(body, FreeBody) else body.rotation
-            begin[f"bodies/{name}/rotation"] = np.array(given, float)
-        self.names = list(begin)
-        self.last = np.array(list(begin.values())).reshape(-1, 3)  # (n, 3) deg
-
-    def go_on(self, values: dict[str, Floats]) -> None:
-        """Put in place of the rotations (nb, 3) in `values` the same ones, deg, each nearest to the one before it."""
-        for k, name in enumerate(self.names):
-            for row in values.get(name, ()):
-                row[:] = self.last[k] = nearest_angles(row, self.last[k])
-
-
-def nearest_angles(angles: Floats, before: Floats) -> Floats:
-    """Roll, pitch and yaw (3,) deg of the same rotation as `angles`, nearest to `before`.
-
-    The same: whole turns of each, or half a turn more of roll and yaw with 180 deg - pitch in place of pitch.
-    """
-    other = np.array([angles[0] + 180.0, 180.0 - angles[1], angles[2] + 180.0])
-    both = [x + 360.0 * np.round((before - x) / 360.0) for x in (np.asarray(angles, float), other)]
-    return min(both, key=lambda x: float(((x - before) ** 2).sum()))
-
-
 def _clamp_moment(system: Network, model: NetworkModel, seen: Sampled, point: str) -> Floats | None:
     """Moment (nb, 3) N m of the lines that are clamped at a point, about it; None: there are none."""
     here = system.clamped_at(point)

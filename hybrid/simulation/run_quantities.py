@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from hybrid.outputs.observation import Probe
 from hybrid.outputs.obstacle_forces import KEYS, Lines, pair_fields, pair_forces
 from hybrid.outputs.quantities import Quantities
 from hybrid.outputs.section_use import StepQuantities
+from hybrid.scene.bodies import FreeBody
 from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.quantities import KINDS, Quantity
@@ -23,8 +24,10 @@ from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import network_of
 from hybrid.simulation.line_result import LineResult, Wanted, observer_of
+from hybrid.simulation.parts import Part
 from hybrid.simulation.result_file import STEP_FIELDS, limits_of
 from hybrid.simulation.run_points import fields_of
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.store.copying import GROUP
 from hybrid.store.format import Field
@@ -44,8 +47,10 @@ def idle_ends(system: Network, model: NetworkModel) -> list[tuple[int, int]]:
     return found
 
 
-class RunQuantities:
+class RunQuantities(Part):
     """The quantities of all lines, each computed from a state of its line."""
+
+    name, is_of_form = "quantities", True
 
     def __init__(self, system: Network, scenes: Mapping[str, LineScene]) -> None:
         """scenes: of the lines whose quantities are kept here, by name; others keep them themselves."""
@@ -89,7 +94,7 @@ class RunQuantities:
                 self._steps[line.name].share(path, begins.pop(0))
                 line.books = self._steps[line.name].given_to(line.books)
 
-    def follow(self, model: NetworkModel) -> None:
+    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Know from now on which ends came loose: nothing takes their pull, which has no direction."""
         self._idle = frozenset((model.names[line], k) for line, k in idle_ends(self._system, model))
         for name, x in self._steps.items():
@@ -108,28 +113,26 @@ class RunQuantities:
         """Those of a line."""
         return {name: x for name, x in self.range_values().items() if self._wanted[name.split("/")[-1]].line == line}
 
-    def checkpoint(self) -> dict[str, np.ndarray]:
+    def checkpoint(self) -> dict[str, Any]:
         """Ranges by line, and from what excursions and azimuths count."""
-        return {name: x.reached.copy() for name, x in self._steps.items()} | self.references()
+        return {"quantities": {name: x.reached.copy() for name, x in self._steps.items()} | self._references()}
 
-    def references(self) -> dict[str, np.ndarray]:
+    def _references(self) -> dict[str, np.ndarray]:
         """From where excursions, m, and from which azimuths, deg, of a line count, by `line/first` and `line/turns`."""
         found = {f"{line}/first": x.first for line, (x, _) in self._of_line.items()}
         found |= {f"{line}/turns": x.turns for line, (x, _) in self._of_line.items()}
         return {name: x.copy() for name, x in found.items() if x.size}
 
-    def unknown(self) -> dict[str, np.ndarray]:
-        """The same of a run that has kept none so far."""
+    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """In files of earlier programs there are no ranges, or no references: these are unknown."""
         for x in self._steps.values():
             x.restore(None)
-        return self.checkpoint()
+        mine = saved["quantities"] if "quantities" in saved else self.checkpoint()["quantities"]
+        return {"quantities": self._references() | mine if isinstance(mine, dict) else mine}
 
-    def of_today(self, saved: object) -> object:
-        """What a checkpoint has, of a file of before with unknown references: it kept none."""
-        return self.references() | saved if isinstance(saved, dict) else saved
-
-    def restore(self, saved: Mapping[str, np.ndarray]) -> None:
+    def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on with ranges that a checkpoint has; of one from before there were any, they stay unknown."""
+        saved = saved["quantities"]
         for name, x in self._steps.items():
             x.restore(saved.get(name))
         for line, (found, _) in self._of_line.items():
@@ -172,6 +175,49 @@ class RunQuantities:
 
     def _radii(self, line: LineResult) -> Floats:
         return Quantities(line.scene, {}).radii(line.model.line.s)
+
+
+class Rotations(Part):
+    """Roll, pitch and yaw of bodies and points that go on from output to output, beyond half a turn."""
+
+    name, is_of_form = "rotations", True
+
+    def __init__(self, system: Network, model: NetworkModel) -> None:
+        """They begin within half a turn of what the scene gives for bodies, and of 0 for points."""
+        begin = {f"points/{name}/rotation": np.zeros(3) for name in model.rigid}
+        for name, body in system.bodies.items():
+            given = body.initial_rotation if isinstance(body, FreeBody) else body.rotation
+            begin[f"bodies/{name}/rotation"] = np.array(given, float)
+        self.names = list(begin)
+        self.last = np.array(list(begin.values())).reshape(-1, 3)  # (n, 3) deg
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Those of the last output."""
+        return {"rotations": self.last.copy()}
+
+    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """In files of an earlier program they were within half a turn of 0."""
+        return {"rotations": saved.get("rotations", self.last)}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on from there."""
+        self.last[:] = saved["rotations"]
+
+    def go_on(self, values: dict[str, Floats]) -> None:
+        """Put in place of the rotations (nb, 3) in `values` the same ones, deg, each nearest to the one before it."""
+        for k, name in enumerate(self.names):
+            for row in values.get(name, ()):
+                row[:] = self.last[k] = nearest_angles(row, self.last[k])
+
+
+def nearest_angles(angles: Floats, before: Floats) -> Floats:
+    """Roll, pitch and yaw (3,) deg of the same rotation as `angles`, nearest to `before`.
+
+    The same: whole turns of each, or half a turn more of roll and yaw with 180 deg - pitch in place of pitch.
+    """
+    other = np.array([angles[0] + 180.0, 180.0 - angles[1], angles[2] + 180.0])
+    both = [x + 360.0 * np.round((before - x) / 360.0) for x in (np.asarray(angles, float), other)]
+    return min(both, key=lambda x: float(((x - before) ** 2).sum()))
 
 
 # Forces between lines that touch each other, at the outputs of a system: which pairs are named, and their values.

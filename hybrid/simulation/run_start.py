@@ -26,11 +26,11 @@ from hybrid.scene.motion_tables import Motion
 from hybrid.scene.network_scene import Network, floating_groups
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.schema import LineScene, Points
+from hybrid.simulation.contact_equilibrium import refuse_start_in_obstacles
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.equilibrium import count_turns, equilibrium_of, settling, solve_like
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.lines_contact_equilibrium import settle, solve_with_contact
-from hybrid.simulation.lines_contact_start import refuse_start_in_obstacles
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.solve.flaws import ON_BED, rubs_on
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, joined_ends

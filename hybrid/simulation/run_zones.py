@@ -7,7 +7,7 @@ proposes is carried out: the line has other cells then, and the system another s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -37,12 +37,13 @@ from hybrid.simulation.initial_zones import (
 )
 from hybrid.simulation.kind_changes import LineKinds, carries_all, copy_into
 from hybrid.simulation.lines_contact_equilibrium import nearness_in
+from hybrid.simulation.old_checkpoints import zoning_of_today
+from hybrid.simulation.parts import Part
 from hybrid.simulation.run_cells import equilibrium_on_cells, following
-from hybrid.simulation.run_contact import go_on_as_attached, renew_solver
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.run_start import joined_lines, solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
-from hybrid.solve.joined import NetworkState, NetworkTaken
+from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.run import Tried
 from hybrid.store.named_arrays import matched
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
     from hybrid.simulation.payout_zones import PaidZones
     from hybrid.simulation.run_payout import RunPayout
+    from hybrid.solve.network_solver import NetworkSolver
     from hybrid.solve.network_steps import NetworkSteps
 
 
@@ -247,12 +249,14 @@ class _LineZones:
         return self.switching.table
 
 
-class RunZones:
+class RunZones(Part):
     """The zones of all lines of a run whose zones move.
 
     Steps follow them compiled, and Python looks at them where something is due; a criterion of the user's own is asked
     around every try, contact after every step, and outputs of criteria are written before the next one.
     """
+
+    name, is_of_form = "zones", True  # which follow every step
 
     def __init__(self, run: RunOfLines, managers: Mapping[int, DomainManager], payout: RunPayout | None = None) -> None:
         every = run.resolution.one.every
@@ -291,7 +295,7 @@ class RunZones:
         loop.hold_zones([x.switching.table for x in self.lines])
         loop.follow([x.bind(run, loop) for x in self.lines])
         mine = [run.lines[x.number] for x in self.lines]
-        if run.shared is not None or any(x.contact is not None for x in mine):
+        if run.contact.shared is not None or any(x.contact is not None for x in mine):
             loop.counts.asks |= b.ASK_STEPS
         if any(x.observer.writes_criteria for x in mine):
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_STEPS
@@ -315,11 +319,12 @@ class RunZones:
             if x.cells is not None:
                 x.cells.sync()
 
-    def look_ahead(self) -> None:
+    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Criteria know how near lines come to themselves and each other, by the contact that the solver has now."""
         run = self._run
         horizons = {x.number: LOOKAHEAD * x.switching.manager.pace for x in self.lines}
-        near = {} if run.shared is None else run.shared.look_ahead(max(horizons.values()))
+        shared = run.contact.shared
+        near = {} if shared is None else shared.look_ahead(max(horizons.values()))
         for x in self.lines:
             contact = run.lines[x.number].contact
             if contact is not None:
@@ -343,7 +348,7 @@ class RunZones:
         return self._run.model.models[x.number].ends.at(self._run.t)
 
     @property
-    def follow_curvature(self) -> bool:
+    def remeshes(self) -> bool:
         """Whether cells of a line follow the curvature: its nodes come and go."""
         return any(x.switching.zones.clock.share > 0.0 for x in self.lines)
 
@@ -359,15 +364,25 @@ class RunZones:
 
     def checkpoint(self) -> dict[str, Any]:
         """Base cells that are rod, and what is under way, of each line by name; between two steps."""
-        return {
-            self._run.lines[x.number].name: {
-                "rod": x.switching.manager.layout.rod.copy(), "here": x.switching.manager.layout.here,
-                "switching": x.switching.checkpoint(),
-            }
-            for x in self.lines
-        }  # fmt: skip
+        found = {}
+        for x in self.lines:
+            layout, switching = x.switching.manager.layout, x.switching.checkpoint()
+            name = self._run.lines[x.number].name
+            found[name] = {"rod": layout.rod.copy(), "here": layout.here, "switching": switching}
+        return {"zones": found}
 
-    def take_rods(self, saved: Any) -> None:
+    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """Files of earlier programs do not say where there are nodes, nor all that is under way."""
+        zones = saved.get("zones", {})
+        if not (isinstance(zones, dict) and all(isinstance(x, dict) for x in zones.values())):
+            return {"zones": zones}
+        found = {name: {"here": None} | x for name, x in zones.items()}
+        for x in found.values():
+            if isinstance(x.get("switching"), dict):
+                x["switching"] = zoning_of_today(x["switching"])
+        return {"zones": found}
+
+    def restore_cells(self, saved: Mapping[str, Any]) -> bool:
         """Give lines the zones of a checkpoint, in which nothing is under way yet.  ValueError: they are none of them.
 
         Contact with itself is that of the model of the run.
@@ -377,7 +392,9 @@ class RunZones:
         for x in (x for x in self.lines if x.paid is None):  # a winch gives its line the cells of then
             k, layout, manager = x.number, x.full.layout, x.switching.manager
             assert layout is not None
-            mine = matched(saved[run.lines[k].name], {"rod": layout.rod, "here": None, "switching": None}, "zones")
+            mine = matched(
+                saved["zones"][run.lines[k].name], {"rod": layout.rod, "here": None, "switching": None}, "zones"
+            )
             model = on_layout(models[k], _saved_layout(layout, mine))
             assert model.layout is not None
             manager.set_layout(model.layout)
@@ -386,27 +403,27 @@ class RunZones:
             models[k], states[k] = model, state_for(model.line)
             run.lines[k].take_cells(model, extremes=False)
         run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
+        return True
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on as `checkpoint` has written, of lines that have those zones.  ValueError: that cannot be."""
         for x in self.lines:
-            x.switching.restore(saved[self._run.lines[x.number].name]["switching"])
+            x.switching.restore(saved["zones"][self._run.lines[x.number].name]["switching"])
         self._note_contact()
 
     # --- steps ------------------------------------------------------------------------------------
 
     def prepare(self, end: float) -> None:
-        """Before a try that ends at `end` (s): lengths and stiffness as they will be then."""
+        """Lengths and stiffness as they will be then."""
         run = self._run
         for x in self.lines if not self._compiled else ():
             x.follow(run, b.SOLVE, run.t, end, run.state.lines[x.number], run.other.lines[x.number])
 
-    def wants_more_rod(self, taken: NetworkTaken, end: float, last: bool) -> bool:
-        """After a try to `end` (s): whether lines have got more rod, with which the step is to be repeated.
-
-        last: no shorter step is left to try.
-        """
+    def wants_retry(self) -> bool:
+        """Whether lines have got more rod, with which the step is to be repeated."""
         run, changes, step = self._run, list[tuple[_LineZones, Change]](), int(self._run.loop.counts.steps)
+        taken, clock = run.loop.tried, run.loop.clock
+        end, last = float(clock.try_end), bool(0.5 * clock.tried_dt < clock.shortest)  # the last: no shorter is left
         if step != self._rescued:
             self._rescues, self._rescued = 0, step
         for x in self.lines:
@@ -426,20 +443,20 @@ class RunZones:
         self._change(changes)
         return bool(changes)
 
-    def accepted(self, dt: float) -> None:
-        """After an accepted step of dt (s), with the states exchanged: energy, and what should change."""
+    def note_step(self) -> None:
+        """With the states exchanged: energy, and what should change."""
         run = self._run
         self._note_contact()
         for x in self.lines:
             k = x.number
             state, before = run.state.lines[k], run.other.lines[k]
             if not self._compiled:
-                x.clock.last_dt, x.clock.last_rho = dt, run.last_rho
+                x.clock.last_dt, x.clock.last_rho = run.last_step, run.last_rho
                 x.follow(run, b.END_STEP, run.t, run.t, state, before)
             x.pending = x.switching.book_step(run.t, state)
 
-    def adapt(self) -> None:
-        """After the outputs of a step: carry out what is pending."""
+    def after_step(self) -> None:
+        """Carry out what is pending."""
         changes = [(x, x.pending) for x in self.lines if x.pending is not None]
         for x in self.lines:
             x.pending = None
@@ -471,7 +488,7 @@ class RunZones:
             model, booked = self._kinds.change(x.number, x.switching, change)
             self._note(x, change, model, booked)
             run.lines[x.number].take_kinds(model)
-        go_on_as_attached(run, AFTER_CHANGE)
+        run.go_on_as_attached(AFTER_CHANGE)
 
     def _note(self, x: _LineZones, change: Change, model: Model, booked: float) -> None:
         """A line has changed: its energy (J) is booked, events tell, and the run has its model."""
@@ -537,7 +554,7 @@ class RunZones:
             x.full = on_layout(model, x.full.layout)
 
     @property
-    def numbers(self) -> list[int]:
+    def changed(self) -> Collection[int]:
         """Of the lines whose zones move."""
         return [x.number for x in self.lines]
 
@@ -547,7 +564,7 @@ class RunZones:
         What that changes of the energy of contact is booked, of lines whose zones stay as well: of others they touch.
         """
         run = self._run
-        renew_solver(run, after)
+        run.renew_solver(after)
         before = self.contact_energy.copy()
         self._note_contact()
         for line, more in zip(run.lines, self.contact_energy - before, strict=True):
@@ -568,7 +585,7 @@ class RunKinds:
     def apply(run: RunOfLines, switched: Sequence[ZoneSwitching]) -> bool:
         """Whether zones of these lines can change so between two steps of a run whose solver is attached."""
         attached = run.solver.turns is not None and run.solver.turns is run.loop.turns
-        alone = run.payout is None and run.shared is None and not run.solver.meets
+        alone = run.payout is None and run.contact.shared is None and not run.solver.meets
         alone &= all(line.contact is None and line.correction is None for line in run.lines)
         if not (attached and alone):
             return False

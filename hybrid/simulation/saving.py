@@ -98,20 +98,15 @@ def bring_back(run: NetworkRun, saved: Saved) -> None:
     for recorder, mark in zip(recorders(run), saved.marks, strict=True):
         recorder.back_to(mark)
     # Something has broken since, or contact has begun, or zones or lengths have changed, or what changes is under way.
-    if run.model is not saved.model or run.zones is not None or run.payout is not None:
-        run.model, run.failures.broken = saved.model, [*saved.run["broken"]]
-        moving = run.zones.numbers if run.zones is not None else []
-        moving += [*run.payout.lines] if run.payout is not None else []
+    moving = {k for part in run.parts for k in part.changed}
+    if run.model is not saved.model or moving:
+        run.model = saved.model
         for k, (line, model, rows) in enumerate(zip(run.lines, saved.model.models, saved.waiting, strict=True)):
             line.wait_again(rows._replace(outputs=(), errors=(), ratios=(), aside=(), log=()))
             if k not in moving:
                 line.follow(model)
-        if run.zones is not None:
-            run.zones.take_rods(saved.run["zones"])
-        if run.payout is not None:
-            run.payout.restore(saved.run["payout"])
-        if run.planes is not None:
-            run.planes.restore_planes(saved.run["planes"])
+        for part in reversed(run.parts):
+            part.restore_cells(saved.run)
         if moving:
             run.renew_other()
         run.make_solver()

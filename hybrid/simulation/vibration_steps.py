@@ -15,6 +15,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import Resolution, start_vibrations
 from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import LineScene
+from hybrid.simulation.parts import Part
 from hybrid.store.named_arrays import matched
 
 SEEN = 2.0  # periods of the vibration over which its amplitude is found, and from one look at it to the next
@@ -108,48 +109,60 @@ class VibrationSteps:
         self._bound(clock)
 
 
-class VibrationsOfLines:
+class VibrationsOfLines(Part):
     """The same of several lines, by name, whose steps are those of the line that asks for the shortest."""
 
-    def __init__(self, lines: Mapping[str, VibrationSteps]) -> None:
-        self._lines = lines
-        self.begins = sorted({t for x in lines.values() for t in x.begins})  # s
+    name = "vibrations"
+
+    def __init__(self, lines: Mapping[str, VibrationSteps], clock: Clock) -> None:
+        """clock: of the run."""
+        self._lines, self._clock = lines, clock
+        self._begins = sorted({t for x in lines.values() for t in x.begins})
+
+    @property
+    def begins(self) -> list[float]:
+        """When vibrations begin, s."""
+        return self._begins
 
     @property
     def due(self) -> float:
         """When to look next (s) whether one lasts; infinity: none is there."""
         return min((x.look for x in self._lines.values()), default=np.inf)
 
-    def begin(self, clock: Clock) -> None:
-        """As of `VibrationSteps`."""
+    def at_stop(self) -> None:
+        """Steps are short from here on if a vibration begins here."""
         for x in self._lines.values():
-            x.begin(clock)
-        self._bound(clock)
+            x.begin(self._clock)
+        self._bound()
 
     def log(self, rows: Floats) -> None:
         """Remember the forces (n, L, 3) at the ends of lines in steps, as of `VibrationSteps`."""
         for k, x in enumerate(self._lines.values()):
             x.log(rows[:, k])
 
-    def judge(self, clock: Clock) -> None:
-        """As of `VibrationSteps`, of lines at whose look the clock stands."""
+    def at_due(self) -> None:
+        """Longer steps, of lines that are looked at now, where little of the vibration shows."""
         now = self.due
         for x in self._lines.values():
             if x.look == now:
-                x.judge(clock)
-        self._bound(clock)
+                x.judge(self._clock)
+        self._bound()
 
-    def _bound(self, clock: Clock) -> None:
-        if self.begins:
-            clock.largest = min(x.largest for x in self._lines.values())
-            clock.next_dt = min(clock.next_dt, clock.largest)
+    def _bound(self) -> None:
+        if self._begins:
+            self._clock.largest = min(x.largest for x in self._lines.values())
+            self._clock.next_dt = min(self._clock.next_dt, self._clock.largest)
 
     def checkpoint(self) -> dict[str, Any]:
         """What later steps depend on, by line."""
-        return {name: x.checkpoint() for name, x in self._lines.items() if x.begins}
+        return {"vibrations": {name: x.checkpoint() for name, x in self._lines.items() if x.begins}}
 
-    def restore(self, saved: Mapping[str, Any], clock: Clock) -> None:
+    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """In files of an earlier program there were none."""
+        return {"vibrations": saved.get("vibrations", {})}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue as `checkpoint` has said, as of `VibrationSteps`."""
         for name, x in self._lines.items():
-            x.restore(saved.get(name), clock)
-        self._bound(clock)
+            x.restore(saved["vibrations"].get(name), self._clock)
+        self._bound()

@@ -18,7 +18,8 @@ from hybrid.kernels.contact.self_contact_law import WX, P
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.state import Line
 from hybrid.kernels.step.accept import MANY, collapses
-from hybrid.simulation import network_run, run_contact
+from hybrid.simulation import network_run
+from hybrid.simulation.run_contact import RunContact
 from hybrid.solve.self_contact import SelfContact
 
 GIVEN_UP, COLLAPSE = "contact given up", "steps collapse"
@@ -31,23 +32,23 @@ def kinds(result: hybrid.Result) -> set[str]:
 def test_it_comes_and_goes_with_the_legs(monkeypatch: pytest.MonkeyPatch) -> None:
     """An end that swings beside the other: the legs touch twice."""
     happened: list[tuple[str, float]] = []
-    for name in ("begin_contact", "end_contact"):
+    let_touch = RunContact._let_touch
 
-        def noted(moving: Any, *more: Any, name: str = name) -> None:
-            happened.append((name, moving.t))
-            getattr(run_contact, name)(moving, *more)
+    def noted(contact: RunContact, numbers: Any, touch: bool = True) -> None:
+        happened.append(("begins" if touch else "ends", contact._run.t))
+        let_touch(contact, numbers, touch)
 
-        monkeypatch.setattr(network_run, name, noted)
+    monkeypatch.setattr(RunContact, "_let_touch", noted)
     sway = {"surge": {"amplitude": 0.26, "period": 2.0}, "ramp": 4.0}
     ends = {
         "start": {"kind": "pinned", "position": [0, 0, 0]},
         "end": {"kind": "pinned", "position": [0.3, 0, 0], "motion": sway},
     }
     result = hybrid.run(hybrid.validate_scene(led_through(ends=ends, time={"duration": 7.0, "step": 0.01})))
-    assert [name for name, _ in happened] == ["begin_contact", "end_contact"] * 2
+    assert [name for name, _ in happened] == ["begins", "ends"] * 2
     assert "line touches itself" in kinds(result) and "line meets itself" not in kinds(result)
     assert float(result["self_distance/distance"]) > 0.85 * WIDTH
-    ends_at = [t for name, t in happened if name == "end_contact"]
+    ends_at = [t for name, t in happened if name == "ends"]
     assert not any(result["energy/self_contact"][np.searchsorted(result.times, ends_at)])
     put_in = sum(
         np.abs(result[name]).max() for name in result.names if name.startswith("work/") and name != "work/scheme"

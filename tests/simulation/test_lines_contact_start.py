@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.kernels.state.books import PARTS_ITSELF
 from hybrid.model.network import build_system
 from hybrid.simulation import run_checkpoint
-from hybrid.simulation.run_contact import gives_up_contact
 from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, crossing, lowered
 from tests.validation.test_validation_obstacles_of_lines import system_of
 
@@ -246,7 +246,7 @@ def test_contact_that_lets_no_step_lead_on_is_given_up_and_lines_pass(begun: Any
     tables = unasked()
     with hybrid.Simulation(tables, tmp_path / "whole.h5") as run:
         run.advance(0.5)
-        assert gives_up_contact(run._run, 1e-6)
+        assert run._run.contact.gives_up(1e-6)
         assert run._run.model.touching is None
         run.advance(0.8)
         result = run.result()
@@ -260,7 +260,8 @@ def test_a_line_that_parts_from_itself_as_it_comes_near_another_one_stays_in_con
     with hybrid.Simulation(unasked()) as run:
         run.advance(0.5)
         run._run.lines[0].parts_itself = True  # as if it had been seen in the step in which contact of two lines began
-        run._run._after_step(0.01)
+        run._run.loop.counts.notices |= PARTS_ITSELF
+        run._run._after_step()
         run.advance(0.8)
         assert same(begun, run.result()) < 1e-9
 

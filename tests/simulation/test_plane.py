@@ -16,7 +16,7 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.model.build import build
 from hybrid.model.plane import WHAT
-from hybrid.simulation.plane_monitor import PlaneMonitor
+from hybrid.simulation.lone_planes import PlaneMonitor
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Two marches that solve the same equations end Newton within its tolerance of each other, 1e-9 of the length.

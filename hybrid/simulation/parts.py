@@ -1,0 +1,190 @@
+"""Parts of a run: what its loop asks of each of them, and in which order.
+
+A run owns arrays and compiled steps, and knows what else there is to a run by the verbs of `Part` alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
+from math import inf
+from typing import Any
+
+from hybrid.kernels.state.state import Floats
+from hybrid.model.network import NetworkModel
+from hybrid.simulation.run_points import Sampled
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.network_steps import NetworkSteps
+
+# What is asked of several parts is asked in this order.
+ORDER = (
+    "planes",  # a line goes on in space, or in its plane, before anything changes its cells
+    "lines",  # what makes going on senseless ends the run before more is changed
+    "contact",  # begins and ends on the cells on which lines were seen to be near
+    "cuts",  # their text says what touches now
+    "zones",  # before nodes, which enter and leave beside the cells that a line has
+    "payout",  # before what breaks: a winch may come to its end in the step that breaks its line
+    "failures",  # last of what changes lines: what comes loose does so from all of them as they are
+    "vibrations",  # bounds the steps to come, whatever has changed
+    "quantities",  # from here on parts only look
+    "rotations",
+    "floating",
+)
+EVERY_STEP = 1 << 40  # beside the bits of Counts.notices: of every step that Python has a part in
+
+
+class Part:
+    """A capability of a run, by the verbs that its loop has for all of them; here none does anything."""
+
+    name = ""  # its place in ORDER
+    is_of_form = False  # whether what it keeps in a checkpoint has the form of what it would keep now
+
+    @property
+    def changed(self) -> Collection[int]:
+        """Numbers of lines whose cells it changes."""
+        return ()
+
+    @property
+    def remeshes(self) -> bool:
+        """Whether nodes of lines come and go."""
+        return False
+
+    wants = EVERY_STEP  # the bits of a step (kernels.state.books) of which it must hear
+
+    # --- the start: in this order -------------------------------------------------------------------
+
+    def place(self) -> None:
+        """The first state is known, and there is no solver yet."""
+
+    def balance(self) -> None:
+        """There is a solver, and no accelerations yet."""
+
+    def begin(self) -> None:
+        """Accelerations are consistent, and nothing has moved."""
+
+    # --- another solver, and what steps are attached to -----------------------------------------------
+
+    def fit_lines(self) -> None:
+        """Another solver is to be made: lines become what they are computed as."""
+
+    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
+        """Another solver makes the steps from now on, of lines as the model has them."""
+
+    def attach(self, loop: NetworkSteps) -> None:
+        """Compiled steps are to begin, or to ask for what they do (`Counts.asks`)."""
+
+    def sync(self) -> None:
+        """Compiled steps have come back: Python knows what they have changed."""
+
+    # --- steps ----------------------------------------------------------------------------------------
+
+    def begin_leg(self) -> None:
+        """Steps of a length that follows the motion go to another stop."""
+
+    def prepare(self, end: float) -> None:
+        """Before a try that ends at `end` (s), where steps ask."""
+
+    def wants_retry(self) -> bool:
+        """After a try, where steps ask: whether it is to be made again, with other lines."""
+        return False
+
+    def gives_up(self, dt: float) -> bool:
+        """No step of dt (s) leads on: whether one may now, as something is given up."""
+        return False
+
+    def note_step(self) -> None:
+        """After a step with one of the bits that it wants: books alone, nothing changes."""
+
+    def after_step(self) -> None:
+        """Likewise, once all parts have noted the step: lines may change.  LineFailed: the run ends here."""
+
+    def forces_on(self) -> AbstractContextManager[Mapping[int, Floats]]:
+        """While accelerations are found: second rates (N,) m/s2 of the lengths of cells, by line."""
+        raise NotImplementedError
+
+    @property
+    def breaks(self) -> list[float]:
+        """Times (s) at which a step ends, and what holds lines may change."""
+        return []
+
+    @property
+    def begins(self) -> list[float]:
+        """Times (s) at which a step ends whose length follows the motion."""
+        return []
+
+    @property
+    def due(self) -> float:
+        """When it is to be asked next (s), between two steps."""
+        return inf
+
+    def at_due(self) -> None:
+        """That time has come."""
+
+    def at_stop(self) -> None:
+        """Steps have come to a stop, or are to begin."""
+
+    # --- what is recorded -----------------------------------------------------------------------------
+
+    def log(self, rows: Floats) -> None:
+        """Steps have been made, (n, L, 3): s; N, at start and end of each line."""
+
+    def at_output(self, seen: Sampled) -> None:
+        """Outputs have been recorded.  LineFailed: the run ends here."""
+
+    def finish(self, status: str) -> None:
+        """What is to be said of the whole run, of which this is the status, before its file is closed."""
+
+    # --- checkpoints: parts go on in the opposite order, as each has found lines as those before it left them ----
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What it keeps between two steps, by names in the checkpoint of the run."""
+        return {}
+
+    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """Of a checkpoint, what it keeps, with what files of earlier programs do not have."""
+        return {}
+
+    def restore_joints(self, saved: Mapping[str, Any]) -> bool:
+        """Lines of the scene come loose, or touch, as in a checkpoint; whether a solver has to follow.
+
+        ValueError, here and below: that cannot be.
+        """
+        return False
+
+    def restore_cells(self, saved: Mapping[str, Any]) -> bool:
+        """Likewise the cells, planes and lengths of lines that are joined as then."""
+        return False
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on as then, with a solver of the lines of then; in the order of steps."""
+
+
+def _having(parts: Iterable[Part], verb: str) -> tuple[Callable[..., Any], ...]:
+    """The verb of those parts that do something there."""
+    return tuple(getattr(x, verb) for x in parts if getattr(type(x), verb) is not getattr(Part, verb))
+
+
+class Parts:
+    """The parts of a run in their order; what a part does not do costs nothing."""
+
+    def __init__(self, parts: Iterable[Part]) -> None:
+        self._all = parts = sorted(parts, key=lambda x: ORDER.index(x.name))
+        self.attach, self.sync, self.follow = (_having(parts, x) for x in ("attach", "sync", "follow"))
+        self.prepare, self.begin_leg = _having(parts, "prepare"), _having(parts, "begin_leg")
+        self.forces_on, self.log = _having(parts, "forces_on"), _having(parts, "log")
+        self.at_output, self.at_stop = _having(parts, "at_output"), _having(parts, "at_stop")
+        self.note_step, self.after_step = (
+            [(x.wants, verb) for x in parts for verb in _having([x], name)] for name in ("note_step", "after_step")
+        )
+        self.begins = sorted({t for x in parts for t in x.begins})  # s
+
+    def __iter__(self) -> Iterator[Part]:
+        return iter(self._all)
+
+    def __reversed__(self) -> Iterator[Part]:
+        return reversed(self._all)
+
+    @property
+    def due(self) -> float:
+        """When one is to be asked next (s), between two steps."""
+        return min((x.due for x in self._all), default=inf)
