@@ -313,7 +313,7 @@ class LonePlanes(Part):
                 changes[k] = partial(_as_computed, plane=plane, flat=x.plane is not None)
         change_lines(self._run, changes)
 
-    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
+    def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Steps are made by another solver, with lines as of `fit_lines`."""
         for x in self._lines.values():
             x.attach(solver)

@@ -340,7 +340,7 @@ class NetworkRun:
 
     def gather_events(self) -> None:
         """Record the events of the lines, in the result of the system with their names, as they happened."""
-        self.contact.tell()
+        self.contact.note_meetings()
         self.file.gather()
 
     def _output(self) -> None:
@@ -457,8 +457,8 @@ class NetworkRun:
         self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared, self.resolution.tolerance)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
-        for follow in self.parts.follow:
-            follow(self.model, self.solver)
+        for use_solver in self.parts.use_solver:
+            use_solver(self.model, self.solver)
         if self.loop.controlled:
             self.solver.allowed[:] = self.resolution.allowed
         self.loop.stir(self.model.members_of(self.solver.bodies))

@@ -67,7 +67,7 @@ class Part:
     def fit_lines(self) -> None:
         """Another solver is to be made: lines become what they are computed as."""
 
-    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
+    def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Another solver makes the steps from now on, of lines as the model has them."""
 
     def attach(self, loop: NetworkSteps) -> None:
@@ -169,7 +169,7 @@ class Parts:
 
     def __init__(self, parts: Iterable[Part]) -> None:
         self._all = parts = sorted(parts, key=lambda x: ORDER.index(x.name))
-        self.attach, self.sync, self.follow = (_having(parts, x) for x in ("attach", "sync", "follow"))
+        self.attach, self.sync, self.use_solver = (_having(parts, x) for x in ("attach", "sync", "use_solver"))
         self.prepare, self.begin_leg = _having(parts, "prepare"), _having(parts, "begin_leg")
         self.forces_on, self.log = _having(parts, "forces_on"), _having(parts, "log")
         self.at_output, self.at_stop = _having(parts, "at_output"), _having(parts, "at_stop")

@@ -95,8 +95,9 @@ class RunContact(Part):
     wants = b.IS_BENT | b.MEETS_ITSELF | b.NEARS_ITSELF | b.PARTS_ITSELF | b.HIDES_ITSELF | b.LINES_NEAR
 
     def __init__(self, run: RunOfLines, lets_touch: bool, watches: bool) -> None:
-        """lets_touch: whether contact begins by itself where lines come near themselves, else that is only noticed;
+        """Of a run whose contact is as the scene asks for it.
 
+        lets_touch: whether contact begins by itself where lines come near themselves, else that is only noticed;
         watches: whether lines that pass through each other are told of.
         """
         self._run, self.lets_touch, self._watches = run, lets_touch, watches
@@ -130,10 +131,10 @@ class RunContact(Part):
         self.shared = shared
         return contacts, shared
 
-    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
+    def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Look in the steps of another solver which lines pass through each other."""
         if self.watch is not None:
-            self._tell_passages()
+            self._note_passages()
         self.watch_lines()
 
     def watch_lines(self) -> None:
@@ -227,9 +228,10 @@ class RunContact(Part):
             self._end_alone(parted)
 
     def _begin_alone(self) -> None:
-        """Contact is computed from now on of lines that have come near themselves; those within themselves go on
+        """Contact is computed from now on of lines that have come near themselves.
 
-        without.  Nothing moves; energy that contact has at once is booked as that of a change of zones.
+        Those within themselves go on without.  Nothing moves; energy that contact has at once is booked as that of a
+        change of zones.
         """
         run = self._run
         near = [line for line in run.lines if line.nears_itself]
@@ -288,7 +290,7 @@ class RunContact(Part):
         """Contact is computed from now on of lines that have come near each other; whether any begins."""
         pairs = self._lines_near()
         if not pairs:  # they are let pass
-            self._tell_passages()
+            self._note_passages()
             self.watch_lines()
             return False
         now = self._run.model.touching.pairs if self._run.model.touching is not None else []
@@ -380,9 +382,9 @@ class RunContact(Part):
         return True
 
     def _touching_now(self) -> set[Pair]:
-        """Lines whose contact began by itself, two each, that touch in the state that was looked at last; a line that
+        """Lines whose contact began by itself, two each, that touch in the state that was looked at last.
 
-        touches itself beside others, twice.
+        A line that touches itself beside others stands there twice.
         """
         if self.shared is None or self._run.system.contact is not None:
             return set()
@@ -390,7 +392,7 @@ class RunContact(Part):
 
     # --- what is told ---------------------------------------------------------------------------------
 
-    def tell(self) -> None:
+    def note_meetings(self) -> None:
         """An event for every two lines that have met, with contact or without, when they do first."""
         run, shared = self._run, self._run.solver.shared
         for a, c, t, s, other in sorted(shared.met() if shared is not None else (), key=lambda x: x[2]):
@@ -399,9 +401,9 @@ class RunContact(Part):
             self._met.add((a, c))
             text = meeting_text(run.model.names[a], run.model.names[c], s, other)
             run.recorder.event(t, 0.0, 0.0, "lines touch", text)
-        self._tell_passages()
+        self._note_passages()
 
-    def _tell_passages(self) -> None:
+    def _note_passages(self) -> None:
         """An event for every two lines that have met without contact, when they do first.
 
         Of lines that lie along each other from what both are joined to there is nothing to tell, as at the start.

@@ -40,7 +40,7 @@ class Cuts(Part):
         run = self._run
         loop, clock, flags = run.loop, run.loop.clock, int(run.loop.counts.notices)
         if flags & b.COLLAPSES:
-            self._tell_collapse()
+            self._note_collapse()
         if flags & b.STEPS_CUT:
             turned = run.lines[loop.turned_line]
             note_cut(clock, float(clock.most_turn), turned.model.length, turned.events, loop.controlled)
@@ -69,7 +69,7 @@ class Cuts(Part):
         own = (line.contact for line in self._run.lines)
         return TOUCHES_ITSELF if pairs or any(x is not None and x.touches for x in own) else ""
 
-    def _tell_collapse(self) -> None:
+    def _note_collapse(self) -> None:
         """Steps have become so short that the run may not end: an event; one to be compared with stops."""
         run = self._run
         count, clock = run.loop.counts, run.loop.clock

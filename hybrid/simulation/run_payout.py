@@ -70,7 +70,7 @@ class RunPayout(Part):
 
     # --- steps ------------------------------------------------------------------------------------
 
-    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
+    def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """A solver finds forces with the lengths of now, of the state of now."""
         for k, x in self.lines.items():
             x.layout = model.models[k].layout

@@ -94,7 +94,7 @@ class RunQuantities(Part):
                 self._steps[line.name].share(path, begins.pop(0))
                 line.books = self._steps[line.name].given_to(line.books)
 
-    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
+    def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Know from now on which ends came loose: nothing takes their pull, which has no direction."""
         self._idle = frozenset((model.names[line], k) for line, k in idle_ends(self._system, model))
         for name, x in self._steps.items():

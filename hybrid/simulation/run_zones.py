@@ -319,7 +319,7 @@ class RunZones(Part):
             if x.cells is not None:
                 x.cells.sync()
 
-    def follow(self, model: NetworkModel, solver: NetworkSolver) -> None:
+    def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Criteria know how near lines come to themselves and each other, by the contact that the solver has now."""
         run = self._run
         horizons = {x.number: LOOKAHEAD * x.switching.manager.pace for x in self.lines}
