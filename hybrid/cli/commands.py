@@ -114,8 +114,8 @@ def static(
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
         asked = load(console, scene, settings)
-        from hybrid.cli.lines_tables import check_holding, show_holding
         from hybrid.cli.progress_line import span
+        from hybrid.cli.result_tables import check_holding, show_equilibrium, show_holding
 
         check_holding(asked, stiffness, offsets, reach, heading)
         target = console.will_write(output or Path(f"{scene.stem}.static.h5"))
@@ -125,8 +125,8 @@ def static(
         result = hybrid.static(asked, target, overwrite=not keep)
         wall = clock.perf_counter() - begin
         _draw(result, picture)
-        more, facts = _show_equilibrium(console, result)
-        text = f"equilibrium in {span(wall)} of wall time{more}"
+        facts = show_equilibrium(console, result)
+        text = f"equilibrium in {span(wall)} of wall time"
         console.done(text, target, picture, status=result.status, wall=wall, **facts)
         show_holding(console, asked, stiffness, offsets, reach, heading)
 
@@ -276,6 +276,7 @@ def _ended(
 ) -> None:  # fmt: skip
     """Print the summary of a run that has ended; computed: s of it, by this command."""
     from hybrid.cli.progress_line import span, speed
+    from hybrid.cli.result_tables import show_motion
 
     _draw(result, picture)
     logged = next(x for _, x in result.each_line())
@@ -285,55 +286,8 @@ def _ended(
     text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
     if computed < duration:
         text = f"{duration:.6g} s in {steps} steps, the last {computed:.6g} s in {span(wall)} of wall time ({pace})"
-    more, facts = _show_motion(console, asked, result, target)
+    more, facts = show_motion(console, asked, result, target)
     console.done(text + more, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
-
-
-def _show_motion(console: Console, asked: Any, result: Result, target: Path) -> tuple[str, dict[str, Any]]:
-    """Print what a run has reached; what to say of it behind its length, and for programs."""
-    if result.lines:
-        from hybrid.cli.lines_tables import show_lines
-        from hybrid.store.records import error_words
-
-        known = "error_total_position" in result.attributes
-        more = f"estimated error {error_words(result.attributes)}" if known else "error not estimated"
-        return f"; {more}", show_lines(console, result)
-    from hybrid.cli.tables import (
-        errors_facts,
-        errors_table,
-        extremes_facts,
-        extremes_table,
-        zones_line,
-        zones_over_time,
-    )
-
-    console.events(result.events)
-    facts = zones_over_time(result) if asked.model.kind == "adaptive" else {}
-    if facts:
-        console.show(lambda: zones_line(facts, target))
-    errors, extremes = errors_facts(result), extremes_facts(result)
-    if errors:
-        console.show(lambda: errors_table(errors, result))
-    console.show(lambda: extremes_table(extremes))
-    return "" if errors else "; error not estimated", facts | {"errors": errors, "extremes": extremes}
-
-
-def _show_equilibrium(console: Console, result: Result) -> tuple[str, dict[str, Any]]:
-    """The same of an equilibrium."""
-    if result.lines:
-        from hybrid.cli.lines_tables import show_lines
-
-        path, residual = (result.attributes[f"static_{x}"] for x in ("path", "residual"))
-        found = show_lines(console, result)
-        return f" ({path}; residual force {residual:.2g} N)", found | {"path": path, "residual": residual}
-    from hybrid.cli.tables import equilibrium_facts, equilibrium_table, errors_facts, errors_table
-
-    facts, errors = equilibrium_facts(result), errors_facts(result)
-    console.show(lambda: equilibrium_table(facts))
-    if errors:
-        console.show(lambda: errors_table(errors, result))
-    console.events(result.events)
-    return "", facts | {"errors": errors}
 
 
 def _draw(result: Result, picture: Path | None) -> None:

@@ -129,11 +129,6 @@ def unknown_text(facts: dict[str, Any], unit: str) -> str:
     return f"; {UNKNOWN}" * (("curvature" if unit == "m" else "tension") in facts["not_converged"])
 
 
-def extremes_table(facts: dict[str, Any]) -> Any:
-    """What a run has reached, over all of its time."""
-    return Grid(list(extremes_rows(facts, moves=True)))
-
-
 def _on_the_seabed(result: Result) -> dict[str, Any]:
     """Touchdown, grounded length and contact force, where there is a seabed; None where nothing touches."""
     if "grounded_length" not in result:
@@ -158,29 +153,33 @@ def _is_anchor(result: Result, end: str) -> bool:
     return float(place @ normal) - offset <= ANCHORED
 
 
-def equilibrium_table(facts: dict[str, Any]) -> Any:
+def search_rows(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """How an equilibrium was found."""
+    yield "found by", facts["path"].replace("; ", "\n")
+    if facts["residual"] is not None:
+        yield "residual force", f"{facts['residual']:.2g} N at most"
+
+
+def ends_rows(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Forces at the ends of a line at rest, what lies on the seabed, its zones and its lowest point."""
+
     def vector(x: list[float]) -> str:
         zero = 1e-9 * max(abs(c) for c in x)
         return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
 
-    rows: list[tuple[str, ...]] = [("found by", facts["path"].replace("; ", "\n"))]
-    if facts["residual"] is not None:
-        rows.append(("residual force", f"{facts['residual']:.2g} N at most"))
-    rows += extremes_rows(facts, moves=False)
     for end, force in facts["force"].items():
-        rows.append((f"force at {end}", f"{vector(force)} N on the cable"))
+        yield f"force at {end}", f"{vector(force)} N on the cable"
     if facts.get("grounded_length"):
         a, b = facts["touchdown"]
-        rows.append(("on the seabed", f"{facts['grounded_length']:.5g} m between s = {a:.5g} and {b:.5g} m"))
-        rows.append(("contact force", f"{facts['contact_force']:.5g} N"))
+        yield "on the seabed", f"{facts['grounded_length']:.5g} m between s = {a:.5g} and {b:.5g} m"
+        yield "contact force", f"{facts['contact_force']:.5g} N"
     elif "grounded_length" in facts:
-        rows.append(("on the seabed", "nothing"))
+        yield "on the seabed", "nothing"
     for end, lift in facts.get("uplift", {}).items():
-        rows.append((f"uplift at {end}", f"{lift['force']:.5g} N, {lift['angle']:.3g} deg from the seabed"))
+        yield f"uplift at {end}", f"{lift['force']:.5g} N, {lift['angle']:.3g} deg from the seabed"
     if len(facts["zones"]) > 1:
-        rows.append(("zones", "\n".join(f"{z['kind']} {z['s_a']:.5g} to {z['s_b']:.5g} m" for z in facts["zones"])))
-    rows.append(("lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m"))
-    return Grid(rows)
+        yield "zones", "\n".join(f"{z['kind']} {z['s_a']:.5g} to {z['s_b']:.5g} m" for z in facts["zones"])
+    yield "lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m"
 
 
 def zones_over_time(result: Result) -> dict[str, Any]:
@@ -278,14 +277,14 @@ def _short(x: float, beside: float = 0.0) -> str:
     return f"{float(f'{x:.2g}'):.6g}" if 1e-4 <= abs(x) < 1e6 or x == 0.0 else f"{x:.1e}"
 
 
-def zones_line(facts: dict[str, Any], file: Path) -> str:
-    """The same in a line."""
-    rod, changes = facts["rod"], facts["zone_changes"]
+def zones_line(facts: dict[str, Any], file: Path, name: str = "") -> str:
+    """The same in words; name: of the line, if it has one."""
+    rod, changes, of = facts["rod"], facts["zone_changes"], f"line {name}, " * bool(name)
     if not changes:
-        return f"rod: {rod['mean']:.0%} of the line, all the time"
+        return f"{of}rod: {rod['mean']:.0%} of the line, all the time"
     times = f"{changes} change{'s' * (changes > 1)} of zones"
-    part = f"rod: {rod['least']:.0%} to {rod['most']:.0%} of the line, {rod['mean']:.0%} on average"
-    return f"{part}; {times}: hybrid plot --zones {file}"
+    part = f"{of}rod: {rod['least']:.0%} to {rod['most']:.0%} of the line, {rod['mean']:.0%} on average"
+    return f"{part}; {times}: hybrid plot --zones {file}{f' --line {name}' * bool(name)}"
 
 
 def judged(table: TradeTable, row: Row) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,10 +18,11 @@ import hybrid
 import hybrid.cli.commands  # registers them
 from hybrid.cli.app import app
 from hybrid.cli.console import Console
-from hybrid.cli.lines_tables import show_lines
 from hybrid.cli.plan_tables import plan_rows
+from hybrid.cli.result_tables import show_equilibrium, show_motion
 from hybrid.errors import ResultError
 from hybrid.scene.read import as_scene
+from hybrid.scene.short_form import network_of
 from hybrid.store.records import Zone
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks, Text
@@ -38,6 +40,7 @@ from hybrid.view.lines_report import _extreme_text
 from hybrid.view.report import html
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
+ENDS = {"start": 0, "end": 11.5}
 PLACES = {"east": (100, 0), "north": (-50, 87), "south": (-50, -87)}
 
 
@@ -218,10 +221,29 @@ def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None
 
 
 def test_the_table_of_a_run_judges_each_line(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    show_lines(Console(False, False), hybrid.open(path))
+    show_motion(Console(False, False), as_scene(spar()), hybrid.open(path), path)
     said = " ".join(capsys.readouterr().out.split())
     east, north = said.split("line east")[1].split("line north")
     assert "; max_tension of 1000 N BROKEN" in east and "BROKEN" not in north
+
+
+@pytest.mark.parametrize("form", [as_scene, network_of])
+def test_zones_and_the_search_are_said_of_one_line_and_of_many(
+    form: Callable[[Any], hybrid.Scene], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of lines with names how much was rod was not said, and how the equilibrium was found behind the file alone."""
+    ends = {name: {"kind": "clamped", "position": [x, 0, 0], "tangent": [1, 0, 0]} for name, x in ENDS.items()}
+    section = SECTION | {"length": 12, "bending_stiffness": 5.0, "diameter": 0.05}
+    asked = form(as_scene({
+        "cable": {"sections": [section]}, "ends": ends, "model": "adaptive", "mesh": {"cells": 60},
+        "initial": "equilibrium", "time": {"duration": 0.2, "step": 0.1},
+    }))  # fmt: skip
+    show_motion(Console(False, False), asked, hybrid.run(asked), Path("run.h5"))
+    moved = capsys.readouterr().out
+    assert re.search(r"rod: \d+% of the line, all the time|rod: \d+% to \d+% of the line", moved)
+    show_equilibrium(Console(False, False), hybrid.static(asked))
+    rows = capsys.readouterr().out.splitlines()
+    assert rows[0].startswith("found by") and any(x.startswith("residual force") for x in rows)
 
 
 def test_the_stress_of_pipes_is_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -231,7 +253,7 @@ def test_the_stress_of_pipes_is_judged(tmp_path: Path, capsys: pytest.CaptureFix
     points = {"a": {"position": [0, 0, -60]}, "b": {"position": [100, 0, 0]}}
     path = tmp_path / "pipe.h5"
     result = hybrid.static({"points": points, "lines": {"l": line}}, path)
-    show_lines(Console(False, False), result)
+    show_equilibrium(Console(False, False), result)
     assert re.search(r"von_mises of \S+ Pa, above the 1e\+06 Pa allowed; BROKEN", capsys.readouterr().out)
     text = html(result)
     assert "Line l: von mises." in text and "None, beside limits that are broken." in text
@@ -369,7 +391,7 @@ def test_the_table_of_many_lines_fits(
     many: Path, columns: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
-    show_lines(Console(False, False), hybrid.open(many))
+    show_motion(Console(False, False), as_scene(fan()), hybrid.open(many), many)
     said = capsys.readouterr().out.splitlines()
     rows = [x.split() for x in said if x.startswith("leg")]
     assert [row[0] for row in rows] == ["leg12", "leg13", "leg11", "leg10", "leg9", "leg8", "leg7", "leg6"]

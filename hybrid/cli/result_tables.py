@@ -1,26 +1,35 @@
-"""What run and static print of lines with names, and of the points and bodies where they meet."""
+"""What run and static print of lines, and of the points and bodies where they meet."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import hybrid
+from hybrid.cli.console import Grid
 from hybrid.cli.tables import (
+    ends_rows,
+    equilibrium_facts,
+    errors_facts,
+    errors_table,
     extremes_facts,
-    judged_text,
-    place_text,
+    extremes_rows,
     quantities_facts,
-    unknown_text,
+    search_rows,
     verdict_text,
     verdicts_of,
+    zones_line,
+    zones_over_time,
 )
 from hybrid.errors import Complaint, SceneError
 from hybrid.store.envelope import NOT_VERIFIED, TOUCH
+from hybrid.store.records import error_words
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -32,20 +41,79 @@ MOST_LISTED = 12
 SHOWN = 8
 
 
-def show_lines(console: Console, result: Result) -> dict[str, Any]:
-    """Print what lines, points and bodies have reached, and return it."""
+def show_motion(console: Console, asked: Any, result: Result, target: Path) -> tuple[str, dict[str, Any]]:
+    """Print what a run has reached; what to say of it behind its length, and for programs."""
+    console.events(result.events)
+    zones = {name: zones_over_time(line) for name, line in result.each_line() if name in asked.adaptive}
+    for name, found in [*zones.items()][:MOST_LISTED]:
+        console.show(partial(zones_line, found, target, name))
+    errors = _show_errors(console, result)
+    more = "; error not estimated" if not errors else ""
+    if errors and result.lines:
+        more = f"; estimated error {error_words(result.attributes)}"
+    lines = _facts_of_lines(result)
+    rest = _show_lines(console, result, lines)
+    if "" in lines:
+        return more, zones.get("", {}) | {"errors": errors, "extremes": lines[""]}
+    return more, {"lines": {name: facts | zones.get(name, {}) for name, facts in lines.items()}} | rest
+
+
+def show_equilibrium(console: Console, result: Result) -> dict[str, Any]:
+    """The same of an equilibrium."""
+    lines = _facts_of_lines(result)
+    whole = equilibrium_facts(result) if "" in lines else _search_facts(result)
+    rest = _show_lines(console, result, lines, whole)
+    errors = _show_errors(console, result)
+    console.events(result.events)
+    return whole | ({"errors": errors} if "" in lines else {"lines": lines} | rest)
+
+
+def _facts_of_lines(result: Result) -> dict[str, Any]:
+    """What each line has reached, and whether that is accurate; of many the worst come first."""
     from hybrid.view.along import worst_first
 
-    names = list(result.lines) if len(result.lines) <= MOST_LISTED else worst_first(result)
-    lines = {name: extremes_facts(result.lines[name]) | verdicts_of(result.lines[name]) for name in names}
-    held = quantities_facts(result)
-    points, bodies = _last(result, "points"), _last(result, "bodies")
-    console.events(result.events)
-    end = float(result.times[-1]) if len(result.times) > 1 else None
-    meetings = [(x.t, x.text) for x in result.events if x.kind == TOUCH]
-    meetings += [(x.t_force, f"{x.partner}: {x.text}") for x in result.contacts()]
-    console.show(lambda: _table(lines, points, bodies, held, end, meetings))
-    return {"lines": lines, "points": points, "bodies": bodies, "quantities": held}
+    each = dict(result.each_line())
+    names = [*each] if len(each) <= MOST_LISTED else worst_first(result)
+    return {name: extremes_facts(each[name]) | (verdicts_of(each[name]) if name else {}) for name in names}
+
+
+def _show_errors(console: Console, result: Result) -> dict[str, Any]:
+    """Print the estimated errors of a line alone; those of the result."""
+    errors = errors_facts(result)
+    if errors and not result.lines:
+        console.show(lambda: errors_table(errors, result))
+    return errors
+
+
+def _show_lines(
+    console: Console, result: Result, lines: dict[str, Any], search: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Print what lines, points and bodies have reached, and return that of the latter.
+
+    search: of an equilibrium, how it was found.
+    """
+    points, bodies, held = _last(result, "points"), _last(result, "bodies"), list[dict[str, Any]]()
+    end = float(result.times[-1]) if search is None and len(result.times) > 1 else None
+    meetings: list[tuple[float, str]] = []
+    if "" not in lines:  # else they are among the facts of the line
+        held, meetings = quantities_facts(result), [(x.t, x.text) for x in result.events if x.kind == TOUCH]
+        meetings += [(x.t_force, f"{x.partner}: {x.text}") for x in result.contacts()]
+    many = len(lines) > MOST_LISTED
+    rows = [*search_rows(search)] if search is not None else []
+    for name, facts in () if many else lines.items():
+        rows += _rows_of_line(name, facts, end is not None)
+    rows += ends_rows(search) if search is not None and "" in lines else []
+    rows += _rows_beside(points, bodies, held, end, meetings)
+    if many:
+        console.show(lambda: _ranked(lines, end is not None))
+        console.show(lambda: "")
+    console.show(lambda: Grid(rows))
+    return {"points": points, "bodies": bodies, "quantities": held}
+
+
+def _search_facts(result: Result) -> dict[str, Any]:
+    """How the equilibrium of lines was found."""
+    return {x: result.attributes[f"static_{x}"] for x in ("path", "residual")}
 
 
 def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
@@ -58,57 +126,39 @@ def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _table(
-    lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any], held: list[dict[str, Any]],
-    end: float | None, meetings: list[tuple[float, str]],
-) -> Any:  # fmt: skip
+def _rows_beside(
+    points: dict[str, Any], bodies: dict[str, Any], held: list[dict[str, Any]], end: float | None,
+    meetings: list[tuple[float, str]],
+) -> Iterator[tuple[str, str]]:  # fmt: skip
     """end: s, time of the last output, of which points and bodies are; None: of an equilibrium; meetings: of lines,
 
     when (s) and where they touched first, and with what force.
     """
-    from rich.console import Group
-    from rich.table import Table
-
     last = "" if end is None else f"at t = {end:.5g} s: "
-    table = Table.grid(padding=(0, 2))
-    for name, facts in lines.items() if len(lines) <= MOST_LISTED else ():
-        for k, text in enumerate(_of_line(facts, end is not None)):
-            table.add_row("" if k else f"line {name}", text)
-    for name, text in _shown(points, "point", last + "{}", _of_point):
-        table.add_row(name, text)
-    for name, text in _shown(bodies, "body", last + "{}", _of_body):
-        table.add_row(name, text)
+    yield from _shown(points, "point", last + "{}", _of_point)
+    yield from _shown(bodies, "body", last + "{}", _of_body)
     for t, text in meetings[:SHOWN]:
-        table.add_row("contact", f"{'' if end is None else f't = {t:.5g} s: '}{text}")
+        yield "contact", f"{'' if end is None else f't = {t:.5g} s: '}{text}"
     if len(meetings) > SHOWN:
-        table.add_row("", f"{len(meetings) - SHOWN} more contacts are among the events of the report")
+        yield "", f"{len(meetings) - SHOWN} more contacts are among the events of the report"
     for x in held:
-        table.add_row(x["name"], x["text"] + x["when"] + x["ending"])
-    table.columns[0].style = "bold"
-    return table if len(lines) <= MOST_LISTED else Group(_ranked(lines, end is not None), "", table)
+        yield x["name"], x["text"] + x["when"] + x["ending"]
 
 
-def _of_line(facts: dict[str, Any], moves: bool) -> Iterator[str]:
-    """What a line has reached; moves: whether there are times."""
-
-    def at(x: dict[str, Any], unit: str) -> str:
-        return f"{x['value']:.5g} {unit} {place_text(x)}" + f", t = {x['t']:.5g} s" * moves
-
-    most, least = facts["tension_max"], facts["tension_min"]
-    limits = {x["limit"]: x for x in facts["limits"]}
-    low, high = (
-        at(x, "N") + judged_text(limits.get(limit), "N", x)
-        for x, limit in ((least, "min_tension"), (most, "max_tension"))
-    )
-    yield f"tension {low}, to {high}{unknown_text(facts, 'N')}"
-    bent, bend = facts.get("bend_radius_min"), limits.get("min_bend_radius")
-    if bent is not None and bend is not None:
-        yield f"smallest bend radius {at(bent, 'm')}{judged_text(bend, 'm', bent)}{unknown_text(facts, 'm')}"
-    if (pressed := facts.get("contact_max")) is not None:
-        held = judged_text(limits.get("max_contact_force"), "N/m", pressed)
-        yield f"largest contact force {at(pressed, 'N/m')}, of {pressed['partner']}{held}"
-    yield from (x["text"] + x["when"] + x["ending"] for x in facts["quantities"])
-    yield from map(verdict_text, facts.get("accuracy", ()))
+def _rows_of_line(name: str, facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str]]:
+    """What a line has reached, of one with a name in as few rows as will do; moves: whether there are times."""
+    rows = [*extremes_rows(facts, moves)]
+    if not name:
+        yield from rows
+        return
+    (_, most), (_, least), *others = rows
+    texts, bound = [f"tension {least}, to {most}"], any(x["limit"] == "min_bend_radius" for x in facts["limits"])
+    names = {x["name"] for x in facts["quantities"]}  # which say it themselves
+    for title, text in others:
+        if bound or title != "smallest bend radius":
+            texts.append(text if title in names else f"{title} {text}")
+    texts += map(verdict_text, facts.get("accuracy", ()))
+    yield from ((f"line {name}" * (not k), text) for k, text in enumerate(texts))
 
 
 def _ranked(lines: dict[str, Any], moves: bool) -> Any:
