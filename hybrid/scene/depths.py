@@ -51,7 +51,10 @@ class Depths(Table):
         if self.file is not None:
             fix = "leave it out, or leave file out"
             refuse(Finding((name,), "nothing, because file already gives the depths", fix) for name in given)
-            self._readable()
+            from hybrid.scene.motion_file import readable
+
+            with readable(self.file):
+                assert self.surface is not None
             return self
         if len(given) < 3:
             fix = "write x: [...], y: [...], depth: [[...], ...], or file: depths.csv"
@@ -71,15 +74,6 @@ class Depths(Table):
                 expected = f"{len(self.y)} numbers, one for each y"
                 refuse([Finding(("depth", k), expected, "rows go with x, columns with y", f"{len(row)} numbers")])
         return self
-
-    def _readable(self) -> None:
-        from hybrid.scene.motion_file import RecordRefused, check_file
-
-        try:
-            check_file(self.file or "")
-            assert self.surface is not None
-        except RecordRefused as refused:
-            refuse([refused.finding])
 
 
 class Surface(NamedTuple):

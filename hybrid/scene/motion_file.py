@@ -7,6 +7,7 @@ import os
 import stat
 from array import array
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import ResultError, command_for, optional_package
-from hybrid.scene.base import Finding
+from hybrid.scene.base import Finding, refuse
 
 Array = NDArray[np.float64]
 
@@ -217,6 +218,16 @@ def check_file(path: str | Path, what: str = "a CSV file") -> None:
         fix = "sample less finely, as 20 rows a period are enough; or cut it to time.duration"
         given = f"{path}, {status.st_size / 1e6:.0f} MB"
         raise RecordRefused(f"a file of at most {LARGEST_FILE / 1e6:.0f} MB", fix, given)
+
+
+@contextmanager
+def readable(path: str, what: str = "a CSV file") -> Iterator[None]:
+    """What is read of a file of a table, within, is refused with what is wrong with the file, if anything is."""
+    try:
+        check_file(path, what)
+        yield
+    except RecordRefused as refused:
+        refuse([refused.finding])
 
 
 def _table(

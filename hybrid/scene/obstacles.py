@@ -245,13 +245,11 @@ class MeshObstacle(_Rotated):
 
     @model_validator(mode="after")
     def _readable(self) -> Self:
-        from hybrid.scene.mesh_file import read_mesh
-        from hybrid.scene.motion_file import RecordRefused
+        from hybrid.scene.mesh_file import WHAT, read_mesh
+        from hybrid.scene.motion_file import readable
 
-        try:
+        with readable(self.file, WHAT):
             read_mesh(self.file)
-        except RecordRefused as refused:
-            refuse([refused.finding])
         return self
 
     def distance(self, x: tuple[float, float, float]) -> float:

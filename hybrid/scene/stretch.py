@@ -59,13 +59,10 @@ class CurveFile(Table):
 
     @model_validator(mode="after")
     def _readable(self) -> CurveFile:
-        from hybrid.scene.motion_file import RecordRefused, check_file
+        from hybrid.scene.motion_file import readable
 
-        try:
-            check_file(self.file)
+        with readable(self.file):
             assert self.rows
-        except RecordRefused as refused:
-            refuse([refused.finding])
         return self
 
 

@@ -140,13 +140,10 @@ class _OfFile(Table):
         yield self.significant_height, ("file",), self.main_period, ("file",)
 
     def _refuse_unreadable(self) -> None:
-        from hybrid.scene.motion_file import RecordRefused, check_file
+        from hybrid.scene.motion_file import readable
 
-        try:
-            check_file(self.file)
+        with readable(self.file):
             assert self.recorded
-        except RecordRefused as refused:
-            refuse([refused.finding])
 
 
 class GivenWaves(_OfFile):
