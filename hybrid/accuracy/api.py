@@ -18,14 +18,13 @@ from hybrid.accuracy.model_choice import CHOSEN, chosen_and_surveyed, rods_inste
 from hybrid.accuracy.passes import Passes, emptied
 from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import ComputationError, ResultError, SceneError
-from hybrid.model.model_costs import with_model
+from hybrid.model.model_costs import with_models
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import model_is_free
-from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import missing_time
-from hybrid.simulation.case import Case
-from hybrid.simulation.case_at_rest import CaseAtRest
+from hybrid.scene.short_form import network_of
+from hybrid.simulation.case import Case, CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.progress import Listener, ProgressReporter, interrupts, listener_of, tell_of_compiling
 from hybrid.simulation.restart import remaining
@@ -64,8 +63,8 @@ def run(
         raise SceneError([missing_time()])
     _check(scene, criterion)
     case = Case(scene, criterion)
-    chosen = criterion is None and case.flat and model_is_free(case.scene)  # most often rods: they compile the least
-    compile_beside(with_model(case.scene, "rod") if chosen else scene)
+    free = [name for name in scene.lines if criterion is None and model_is_free(scene.scene_of(name))]
+    compile_beside(with_models(scene, dict.fromkeys(free, "rod")))  # most often chosen: they compile the least
     target = _target(output, overwrite, case.wants_errors)
     with locked(_path(output)), _supervised(case, progress):
         if isinstance(target, Path):
@@ -136,7 +135,7 @@ def resume(
         if left.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
-        _check(left.scene, criterion, moves=False)
+        _check(left.scene, criterion)
         case = Case(left.scene, criterion, left.changes, left.points)
         with _supervised(case, progress):
             Passes(case, target, path, left).compute()
@@ -151,13 +150,9 @@ def first_at_rest(scene: Any) -> tuple[Any, NetworkResolution]:
     return case.scene, found
 
 
-def _check(scene: Any, criterion: UserCriterion | None = None, moves: bool = True) -> None:
-    """SceneError: its motions are none; TypeError: there is nothing that a criterion could ask for.
-
-    moves: whether the former is to be looked at.
-    """
-    if moves and not scene.line_names:  # of several lines they were looked at with the scene
-        check_motions(scene)
+def _check(scene: Any, criterion: UserCriterion | None = None) -> None:
+    """SceneError: its motions are none; TypeError: there is nothing that a criterion could ask for."""
+    network_of(scene)  # which is checked with its motions
     if criterion is not None and not scene.adaptive:
         raise TypeError(NO_ZONES)
 

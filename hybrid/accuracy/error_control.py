@@ -38,6 +38,8 @@ Beside = AbstractContextManager[Sequence[Callable[[], Samples]]]
 class Compares(Comparable, Protocol):
     """What computes the runs that a result is compared with; all raise ComputationError."""
 
+    @property
+    def names(self) -> Mapping[str, str]: ...
     def beside(self, samples: Sequence[Callable[[], Samples]]) -> Beside:
         """Several of them at the same time (simulation.case)."""
 
@@ -77,7 +79,7 @@ class ErrorController:
     compared: Tree | None = None  # checkpoint of the first result with its comparisons, as long as that stands
     standing: Samples = field(default_factory=dict)  # the result in its place
     notes: list[tuple[str, str]] = field(default_factory=list)  # events of all lines
-    _touching: bool = False  # whether contact that nobody asks for was computed in the runs to compare with
+    _touching: set[str] = field(default_factory=set)  # lines that could touch themselves in runs to compare with
     _lost: bool = False  # whether the runs to compare with are to be computed again
 
     def __post_init__(self) -> None:
@@ -287,7 +289,7 @@ class ErrorController:
 
     def _touches_now(self, result: Samples) -> bool:
         """Whether lines touch themselves in a result, and did not where they could not, in runs to compare with."""
-        return not self._touching and any(x.touches for x in result.values())
+        return any(x.touches and name not in self._touching for name, x in result.items())
 
     def _take_finer(self, result: Samples) -> None:
         self.settle(True)
@@ -319,7 +321,7 @@ class ErrorController:
                         self._lacks_errors(error)
                         return
                 if not k and (first := found[0]) is not None:
-                    self._touching = any(x.touches for x in first.values())
+                    self._touching = {name for name, x in first.items() if x.touches}
                     found[0] = with_model_errors(self.case, first, self.runs)
         for name, line in self.lines.items():
             one, second, third = (None if x is None else x[name] for x in found)
@@ -361,7 +363,7 @@ class ErrorController:
             "runs": np.array(self.runs), "next": self.next and _tree(self.next),
             "first": self.first and _tree(self.first),
             "budget": self.budget.checkpoint() if self.budget is not None else [], "notes": list(self.notes),
-            "touching": self._touching, "lines": {name: x.checkpoint() for name, x in self.lines.items()},
+            "touching": sorted(self._touching), "lines": {name: x.checkpoint() for name, x in self.lines.items()},
         }  # fmt: skip
 
     def restore(
@@ -374,23 +376,25 @@ class ErrorController:
         are computed again.  ResultError or ValueError: it is none of this scene.
         """
         tree = _as_now(tree, scenes, kept)
-        template: Tree = {"runs": np.zeros(0), "touching": True}
-        names = ("next", "first", "lines", "budget", "notes")
+        template: Tree = {"runs": np.zeros(0)}
+        names = ("next", "first", "lines", "budget", "notes", "touching")
         saved = matched(
             {"touching": True, "notes": [], "first": None, "budget": []} | dict(tree),
             template | dict.fromkeys(names),
             "error control",
         )
         self.runs[:] = saved["runs"].tolist()
-        self._touching, self.notes = saved["touching"], list(restored_notes(saved["notes"]))
+        touching = saved["touching"]  # whether all could, in files of 1.0
+        self._touching = set(scenes if touching is True else touching or ())
+        self.notes = list(restored_notes(saved["notes"]))
         self.next, self.first = (x and _resolution(x, scenes) for x in (saved["next"], saved["first"]))
         if self.budget is not None and saved["budget"]:
             self.budget.restore(matched(saved["budget"], [0.0, 0.0], "budget"))
-        if set(saved["lines"]) - set(scenes):
+        if (set(saved["lines"]) | self._touching) - set(scenes):
             raise ValueError("errors of other lines")
         for name, line in saved["lines"].items():
-            on_disk = name if len(scenes) > 1 else ""
-            self._lost |= not self.lines[name].restore(line, scenes[name], points[name], source, on_disk)
+            on_disk = scenes[name], points[name], source, self.case.names[name]
+            self._lost |= not self.lines[name].restore(line, *on_disk)
         self.standing = {k: x.estimate.run for k, x in self.lines.items() if x.estimate is not None}
         if self.next is None and not self.known:
             raise ValueError("neither a result nor one that is to come")

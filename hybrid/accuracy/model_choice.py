@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection
 from dataclasses import replace
 from math import ceil, isinf
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import Model
@@ -34,15 +34,12 @@ from hybrid.scene.analysis import RodModel
 from hybrid.scene.cable import Section
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import AdaptiveModel, Environment, LineScene
+from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.case import Case
 from hybrid.simulation.initial_zones import HOLD
 from hybrid.simulation.layer_mesh import layered, shown
 from hybrid.simulation.mesh_survey import CELLS, STEPS, Survey, lack_along, with_survey
 from hybrid.simulation.zone_switching import LONGEST_IN_PACE, READY
-
-if TYPE_CHECKING:
-    from hybrid.scene.network_scene import Network
-
 
 # Why a line may be no catenary that has come near itself in a pre-run.
 NEAR = "it comes near itself, and contact of catenaries alone is not asked for"
@@ -102,7 +99,7 @@ def chosen_and_surveyed(
     with case.instead(rods):
         of_rods, coarse = case.lines, resolution.coarser(CELLS, STEPS if case.moves else 1.0)
         if not (case.moves and case.scene.starts_as_placed):  # a shape that is given has the bends that it has
-            coarse = shown(of_rods, coarse, case.first_compared)
+            coarse = shown(of_rods, coarse, case.first_shapes)
         surveys = case.survey(resolution, coarse)
     if surveys is None:
         failed = ModelChoice("rod", "the pre-run that would show what others cost failed")
@@ -152,28 +149,14 @@ def rods_instead_of_slack(scene: Scene, error: ComputationError) -> Instead | No
     """A scene with rods in place of catenaries that stood for no model; None: they did not, or did not go slack."""
     if error.outcome != Outcome.SLACK or error.t is None:
         return None
-    asked: Any = scene
-    return _rods_in_network(asked, error) if scene.line_names else _rods_of_cable(asked, error)
-
-
-def _rods_of_cable(scene: LineScene, error: ComputationError) -> Instead | None:
-    if "model" in scene.model_fields_set or payout_of(scene) is not None or scene.model.kind != "catenary":
+    name, network, form = error.line_name, network_of(scene), short_form(scene)
+    line = next((x for key, x in network.lines.items() if form.names[key] == name), None)
+    if line is None or line.model is not None or payout_of(scene.scene_of(name)) is not None:
         return None
-    sections, given = _stiffened(scene.cable.sections, scene.environment)
-    cable = scene.cable.model_copy(update={"sections": sections})
-    return Instead(scene.model_copy(update={"cable": cable, "model": RodModel()}), _text(error, given))
-
-
-def _rods_in_network(system: Network, error: ComputationError) -> Instead | None:
-    """Rods in the line that the error names."""
-    line = system.lines.get(error.line_name)
-    if line is None or line.model is not None:
-        return None
-    sections, given = _stiffened(line.sections, system.environment)
-    other = line.model_copy(update={"sections": sections, "model": RodModel()})
-    lines = {name: other if name == error.line_name else x for name, x in system.lines.items()}
-    text = f"line {error.line_name}: {_text(error, given)}" + "; no other line has changed" * (len(lines) > 1)
-    return Instead(system.model_copy(update={"lines": lines}), text)
+    sections, given = _stiffened(line.sections, scene.environment)
+    text = f"{f'line {name}: ' * bool(name)}{_text(error, given)}"
+    text += "; no other line has changed" * (len(form.names) > 1)
+    return Instead(scene.with_lines({name: {"sections": sections, "model": RodModel()}}), text)
 
 
 def _stiffened(sections: tuple[Section, ...], around: Environment) -> tuple[tuple[Section, ...], list[float]]:

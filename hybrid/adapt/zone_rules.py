@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial, update_wrapper
 from typing import Any, NamedTuple
 
@@ -360,13 +360,18 @@ UserCriterion = Callable[[NodeState], Floats]
 
 
 def of_line(criterion: UserCriterion | None, name: str) -> UserCriterion | None:
-    """The criterion for a line of several, which sees its name."""
+    """The criterion for a line, which sees its name."""
+    return with_names(criterion, {"": name})
+
+
+def with_names(criterion: UserCriterion | None, names: Mapping[str, str]) -> UserCriterion | None:
+    """The criterion, which sees other names of lines."""
     if criterion is None:
         return None
     asked = criterion
 
     def of_named(nodes: NodeState) -> Floats:
-        return asked(nodes._replace(line=name))
+        return asked(nodes._replace(line=names[nodes.line]))
 
     return update_wrapper(of_named, asked) if callable(asked) else asked
 

@@ -16,7 +16,7 @@ from hybrid.model.plan import plan
 from hybrid.model.resolution import model_is_free
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import located_in, read_text
-from hybrid.simulation.case_at_rest import CaseAtRest
+from hybrid.simulation.case import CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.reader import Result, written_result

@@ -15,7 +15,7 @@ from hybrid.model.contents import Entry
 from hybrid.model.self_reach import payouts, self_reach
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, LinesContact
-from hybrid.scene.root import Scene
+from hybrid.scene.root import Scene, SomeScene
 from hybrid.scene.schema import LineScene
 
 if TYPE_CHECKING:  # its tables take long to make
@@ -101,11 +101,11 @@ def that_may_meet(system: Scene, scenes: Mapping[str, LineScene]) -> tuple[int, 
     return found if len(found) > 1 else ()
 
 
-def passing_each_other(system: Network) -> Network:
+def passing_each_other(scene: SomeScene) -> SomeScene:
     """The same, of which no line touches another one unless the scene asks for it."""
-    if system.contact is not None or len(system.lines) == 1:
-        return system
-    return system.model_copy(update={"contact": LinesContact(between=())})
+    if len(scene.lines) == 1 or scene.contact is not None:
+        return scene
+    return scene.model_copy(update={"contact": LinesContact(between=())})
 
 
 def _may_meet(scene: LineScene) -> bool:

@@ -17,7 +17,7 @@ from hybrid.model.material import Material, tension_floor
 from hybrid.model.mesh import Grading
 from hybrid.model.resolution import Resolution, accuracy_of, holds_stress, requested_accuracy, wants_errors
 from hybrid.scene.accuracy import of_unnamed_model
-from hybrid.scene.network_scene import Network
+from hybrid.scene.root import SomeScene
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, LineScene, RodModel
 
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
@@ -103,12 +103,10 @@ def with_model(scene: LineScene, kind: str) -> LineScene:
     return scene.model_copy(update=changed)
 
 
-def with_models(system: Network, kinds: Mapping[str, str]) -> Network:
+def with_models(scene: SomeScene, kinds: Mapping[str, str]) -> SomeScene:
     """The same with models of these kinds for lines by name, as of `with_model`."""
-    scenes = {name: with_model(system.scene_of(name), kind) for name, kind in kinds.items()}
-    changes = {name: {"model": x.model, "accuracy": x.accuracy} for name, x in scenes.items()}
-    lines = {name: x.model_copy(update=changes.get(name, {})) for name, x in system.lines.items()}
-    return system.model_copy(update={"lines": lines}) if kinds else system
+    lines = {name: with_model(scene.scene_of(name), kind) for name, kind in kinds.items()}
+    return scene.with_lines({name: {"model": x.model, "accuracy": x.accuracy} for name, x in lines.items()})
 
 
 def structural(scene: LineScene, cable: Material) -> str:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import CatenaryModel, LineScene
-
-if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.network_scene import Network
 
 # Diameters of slack of the smallest loop: WINDOW of contact.self_contact_pairs less OUTER of contact.self_contact_law,
 # which a plan does not import.
@@ -90,24 +87,6 @@ def contact_bits(scene: LineScene) -> int:
     if reach.asked:
         return SELF_CONTACT | (SELF_FRICTION if scene.contact.friction else 0)
     return MAY_TOUCH if reach.may else 0
-
-
-def without_contact(scene: LineScene) -> LineScene:
-    """The scene with no contact that it does not ask for."""
-    if scene.contact.self is not None:
-        return scene
-    return scene.model_copy(update={"contact": scene.contact.model_copy(update={"self": False})})
-
-
-def system_without_contact(system: Network) -> Network:
-    """The same of all lines of a system."""
-    lines = {
-        name: line.model_copy(update={"contact": line.contact.model_copy(update={"self": False, "friction": 0.0})})
-        if line.contact.self is None
-        else line
-        for name, line in system.lines.items()
-    }
-    return system.model_copy(update={"lines": lines})
 
 
 def touching_no_more(line: Line) -> Line:

@@ -262,18 +262,19 @@ class NetworkTables(Scene):
 
     def without_friction(self) -> Self:
         """The same whose equilibrium neglects friction, unless the scene says how it settles."""
-        lines = {k: x.model_copy(update={"initial": without_friction(x.initial)}) for k, x in self.lines.items()}
-        return self.model_copy(update={"lines": lines})
+        return self.with_lines({name: {"initial": without_friction(x.initial)} for name, x in self.lines.items()})
+
+    def with_lines(self, changes: Mapping[str, Mapping[str, Any]]) -> Self:
+        """The same with other tables, or other `sections`, of lines by name."""
+        lines = {name: x.model_copy(update=dict(changes.get(name, {}))) for name, x in self.lines.items()}
+        return self.model_copy(update={"lines": lines}) if changes else self
 
     def searched(self) -> Self:
         """The same, whose shapes at the start are those from which the equilibrium is searched for."""
         if not self.starts_as_placed:
             return self
-        lines = {
-            name: line.model_copy(update={"initial": Equilibrium(points=getattr(line.initial, "points", None))})
-            for name, line in self.lines.items()
-        }
-        return self.model_copy(update={"lines": lines})
+        shapes = {name: getattr(line.initial, "points", None) for name, line in self.lines.items()}
+        return self.with_lines({name: {"initial": Equilibrium(points=points)} for name, points in shapes.items()})
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -366,6 +367,11 @@ class NetworkTables(Scene):
         """Whether a line may break from the point at an end."""
         failure = self.lines[name].break_at
         return failure is not None and failure.end == end
+
+    @property
+    def may_break(self) -> bool:
+        """Whether anything may break or be let go."""
+        return any(getattr(x, "break_at", None) is not None for x in (*self.lines.values(), *self.points.values()))
 
     def clamp(self, name: str, end: str) -> ClampedConnection | None:
         """How a line is clamped at an end; None: it turns freely."""

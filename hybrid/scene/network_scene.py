@@ -346,9 +346,8 @@ def _rigid_point_findings(system: NetworkTables, name: str) -> Iterator[Finding]
 
 def travel_findings(system: NetworkTables) -> Iterator[Finding]:
     """Points that are, or move, farther from another than all lines between them are long, at the utmost strain."""
-    fails = [*system.lines.values(), *(x for x in system.points.values() if isinstance(x, FixedPoint | Fairlead))]
-    breaks = any(x.break_at is not None for x in fails)  # what is broken reaches anywhere
-    duration = system.time.duration if system.time is not None and not breaks else 0.0
+    # what is broken reaches anywhere
+    duration = system.time.duration if system.time is not None and not system.may_break else 0.0
     placed = {name: system.first_place(name) for name in system.points if system.is_held(name)}
     motions = {name: _motion(system, name) for name in placed}
     beside = _neighbours(system)

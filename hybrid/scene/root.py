@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
 from pydantic import Field, GetCoreSchemaHandler
 from pydantic.json_schema import models_json_schema
@@ -99,6 +99,7 @@ class Scene(Table):
         def scene_of(self, name: str) -> Any: ...
         def key_of(self, name: str) -> str: ...
         def without_friction(self) -> Self: ...
+        def with_lines(self, changes: Mapping[str, Mapping[str, Any]]) -> Self: ...
 
     def __new__(cls, **tables: Any) -> Self:
         """A scene of the form in which its tables are written."""
@@ -143,6 +144,9 @@ class Scene(Table):
         wanted = max(OUTPUTS, math.ceil(min(PER_PERIOD * time.duration / self.lasting_period, 1e9)))
         most = max(OUTPUTS, int(UNASKED_BYTES / self.size_of_output))
         return max(time.duration / min(wanted, most), time.step or 0.0)
+
+
+SomeScene = TypeVar("SomeScene", bound=Scene)
 
 
 def _as_written(data: Any) -> Scene:

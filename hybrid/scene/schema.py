@@ -246,7 +246,14 @@ class LineScene(Scene):
 
     def without_friction(self) -> Self:
         """The same whose equilibrium neglects friction, unless the scene says how it settles."""
-        return self.model_copy(update={"initial": without_friction(self.initial)})
+        return self.with_lines({"": {"initial": without_friction(self.initial)}})
+
+    def with_lines(self, changes: Mapping[str, Mapping[str, Any]]) -> Self:
+        """The same with other tables, or other `sections`, of lines by name."""
+        update = dict(changes.get("", {}))
+        if "sections" in update:
+            update["cable"] = self.cable.model_copy(update={"sections": update.pop("sections")})
+        return self.model_copy(update=update) if update else self
 
     @model_validator(mode="before")
     @classmethod

@@ -15,7 +15,7 @@ The line is called `cable`, and the points are called as the ends are.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -68,10 +68,11 @@ class ShortForm:
     """Where keys of a network are in the scene that it was made of.
 
     pairs: places in the network and in the scene; what is below such a place is below the other one.  Without any the
-    scene is that network.
+    scene is that network.  names: of the lines of the network, each as in the scene: "" of the one without a name.
     """
 
     pairs: tuple[tuple[Place, Place], ...]
+    names: Mapping[str, str]
 
     def place(self, at: Place) -> Place:
         """Where a key of the network is in the scene."""
@@ -94,7 +95,7 @@ class ShortForm:
 
     @contextmanager
     def said(self) -> Iterator[None]:
-        """What fails within, of the network, is said of the cable."""
+        """What fails within, of the network, is said in words of the scene."""
         try:
             yield
         except ComputationError as error:
@@ -113,7 +114,9 @@ class ShortForm:
             raise SceneError(said, error.file) from None
 
     def error(self, error: ComputationError) -> ComputationError:
-        """What has failed of the network, of the cable."""
+        """What has failed of the network, in words of the scene."""
+        if not self.pairs:
+            return error
         detail, first = re.sub(r"^the cable(; |$)", "", self.text(error.detail)), self.text(error.first)
         return ComputationError(error.outcome, error.t, error.s, detail, error.snapshot, first)
 
@@ -172,7 +175,7 @@ def _made_of(key: _This) -> Network:
 def short_form(scene: Scene) -> ShortForm:
     """Where the keys of the network of a scene are in that."""
     if not isinstance(scene, LineScene):
-        return ShortForm(())
+        return ShortForm((), {name: name for name in scene.lines})
     pairs: list[tuple[Place, Place]] = [(("lines", LINE), ("cable",))]
     pairs += [(("lines", LINE, name), (name,)) for name in ("model", *OF_LINE)]
     pairs += [(("output", name, LINE), ("output", name)) for name in ("points", "history")]
@@ -180,7 +183,7 @@ def short_form(scene: Scene) -> ShortForm:
         _, called, _ = POINTS[getattr(scene.ends, name).kind]
         pairs += [(("points", name), ("ends", name)), (("lines", LINE, "connections", name), ("ends", name))]
         pairs += [(("points", name, there), ("ends", name, here)) for here, there in called.items()]
-    return ShortForm(tuple(pairs))
+    return ShortForm(tuple(pairs), {LINE: ""})
 
 
 def _end(end: End) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The runs of one scene in motion: results, in files that can be resumed, and runs to compare with."""
+"""The runs of one scene, in motion or at rest: results, in files that can be resumed, and runs to compare with."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from hybrid.adapt.zone_rules import UserCriterion, of_line
+from hybrid.adapt.zone_rules import UserCriterion, with_names
 from hybrid.errors import ComputationError, ResultError
+from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.material import NO_DOUBT
-from hybrid.model.model_costs import with_model, with_models
+from hybrid.model.model_costs import with_models
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.resolution import (
@@ -35,12 +36,11 @@ from hybrid.model.resolution import (
     wants_survey,
 )
 from hybrid.model.sections import OutputPoints, output_points
-from hybrid.model.self_reach import self_reach, system_without_contact, without_contact
-from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
+from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors, layer_errors
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE, network_of, short_form
+from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.layer_mesh import rods_at_rest
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
@@ -49,8 +49,7 @@ from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, 
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import is_cut_off, kept_resolution
 from hybrid.simulation.result_checks import damped_vibrations
-from hybrid.simulation.run_file import AnyRecorder, Cable
-from hybrid.simulation.run_of_lines import with_loads_of
+from hybrid.simulation.run_file import AnyRecorder, Asked
 from hybrid.simulation.run_sample import (
     ALL,
     COMPARED,
@@ -71,9 +70,9 @@ from hybrid.simulation.run_sample import (
 )
 from hybrid.simulation.run_zones import Start
 from hybrid.store.array_contents import ArrayRecorder, MemoryTarget, Target
-from hybrid.store.copying import GROUP
+from hybrid.store.copying import group_of
 from hybrid.store.envelope import GROUP as ENVELOPE
-from hybrid.store.hdf5_file import open_file, opened
+from hybrid.store.hdf5_file import open_file
 from hybrid.store.limits import EXTREMES, extremes_about
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result, written_result
@@ -98,7 +97,7 @@ MOST_IN_MEMORY = 1_000_000
 class Case:
     """One scene in motion, of any number of lines, computed as often and as finely as it takes.
 
-    What it gives of a run is by the names of the lines; that of a cable is `LINE`, as in the network of it.
+    What it gives of a run is by the names that lines have in its network.
     """
 
     moves = True
@@ -108,44 +107,47 @@ class Case:
     _results = 0  # that were begun
     _told: tuple[object, str] | None = None  # a scene, and what it is as a text
     _start: tuple[Network, NetworkResolution, Start] | None = None  # that was looked at last
-    _apart: tuple[Network, Network] | None = None  # a network, and the same without contact
+    # Whether contact of lines with themselves that nobody asks for is computed in runs to compare with: where one has
+    # touched itself in a result.  Before, coarse cells would meet where those of the result do not.
+    touches_itself = False
 
     def __init__(
         self,
         scene: Scene,
         criterion: UserCriterion | None,
         changes: Sequence[LoadChange[Any]] = (),
-        points: OutputPoints | None = None,
+        points: Mapping[str, OutputPoints] | None = None,
     ) -> None:
         """changes: scenes that hold from some time on; what they may differ in, `remaining_run` has checked.
 
-        points: of the result of a cable that is continued; None: those of the scene.
+        points: of the result that is continued, by the names that lines have in the scene; None: those of the scene.
         """
         self.scene: Any = scene  # what is computed, as the user wrote it
-        # Whether it is of a cable: its file is flat, and the error of leaving bending out is followed along its run,
-        # which moves no ends.  Lines that are joined move each other, and are compared with rods.
+        # Whether its line has no name: what leaving bending out does is followed along its run, which moves no ends.
+        # Lines that are joined move each other, and are compared with rods.
         self.flat = not scene.line_names
-        self.criterion = of_line(criterion, "") if self.flat else criterion
+        self.criterion = with_names(criterion, self.names)
         self.changes: tuple[LoadChange[Any], ...] = tuple(changes)
-        if not self.flat:
-            self.changes = tuple(replace(x, scene=with_loads_of(self.network, x.scene)) for x in changes)
-        self.points = {name: points or self._points_of(x) for name, x in self.lines.items()}
+        lines, kept = self.lines, points or {}
+        self.points = {name: kept.get(self.names[name]) or self._points_of(x) for name, x in lines.items()}
         # Of these, where runs are compared: a bend may be sharp between a hundred places.
         self.places = {
-            name: ALL if judges_bends(x) else compared_places(self.points[name]) for name, x in self.lines.items()
+            name: ALL if judges_bends(x) else compared_places(self.points[name]) for name, x in lines.items()
         }
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
         self._owner = threading.get_ident()  # the thread that puts files in their places
         self.near_themselves = set[str]()  # lines that came near themselves in a run to compare with
-        # Whether contact of lines with themselves is computed in runs to compare with: where it is asked for, or a line
-        # has touched itself in a result.  Before, coarse cells would meet where those of the result do not.
-        self.touches_itself = self.flat and bool(self.network.lines[LINE].contact.self)
         self.reach = dict[str, Reach]()  # how far lines move, by a pre-run
         self.notes: list[tuple[str, str]] = []  # events (kind, text) of the whole of every result
         self._unwanted = threading.Event()  # what runs to compare with still compute
 
     # --- the scene ------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> Mapping[str, str]:
+        """Names of the lines of the network, each with that of the line in the scene."""
+        return short_form(self.scene).names
 
     def _points_of(self, scene: LineScene) -> OutputPoints:
         """Where outputs of a line are."""
@@ -161,14 +163,11 @@ class Case:
     @property
     def lines(self) -> dict[str, LineScene]:
         """The lines by name, as scenes of their own."""
-        scenes = [self.scene.scene_of(name) for name in self.scene.lines]
-        return dict(zip(self.network.lines, scenes, strict=True))
+        return {name: self.scene.scene_of(called) for name, called in self.names.items()}
 
     def with_models(self, kinds: Mapping[str, str]) -> Any:
         """The scene with models of these kinds for lines by name."""
-        if not self.flat:
-            return with_models(self.scene, kinds)
-        return with_model(self.scene, kinds[LINE]) if kinds else self.scene
+        return with_models(self.scene, {self.names[name]: kind for name, kind in kinds.items()})
 
     @contextmanager
     def instead(self, scene: Any) -> Iterator[None]:
@@ -187,8 +186,7 @@ class Case:
     @property
     def from_rest(self) -> bool:
         """Whether it begins from an equilibrium, or is one."""
-        ends = self.scene.ends.both if self.flat else ()
-        return not (self.moves and (self.scene.starts_as_placed or any(end.release for end in ends)))
+        return not (self.moves and (self.scene.starts_as_placed or self.network.may_break))
 
     @property
     def _duration(self) -> float:
@@ -245,12 +243,6 @@ class Case:
 
     def resume(self, source: Path, target: Path, before: Tree | None = None) -> Samples:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
-        if self.flat:
-            with opened(source) as file:
-                if "self_contact" not in file and self_reach(self.scene).may:
-                    told, self.scene = self._texts[0], without_contact(self.scene)
-                    self.changes = tuple(replace(x, scene=without_contact(x.scene)) for x in self.changes)
-                    self._told = self.scene, told  # the file keeps what was asked for
         resolution = kept_resolution(self.network, source)
         first = self._takes_its_place(target)
         begin = self._begin_result(resolution.one, first)
@@ -263,8 +255,13 @@ class Case:
         if not is_cut_off(source, self._texts, resolution):
             return False
         with open_result(source) as result:
-            parts = result.lines or {LINE: result}
-            return all(np.array_equal(parts[name]["s"], x.s) for name, x in self.points.items())
+            lines = self._by_line(result)
+            return all(np.array_equal(lines[name]["s"], x.s) for name, x in self.points.items())
+
+    def _by_line(self, result: Result) -> dict[str, Result]:
+        """Results of the lines by name."""
+        found = dict(result.each_line())
+        return {name: found[called] for name, called in self.names.items()}
 
     def _begin_result(self, resolution: Resolution, first: bool) -> float:
         """The pass of a result begins; s of processor time.  first: it takes the place of one that may be there."""
@@ -300,11 +297,12 @@ class Case:
         with ExitStack() as stack:
             data = late.data if late is not None else stack.enter_context(open_file(target, summed=False))
             result = stack.enter_context(written_result(target) if whole is None else nullcontext(whole))
-            parts = result.lines or {LINE: result}
+            lines = self._by_line(result)
             for line in run.lines:
-                group = "" if self.flat else f"{GROUP}/{line.name}/"
-                samples[line.name] = self._sample_of(line, run, data, group, parts[line.name], cpu, stay)
-        self.touches_itself |= any(x.touches for x in samples.values())
+                group = group_of(self.names[line.name])
+                samples[line.name] = self._sample_of(line, run, data, group, lines[line.name], cpu, stay)
+        asked = {name for name, x in self.network.lines.items() if x.contact.self}
+        self.touches_itself |= any(x.touches for name, x in samples.items() if name not in asked)
         return samples
 
     def _sample_of(
@@ -329,7 +327,6 @@ class Case:
             for x, y in stored.items()
         }
         places, kinds = self.places[name], own["events/kind"][()]
-        unasked = self.flat or self.network.lines[name].contact.self is None
         missed = {x: most_at_places(own[EDGE_ERRORS + x], places) for x in MISSED if EDGE_ERRORS + x in own}
         cells = compared_cells(model)
         if follows_curvature(scene):
@@ -337,26 +334,26 @@ class Case:
         held: dict[str, Any] = {}
         if self._judges(name):
             held = {x: own[x][()] for x in _datasets(own, ENVELOPE, EXTREMES)}
-            asked = (x for x, q in self.network.output.quantities.items() if group and q.line == name)
+            asked = (x for x, q in self.network.output.quantities.items() if q.line == name)
             held |= {full: data[full][()] for x in asked if (full := f"{EXTREMES}/{x}") in data}
         values, model_error = split_outputs(found)
         moves, notes, forces = line.manager is not None, Notes(), np.zeros((0, 3))
         if self.moves:
             forces = np.column_stack([own[f"steps/{x}"][()] for x in FORCES])
-        if self.flat and resolution.local is not None:
+        if resolution.local is not None:
             notes = damped_vibrations(result)
         return RunSample(
             resolution, values, cells, max(run.steps, 1), cpu, 1, b"unresolved bend" in kinds, model_error,
             resolution.zones * model.length if moves and self.flat else 0.0, notes,
             forces=forces, catenary=np.array([catenary_share(x) for x in result.zones]) if moves else np.zeros(0),
-            doubt=doubt_of_line(line), touches=b"line touches itself" in kinds and unasked, places=places,
+            doubt=doubt_of_line(line), touches=b"line touches itself" in kinds, places=places,
             at_edges=missed, extremes=extremes_about(held, self.points[name].s),
             rods=() if self.flat else rods_of(result.zones),
         )  # fmt: skip
 
     def _judges(self, name: str) -> bool:
-        """Whether limits are held against extremes of a line, or ranges of several lines are asked for by name."""
-        asked = not self.flat and any(x.line == name for x in self.network.output.quantities.values())
+        """Whether limits are held against extremes of a line, or ranges of it are asked for by name."""
+        asked = any(x.line == name for x in self.network.output.quantities.values())
         return self.moves and self.wants_errors and (asked or has_limits(self.lines[name]))
 
     def _places_of(self, name: str, line: str) -> np.ndarray | None:
@@ -401,13 +398,13 @@ class Case:
             name: x.s[self.places[name]] if self.places[name].size else x.s for name, x in self.points.items()
         }
         looked = {name: x._replace(s=s[name]) if name in s else x for name, x in self.points.items()}
-        recording = Recording(points=looked, until=until, touches=not self.flat or self.touches_itself)
+        recording = Recording(points=looked, until=until, touches=self.touches_itself)
         run = self._network_run(resolution, None, recording)
         if points is None and self.beside_result is not None:
             for line in run.lines:
                 numbers = (len(run.times) + 1) * sum(math.prod(field.shape) for field in line.observer.fields)
                 if numbers > MOST_IN_MEMORY:
-                    key = rows_key(resolution.lines[line.name], "" if self.flat else line.name)
+                    key = rows_key(resolution.lines[line.name], self.names[line.name])
                     line.recorder = RowsRecorder(rows_path(self.beside_result, key), FORCE_COLUMNS)
         try:
             with self._said():
@@ -416,7 +413,7 @@ class Case:
             for line in run.lines:
                 line.recorder.close("", "")
         for line in run.lines:
-            if line.contact is not None or (self.flat and run.contact.came_near_itself):
+            if line.contact is not None or line.name in run.contact.near_themselves:
                 self.near_themselves.add(line.name)
         cpu = clock.thread_time() - begin
         return {x.name: self._compared_line(x, run, cpu, judged=points is None) for x in run.lines}
@@ -438,7 +435,7 @@ class Case:
             resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
             resolution.every, False, errors, resolution.zones * line.model.length if moves and self.flat else 0.0,
             notes, rows, found.steps, found.catenary if moves else np.zeros(0), doubt_of_line(line),
-            run.contact.lets_touch if self.flat else self.touches_itself, self.places[name],
+            run.contact.lets_touch or bool(self.network.lines[name].contact.self), self.places[name],
             extremes=extremes_about(held, self.points[name].s), rods=tuple(sorted(found.rods)),
         )  # fmt: skip
 
@@ -472,7 +469,7 @@ class Case:
         self, coarse: NetworkResolution, until: float | None
     ) -> tuple[dict[str, Model], dict[str, Floats], Samples]:
         """Models of a pre-run, where they are looked at, m, and what is seen there."""
-        models = {name: model for name, (model, _) in self.first_compared(coarse).items()}
+        models = {name: model for name, (model, _) in self.first_shapes(coarse).items()}
         points = {name: survey_points(x, coarse.lines[name]) for name, x in models.items()}
         return models, points, self.sample(coarse, points, until)
 
@@ -480,52 +477,35 @@ class Case:
 
     def _said(self) -> AbstractContextManager[None]:
         """What fails within, in the words of the scene."""
-        return short_form(self.scene).said() if self.flat else nullcontext()
+        return short_form(self.scene).said()
 
     def _network_run(self, resolution: NetworkResolution, target: Target | None, recording: Recording) -> NetworkRun:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
         network, changes = self.network, [replace(x, scene=network_of(x.scene)) for x in self.changes]
-        network = self._compared_network if target is None else network
-        cable = Cable(self.scene, self.changes) if self.flat else None
-        recording = recording._replace(planes=True, error=self.flat, cable=cable)
+        recording = recording._replace(planes=True, error=self.flat, asked=Asked(self.scene, self.changes))
         if recording.points is None:
             recording = recording._replace(points=self.points)
         with self._said():
             if recording.source is None:
-                recording = recording._replace(start=self._first_state(resolution, network))
+                recording = recording._replace(start=self._first_state(resolution))
             texts, end = self._texts, (self.criterion, changes)
             return NetworkRun(network, target, texts[0], self.moves, resolution, recording, *end)
 
-    @property
-    def _compared_network(self) -> Network:
-        """The network of runs to compare with."""
-        if not self.moves or self.flat or self.touches_itself:
-            return self.network
-        if self._apart is None or self._apart[0] is not self.network:
-            self._apart = self.network, system_without_contact(self.network)
-        return self._apart[1]
-
-    def _first_state(self, resolution: NetworkResolution, network: Network) -> Start:
-        """The first state of a network, which may have been kept for a run of this resolution."""
-        kept, self._start = self._start, None
+    def _first_state(self, resolution: NetworkResolution) -> Start:
+        """The first state, which may have been kept for a run of this resolution."""
+        (kept, self._start), network = (self._start, None), self.network
         if kept is not None and kept[0] is network and _is_same(kept[1], resolution):
             return kept[2]
         with at_once(self.interrupted):
             return start_of(network, build_system(network, resolution), self.moves, self.criterion)
 
     def first_shapes(self, resolution: NetworkResolution) -> dict[str, tuple[Model, State]]:
-        """Models and first states of a result, by line; they are kept for that of this resolution, if it comes next."""
-        return self._shapes(resolution, self.network)
-
-    def first_compared(self, resolution: NetworkResolution) -> dict[str, tuple[Model, State]]:
-        """The same of a run to compare with."""
-        return self._shapes(resolution, self._compared_network)
-
-    def _shapes(self, resolution: NetworkResolution, network: Network) -> dict[str, tuple[Model, State]]:
+        """Models and first states of a run, by line; they are kept for that of this resolution, if it comes next."""
+        network = self.network
         if network.adaptive:  # as rods, before zones are found
             return rods_at_rest(network, resolution, self.moves)
         with self._said():
-            start = self._first_state(resolution, network)
+            start = self._first_state(resolution)
         self._start = network, resolution, start
         states = [x.start for x in start.model.models] if start.found is None else start.found.state.lines
         return dict(zip(start.model.names, zip(start.model.models, states, strict=True), strict=True))
@@ -555,6 +535,59 @@ def _datasets(data: Mapping[str, Any], *groups: str) -> list[str]:
 def doubt_of_line(line: LineResult) -> Floats:
     """`RunSample.doubt` of a complete run; of zones that move criteria of zones bound what bending does."""
     return line.correction.doubt if line.correction is not None and line.manager is None else np.array(NO_DOUBT)
+
+
+class CaseAtRest(Case):
+    """The equilibrium of one scene at t = 0, under loads that have grown to their full size."""
+
+    moves = False
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene, None)
+        self.places = dict.fromkeys(self.lines, ALL)  # there is one output
+
+    def record(self, resolution: NetworkResolution, target: Target, before: Tree | None = None) -> Samples:
+        """Compute the result into a file, or memory; what is to be compared of it.  before: nobody goes on with it."""
+        begin, recording = clock.process_time(), Recording(pending=ERROR_ESTIMATE if self.wants_errors else "")
+        return self._move(self._network_run(resolution, target, recording), begin, first=True)
+
+    def beside(
+        self, samples: Sequence[Callable[[], Samples]]
+    ) -> AbstractContextManager[Sequence[Callable[[], Samples]]]:
+        """Equilibria are found one after the other."""
+        return nullcontext(samples)
+
+    def _compute(self, run: NetworkRun, interrupted: Callable[[], bool]) -> None:
+        run.record_equilibrium()
+
+    def _compared(self, run: NetworkRun, target: Target, cpu: float, late: LateFile | None) -> Samples:
+        if not self.wants_errors:
+            return super()._compared(run, target, cpu, late)
+        return {line.name: _sample(line, run, cpu) for line in run.lines}
+
+    def _compared_line(self, line: LineResult, run: NetworkRun, cpu: float, judged: bool) -> RunSample:
+        return _sample(line, run, cpu)
+
+
+def _sample(line: LineResult, run: NetworkRun, cpu: float) -> RunSample:
+    """What is compared of a line in an equilibrium that has been recorded; cpu: s, that it took."""
+    k, model, correction = line.number, line.model, line.correction
+    batch = line.state_now(0.0, run.solver.lines[k].ends, run.state.lines[k], run.solver.work[k])
+    seen = line.observer.observation(batch)
+    shift = correction.shift(correction.corrector.sampled[:1], batch) if correction is not None else None
+    values = line.observer.values_of(seen, shift=shift)
+    missed = edge_errors(seen) if model.line.bits & SEABED else {}
+    at_edges = {name: error[:, 0] for name, error in missed.items()}
+    for name, error in layer_errors(seen, [int(np.argmin(np.abs(model.line.s - at))) for at in model.attached]).items():
+        at_edges[name] = np.maximum(error, at_edges.get(name, 0.0))
+    return RunSample(
+        run.resolution.lines[line.name], {name: np.array(values[name]) for name in COMPARED if name in values},
+        compared_cells(model), 1, cpu, 1, False,
+        {k.removeprefix(MODEL_ERRORS): np.array(x) for k, x in values.items() if k.startswith(MODEL_ERRORS)},
+        catenary=np.array([catenary_share(model.zones)]) if model.layout is not None else np.zeros(0),
+        doubt=np.array(NO_DOUBT) if correction is None else correction.doubt,
+        at_edges={name: error[None] for name, error in at_edges.items()}, rods=rods_of([model.zones]),
+    )  # fmt: skip
 
 
 # Runs in threads beside each other: kernels release the GIL, and runs share nothing that they write.

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +20,7 @@ from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import Equilibrium, LineScene
-
-if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.network_scene import Network
+from hybrid.scene.short_form import network_of, short_form
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.entry.in_plane", "run.entry.in_space")
@@ -31,12 +29,11 @@ ZONES = "mesh.zone_step.follow_zones"
 CRITERIA = "mesh.zone_step.evaluate_criteria"
 MODEL_ERROR = "watch.bending_error.advance_error"
 STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
-# Of several lines: what all of them call, steps, equilibria, those that touch, those that are paid out.
-OF_LINES = ("run.network.solve_system", SOLVER[1], OUTPUTS)
+# Steps, equilibria, lines that are joined or touch, those that are paid out.
+OF_JOINED = "run.network.solve_system"
 STEPS_OF_LINES, REST_OF_LINES = "run.network_run.run_system", "run.network_run.sample_system"
 BOOKS_OF_LINES, START_OF_LINES = "run.network.book_system_step", "run.network.begin_line"
 TOUCHING_LINES = "junctions.lines_contact.touch_system", "junctions.shared_contact.shared_task"
-_OF_TOUCHING = OF_LINES[0], TOUCHING_LINES[0]  # of a line that touches itself
 PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "run.payout_run.change_node"  # this one: the rest
 
 # A cable for the second process to compile with; nothing is computed of it.
@@ -50,32 +47,37 @@ SAMPLE = {
 def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     """The kernels that a run of a scene calls, as room.file.function, by the last of each family; the solver's first.
 
-    static: those of its equilibrium, whose stability is judged where there are rods and no end moments.
+    static: those of its equilibrium, whose stability is judged where there are rods and no end moments.  Whether a line
+    is in a plane follows from the scene; rarely its first shape leaves the plane.
     """
-    one: Any = scene
-    return _kernels_of_lines(one, static) if scene.line_names else _kernels_of_cable(one, static)
-
-
-def _kernels_of_cable(scene: Any, static: bool) -> list[str]:
-    """Of a cable, which is computed as a network of one line.
-
-    Whether it is in a plane follows from the scene; rarely its first shape leaves the plane.
-    """
-    in_space = _is_in_space(scene, scene.dimension)
-    steps = [REST_OF_LINES] if static else [STEPS_OF_LINES, BOOKS_OF_LINES]
-    found = [SOLVER[in_space], START_OF_LINES, *steps, OUTPUTS]
-    if not in_space and _is_judged(scene, static):
+    network, form = network_of(scene), short_form(scene)
+    lines = {name: scene.scene_of(called) for name, called in form.names.items()}
+    together = {x for pair in network.touching_pairs for x in pair}
+    together |= {name for name, x in network.lines.items() if network.is_joined(x.start) or network.is_joined(x.end)}
+    alone = {name: x for name, x in lines.items() if name not in together}
+    planar = {name: x for name, x in alone.items() if not _is_in_space(x, scene.dimension)}
+    found = [SOLVER[0]] * bool(planar) + [SOLVER[1]] * (len(planar) < len(lines))
+    found += [START_OF_LINES, *([REST_OF_LINES] if static else [STEPS_OF_LINES, BOOKS_OF_LINES]), OUTPUTS]
+    touch_themselves = any(x.contact.self for x in lines.values())
+    if together or touch_themselves:
+        found.append(OF_JOINED)
+    leave_out = {name for name, x in lines.items() if wants_errors(x) and x.model.kind != "rod"}
+    followed = {name for name in leave_out if not form.names[name]}  # others are compared with rods
+    rods = {name for name, x in lines.items() if _has_rods(x)} | (leave_out - followed)
+    if any(_is_judged(x, static) for name, x in planar.items() if name in rods):
         found.append(STABILITY)
-    if scene.time is not None and scene.model.kind == "adaptive":
+    if scene.time is not None and scene.adaptive:
         found.append(CRITERIA if static else ZONES)
-    if not static and payout_of(scene) is not None:
+    if not static and any(payout_of(x) is not None for x in lines.values()):
         found += PAYOUT_OF_LINES
-    if scene.contact.self:
-        found += [TOUCHING, *_OF_TOUCHING]
-    if wants_errors(scene) and scene.model.kind != "rod":
+    if network.touching_pairs or touch_themselves:
+        found += TOUCHING_LINES
+    if touch_themselves:
+        found.append(TOUCHING)
+    if followed:
         found.append(MODEL_ERROR)
-        if static and scene.dimension is None and not in_space:
-            found.append(SOLVER[1])  # what leaving bending out does is followed in space
+    if static and scene.dimension is None and followed & {*planar} and SOLVER[1] not in found:
+        found.append(SOLVER[1])  # what leaving bending out does is followed in space
     return found
 
 
@@ -87,28 +89,9 @@ def _is_in_space(scene: LineScene, dimension: int | None) -> bool:
 
 
 def _is_judged(scene: LineScene, static: bool) -> bool:
-    """Whether the stability of an equilibrium is."""
+    """Whether the stability of an equilibrium with rods is."""
     turned = any(load.what == "moment" for end in scene.ends.both for load in end.loads)
-    return (static or isinstance(scene.initial, Equilibrium)) and _has_rods(scene) and not turned
-
-
-def _kernels_of_lines(system: Network, static: bool) -> list[str]:
-    """Of lines with names."""
-    found = [*OF_LINES, START_OF_LINES, *((REST_OF_LINES,) if static else (BOOKS_OF_LINES, STEPS_OF_LINES))]
-    joined = {name for name, x in system.lines.items() if system.is_joined(x.start) or system.is_joined(x.end)}
-    scenes = [system.scene_of(name) for name in system.lines if name not in joined]
-    planar = [x for x in scenes if not _is_in_space(x, system.dimension)]
-    if planar:
-        found.insert(0, SOLVER[0])
-    if any(_is_judged(x, static) for x in planar):
-        found.append(STABILITY)
-    if system.adaptive:
-        found.append(CRITERIA if static else ZONES)
-    if system.touching_pairs:
-        found += TOUCHING_LINES
-    if not static and any(payout_of(system.scene_of(name)) for name in system.lines):
-        found += PAYOUT_OF_LINES
-    return found
+    return (static or isinstance(scene.initial, Equilibrium)) and not turned
 
 
 def _has_rods(scene: LineScene) -> bool:
@@ -126,12 +109,9 @@ def compile_beside(scene: Scene, static: bool = False) -> None:
     """Let a second process compile what a scene calls besides the solver, which this one compiles meanwhile.
 
     Each waits for what the other is compiling (machine.compile).  Does nothing where all is compiled, or where there is
-    one core, or lines have names.  static: for its equilibrium alone.
+    one core.  static: for its equilibrium alone.
     """
-    if scene.line_names:
-        return
-    one: Any = scene
-    needed = [*_kernels_of_cable(one, static)[1:], *([] if static else [REST_OF_LINES])]  # beside the solver
+    needed = [*kernels_of(scene, static)[1:], *([] if static else [REST_OF_LINES])]  # beside the solver
     if MODEL_ERROR in needed and SOLVER[1] not in needed:  # a line in a plane needs both solvers
         needed.insert(needed.index(OUTPUTS) + 1, SOLVER[1])
     missing = [name for name in needed if not is_ready(name)]
@@ -159,7 +139,7 @@ def compile_all(names: Sequence[str]) -> None:
     from hybrid.kernels.run.entry import in_space
 
     table = np.zeros(0, np.int64)  # of which only the type counts
-    for name in (*OF_LINES[:1], START_OF_LINES, REST_OF_LINES, BOOKS_OF_LINES, STEPS_OF_LINES, *PAYOUT_OF_LINES[:2]):
+    for name in (OF_JOINED, START_OF_LINES, REST_OF_LINES, BOOKS_OF_LINES, STEPS_OF_LINES, *PAYOUT_OF_LINES[:2]):
         if name in names:
             entry(name).compile_unless_busy(table)
     if PAYOUT_OF_LINES[2] in names:

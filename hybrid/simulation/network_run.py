@@ -52,7 +52,7 @@ from hybrid.simulation.run_contact import (
 )
 from hybrid.simulation.run_cuts import Cuts
 from hybrid.simulation.run_failures import Failures
-from hybrid.simulation.run_file import Cable, CableFile, LinesFile
+from hybrid.simulation.run_file import Asked, file_of
 from hybrid.simulation.run_of_lines import WatchedLines, change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.run_points import Sampled
 from hybrid.simulation.run_quantities import Rotations, RunQuantities
@@ -91,7 +91,7 @@ class Recording(NamedTuple):
     which they lie; start: the first state, if it is known; points: of outputs of lines by name, None: those of
     their scenes; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself
     where lines come near themselves, else that is only noticed; error: whether that of leaving bending out is followed,
-    of lines whose resolution says so; cable: what the network was made of, whose file it gets.
+    of lines whose resolution says so; asked: what the network was made of, by whose names it gets its file.
     """
 
     mode: WriteMode = AT_ONCE
@@ -105,7 +105,7 @@ class Recording(NamedTuple):
     until: float | None = None
     touches: bool = True
     error: bool = False
-    cable: Cable | None = None
+    asked: Asked | None = None
 
 
 ALONE = Recording()
@@ -177,8 +177,7 @@ class NetworkRun:
             self.payout = RunPayout(me)
         reels = self.payout.lines if self.payout is not None else {}
         self.rotations = Rotations(system, self.model)
-        form, points = LinesFile if recording.cable is None else CableFile, recording.points or {}
-        self.file: LinesFile | CableFile = form(me, text, recording)
+        self.file, points = file_of(me, text, recording), recording.points or {}
         self.lines = list[LineResult]()
         for k, (name, scene, model, state) in enumerate(
             zip(names, self.scenes, self.model.models, self.state.lines, strict=True)

@@ -30,7 +30,8 @@ from hybrid.store.reader import Result, open_result
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.model.network import NetworkResolution
-    from hybrid.scene.network_scene import Network
+    from hybrid.scene.root import Scene
+    from hybrid.scene.schema import LineScene
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
 MAY_CHANGE = (
@@ -48,7 +49,7 @@ S = TypeVar("S")
 
 @dataclass(frozen=True)
 class LoadChange(Generic[S]):
-    """From time t (s) on, this scene, of one cable or of several lines, holds."""
+    """From time t (s) on, this scene holds."""
 
     t: float
     scene: S
@@ -58,19 +59,18 @@ class LoadChange(Generic[S]):
 class Remaining(Generic[S]):
     """What is to be done with a result: a scene, what changes later, and where to begin.
 
-    flat: whether it is of a cable, whose file has no groups of lines.  before: what was found before the run, of what
-    it is part of; {}: nothing, it begins with `resolution`.  anew: from t = 0, not from the checkpoint; reached: s,
-    where it begins; points: of a flat result, None if it is computed anew.
+    before: what was found before the run, of what it is part of; {}: nothing, it begins with `resolution`.  anew: from
+    t = 0, not from the checkpoint; reached: s, where it begins; points: of the lines of the result by their names in
+    the scene, None if it is computed anew.
     """
 
     scene: S
     changes: tuple[LoadChange[S], ...]
-    flat: bool
     resolution: NetworkResolution
     before: Tree
     anew: bool
     reached: float
-    points: OutputPoints | None
+    points: Mapping[str, OutputPoints] | None
 
 
 def remaining(
@@ -114,27 +114,25 @@ def _found(path: Path) -> tuple[Remaining[Any], bool]:
             state = point.state
             meets, reached = "let_pass" in state, max(point.t, float(state["t"]))
         with open_result(path) as result:
-            flat, points = not result.lines, None
+            lines = dict(result.each_line())
+            scene = _as_often(as_begun(read_text(result.scene_text)[0], lines, meets), result)
+            told = [(t, as_begun(read_text(text)[0], lines, meets)) for t, text in _told(path, result)]
+            with refused(path):
+                points = {name: _points_of(part, scene.scene_of(name)) for name, part in lines.items()}
+            done = result.done and not before
+    changes, resolution = tuple(LoadChange(*x) for x in told), kept_resolution(network_of(scene), path)
+    return Remaining(scene, changes, resolution, before, False, reached, points), done
 
-            def read(text: str) -> Any:
-                scene: Any = read_text(text)[0]
-                return scene if flat else as_begun(scene, result, meets)
 
-            scene = _as_often(read(result.scene_text), result)
-            changes = tuple(LoadChange(t, read(text)) for t, text in _told(path, result))
-            if flat:
-                with refused(path):
-                    longest = longest_out(scene)
-                    points = restored_points(result, longest, None if winch_side(scene) else scene.length)
-            done = result.done and not (flat and before)
-    resolution = kept_resolution(network_of(scene), path)
-    return Remaining(scene, changes, flat, resolution, before, False, reached, points), done
+def _points_of(result: Result, scene: LineScene) -> OutputPoints:
+    """Where outputs of the line of a result are; ValueError: they are not on it."""
+    return restored_points(result, longest_out(scene), None if winch_side(scene) else scene.length)
 
 
 def _longer(left: Remaining[Any], until: float) -> Remaining[Any]:
     """The same until another time (s), with outputs as often as before."""
-    reading = "hybrid.open(path).at(t=...)" if left.flat else "hybrid.open(path).lines[name].at(t=...)"
-    _refuse_what_is_no_later_time(until, left.reached, reading)
+    of_line = "".join(f".lines[{name!r}]" for name in [*left.scene.lines][:1] if name)
+    _refuse_what_is_no_later_time(until, left.reached, f"hybrid.open(path){of_line}.at(t=...)")
     _refuse_before_changes(left.changes, until)
     every = left.scene.output_interval
     scene = _scene_until(left.scene, until, every)
@@ -183,16 +181,14 @@ def _check(last: LoadChange[Any], changed: Any, resolution: NetworkResolution, b
                 _refuse_jump(one, other, k, begin, dotted(form.place((*place, "motion"))))
 
 
-def as_begun(system: Network, result: Result, meets: bool) -> Network:
+def as_begun(scene: Scene, lines: Mapping[str, Result], meets: bool) -> Scene:
     """The same, without contact that nobody asks for, of a result of a version that computed none then.
 
-    meets: whether it computed that between lines.
+    lines: of the result; meets: whether it computed that between lines.
     """
-    system, lines = system if meets else passing_each_other(system), dict(system.lines)
-    for name, line in system.lines.items():
-        if "self_contact" not in result.lines[name] and self_reach(system.scene_of(name)).may:
-            lines[name] = line.model_copy(update={"contact": line.contact.model_copy(update={"self": False})})
-    return system.model_copy(update={"lines": lines})
+    alone = [name for name, x in lines.items() if "self_contact" not in x and self_reach(scene.scene_of(name)).may]
+    contact = {name: {"contact": scene.lines[name].contact.model_copy(update={"self": False})} for name in alone}
+    return (scene if meets else passing_each_other(scene)).with_lines(contact)
 
 
 def changes_text(changes: Sequence[LoadChange[Any]]) -> str:

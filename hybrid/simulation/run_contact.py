@@ -101,7 +101,7 @@ class RunContact(Part):
         watches: whether lines that pass through each other are told of.
         """
         self._run, self.lets_touch, self._watches = run, lets_touch, watches
-        self.came_near_itself = False  # whether a line has
+        self.near_themselves = set[str]()  # names of lines that have come near themselves
         self.shared: SharedContact | None = None  # of lines with each other
         self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
         self._met: set[Pair] = set()  # lines that have been said to touch
@@ -235,7 +235,7 @@ class RunContact(Part):
         """
         run = self._run
         near = [line for line in run.lines if line.nears_itself]
-        self.came_near_itself |= bool(near)
+        self.near_themselves |= {line.name for line in near}
         if not self.lets_touch:
             for line in near:
                 line.watch_itself_no_more(run.solver)

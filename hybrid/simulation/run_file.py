@@ -1,8 +1,7 @@
 """What a run of lines is recorded in: a result of each line within that of the points, or the file of a cable.
 
 `LinesFile` has points, bodies, pairs and what is asked for by name at its root, and each line in a group of its own.
-`CableFile` is that of a network of one line that the scene of a cable was made of: the result of the line alone, in the
-words of that scene.
+`CableFile` is that of a line without a name: the result of the line alone, in the words of its scene.
 """
 
 from __future__ import annotations
@@ -44,11 +43,11 @@ from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 AnyRecorder = Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
 
 
-class Cable(NamedTuple):
-    """The scene of a cable that a network was made of, and what changes in it later."""
+class Asked(NamedTuple):
+    """The scene that a network was made of, and what changes in it later."""
 
-    scene: LineScene
-    changes: Sequence[LoadChange[LineScene]] = ()
+    scene: Any
+    changes: Sequence[LoadChange[Any]] = ()
 
 
 class Filing(Protocol):
@@ -59,7 +58,7 @@ class Filing(Protocol):
     @property
     def pending(self) -> str: ...
     @property
-    def cable(self) -> Cable | None: ...
+    def asked(self) -> Asked | None: ...
     @property
     def source(self) -> Any: ...
 
@@ -141,7 +140,7 @@ class LinesFile:
 
     @property
     def _texts(self) -> dict[str, Text]:
-        changes = self._run.changes
+        changes = self._run.changes if self._asks.asked is None else self._asks.asked.changes
         return {"scene": self._text} | ({"changes": changes_text(changes)} if changes else {})
 
     def begin(self) -> AnyRecorder:
@@ -230,8 +229,8 @@ class CableFile(LinesFile):
 
     def __init__(self, run: RecordedRun, text: Text, asks: Filing) -> None:
         super().__init__(run, text, asks)
-        assert asks.cable is not None
-        self._cable, self._form = asks.cable, short_form(asks.cable.scene)
+        assert asks.asked is not None
+        self._asked, self._form = asks.asked, short_form(asks.asked.scene)
 
     @property
     def _line(self) -> LineResult:
@@ -247,14 +246,14 @@ class CableFile(LinesFile):
         return s, s
 
     def scene_of(self, scene: LineScene) -> LineScene:
-        return self._cable.scene
+        return self._asked.scene
 
     def of_quantities(self, scenes: Mapping[str, LineScene]) -> Mapping[str, LineScene]:
         return {}
 
     @property
     def _texts(self) -> dict[str, Text]:
-        return {"scene": self._text, "changes": changes_text(self._cable.changes)}
+        return {"scene": self._text, "changes": changes_text(self._asked.changes)}
 
     def line_recorder(
         self, line: LineResult, found: LinesAtRest | None, outputs: int, manager: DomainManager | None
@@ -306,6 +305,12 @@ class CableFile(LinesFile):
     def close(self, status: str, message: str) -> None:
         self.gather()
         self._line.recorder.close(status, message)
+
+
+def file_of(run: RecordedRun, text: Text, asks: Filing) -> LinesFile:
+    """What a run is recorded in, by the names that its lines have in the scene; text: the scene."""
+    form = CableFile if asks.asked is not None and "" in asks.asked.scene.lines else LinesFile
+    return form(run, text, asks)
 
 
 def _named(line: LineResult, state: Any) -> dict[str, Any]:

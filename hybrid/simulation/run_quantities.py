@@ -29,7 +29,7 @@ from hybrid.simulation.result_file import STEP_FIELDS, limits_of
 from hybrid.simulation.run_points import fields_of
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.store.copying import GROUP
+from hybrid.store.copying import group_of
 from hybrid.store.format import Field
 
 MORE_CELLS = 4  # times as many as at first may a line have whose chords are looked at; with more nothing is known
@@ -281,18 +281,16 @@ def listed_outputs(scene: SceneLike) -> list[Listed]:
     Of several lines: what is recorded of points and bodies, and of every line under `lines/<name>/`.
     """
     asked = as_scene(scene)
-    moves, named, system = asked.time is not None, bool(asked.line_names), network_of(asked)
-    free = [name for name in system.lines if model_is_free(system.scene_of(name))]
-    system = with_models(system, dict.fromkeys(free, "adaptive"))
-    model, found, scenes = build_system(system), list[Listed](), system.scenes_of_lines
-    if named:
+    free, moves = [name for name in asked.lines if model_is_free(asked.scene_of(name))], asked.time is not None
+    asked = with_models(asked, dict.fromkeys(free, "adaptive"))
+    system, scenes, found = network_of(asked), asked.scenes_of_lines, list[Listed]()
+    model = build_system(system)
+    if "" not in scenes:  # which would record the quantities itself, and has no points beside it
         found = _over_time([*fields_of(system), *fields_of_pairs(model), *RunQuantities(system, scenes).fields])
-    else:  # a cable is recorded by its own scene, which has its quantities
-        scenes = {name: asked.scene_of(key) for name, key in zip(scenes, asked.lines, strict=True)}
     for (name, each), built in zip(scenes.items(), model.models, strict=True):
         wanted = Wanted(error=built.follows_error and wants_errors(each))
         fields = observer_of(each, built, moves, wanted=wanted).fields
-        found += _over_time(fields, steps=moves, begin=f"{GROUP}/{name}/" if named else "")
+        found += _over_time(fields, steps=moves, begin=group_of(name))
     return _with_ranges(found, asked.output.quantities) if moves else found
 
 

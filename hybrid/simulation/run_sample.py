@@ -179,7 +179,7 @@ def usual_cells(nodes: np.ndarray) -> float:
     return float(np.median(bits.sum(axis=1))) - 1.0
 
 
-def rods_of(zones: Sequence[Sequence[ZoneRow]]) -> tuple[tuple[float, float], ...]:
+def rods_of(zones: Sequence[Sequence[Zone | ZoneRow]]) -> tuple[tuple[float, float], ...]:
     """Stretches (m) of a line that are rod at any output; zones: of the outputs."""
     return tuple(sorted({(zone.s_a, zone.s_b) for each in zones for zone in each if zone.kind == "rod"}))
 

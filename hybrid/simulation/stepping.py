@@ -27,7 +27,7 @@ from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.layer_mesh import layered, rods_at_rest
 from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, with_survey
 from hybrid.simulation.network_run import NetworkRun, Recording, static_system
-from hybrid.simulation.run_file import Cable
+from hybrid.simulation.run_file import Asked
 from hybrid.simulation.run_start import named
 from hybrid.simulation.saving import Saved, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.set_obstacles import ONE_STEP
@@ -131,9 +131,8 @@ class Simulation(SteppedPoints):
     def _begun(self, most: int, criterion: UserCriterion | None) -> NetworkRun:
         """The run at its start; most: iterations that a step may take.  ComputationError."""
         compile_beside(self.scene)
-        recording = Recording(planes=self._system.dimension == 2)  # else points may be set anywhere
-        if self._form is not None:
-            recording = recording._replace(cable=Cable(self.scene))
+        # in space points may be set anywhere
+        recording = Recording(planes=self._system.dimension == 2, asked=Asked(self.scene))
         with nullcontext() if self._form is None else self._form.said():
             cells, text = layers_at_rest(self._system), scene_text(self.scene)
             run = NetworkRun(self._system, self._target, text, True, cells, recording, criterion)

@@ -141,17 +141,20 @@ def in_turn(tables: Sequence[Table]) -> Iterator[Sequence[Table]]:
         yield tables[k : k + TOGETHER]
 
 
+def group_of(line: str) -> str:
+    """What names of datasets of a line begin with; nothing for the line without a name, whose result is the file."""
+    return f"{GROUP}/{line}/" if line else ""
+
+
 def of_part(name: str, counts: Mapping[str, int]) -> dict[str, int]:
     """What a line is told of counts by name, where those of lines begin with where their results are."""
-    begin = f"{GROUP}/{name}/"
+    begin = group_of(name)
     return {key.removeprefix(begin): count for key, count in counts.items() if key.startswith(begin)}
 
 
 def of_all(counts: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
     """Counts by name of a system (under the name "") and of its lines as one table."""
-    return {
-        f"{GROUP}/{name}/{key}" if name else key: count for name, each in counts.items() for key, count in each.items()
-    }
+    return {group_of(name) + key: count for name, each in counts.items() for key, count in each.items()}
 
 
 class Lines(Mapping[str, R]):

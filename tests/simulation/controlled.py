@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 from hybrid.accuracy.error_control import ErrorController
 from hybrid.accuracy.error_order import Errors
@@ -23,6 +23,7 @@ class OneLine:
     """A control of a line in motion, and the case that it computes; sample, result: make its runs up."""
 
     moves = flat = True
+    names: ClassVar[dict[str, str]] = {LINE: ""}
 
     def __init__(
         self, asked: RequestedAccuracy | None, free: Free, sample: Made, result: Made,

@@ -26,7 +26,7 @@ from hybrid.model.build import build
 from hybrid.model.mesh import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
-from hybrid.scene.short_form import LINE
+from hybrid.scene.short_form import LINE, network_of
 from hybrid.simulation.result_checks import cubic_spline
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.named_arrays import pack, unpack
@@ -682,7 +682,8 @@ def test_a_reader_does_not_lose_the_figure(tmp_path):
 
 
 @pytest.mark.long
-def test_what_steps_damp_out_is_said():
+@pytest.mark.parametrize("form", [lambda scene: scene, network_of], ids=["cable", "named"])
+def test_what_steps_damp_out_is_said(form):
     """A stiff rod let go swings as a pendulum; its bending vibrations are far below what a step may be wrong by."""
     data = {
         "cable": {"sections": [{"length": 1.0, "mass": 1.0, "bending_stiffness": 20.0}]},
@@ -693,8 +694,8 @@ def test_what_steps_damp_out_is_said():
         "output": {"every": 0.1, "points": 11},
         "accuracy": "1 cm",
     }
-    assert "vibrations damped" in {e.kind for e in hybrid.run(hybrid.validate_scene(data)).events}
-    assert "vibrations damped" not in {e.kind for e in hybrid.run(swinging()).events}
+    assert "vibrations damped" in {e.kind for e in hybrid.run(form(hybrid.validate_scene(data))).events}
+    assert "vibrations damped" not in {e.kind for e in hybrid.run(form(swinging())).events}
 
 
 def test_accuracy_needs_its_figure():

@@ -11,7 +11,7 @@ import pytest
 import hybrid
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.read import as_scene
-from hybrid.scene.short_form import LINE
+from hybrid.scene.short_form import LINE, network_of
 from hybrid.simulation import line_result
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample
@@ -75,6 +75,33 @@ def test_many_outputs_go_into_a_file(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     stored = sample(case)
     assert stored.rows and len(list(tmp_path.iterdir())) == 1
     assert_same(kept, stored)
+
+
+@pytest.mark.parametrize("form", [as_scene, lambda x: network_of(as_scene(x))], ids=["cable", "named"])
+def test_errors_that_were_not_estimated_are_made_up_for(form: Any, monkeypatch: Any, tmp_path: Path) -> None:
+    """A result that is complete, but for its errors."""
+    tables = SCENE | {"model": "catenary", "time": {"duration": 0.2, "step": 0.02}, "output": {"errors": True}}
+    del tables["accuracy"]
+    scene, path = form(tables), tmp_path / "run.h5"
+
+    def stop(progress: Any) -> None:
+        if progress.name == "error estimation":
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("hybrid.simulation.progress.REPORT_EVERY", 0.0)
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, path, progress=stop)
+    assert hybrid.open(path).pending
+    assert "error_total_position" in hybrid.resume(path).attributes
+
+
+@pytest.mark.parametrize("form", [as_scene, lambda x: network_of(as_scene(x))], ids=["cable", "named"])
+def test_a_line_that_is_let_go_is_not_at_rest(form: Any) -> None:
+    """Its end forces then have the order of a start."""
+    held = Case(form(SCENE), None)
+    ends = {name: dict(x) for name, x in SCENE["ends"].items()}
+    ends["start"]["release_at"] = {"time": 0.4}
+    assert held.from_rest and not Case(form(SCENE | {"ends": ends}), None).from_rest
 
 
 @pytest.mark.long

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,14 @@ import pytest
 from test_self_contact_default import led_through
 
 import hybrid
-from hybrid.scene.short_form import LINE
+from hybrid.model.network import NetworkResolution
+from hybrid.scene.short_form import LINE, network_of
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import Samples
 
+Form = Callable[[Any], Any]
+FORMS = pytest.mark.parametrize("form", [lambda scene: scene, network_of], ids=["cable", "named"])
+OUTPUT = {"every": 0.1, "points": 21, "errors": True}
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 
 
@@ -31,24 +36,35 @@ def touched(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     return found
 
 
-def test_they_are_made_with_contact_where_the_result_touches(touched: list[bool]) -> None:
-    result = hybrid.run(hybrid.validate_scene(led_through(output={"every": 0.1, "points": 21, "errors": True})))
+@FORMS
+def test_they_are_made_with_contact_where_the_result_touches(form: Form, touched: list[bool]) -> None:
+    result = hybrid.run(form(hybrid.validate_scene(led_through(output=OUTPUT))))
     assert "line touches itself" in {event.kind for event in result.events}
     assert touched == [True] * 3 and result.attributes["effort_runs"] == 4
-    assert float(result["errors/total/position"].max()) > 0.0
+    assert all(float(x["errors/total/position"].max()) > 0.0 for _, x in result.each_line())
 
 
-def test_they_compute_none_where_it_does_not(touched: list[bool]) -> None:
-    near = led_through(time={"duration": 1.5, "step": 0.02}, output={"every": 0.1, "points": 21, "errors": True})
-    result = hybrid.run(hybrid.validate_scene(near))
+@FORMS
+def test_they_compute_none_where_it_does_not(form: Form, touched: list[bool]) -> None:
+    near = led_through(time={"duration": 1.5, "step": 0.02}, output=OUTPUT)
+    result = hybrid.run(form(hybrid.validate_scene(near)))
     assert "line touches itself" not in {event.kind for event in result.events}
     assert touched == [False] * 3
 
 
-def test_they_do_from_the_start_where_contact_is_asked(touched: list[bool]) -> None:
+@FORMS
+def test_they_do_from_the_start_where_contact_is_asked(form: Form, touched: list[bool]) -> None:
     more = {"contact": {"self": True}, "time": {"duration": 0.1, "step": 0.02}}
-    hybrid.run(hybrid.validate_scene(led_through(**more, output={"every": 0.1, "points": 21, "errors": True})))
+    hybrid.run(form(hybrid.validate_scene(led_through(**more, output=OUTPUT))))
     assert touched == [True] * 3
+
+
+@FORMS
+def test_a_line_that_came_near_itself_is_known(form: Form) -> None:
+    """Of which the choice of a model makes no catenary."""
+    case = Case(form(hybrid.validate_scene(led_through(output=OUTPUT))), None)
+    case.sample(NetworkResolution.of(case.lines))
+    assert case.near_themselves == {LINE}
 
 
 @pytest.mark.long

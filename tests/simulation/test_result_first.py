@@ -22,8 +22,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
 from hybrid.simulation import network_run, run_cells
-from hybrid.simulation.case import Case
-from hybrid.simulation.case_at_rest import CaseAtRest
+from hybrid.simulation.case import Case, CaseAtRest
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
 from hybrid.store import whole_file, writer
 from hybrid.store.whole_file import LateFile
