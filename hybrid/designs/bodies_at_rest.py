@@ -60,7 +60,7 @@ class BodiesAtRest:
         bodies = [self.body_at(l, k) for k in (0, 1)]
         return np.stack([self.axes(b) @ x if b >= 0 else np.zeros(3) for b, x in zip(bodies, fairleads, strict=True)])
 
-    def own(self, model: NetworkModel) -> Floats:
+    def loads_besides_lines(self, model: NetworkModel) -> Floats:
         """(B, 6) N, N m, on the bodies but for their lines, as a model has them where they are.
 
         ValueError: the model has other members.

@@ -184,7 +184,7 @@ def task_of(source: Any, unknowns: Mapping[str, Any] | None, more: Mapping[str, 
 
 
 def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str) -> Found:
-    objective, first = problem.objective, problem.equilibria.at(problem.space.start)
+    objective, first = problem.objective, problem.equilibria.point_of(problem.space.start)
     best = _reached(problem) if objective is None else optimum(problem, objective)
     point = best.point
     _refuse_what_fights(problem, point)
@@ -231,7 +231,7 @@ def _common(
         "keys": dict(zip(space.names, equilibria.keys, strict=True)),
         "scene": scene_with(asked, equilibria.keys, point.x),
         "scenes": {case: equilibria.scene(case, point.x) for case in equilibria.scenes},
-        "before": equilibria.at(space.start).shapes(), "after": point.shapes(), "bed": _bed(asked), "file": file,
+        "before": equilibria.point_of(space.start).shapes(), "after": point.shapes(), "bed": _bed(asked), "file": file,
         "ways": dict(equilibria.motions.ways),
     }  # fmt: skip
 
@@ -249,7 +249,7 @@ def _identified(task: TaskFile[Design], asked: AnyScene, file: str) -> Identifie
         kept=(), bounds=tuple(edges), minimised=None, minimised_at_start=None, notes=tuple(notes),
         estimates=found.estimates, correlations=found.correlations, apart=found.apart, count=found.count,
         scatter=found.scatter, stated=measured.deviations is not None, measured=_places(measured, found.point),
-        histories=_histories(measured, equilibria.at(space.start), found.point),
+        histories=_histories(measured, equilibria.point_of(space.start), found.point),
         **_common(task, asked, equilibria, space, found.point, file),
     )  # fmt: skip
 
@@ -334,7 +334,7 @@ def _refuse_what_fights(problem: Problem, point: Point) -> None:
 def _checked(problem: Problem, point: Point) -> tuple[list[str], Floats | None]:
     """What is broken on cells half as long, and results there; None: there is no equilibrium."""
     try:
-        finer = problem.equilibria.at(point.x, FINER).values
+        finer = problem.equilibria.point_of(point.x, FINER).values
     except ComputationError as error:
         first = str(error).splitlines()[0]
         return [f"not checked on twice the cells: {first}"], None
@@ -385,7 +385,7 @@ def openmdao_component(
     refuse_edges(asked, [x.quantity for x in task.asked.targets.values()])  # a design takes them as they are
     problem = problem_of(task, asked)
     try:
-        problem.equilibria.at(problem.space.start)
+        problem.equilibria.point_of(problem.space.start)
     except SceneError as error:
         raise refused_result(task, error) from None
     return DesignComponent(problem, inputs_of(problem, asked), outputs_of(problem, task, asked), driven)

@@ -33,7 +33,7 @@ class Point:
         for case, rest in rests.items():
             self.values[equilibria.rows[case]] = rest.values
         self._slopes: Floats | None = None
-        self._take_motions()
+        self._read_motions()
 
     @property
     def slopes(self) -> Floats:
@@ -75,7 +75,7 @@ class Point:
             values[rows] = [each.moved(x - self.x).values[0] for each in self._motions[case]]
         return np.asarray(values)
 
-    def _take_motions(self) -> None:
+    def _read_motions(self) -> None:
         self._of.motions.values(self._motion, self.values)
         self._of.check(self)
         self._slopes = None
@@ -85,14 +85,14 @@ class Point:
         motions = self._of.motions
         if not motions.run(self._motion, motions.rows if cases is None else cases):
             return False
-        self._take_motions()
+        self._read_motions()
         return True
 
     def refresh(self, cases: set[str]) -> bool:
         """Make slopes of motions in these cases those of runs beside; False: they are."""
         if not self._of.motions.refresh(self._motion, cases):
             return False
-        self._take_motions()
+        self._read_motions()
         return True
 
     def nodes(self, case: str, name: str) -> Floats:
@@ -124,11 +124,11 @@ class Equilibria:
         self._kept: dict[bytes, Point] = {}
         self._places: dict[str, Places] = {}  # cells of the first: others would make results jump
 
-    def at(self, x: Floats, cells: float = 1.0, moving: Iterable[str] | None = None) -> Point:
+    def point_of(self, x: Floats, cells: float = 1.0, moving: Iterable[str] | None = None) -> Point:
         """Equilibria with values (n,) of unknowns.
 
-        cells: how many times as long as usual; moving: cases that are run, others are foretold (`Motions.at`); None:
-        all.
+        cells: how many times as long as usual; moving: cases to run, others are foretold (`Motions.runs_of`);
+        None: all.
         SceneError: a scene may not have these; ComputationError: there is no equilibrium, or a result is not there in
         it, such as `touchdown` of a line that does not lie on the bed.
         """
@@ -144,7 +144,7 @@ class Equilibria:
             of = [self.wanted[k][1] for k in self.rows[case]]
             rests[case] = at_rest(self.scene(case, x), of, cells, self._places.get(case, NO_PLACES))
             self._places.setdefault(case, rests[case].places)
-        point = Point(x.copy(), rests, self.motions.at(x, cells < 1.0, moving), self)
+        point = Point(x.copy(), rests, self.motions.runs_of(x, cells < 1.0, moving), self)
         if cells == 1.0:
             first = [*self._kept.items()][:1]  # where a search began is asked for once more at its end
             self._kept = dict(first + [*self._kept.items()][1:][-1:]) | {x.tobytes(): point}

@@ -76,7 +76,7 @@ def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> Fit:
     scale = measured.deviations if measured.deviations is not None else np.full(values.size, _typical(values))
 
     def off(x: Floats) -> Rows:
-        point = equilibria.at(x)
+        point = equilibria.point_of(x)
         return Rows(point, (point.values[rows] - values) / scale, lambda: point.slopes[rows] / scale[:, None])
 
     def refresh(point: Point) -> bool:
@@ -137,7 +137,7 @@ def _by_cells(
 ) -> tuple[Floats, list[str]]:  # fmt: skip
     """By how much unknowns change on cells half as long: one more step from there."""
     try:
-        finer = equilibria.at(best.point.x, FINER)
+        finer = equilibria.point_of(best.point.x, FINER)
     except ComputationError as error:
         return np.full(sizes.size, np.nan), [f"not checked on twice the cells: {str(error).splitlines()[0]}"]
     change = (finer.values - best.point.values)[rows] / scale

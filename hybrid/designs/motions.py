@@ -95,7 +95,7 @@ class Motions:
         self._last: dict[str, tuple[Floats, list[Peaks]]] = {}  # of each case the last run whose slopes were asked for
         self.ways: dict[str, str] = {}  # by case that has slopes, how these are found
 
-    def at(self, x: Floats, finer: bool = False, cases: Iterable[str] | None = None) -> OfMotion:
+    def runs_of(self, x: Floats, finer: bool = False, cases: Iterable[str] | None = None) -> OfMotion:
         """Runs with values (n,) of unknowns; cases: of which; others are foretold; None: of all."""
         point = OfMotion(x.copy(), {})
         self.run(point, self.rows if cases is None else cases, finer)
@@ -183,10 +183,10 @@ class Motions:
             if not self._with_tangents(point, case):
                 self.run(point, {case})
                 columns = [self._difference(point, case, i) for i in range(point.x.size)]
-                self._take(point, case, np.stack(columns, axis=1))
+                self._keep_slopes(point, case, np.stack(columns, axis=1))
         return bool(wanted)
 
-    def _take(self, point: OfMotion, case: str, slopes: Floats) -> None:
+    def _keep_slopes(self, point: OfMotion, case: str, slopes: Floats) -> None:
         """Keep slopes (W, n) of all peaks of the results of a case that was run."""
         run, first, out = point.runs[case], 0, []
         values = run.at_peaks(self._of[case], run.peaks)
@@ -202,7 +202,7 @@ class Motions:
         if self.ways.get(case, TANGENTS) != TANGENTS:
             return False
         try:
-            self._take(point, case, self._tangents(point, case))
+            self._keep_slopes(point, case, self._tangents(point, case))
         except Unfollowed as why:
             self.ways[case] = f"{DIFFERENCES}: {why}"
             return False

@@ -150,12 +150,12 @@ def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> S
     equilibria = Equilibria({"": asked}, [(key,) for key in by], [("", name) for name in targets])
     scale = np.abs(goal)
     if not goal.all():  # what is sought to be 0 is as large as it is at first, or as the numbers can make it
-        first_point = equilibria.at(start)
+        first_point = equilibria.point_of(start)
         size = np.maximum(np.abs(first_point.values), np.abs(first_point.slopes) @ np.abs(start))
         scale = np.where(goal == 0.0, np.maximum(size, 1e-12), scale)
 
     def off(x: Floats) -> Rows:
-        point = equilibria.at(x)
+        point = equilibria.point_of(x)
         return Rows(point, (point.values - goal) / scale, lambda: point.slopes / scale[:, None])
 
     reached = nearest(off, signed(tuple(by), start))

@@ -119,7 +119,7 @@ class NetworkAtRest(OfScene):
         self._matrix = A + self._bodies.stiffness_besides(A) if self._bodies.count else A
         self._factors = Factors(self._matrix)
         self._first_body = self._network.size - 6 * self._bodies.count  # of the unknowns
-        own = self._bodies.own(run.model) + self._bodies.pressed([x.here for x in self.lines])
+        own = self._bodies.loads_besides_lines(run.model) + self._bodies.pressed([x.here for x in self.lines])
         self._here = self._arms(run.model), own
         self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])
         wanted_of = (l for l, x in enumerate(self.lines) if x.wanted)
@@ -358,7 +358,7 @@ class NetworkAtRest(OfScene):
             return _Changed(out, *self._here)
         whole = self._model if built is None else built
         try:
-            return _Changed(out, self._arms(whole), self._bodies.own(whole) + self._bodies.pressed(out))
+            return _Changed(out, self._arms(whole), self._bodies.loads_besides_lines(whole) + self._bodies.pressed(out))
         except ValueError:
             raise _other_cells(key) from None
 

@@ -138,7 +138,7 @@ class NetworkOthers:
         else:
             self._rest()
         reports = self._accelerate()
-        self._follow(reports)
+        self._call_each_step(reports)
         for l, line in enumerate(run.lines):
             state, ends, sea = run.state.lines[l], self._ends(run.solver.lines[l], run.state.lines[l]), line.model.sea
             self._base[l].append(
@@ -301,7 +301,7 @@ class NetworkOthers:
         )  # fmt: skip
         return table
 
-    def _follow(self, reports: Sequence[Sequence[Floats]]) -> None:
+    def _call_each_step(self, reports: Sequence[Sequence[Floats]]) -> None:
         """Have the run call the kernel behind every step."""
         run = self._run
         loop, solver = run.loop, run.solver

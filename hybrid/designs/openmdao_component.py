@@ -31,7 +31,7 @@ class DesignComponent(ExplicitComponent):
         return found if found is not None and found.text != NOTHING else None
 
     def setup(self) -> None:
-        start = self._design.equilibria.at(self._design.space.start)
+        start = self._design.equilibria.point_of(self._design.space.start)
         sizes = self._design.space.sizes(self._design.space.start)
         for (name, x), size in zip(self._of_inputs.items(), sizes, strict=True):
             self.add_input(name, val=x.start, units=_units(x.unit), desc=_described(x.text, x.unit))
@@ -76,7 +76,7 @@ class DesignComponent(ExplicitComponent):
         """Equilibria with these inputs; AnalysisError: there are none."""
         x = np.array([inputs[name].item() for name in self._of_inputs])
         try:
-            return self._design.equilibria.at(x)
+            return self._design.equilibria.point_of(x)
         except (ComputationError, SceneError) as error:
             raise AnalysisError(str(error)) from error
 

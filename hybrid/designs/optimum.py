@@ -74,7 +74,7 @@ def reach(problem: Problem, start: Floats | None = None) -> Rows:
     """The values nearest to keeping all constraints; residuals are by how many parts each is off."""
 
     def off(x: Floats) -> Rows:
-        point = problem.equilibria.at(x)
+        point = problem.equilibria.point_of(x)
         values = np.array([c.off(point.values[c.row]) for c in problem.constraints])
         return Rows(point, values, lambda: np.stack([_slopes(c, point) for c in problem.constraints]))
 
@@ -157,13 +157,13 @@ def _ran_off(problem: Problem, objective: Objective, point: Point) -> tuple[int,
     """
     space, equilibria, out = problem.space, problem.equilibria, []
     sizes = space.sizes(space.start)
-    enough = objective.value(point) + problem.within.exact * size_of(objective, equilibria.at(space.start), sizes)
+    enough = objective.value(point) + problem.within.exact * size_of(objective, equilibria.point_of(space.start), sizes)
     for i, (x, start) in enumerate(zip(point.x, space.start, strict=True)):
         ahead = 2.0 * x - start if x * start <= 0.0 else 2.0 * x if abs(x) > abs(start) else 0.5 * x
         if abs(x - start) < FAR * sizes[i] or not space.low[i] <= ahead <= space.high[i]:
             continue
         try:
-            there = equilibria.at(np.where(np.arange(space.start.size) == i, ahead, point.x))
+            there = equilibria.point_of(np.where(np.arange(space.start.size) == i, ahead, point.x))
             if objective.value(there) <= enough and kept(problem, there):
                 out.append(i)
         except (ComputationError, SceneError):
@@ -186,7 +186,7 @@ class _Search:
 
     def __init__(self, problem: Problem, objective: Objective, start: Floats) -> None:
         self._problem, self._objective = problem, objective
-        self._here = problem.equilibria.at(start)
+        self._here = problem.equilibria.point_of(start)
         self._sizes = problem.space.sizes(start)
         self._scale = size_of(objective, self._here, self._sizes)
         self._hessian, self._penalty = CURVATURE * np.eye(start.size), PENALTY
@@ -240,7 +240,7 @@ class _Search:
         space = self._problem.space
         try:
             x = np.clip(self._here.x + self._sizes * step, space.low, space.high)
-            point = self._problem.equilibria.at(x, moving=self._problem.moving(self._here, x) | self._watched)
+            point = self._problem.equilibria.point_of(x, moving=self._problem.moving(self._here, x) | self._watched)
             self._objective.parts(point)
         except (ComputationError, SceneError) as error:
             self.stopped = " ".join(str(error).split())
@@ -359,7 +359,7 @@ def peaks_of(constraint: Constraint, point: Point) -> tuple[Floats, Floats]:
 
 def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
     """Prices of what holds the optimum: the multipliers that leave least of the slopes of what is minimised."""
-    space, constraints, start = problem.space, problem.constraints, problem.equilibria.at(problem.space.start)
+    space, constraints, start = problem.space, problem.constraints, problem.equilibria.point_of(problem.space.start)
     own, first_sizes = space.sizes(point.x), space.sizes(space.start)
     sizes = np.maximum(own, first_sizes)  # of an unknown that goes to 0, where a part of itself changes nothing more
     gradient = objective.slopes(point) * sizes

@@ -214,7 +214,7 @@ def begun(problem: Problem) -> Problem:
 
     ComputationError: there is no equilibrium there; SceneError: results that are not there.
     """
-    point = problem.equilibria.at(problem.space.start)
+    point = problem.equilibria.point_of(problem.space.start)
     if problem.objective is not None:
         problem.objective.value(point)  # refused before the search
     scaled = [x._replace(scale=x.scale or abs(float(point.values[x.row])) or 1.0) for x in problem.constraints]

@@ -45,7 +45,7 @@ class Course(NamedTuple):
     dimension: int | None = 3
     tolerance: float = SOLVED_TO
 
-    def at(self, finer: bool) -> Mapping[str, Resolution]:
+    def resolutions(self, finer: bool) -> Mapping[str, Resolution]:
         """How finely lines are computed; finer: on cells and in steps half as long."""
         return {k: _halved(x) for k, x in self.lines.items()} if finer else self.lines
 
@@ -115,7 +115,7 @@ def replay(
     with short_form(course.scene).said():
         run_system(
             network, target, scene_text(network), ProgressReporter(None, scene.require_time().duration), lambda: False,
-            resolution=NetworkResolution(course.at(finer), course.tolerance), recording=Recording(begun=begun),
+            resolution=NetworkResolution(course.resolutions(finer), course.tolerance), recording=Recording(begun=begun),
         )  # fmt: skip
     return written_result(target)
 
@@ -134,7 +134,7 @@ def with_outputs(
     if each_step:
         output["every"] = float(np.median(np.diff([0.0, *first.ends]))) if first.ends else first.step
     if more is not None and not scene.line_names:
-        (model,) = build_system(network, NetworkResolution(course.at(finer))).models
+        (model,) = build_system(network, NetworkResolution(course.resolutions(finer))).models
         output["points"] = {LINE: at_nodes(model.line.s, more)}
     return network.model_copy(update={"output": network.output.model_copy(update=output)})
 

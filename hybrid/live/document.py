@@ -68,7 +68,7 @@ class Document:
         if base != self.revision and base in self._former:
             text = merged(self._former[base], text, self.text)
         if text != self.text:
-            self._take(text)
+            self._accept(text)
         return self.text
 
     def save(self, name: str | None = None, force: bool = False) -> None:
@@ -93,7 +93,7 @@ class Document:
         if to.parent != self.folder.resolve() and not (target == self.path and to == self._opened):
             raise Refused(f"{target.name} is a link to {to}, which is outside {self.folder}: take another name")
 
-    def look(self) -> str:
+    def compare_with_disk(self) -> str:
         """Compare with the file on disk.
 
         "": as it was; "taken": its new text is the text now; "differs": it has another text, and so has this; "gone":
@@ -115,7 +115,7 @@ class Document:
         was_changed, self.saved = self.changed, found
         if was_changed:
             return "differs"
-        self._take(found)
+        self._accept(found)
         return "taken"
 
     def reload(self) -> None:
@@ -127,9 +127,9 @@ class Document:
                 raise Refused(str(error)) from None
             self.saved, self._stamp = found, stamp_of(self.path)
             if found != self.text:
-                self._take(found)
+                self._accept(found)
 
-    def _take(self, text: str) -> None:
+    def _accept(self, text: str) -> None:
         self.revision += 1
         self._former[self.revision] = text
         kept = sum(map(len, self._former.values()))

@@ -108,7 +108,7 @@ class Session:
         if self.playback is not None and self.playback.head:
             client.send(self._frames(0))
         client.send(self._state())
-        self._tell_state()
+        self._send_state()
         return client
 
     @property
@@ -120,9 +120,9 @@ class Session:
         """A browser goes."""
         if client in self._clients:
             self._clients.remove(client)
-        self._tell_state()
+        self._send_state()
 
-    def tell(self, message: str, but: Client | None = None) -> None:
+    def send_all(self, message: str, but: Client | None = None) -> None:
         """Send a message to all, but one."""
         for client in self._clients:
             if client is not but:
@@ -139,7 +139,7 @@ class Session:
             client.send(_message("refused", text=str(refused)))
         except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError) as error:
             client.send(_message("refused", text=f"not understood: {type(error).__name__}: {error}"[:500]))
-        self._tell_state()
+        self._send_state()
 
     async def _do(self, client: Client, asked: dict[str, Any]) -> None:
         what = asked.get("do")
@@ -176,7 +176,7 @@ class Session:
         taken = document.edit(text, base)
         if document.revision != before:
             self._wanted.set()
-            self.tell(self._text(client.number), but=client)
+            self.send_all(self._text(client.number), but=client)
         client.send(_message("taken", revision=document.revision, text=None if taken == text else taken))
 
     def _replace(self, document: Document, text: str) -> None:
@@ -188,7 +188,7 @@ class Session:
 
     def _changed(self, by: int) -> None:
         self._wanted.set()
-        self.tell(self._text(by))
+        self.send_all(self._text(by))
 
     def _text(self, by: int = 0) -> str:
         assert self.document is not None
@@ -199,9 +199,9 @@ class Session:
         while self.document is not None:
             await asyncio.sleep(WATCH)
             try:
-                found = self.document.look()
+                found = self.document.compare_with_disk()
             except SceneError as error:
-                self.tell(_message("refused", text=f"the file on disk is not read: {error}"))
+                self.send_all(_message("refused", text=f"the file on disk is not read: {error}"))
                 continue
             if found == "gone":
                 self._gone = clock.monotonic()
@@ -215,7 +215,7 @@ class Session:
             elif found == "differs":
                 self._disk = "differs"
             if found or self._disk == "gone":
-                self._tell_state()
+                self._send_state()
 
     async def _watch_named(self) -> None:
         """Look at the files that the scene names, such as motions: where one has changed there is a new picture."""
@@ -239,7 +239,7 @@ class Session:
             if not text.strip():
                 continue
             self._computing = clock.monotonic()
-            late = asyncio.get_running_loop().call_later(0.3, self._tell_state)
+            late = asyncio.get_running_loop().call_later(0.3, self._send_state)
             asked = {"do": "picture", "text": text, "file": self.document.name}
             answer = await self.workers.ask(asked, self._wanted)
             late.cancel()
@@ -250,8 +250,8 @@ class Session:
             self._answer, self._answered = answer, revision
             if _has_frame(answer):
                 self._picture = answer
-            self.tell(_picture(revision, answer))
-            self._tell_state()
+            self.send_all(_picture(revision, answer))
+            self._send_state()
 
     async def report(self, of_motion: bool) -> dict[str, Any]:
         """The report of the equilibrium, or of the result that is played: `html`, or `refused`."""
@@ -291,7 +291,7 @@ class Session:
         if self.playback is not None:
             self.playback.close()
         self.playback = None
-        self.run = Run(document.path, target, self._tell_state)
+        self.run = Run(document.path, target, self._send_state)
         self._spawn(self._run_to_end(self.run))
 
     async def _run_to_end(self, run: Run) -> None:
@@ -338,11 +338,11 @@ class Session:
             was = playback.running, playback.problem
             before, new = await asyncio.to_thread(playback.read)
             if new and playback.problem:
-                self.tell(_message("refused", text=playback.problem))
+                self.send_all(_message("refused", text=playback.problem))
             elif (new or again) and playback.head:
-                self.tell(self._frames(0 if again else before))
+                self.send_all(self._frames(0 if again else before))
             if was != (playback.running, playback.problem):
-                self._tell_state()
+                self._send_state()
 
     def _frames(self, begin: int) -> str:
         """Frames from that number on; those before it the page has."""
@@ -370,11 +370,11 @@ class Session:
         }  # fmt: skip
         return _message("state", **state)
 
-    def _tell_state(self) -> None:
+    def _send_state(self) -> None:
         state = self._state()
         if state != self._sent_state:
             self._sent_state = state
-            self.tell(state)
+            self.send_all(state)
 
     def _spawn(self, work: Coroutine[Any, Any, None]) -> None:
         self._tasks = [task for task in self._tasks if not task.done()] + [asyncio.create_task(work)]

@@ -205,7 +205,7 @@ class EndConditions:
 
     def go_on_from(self, old: EndConditions, t: float) -> None:
         """Take the place of other conditions at t (s): tangents that are being turned in go on."""
-        self.take_frames(old)
+        self.copy_frames(old)
         self._turns, self._bring_in = dict(old._turns), old._bring_in
         ramped = {(x.what, x.end): x.ramp for x in old._loads}
         self._loads = tuple(
@@ -229,7 +229,7 @@ class EndConditions:
         out.at(t)
         return out
 
-    def take_frames(self, old: EndConditions) -> None:
+    def copy_frames(self, old: EndConditions) -> None:
         """Stand at rest as other conditions do: what no scene says of a frame hangs on the shape it started from."""
         self._stand_at(old._given[0])
 

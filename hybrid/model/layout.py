@@ -46,7 +46,7 @@ class Layout(_Fields):
         return np.flatnonzero(there)
 
     @property
-    def there(self) -> np.ndarray:
+    def node_flags(self) -> np.ndarray:
         """(K+1,) bool, which nodes of the finest mesh there are."""
         out = np.zeros(self.starts[-1] + 1, bool)
         out[self.places] = True

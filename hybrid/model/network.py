@@ -32,7 +32,7 @@ from hybrid.model.ends import EndConditions, EndLoad
 from hybrid.model.initial_shape import dead_loads, first_state, hung
 from hybrid.model.lines_contact import MEETS, Touching, beside_others, that_may_meet, touching_of
 from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
-from hybrid.model.payout import said_of_line
+from hybrid.model.payout import naming_connection
 from hybrid.model.plane import WHAT
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
@@ -215,7 +215,7 @@ def build_system(
         models = _with_contact(system, models, touching)
     may_meet = that_may_meet(system, maker.scenes)
     models = [_beside_others(x) if k in may_meet else x for k, x in enumerate(models)]
-    if _takes_current(system, models):
+    if _has_drag(system, models):
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
     ends = [(x.start, x.end) for x in system.lines.values()]
     joints = tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends)
@@ -385,7 +385,7 @@ def _beside_others(model: Model) -> Model:
     return replace(model, line=beside_others(model.line), contents=(*model.contents, MEETS))
 
 
-def _takes_current(system: Network, models: Sequence[Model]) -> bool:
+def _has_drag(system: Network, models: Sequence[Model]) -> bool:
     """Whether anything of a system has drag."""
     members = [member for body in system.free_bodies.values() for member in body.members]
     return (
@@ -487,7 +487,7 @@ class FirstLines:
     def _shape(self, name: str, directions: Mapping[str, Any] | None) -> Model:
         scene, mesh, line = self.scene(name, (), directions), self.meshes.get(name), self._system.lines[name]
         alone = not any(self._system.is_joined(point) for point in (line.start, line.end))
-        with said_of_line(name):
+        with naming_connection(name):
             return build(scene, self._resolution[name], mesh, spare=alone or bool(scene.obstacles))
 
     def scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> LineScene:

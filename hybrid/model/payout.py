@@ -437,7 +437,7 @@ SAME_LENGTH = 1e-9
 
 
 @contextmanager
-def said_of_line(name: str) -> Iterator[None]:
+def naming_connection(name: str) -> Iterator[None]:
     """What is refused within of how a line is paid out is said of its connection, if it has a name."""
     try:
         yield

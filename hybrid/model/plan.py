@@ -20,7 +20,7 @@ from hybrid.model.lines_contact import MEETS, that_may_meet
 from hybrid.model.material import material
 from hybrid.model.mesh import Zone
 from hybrid.model.model_costs import foretold_steps, processor_time, structural, with_model
-from hybrid.model.payout import PayoutForecast, said_of_line
+from hybrid.model.payout import PayoutForecast, naming_connection
 from hybrid.model.resolution import first_resolution, model_is_free, predicted_runs
 from hybrid.model.sections import limits_along, outer_diameter
 from hybrid.scene.read import SceneLike, as_scene
@@ -195,7 +195,7 @@ def plan_of_lines(scene: Any) -> NetworkPlan:
     for name, line in scenes.items():
         if scene.time:
             refuse_too_much(line)
-        with said_of_line(name):
+        with naming_connection(name):
             plans[name] = _plan_of_line(line)
     for name in (tuple(scenes)[k] for k in that_may_meet(scene, scenes)):
         plans[name] = replace(plans[name], contents=(*plans[name].contents, MEETS))

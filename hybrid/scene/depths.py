@@ -83,7 +83,7 @@ class Surface(NamedTuple):
     y: NDArray[np.float64]
     values: NDArray[np.float64]
 
-    def at(self, x: float, y: float) -> tuple[float, float, float]:
+    def depth_at(self, x: float, y: float) -> tuple[float, float, float]:
         """Depth (m) and its slopes along x and y, as kernels.laws.bed has them."""
         import numpy as np
 

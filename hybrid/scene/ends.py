@@ -88,14 +88,14 @@ class EndTable(Table):
         self._at = at
         return self
 
-    def _own(self, key: str) -> Any:
+    def _value_of(self, key: str) -> Any:
         """The value of a key, None where the kind has none."""
         return getattr(self, key) if key in type(self).model_fields else None
 
     @property
     def held_position(self) -> Triple | None:
         """Position that is held, inertial frame [m]."""
-        position: Triple | None = self._own("position")
+        position: Triple | None = self._value_of("position")
         return position
 
     @property
@@ -106,24 +106,24 @@ class EndTable(Table):
     @property
     def first_position(self) -> Triple | None:
         """Where the search of the equilibrium puts the end first [m]."""
-        return self.held_position or self._own("initial_guess") or self._at.near
+        return self.held_position or self._value_of("initial_guess") or self._at.near
 
     @property
     def held_tangent(self) -> Triple | None:
         """Direction that is held, of any length."""
-        tangent: Triple | None = self._own("tangent")
+        tangent: Triple | None = self._value_of("tangent")
         return tangent
 
     @property
     def held_normal(self) -> Triple | None:
         """Direction of the material axis a1 that the scene gives, of any length."""
-        normal: Triple | None = self._own("normal")
+        normal: Triple | None = self._value_of("normal")
         return normal
 
     @property
     def held_turns(self) -> float:
         """Turns about its tangent by which the scene twists the end."""
-        turns: float | None = self._own("turns")
+        turns: float | None = self._value_of("turns")
         return turns or 0.0
 
     @property
@@ -154,13 +154,13 @@ class EndTable(Table):
     @property
     def prescribed_motion(self) -> Motion | None:
         """How what is held moves."""
-        motion: Motion | None = self._own("motion")
+        motion: Motion | None = self._value_of("motion")
         return motion
 
     @property
     def release(self) -> Release | None:
         """When what is held is let go."""
-        release: Release | None = self._own("release_at")
+        release: Release | None = self._value_of("release_at")
         return release
 
     @property
@@ -168,7 +168,7 @@ class EndTable(Table):
         """Forces and moments given at the end."""
         found = []
         for key, what in _LOADS.items():
-            load = self._own(key)
+            load = self._value_of(key)
             if isinstance(load, Load):
                 given = next(name for name in ("value", "history", "file") if getattr(load, name) is not None)
                 found.append(GivenLoad(what, (key, given), load))

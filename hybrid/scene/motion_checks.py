@@ -449,11 +449,11 @@ def _missed(rows: Sequence[Row], step: float) -> float | None:
     reach = float(np.ptp(values, axis=0).max())
     begin = np.floor(times / step) * step
 
-    def at(t: np.ndarray) -> np.ndarray:
+    def interpolated(t: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(t, times, column) for column in values.T], axis=1)
 
     part = ((times - begin) / step)[:, None]
-    bow = np.abs(values - (1.0 - part) * at(begin) - part * at(begin + step)).max(axis=1)
+    bow = np.abs(values - (1.0 - part) * interpolated(begin) - part * interpolated(begin + step)).max(axis=1)
     bow[times < 0.0] = 0.0
     return float(times[bow.argmax()]) if bow.max() > MISSED * reach else None
 

@@ -24,7 +24,7 @@ from hybrid.scene.base import (
     speaks_of,
     unit_of,
 )
-from hybrid.scene.schema_walk import Spot, all_keys, arms, follow, is_tag, item, meaning, tables
+from hybrid.scene.schema_walk import Spot, all_keys, arms, is_tag, item, meaning, spot_of, tables
 
 # A larger number would not help, as an example of how to write it.
 LARGEST = 1e12
@@ -98,7 +98,7 @@ def explain(root: type[Table], error: Mapping[str, Any]) -> list[tuple[Finding, 
         return []  # a key that is absent, and whose default waits for a table that is wrong
     if kind == "too_short" and isinstance(value, list | tuple) and len(value) >= context.get("min_length", 0):
         return []  # pydantic counts only the entries that are right; those that are wrong have complaints of their own
-    spot = follow(root, loc)
+    spot = spot_of(root, loc)
     if kind in ("extra_forbidden", "invalid_key"):
         return [(_unknown_key(root, path, spot), True)]
     words = expected(spot.annotation, spot.metadata, spot.field)

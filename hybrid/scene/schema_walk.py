@@ -77,7 +77,7 @@ def is_tag(part: Any) -> bool:
     return isinstance(part, str) and part.startswith("<") and part.endswith(">")
 
 
-def follow(root: type[Table], loc: Place) -> Spot:
+def spot_of(root: type[Table], loc: Place) -> Spot:
     """What the schema has at pydantic's location `loc`."""
     spot = Spot(root, ())
     for part in loc:
@@ -106,7 +106,7 @@ def tables_at(root: type[Table], path: Place) -> list[type[Table]]:
     return [table for a in _types_at(root, path) for table in tables(a)]
 
 
-def takes_names(root: type[Table], path: Place) -> bool:
+def has_names(root: type[Table], path: Place) -> bool:
     """Whether what is at `path` may be a table whose keys are names."""
     return any(_named(a) for a in _types_at(root, path))
 
@@ -131,7 +131,7 @@ def keys_at(root: type[Table], path: Place) -> list[str]:
 
 def shorthand_keys(root: type[Table], path: Place) -> tuple[str, ...]:
     """The keys that a bare word or number at `path` stands for (``model: rod`` is ``{kind: rod}``)."""
-    spot = follow(root, path)
+    spot = spot_of(root, path)
     for mark in [*spot.metadata, *(m for _, found in arms(spot.annotation) for m in found)]:
         if isinstance(mark, PlainNumber):
             return mark.keys

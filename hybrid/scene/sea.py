@@ -305,14 +305,14 @@ class Seabed(Table):
     def height(self, x: float, y: float) -> float:
         """Height of the bed [m] at x, y [m]."""
         if self.depths is not None:
-            return self.z - self.depths.surface.at(x, y)[0]
+            return self.z - self.depths.surface.depth_at(x, y)[0]
         rise_x, rise_y = self.slope or (0.0, 0.0)
         return self.z + rise_x * x + rise_y * y
 
     def rise(self, x: float, y: float) -> tuple[float, float]:
         """How steeply the bed rises along x and y, at x, y [m]."""
         if self.depths is not None:
-            _, down_x, down_y = self.depths.surface.at(x, y)
+            _, down_x, down_y = self.depths.surface.depth_at(x, y)
             return -down_x, -down_y
         return self.slope or (0.0, 0.0)
 

@@ -33,7 +33,7 @@ DRAWN_STRAIN = 0.01
 WEIGHTLESS = 1e-9
 
 
-def _at(position: Triple) -> str:
+def _xyz(position: Triple) -> str:
     return f"[{position[0]:.8g}, {position[1]:.8g}, {position[2]:.8g}]"
 
 
@@ -72,14 +72,14 @@ def span(cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
         distance = math.dist(held["start"], held["end"])
         expected = too_short(cable, distance)
         if expected is not None:
-            given = f"{_at(held['end'])}, which is {distance:.8g} m from the start"
+            given = f"{_xyz(held['end'])}, which is {distance:.8g} m from the start"
             yield Finding(("ends", "end", "position"), expected, fix, given)
     elif near and len(places := held | near) == 2:
         distance, allowed = math.dist(places["start"], places["end"]), cable.length * (1 + POLYLINE_STRETCH)
         if distance > allowed:
             name = "end" if "end" in near else "start"
             expected = f"a place at most {allowed:.8g} m from the other end; the cable is {cable.length:.8g} m long"
-            given = f"{_at(near[name])}, which is {distance:.8g} m from the other end"
+            given = f"{_xyz(near[name])}, which is {distance:.8g} m from the other end"
             yield Finding(("ends", name, "initial_guess"), expected, "a longer cable or a nearer place", given)
 
 
@@ -90,7 +90,7 @@ def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Find
         return
     if (expected := too_short(cable, found.distance)) is None:
         return
-    given = f"motion to {_at(found.place)} at t = {found.t:.6g} s, {found.distance:.8g} m from the other end"
+    given = f"motion to {_xyz(found.place)} at t = {found.t:.6g} s, {found.distance:.8g} m from the other end"
     more = f"a longer cable, {found.distance:.6g} m or more, or {smaller(found.key)}"
     yield Finding(("ends", found.end, "motion", found.key), expected, more, given)
 
@@ -247,11 +247,11 @@ def _straight_start(cable: Cable, ends: Ends, initial: Straight) -> Iterator[Fin
         yield Finding(("initial", "origin"), expected, "add `origin: [x, y, z]` (m), the position of s = 0")
         return
     if initial.origin is not None and math.dist(initial.origin, origin) > near:
-        expected = f"{_at(origin)}, which follows from the held end"
+        expected = f"{_xyz(origin)}, which follows from the held end"
         yield Finding(("initial", "origin"), expected, "leave origin out")
     tip = _along(origin, initial.direction, length)
     if len(held) == 2 and math.dist(tip, held["end"]) > near:
-        expected = f"a straight cable that ends at ends.end.position {_at(held['end'])}; this one ends at {_at(tip)}"
+        expected = f"a straight cable that ends at ends.end.position {_xyz(held['end'])}; this one ends at {_xyz(tip)}"
         yield Finding(("initial", "direction"), expected, "use `initial: {kind: equilibrium}`; it finds the shape")
     yield from _bodies_agree(ends, origin, tip, near)
     if held and initial.velocity is not None and any(initial.velocity):
@@ -269,7 +269,7 @@ def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, loa
     for name, index in (("start", 0), ("end", len(points) - 1)):
         position = ends.held().get(name)
         if position is not None and math.dist(points[index], position) > SAME_PLACE * length:
-            expected = f"{_at(position)}, where ends.{name}.position holds the cable"
+            expected = f"{_xyz(position)}, where ends.{name}.position holds the cable"
             yield Finding(("initial", "points", index), expected, "let the polyline begin and end at the held ends")
     yield from _bodies_agree(ends, points[0], points[-1], SAME_PLACE * length)
 
@@ -325,4 +325,4 @@ def _bodies_agree(ends: Ends, first: Triple, last: Triple, near: float) -> Itera
         there = first if name == "start" else last
         if math.dist(position, there) > near:
             here: Place = ("ends", name, "initial_guess")
-            yield Finding(here, f"{_at(there)}, where initial puts this end of the cable", "leave initial_guess out")
+            yield Finding(here, f"{_xyz(there)}, where initial puts this end of the cable", "leave initial_guess out")

@@ -13,7 +13,7 @@ from typing import Any
 
 from hybrid.errors import Complaint
 from hybrid.scene.base import Place, Table, decimal_comma, did_you_mean, dotted
-from hybrid.scene.schema_walk import keys_at, shorthand_keys, tables_at, takes_names
+from hybrid.scene.schema_walk import has_names, keys_at, shorthand_keys, tables_at
 from hybrid.scene.yaml_nodes import READABLE, WRITE_OUT, TooDeep, composed
 
 Spot = tuple[int, int]
@@ -280,7 +280,7 @@ def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
             refusal = f"the number of an entry of {dotted(path[:depth])} in brackets, counted from 0", fix
         else:
             known = keys_at(schema, path[:depth])
-            named = not known and takes_names(schema, path[:depth]) and isinstance(here.value, dict)
+            named = not known and has_names(schema, path[:depth]) and isinstance(here.value, dict)
             if named and (part in here.value or (depth == len(path) - 1 and value.value is not None)):
                 refusal = None
             elif named:

@@ -229,7 +229,7 @@ class PayingOut:
         if model.layout is not None:
             of_base = self._came_from(self.enters, model.layout.rod.size)
             parts = plan.parts_of(self.count + more_nodes)
-            here = on_other_parts(model.layout, model.layout.there, of_base, parts) if plan.follows else None
+            here = on_other_parts(model.layout, model.layout.node_flags, of_base, parts) if plan.follows else None
             model = replace(model, layout=model.layout._replace(rod=model.layout.rod[of_base], parts=parts, here=here))
         self.count, material = self.count + more_nodes, self.material + more_nodes
         length = self.length
@@ -426,7 +426,7 @@ class PayingOut:
         if self.layout is not None:
             cells["rod"] = self.layout.rod.copy()
             if self.plan.follows:
-                cells["here"] = self.layout.there
+                cells["here"] = self.layout.node_flags
         ended = {"ended": True} if self.ended else {}
         return {"count": self.count, "law": self.law.copy(), "foreseen": self.foreseen, **ended, **kept, **cells}
 

@@ -62,10 +62,10 @@ class PaidZones:
             why = Reason(int(a), int(b) + 1, "grow", "it is about to be taken in")
             change = Change(layout.rod | near, (why,), near, none)
         if paying.plan.follows:
-            here = layout.there
+            here = layout.node_flags
             if not paying.enters:
                 here &= self._may_stay(layout)
-        stays = here is None or bool((here == layout.there).all())
+        stays = here is None or bool((here == layout.node_flags).all())
         return None if change.same and stays else (change, here)
 
     def _may_stay(self, layout: Layout) -> np.ndarray:

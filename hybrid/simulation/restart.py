@@ -172,7 +172,7 @@ def _check(last: LoadChange[Any], changed: Any, resolution: NetworkResolution, b
     old = build_system(before, resolution)
     new = build_system(system, resolution, old)
     for name, one, other, joints in zip(old.names, old.models, new.models, old.joints, strict=True):
-        other.ends.take_frames(one.ends)
+        other.ends.copy_frames(one.ends)
         for k, end_name in enumerate(("start", "end")):
             if joints[k] < 0:
                 point = getattr(system.lines[name], end_name)

@@ -166,12 +166,12 @@ def test_slopes_of_a_motion_are_those_of_central_differences():
         {"": scene}, keys, [("", f"{x} in motion") for x in of], lambda case, x: scene_with(scene, keys, x)
     )
     x = np.array([1.2, 250.0])
-    here = motions.at(x)
+    here = motions.runs_of(x)
     assert not motions.refresh(here, {""})  # the first run has them
     slopes = np.array([peaks.slopes[0] for peaks in motions.peaks(here, np.abs(x))[""]])
     for i in (0, 1):
         d = 0.4 * PART * x[i] * (np.arange(2) == i)
-        more, less = motions.at(x + d).runs[""].values, motions.at(x - d).runs[""].values
+        more, less = motions.runs_of(x + d).runs[""].values, motions.runs_of(x - d).runs[""].values
         np.testing.assert_allclose(slopes[:, i], (more - less) / (2.0 * d[i]), rtol=(1e-3, 5e-2)[i])
     assert motions.count == 1 + 2 * TANGENT + 4
 

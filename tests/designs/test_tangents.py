@@ -89,13 +89,13 @@ def test_a_touchdown_that_moves(model: str) -> None:
 def test_a_line_in_a_plane_is_followed_in_it(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the same tangents as in space, where it goes by a number that moves its plane."""
     tables, of, found = on_the_bed(model), ["last tension@start", "std position.z@150", "max tension@end"], []
-    plain, bits = NetworkOthers._follow, list[int]()
+    plain, bits = NetworkOthers._call_each_step, list[int]()
 
     def follow(self: NetworkOthers, reports: Any) -> None:
         plain(self, reports)
         bits.append(self._model.models[0].line.bits & PLANAR)
 
-    monkeypatch.setattr(NetworkOthers, "_follow", follow)
+    monkeypatch.setattr(NetworkOthers, "_call_each_step", follow)
     tables["time"]["duration"] = 2.0
     for dimension, beside in ((None, []), (3, []), (None, ["ends.end.position[1]"])):
         scene = hybrid.validate_scene(tables | ({"dimension": dimension} if dimension else {}))

@@ -61,7 +61,7 @@ def test_saving_writes_the_file_and_keeps_its_permissions(tmp_path: Path) -> Non
     assert file.stat().st_mode & 0o777 == 0o640
     assert not document.changed
     assert list(tmp_path.iterdir()) == [file]
-    assert document.look() == ""
+    assert document.compare_with_disk() == ""
 
 
 def test_ends_of_lines_stay_those_of_the_file(tmp_path: Path) -> None:
@@ -73,7 +73,7 @@ def test_ends_of_lines_stay_those_of_the_file(tmp_path: Path) -> None:
     document.save()
     assert file.read_bytes() == b"a\r\nc\r\n"
     file.write_bytes(b"a\r\nd\r\n")
-    assert (document.look(), document.text) == ("taken", "a\nd\n")
+    assert (document.compare_with_disk(), document.text) == ("taken", "a\nd\n")
 
 
 def test_a_file_changed_by_another_program_is_not_replaced_unasked(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_a_file_changed_by_another_program_is_not_replaced_unasked(tmp_path: Pat
     with pytest.raises(Refused, match="changed on disk"):
         document.save()
     assert file.read_text() == "theirs\n"
-    assert document.look() == "differs"
+    assert document.compare_with_disk() == "differs"
     assert document.text == "mine\n"
     document.save(force=True)
     assert file.read_text() == "mine\n"
@@ -97,9 +97,9 @@ def test_a_file_that_was_deleted_is_written_anew(tmp_path: Path) -> None:
     document = Document("a: 1\n", file)
     document.edit("a: 2\n", document.revision)
     file.unlink()
-    assert document.look() == "gone"
+    assert document.compare_with_disk() == "gone"
     document.save()
-    assert file.read_text() == "a: 2\n" and document.look() == "" and not document.changed
+    assert file.read_text() == "a: 2\n" and document.compare_with_disk() == "" and not document.changed
 
 
 def test_a_change_on_disk_is_taken_where_nothing_is_unsaved(tmp_path: Path) -> None:
@@ -107,11 +107,11 @@ def test_a_change_on_disk_is_taken_where_nothing_is_unsaved(tmp_path: Path) -> N
     file.write_text(BASE)
     document = Document(BASE, file)
     file.write_text("other text\n")
-    assert document.look() == "taken"
+    assert document.compare_with_disk() == "taken"
     assert document.text == "other text\n"
     assert not document.changed
     file.unlink()
-    assert document.look() == "gone"
+    assert document.compare_with_disk() == "gone"
     assert document.text == "other text\n"
 
 

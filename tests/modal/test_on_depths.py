@@ -21,7 +21,7 @@ def test_a_line_in_a_trough_swings_as_a_pendulum(several: bool) -> None:
     """As far off its bottom as it is high: w^2 = g kappa + (T/m) (n pi/L)^2, whatever the bed's stiffness."""
     y, length, mass = np.linspace(-8, 8, 17), 100.0, 10.0
     depths = {"x": [-50.0, 0.0, 100.0, 150.0], "y": y.tolist(), "depth": [(-0.025 * y**2).tolist()] * 4}
-    slopes = [Depths(**depths).surface.at(50.0, side)[2] for side in (-1e-3, 1e-3)]
+    slopes = [Depths(**depths).surface.depth_at(50.0, side)[2] for side in (-1e-3, 1e-3)]
     curvature = (slopes[0] - slopes[1]) / 2e-3
     line = {"sections": [{"length": length, "mass": mass, "diameter": 0.05, "axial_stiffness": 1e6}]}
     tables = {"environment": {"gravity": G, "seabed": {"z": 0.0, "stiffness": 1e5, "depths": depths}}}

@@ -83,7 +83,7 @@ def test_heights_and_slopes_are_continuous_and_one_is_the_derivative_of_the_othe
         d = 1e-5 * np.eye(3)[k]
         by_difference = (height(places + d)[0] - height(places - d)[0]) / 2e-5
         np.testing.assert_allclose(slopes[:, k], by_difference, rtol=0, atol=2e-5)
-    from_scene = np.array([depths.surface.at(a, b) for a, b, _ in places])
+    from_scene = np.array([depths.surface.depth_at(a, b) for a, b, _ in places])
     np.testing.assert_allclose(-height(places)[0], from_scene[:, 0], rtol=0, atol=1e-9)
     np.testing.assert_allclose(-slopes, from_scene[:, 1:], rtol=0, atol=1e-10)
     on_lines = np.column_stack([x, np.full(8, 3.3), np.zeros(8)])
@@ -109,7 +109,7 @@ def leaves_range(depths: Depths, parts: int = 7) -> float:
         corners = depth[i : i + 2, j : j + 2]
         for a in np.linspace(depths.x[i], depths.x[i + 1], parts):
             for b in np.linspace(depths.y[j], depths.y[j + 1], parts):
-                z = surface.at(a, b)[0]
+                z = surface.depth_at(a, b)[0]
                 most = max(most, z - corners.max(), corners.min() - z)
     return most
 
@@ -130,8 +130,8 @@ def test_a_shelf_on_an_uneven_grid_is_monotone(x: list[float], row: list[float])
     across = Depths(x=[-50, 50], y=x, depth=[row, row])
     assert leaves_range(across, 51) <= 1e-12 * max(row)
     places = np.linspace(x[0], x[-1], 300)
-    along = [depths.surface.at(a, 3.0) for a in places]
-    np.testing.assert_allclose(along, [np.take(across.surface.at(3.0, a), [0, 2, 1]) for a in places], atol=1e-12)
+    along = [depths.surface.depth_at(a, 3.0) for a in places]
+    np.testing.assert_allclose(along, [np.take(across.surface.depth_at(3.0, a), [0, 2, 1]) for a in places], atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -154,7 +154,7 @@ def test_slopes_are_those_of_monotone_cubics() -> None:
     x, row = random_steps(rng, 20), rng.uniform(80, 100, 20)
     depths = Depths(x=x, y=[0, 1, 5], depth=[[z] * 3 for z in row.tolist()])
     places = np.linspace(x[0], x[-1], 500)
-    found = [depths.surface.at(a, 2.2)[0] for a in places]
+    found = [depths.surface.depth_at(a, 2.2)[0] for a in places]
     np.testing.assert_allclose(found, PchipInterpolator(x, row)(places), rtol=1e-12)
 
 

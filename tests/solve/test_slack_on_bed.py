@@ -57,7 +57,7 @@ def ridge() -> tuple[dict[str, Any], float]:
     """A ridge along x, and its curvature at the top."""
     y = np.linspace(-8, 8, 17)
     depths = {"x": [-50.0, 0.0, 100.0, 150.0], "y": y.tolist(), "depth": [(0.025 * y**2).tolist()] * 4}
-    slopes = [Depths(**depths).surface.at(50.0, side)[2] for side in (-1e-3, 1e-3)]
+    slopes = [Depths(**depths).surface.depth_at(50.0, side)[2] for side in (-1e-3, 1e-3)]
     return {"depths": depths}, (slopes[1] - slopes[0]) / 2e-3
 
 
