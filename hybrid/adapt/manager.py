@@ -166,9 +166,11 @@ class DomainManager:
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
         places = layout.starts[-1] + 1
         self.zones = blank_zones(1, n)._replace(  # what the compiled run knows of them
-            here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64),
+            here=np.zeros(places, bool),
+            plan=np.zeros(places, bool),
+            calm=np.zeros(places, np.int64),
             waves=np.zeros(places),
-        )  # fmt: skip
+        )
         self.zones.clock.share, self.zones.clock.fineness = allowed.curvature_error or 0.0, allowed.fineness
         self.tolerance, self.zones.clock.left = allowed.tolerance, 1.0
         for quantity, part in allowed.asked.items():

@@ -201,9 +201,10 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
     space, rows = problem.space, zip(problem.constraints, best.prices, strict=True)
     at = [
         AtBound(name, which, float(best.bounds[i, k]))
-        for i, name in enumerate(space.names) for k, which in enumerate(("low", "high"))
+        for i, name in enumerate(space.names)
+        for k, which in enumerate(("low", "high"))
         if np.isfinite(best.bounds[i, k])
-    ]  # fmt: skip
+    ]
     return Found(
         kept=tuple(_kept(c, price, point, finer) for c, price in rows), bounds=tuple(at),
         minimised=None if objective is None else objective.value(point),
@@ -320,7 +321,7 @@ def _refuse_what_fights(problem: Problem, point: Point) -> None:
         f"{c.name}{f' ({c.case})' if c.case else ''}: {c.result} {words[c.side]} {c.bound:.6g}, and is "
         f"{point.values[c.row]:.6g}"
         for _, c in fights
-    ]  # fmt: skip
+    ]
     space, sizes = problem.space, problem.space.sizes(point.x)
     at = [
         f"{name} = {x:.6g}{' (its bound)' if min(abs(x - low), abs(x - high)) <= AT_BOUND * size else ''}"

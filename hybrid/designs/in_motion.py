@@ -160,9 +160,8 @@ def by_differences(
         for part in PARTS:
             d = part * sizes[key]
             more, less = (
-                Motion(scene_with(asked, [(key,)], np.array([number + x])), wanted, base.course, base)
-                for x in (d, -d)
-            )  # fmt: skip
+                Motion(scene_with(asked, [(key,)], np.array([number + x])), wanted, base.course, base) for x in (d, -d)
+            )
             for each in (more, less):
                 each.check(base, key)
             found.append((more.values - less.values) / (2.0 * d))

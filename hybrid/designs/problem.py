@@ -158,10 +158,11 @@ class Problem(NamedTuple):
             return set()
         foretold = point.foretold(there.x)
         return {
-            c.case for c in self.constraints
+            c.case
+            for c in self.constraints
             if (there.values[c.row] - c.bound) * c.side >= -near * c.scale
             and abs(there.values[c.row] - foretold[c.row]) > self.within.kept * c.scale
-        }  # fmt: skip
+        }
 
     def moving(self, point: Point, x: Floats) -> set[str]:
         """Cases of which a search has to know the motion with values x of unknowns.
@@ -174,9 +175,10 @@ class Problem(NamedTuple):
         if self.moves:
             foretold, changed = point.foretold(x), np.abs(equilibria.motions.changed(x, len(equilibria.wanted)))
             cases |= {
-                c.case for c in self.constraints
+                c.case
+                for c in self.constraints
                 if (foretold[c.row] - c.bound) * c.side >= -(AWAY * c.scale + changed[c.row])
-            }  # fmt: skip
+            }
         return cases
 
 
@@ -375,11 +377,13 @@ def refused_result(task: TaskFile[Design], error: SceneError) -> SceneError:
     found = []
     for x in error.complaints:
         places = [
-            (table, name, "quantity") for table in ("targets", "limits", "results")
+            (table, name, "quantity")
+            for table in ("targets", "limits", "results")
             for name, each in getattr(task.asked, table).items()
-            if each.quantity == x.value or re.search(rf"(^|[ /]){re.escape(each.quantity)}($|@)", x.value)
+            if each.quantity == x.value
+            or re.search(rf"(^|[ /]){re.escape(each.quantity)}($|@)", x.value)
             or each.quantity.split(".")[0] == x.value
-        ]  # fmt: skip
+        ]
         if x.where != "of" or not places:
             return error
         found.append(Finding(places[0], x.expected, x.fix))

@@ -465,7 +465,7 @@ class DrivenEnd:
 
     def set(
         self, begin: float, end: float, position: Vector, velocity: Vector | None, turn: Vector, one_step: bool = False
-    ) -> None:  # fmt: skip
+    ) -> None:
         """From where it is at `begin` (s) to a place at `end`; turn: rotation vector in the axes of its frame, rad.
 
         velocity: (3,) m/s there, None: in one step that which the places imply, else at rest; one_step: whether the way

@@ -310,8 +310,9 @@ def bend_law(material: Material, line: Line, of: NDArray[np.int64]) -> tuple[Flo
     n, half = line.h.size, 0.5 * line.h
     law = np.zeros((n + 1, NO_BEND_LAW.shape[1]))
     for cells, first, last, length, nodes in (
-        (number, FIRST_A, LAST_A, HALF_A, slice(1, n + 1)), (number, FIRST_B, LAST_B, HALF_B, slice(0, n)),
-    ):  # fmt: skip
+        (number, FIRST_A, LAST_A, HALF_A, slice(1, n + 1)),
+        (number, FIRST_B, LAST_B, HALF_B, slice(0, n)),
+    ):
         law[nodes, first], law[nodes, last], law[nodes, length] = begins[cells], begins[cells + 1], half
     same = np.concatenate([[False], number[1:] == number[:-1], [False]])
     law[same, HALF_A] += law[same, HALF_B]

@@ -37,7 +37,7 @@ WRITTEN = ("flow", "axis", "slip", "slid", "bed", "grip", "rolling", "now", "lan
 
 def nearby(
     model: Model, of: LineScene, scene: LineScene, resolution: Resolution, without: int, clamped: bool = False
-) -> Model | None:  # fmt: skip
+) -> Model | None:
     """The model of `scene`, in the cells and zones that `model` has of the scene `of`; None: its cells are others.
 
     without: bits of forces that its line leaves out (kernels.state.report); clamped: frames of ends hang on directions

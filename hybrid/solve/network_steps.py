@@ -140,7 +140,7 @@ class NetworkSteps:
         tables = np.array([x.numbers for x in members.values()])
         self._job.bind(
             members=tables, with_members=np.array([*members], np.int64), stirrer=stir_members.address(tables[0])
-        )  # fmt: skip
+        )
 
     def watch(self, even: np.ndarray, odd: np.ndarray, watcher: int) -> None:
         """After steps of even and odd parity this kernel looks whether lines have met; 0: none does."""

@@ -163,9 +163,11 @@ def own_force(body, old, new, work):
     put(work, OWN + 3, sub(M, mat_vec(R, m)))
     work[KINETIC] = 0.5 * (dot(nu, p1) + dot(w, p2))
     work[POTENTIAL] = (
-        0.5 * body[STIFFNESS] * height * height - body[LIFT] * (old[PLACE + 2] + work[U + 2]) - arm[2]
+        0.5 * body[STIFFNESS] * height * height
+        - body[LIFT] * (old[PLACE + 2] + work[U + 2])
+        - arm[2]
         + 0.5 * (body[STIFFNESS + 2] * t[0] * t[0] + body[STIFFNESS + 1] * t[1] * t[1])
-    )  # fmt: skip
+    )
     work[POWER] = dot(vector(work, LINES), vector(new, V)) + dot(vector(work, LINES + 3), spin)
     work[POWER + 1] = wet - dot(b1, nu) - dot(b2, w)
     work[POWER + 2] = dot(vector(body, FORCE), vector(new, V)) + dot(vector(body, MOMENT), spin)

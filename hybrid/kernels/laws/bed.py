@@ -56,9 +56,11 @@ def corner(heights, c, wx, sx, wy, sy):
 def weigh(heights, a, b, k, rows):
     """Sum over the four corners of a cell of the grid; k: row of its first corner, rows: of one value of x."""
     return (
-        corner(heights, k, a[0], a[2], b[0], b[2]) + corner(heights, k + 1, a[0], a[2], b[1], b[3])
-        + corner(heights, k + rows, a[1], a[3], b[0], b[2]) + corner(heights, k + rows + 1, a[1], a[3], b[1], b[3])
-    )  # fmt: skip
+        corner(heights, k, a[0], a[2], b[0], b[2])
+        + corner(heights, k + 1, a[0], a[2], b[1], b[3])
+        + corner(heights, k + rows, a[1], a[3], b[0], b[2])
+        + corner(heights, k + rows + 1, a[1], a[3], b[1], b[3])
+    )
 
 
 @called

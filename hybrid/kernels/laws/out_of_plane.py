@@ -93,9 +93,11 @@ def moment_stiffness(kappa, M, out, torsion, d):
     # in those of the plane: m = (-d1, d0)
     x, y = d[0], d[1]
     C = (
-        a * y * y - (b + e) * x * y + f * x * x, -a * x * y - b * y * y + e * x * x + f * x * y,
-        -a * x * y + b * x * x - e * y * y + f * x * y, a * x * x + (b + e) * x * y + f * y * y,
-    )  # fmt: skip
+        a * y * y - (b + e) * x * y + f * x * x,
+        -a * x * y - b * y * y + e * x * x + f * x * y,
+        -a * x * y + b * x * x - e * y * y + f * x * y,
+        a * x * x + (b + e) * x * y + f * y * y,
+    )
     return C, (C[0], C[1] - M, C[2] + M, C[3])
 
 

@@ -212,9 +212,11 @@ def count_crossings(seen, blocks, t0, tn, near):
             if blocks[k, 4] == blocks[m, 5]:  # one way all along
                 continue
             if (
-                blocks[k, 0] > blocks[m, 2] or blocks[m, 0] > blocks[k, 2]
-                or blocks[k, 1] > blocks[m, 3] or blocks[m, 1] > blocks[k, 3]
-            ):  # fmt: skip
+                blocks[k, 0] > blocks[m, 2]
+                or blocks[m, 0] > blocks[k, 2]
+                or blocks[k, 1] > blocks[m, 3]
+                or blocks[m, 1] > blocks[k, 3]
+            ):
                 continue
             for i in range(k * BLOCK, min((k + 1) * BLOCK, n)):
                 for j in range(max(m * BLOCK, i + 2), min((m + 1) * BLOCK, n)):

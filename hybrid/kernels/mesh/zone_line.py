@@ -23,7 +23,7 @@ from hybrid.kernels.mesh.fill_line import (
     fill_node,
     fill_point,
     no_element,
-)  # fmt: skip
+)
 from hybrid.kernels.mesh.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds, blank_kinds
 from hybrid.kernels.state.state import Floats, Line, blank_line
 

@@ -165,9 +165,11 @@ def observed_joined(line: Line, batch: Batch, begin: NDArray[np.int64]) -> tuple
     held = Ends(batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
     own = {name: x for name, x in cut.items() if "." not in name}
     first = Output(
-        line._replace(**{name: cut[f"line.{name}"] for name in ALONG_LINE}), Ends(*(x[0] for x in held)),
-        **{"turn": NO_TURN, "bend": bend} | own, energy=energy[0],
-    )  # fmt: skip
+        line._replace(**{name: cut[f"line.{name}"] for name in ALONG_LINE}),
+        Ends(*(x[0] for x in held)),
+        **{"turn": NO_TURN, "bend": bend} | own,
+        energy=energy[0],
+    )
     along = {"energy": energy} | {f"ends.{name}": x for name, x in held._asdict().items()}
     tables = _series(first, energy.shape[0], along)
     _series.shift(tables, on_nodes, begin[:-1], np.diff(begin))
