@@ -245,8 +245,8 @@ BROKEN = {
     "docstring whose first line is no whole sentence": 53,
     "name from the list of banned words": 152,
     "more than two constants in a line": 24,
-    "constructor above 40 lines": 8,
-    "function above 60 lines": 20,
+    "constructor above 40 lines": 6,
+    "function above 60 lines": 18,
     "fmt: skip": 450,
 }
 # Words that do not say what a thing is or does; the second ones only where they are the whole name.

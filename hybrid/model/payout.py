@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -259,13 +259,7 @@ def payout_plan(
         refuse(f"{where}.longest", f"{payout.longest:g}", f"at least {high:.6g} m, which is paid out", "leave it out")
     sections = _from_far_end(scene, longest)
     s = line.s if side else length - line.s[::-1]
-    joint = max((zone.s_a if side else length - zone.s_b for zone in zones), default=0.0)
-    at = material(scene).at
-    points = [x for x in (at if side else length - at).tolist() if x < length]
-    out = scene.cable.sections if side else scene.cable.sections[::-1]
-    changes = [x for x in np.cumsum([x.length for x in out]).tolist() if x < length * (1 - 1e-9)]
-    sleeves = [x.range[1] if side else length - x.range[0] for x in (*stiffeners_of(scene), *restrictors_of(scene))]
-    fixed = max([joint, *points, *changes, *sleeves, _catenary_up_to(scene)])
+    fixed = _last_fixed(scene, zones, side)
     near = int(np.searchsorted(s, fixed * (1 + 1e-12)))
     least = -np.inf if payout.from_outside or payout.winch is not None else least_length(law, length)
     ride = riding_nodes(scene, line, s, least - s[min(near + FEWEST_CELLS, s.size - 1)])
@@ -289,12 +283,7 @@ def payout_plan(
     if not (longest - length) / h < MOST_CELLS:
         given, expected = f"{longest:.6g} m of line in cells of {h:.6g} m", f"at most {MOST_CELLS} cells"
         refuse(where, given, expected, "pay less out (the rate is in m/s, the length in m), or take longer cells")
-    nodes: list[float] = s[: s.size - ride].tolist()
-    for end in np.cumsum([x.length for x in sections[:-1]]).tolist():
-        if nodes[-1] * (1 + 1e-9) < end:
-            nodes += np.linspace(nodes[-1], end, max(round((end - nodes[-1]) / h), 1) + 1)[1:].tolist()
-    while nodes[-3 - ride] < longest:
-        nodes.append(nodes[-1] + h)
+    nodes = _with_cells(s[: s.size - ride].tolist(), sections, longest, h, ride)
     winch = winch_of(payout, length)
     winch.least, winch.most = shortest, longest
     far, places = 0.0 if side else length, np.array(nodes)
@@ -306,6 +295,31 @@ def payout_plan(
         side, far, law, places, finest, length, longest, shortest, zones, cable, _pieces(scene, cable, side, far),
         payout.from_outside, winch, layer, line.s.copy(),
     )  # fmt: skip
+
+
+def _last_fixed(scene: LineScene, zones: Sequence[Zone], side: int) -> float:
+    """The last joint, load or change of section, m from the far end; side: as of `PayoutPlan`."""
+    length = scene.length
+    joint = max((zone.s_a if side else length - zone.s_b for zone in zones), default=0.0)
+    at = material(scene).at
+    points = [x for x in (at if side else length - at).tolist() if x < length]
+    out = scene.cable.sections if side else scene.cable.sections[::-1]
+    changes = [x for x in np.cumsum([x.length for x in out]).tolist() if x < length * (1 - 1e-9)]
+    sleeves = [x.range[1] if side else length - x.range[0] for x in (*stiffeners_of(scene), *restrictors_of(scene))]
+    return max([joint, *points, *changes, *sleeves, _catenary_up_to(scene)])
+
+
+def _with_cells(nodes: list[float], sections: Sequence[Section], longest: float, h: float, ride: int) -> list[float]:
+    """Material nodes and those of cells of about h, m, behind them, as many as the longest line needs.
+
+    ride: how many nodes ride with the fairlead.
+    """
+    for end in np.cumsum([x.length for x in sections[:-1]]).tolist():
+        if nodes[-1] * (1 + 1e-9) < end:
+            nodes += np.linspace(nodes[-1], end, max(round((end - nodes[-1]) / h), 1) + 1)[1:].tolist()
+    while nodes[-3 - ride] < longest:
+        nodes.append(nodes[-1] + h)
+    return nodes
 
 
 def _catenary_up_to(scene: LineScene) -> float:

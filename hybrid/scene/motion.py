@@ -94,21 +94,25 @@ class EndMotion:
         self._shift_spline: Any = None
         self._turn_spline: Any = None
         if motion is not None and motion.file is not None:
-            try:
-                record = motion_record(motion, self.base.tolist(), waves[2] if waves is not None else frame is not None)
-            except RecordRefused as refused:
-                found = refused.finding
-                raise SceneError([Complaint("motion.file", found.given or "", found.expected, found.fix)]) from None
-            if record.shift is not None:
-                self._shift_spline = spline(record.times, record.shift, self.base if self._ramp else None)
-            if record.rotation is not None:
-                still = np.zeros(3) if self._ramp else None
-                self._turn_spline = spline(record.times, np.radians(record.rotation), still)
-            self._last = float(record.times[-1])
+            self._read_record(motion, waves[2] if waves is not None else frame is not None)
         by_table = bool(self._shifts) or self._carried is not None or self._follows
         self._translates = by_table or self._shift_spline is not None
         self._rotates = bool(self._turns) or self._turn_spline is not None
         self.moving = self._translates or self._rotates
+
+    def _read_record(self, motion: Motion, turns: bool) -> None:
+        """Splines of the motion file; turns: whether the end turns with the motion."""
+        try:
+            record = motion_record(motion, self.base.tolist(), turns)
+        except RecordRefused as refused:
+            found = refused.finding
+            raise SceneError([Complaint("motion.file", found.given or "", found.expected, found.fix)]) from None
+        if record.shift is not None:
+            self._shift_spline = spline(record.times, record.shift, self.base if self._ramp else None)
+        if record.rotation is not None:
+            still = np.zeros(3) if self._ramp else None
+            self._turn_spline = spline(record.times, np.radians(record.rotation), still)
+        self._last = float(record.times[-1])
 
     def at(self, t: float) -> tuple[Array, Array, Array | None, Array]:
         """Position (3,) m, velocity (3,) m/s, frame (3, 3) or None, angular velocity (3,) rad/s at t [s].

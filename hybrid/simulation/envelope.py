@@ -90,6 +90,17 @@ def _doubled(nodes: Floats, marked: Floats) -> Floats:
     return np.insert(nodes, np.searchsorted(nodes, marked), marked)
 
 
+def _parts_of(scene: LineScene, model: Model, moves: bool, touches: bool) -> set[str]:
+    """What a line has, or may have in a run, that its extremes depend on; arguments are those of `Envelope`."""
+    out = {"", *({"rod"} if moves and model.layout is not None else {zone.kind for zone in model.zones})}
+    out |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
+    out |= {"obstacles"} if model.line.bits & OBSTACLES else set()
+    touching = SELF_CONTACT | (MAY_TOUCH | MAY_MEET if moves else 0)
+    out |= {"self_contact"} if touches or model.line.bits & touching else set()
+    begun = as_begun(model.line, model.held, scene.dimension)
+    return out | ({"torsion"} if "rod" in out or (begun.torsion.size and not begun.bits & PLANAR) else set())
+
+
 class Envelope:
     """Extremes of one run or equilibrium, lowest and highest with their times, at places s (n,) m.
 
@@ -111,17 +122,9 @@ class Envelope:
         self.start: Floats = np.zeros((nodes.size, 3))  # m, from where displacements count
         self.begin = 0.0  # s
         self.bounds = no_extremes(self.s.size)  # of meshes before that of now
-        has = {"", *({"rod"} if layout is not None else {zone.kind for zone in model.zones})}
-        has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
-        has |= {"obstacles"} if model.line.bits & OBSTACLES else set()
-        later = MAY_TOUCH | MAY_MEET if moves else 0
-        touching = SELF_CONTACT | later
-        has |= {"self_contact"} if touches or model.line.bits & touching else set()
-        begun = as_begun(model.line, model.held, scene.dimension)
-        has |= {"torsion"} if "rod" in has or (begun.torsion.size and not begun.bits & PLANAR) else set()
         pipes = Pipes(scene) if moves and any(x.pipe for x in scene.cable.sections) else None
-        has |= {"pipe"} if pipes is not None else set()
-        self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in has}
+        parts = _parts_of(scene, model, moves, touches) | ({"pipe"} if pipes is not None else set())
+        self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in parts}
         side = 3.0 * NEAR * model.length  # beyond which a place is no longer at a change of section
         first, second = (np.flatnonzero(np.diff(self.s) == 0.0) + k for k in (0, 1))
         beside = self.s.copy()
@@ -134,7 +137,7 @@ class Envelope:
         if pipes is not None:
             self._stress = pipes.largest_allowed(beside, True)
         self._grows = model.payout is not None
-        if model.line.bits & later and not model.line.bits & SELF_CONTACT:
+        if moves and model.line.bits & (MAY_TOUCH | MAY_MEET) and not model.line.bits & SELF_CONTACT:
             self.bounds[:, b.SELF_PRESSURE] = 0.0  # there is no contact before it is computed
         self.itself = SelfWatch(model, no_contact(scene)) if moves else SelfWatch(model)
         asked = scene.output.quantities if moves else {}
