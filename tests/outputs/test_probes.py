@@ -141,7 +141,7 @@ def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytes
             x: np.concatenate(part, axis=-1) for x, part in zip(Shift._fields, parts, strict=True) if x in OF_OUTPUTS
         }
         many = shifts[0]._replace(**joined)
-    again = values_of(observer, observer.look(wide), None if ratios[0] is None else np.concatenate(ratios), many)
+    again = values_of(observer, observer.observation(wide), None if ratios[0] is None else np.concatenate(ratios), many)
     compare(again, {field: np.concatenate([part[field] for part in found]) for field in again})
     computed = [x for field, x in again.items() if not field.startswith("criteria/")]
     assert all(x.flags.c_contiguous and not np.shares_memory(x, wide.work) for x in computed)
