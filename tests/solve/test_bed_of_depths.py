@@ -166,7 +166,7 @@ def test_a_line_over_a_hill_is_pushed_aside_and_balances() -> None:
         assert result.attributes["static_residual"] < 1e-3
         grid = Depths(**hill()["depths"]).surface
         lies = result["contact"][-1] > 50.0
-        under = [-grid.at(a, b)[0] - c for a, b, c in r[lies]]
+        under = [-grid.depth_at(a, b)[0] - c for a, b, c in r[lies]]
         assert min(under) > 0.0 and max(under) < 0.12
 
 
