@@ -13,7 +13,7 @@ from statistics import median
 import numba
 import numpy as np
 import pytest
-from problems import suspension
+from problems import at_rest, suspension
 from scipy.linalg import solve_banded
 
 import hybrid
@@ -21,7 +21,6 @@ from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, eliminate_wide
 from hybrid.kernels.machine import compiler
 from hybrid.kernels.run.entry import assembly, block_rows
 from hybrid.model.build import build
-from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper
 
 pytestmark = pytest.mark.bench
@@ -42,11 +41,9 @@ def scene(zones, every=20.0, start="straight"):
 def moving(zones):
     """A stepper and a state in motion, for timing steps without a driver."""
     model = build(scene(zones, start="equilibrium"))
-    found = solve_statics(
-        model.line, model.sea.at(np.inf), model.ends.at(np.inf), model.start, model.length, model.tension_scale
-    )
+    found = at_rest(model, np.inf)
     stepper = Stepper(model.line, model.length, model.tension_scale)
-    state = found.state.copy()
+    state = found.state.lines[0].copy()
     state.v[:, 1] = 0.1 * np.sin(0.25 * np.pi * model.line.s)  # no turn at the guide, no speed at the pin
     stepper.consistent_accelerations(model.sea.at(np.inf), model.ends.at(np.inf), np.zeros((2, 3)), state)
     return model, stepper, state

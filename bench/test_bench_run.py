@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from peers.hybrid_touchdown import described
+from problems import at_rest
 
 import hybrid
 from hybrid.kernels.run import entry
@@ -29,7 +30,6 @@ from hybrid.model.plane import planar, untwist
 from hybrid.outputs import output_grid
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stability import seed
-from hybrid.solve.statics import Search, solve_statics
 from hybrid.solve.stepper import Stepper
 
 pytestmark = pytest.mark.bench
@@ -172,9 +172,7 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
     scenes = of_duration(4.0), of_duration(12.0)
     model = build(scenes[1])
     sea, ends = model.sea.at(0.0), model.ends.at(0.0)
-    start = solve_statics(
-        model.line, sea, ends, model.start, model.length, model.tension_scale, search=Search(others=model.other_starts)
-    ).state
+    start = at_rest(model).state.lines[0]
     assert model.plane is not None
     line = planar(model.line, model.plane)
     untwist(line, ends, model.cable.held_tangent, start)

@@ -20,9 +20,9 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, SceneError
+from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.simulation.diagnostics import Diagnostics
-from hybrid.solve.statics import Equilibrium
 
 pytestmark = pytest.mark.bench
 SCENES, KINK, COMPRESSED = 300, 1.0, 0.01
@@ -83,9 +83,9 @@ def cable(seed: int) -> dict[str, Any]:
     return tables
 
 
-def flaws_of(found: hybrid.Result, model: Model, rest: Equilibrium) -> tuple[list[str], list[str]]:
+def flaws_of(found: hybrid.Result, model: Model, state: State) -> tuple[list[str], list[str]]:
     """What is wrong with an equilibrium and not said by an event; and what is said."""
-    line, e, T = model.line, rest.state.e, rest.state.T
+    line, e, T = model.line, state.e, state.T
     kinds = {event.kind for event in found.events}
     d = e / np.linalg.norm(e, axis=1)[:, None]
     turn = np.arctan2(np.linalg.norm(np.cross(d[:-1], d[1:]), axis=1), np.einsum("ij,ij->i", d[:-1], d[1:]))
@@ -115,14 +115,14 @@ def flaws_of(found: hybrid.Result, model: Model, rest: Equilibrium) -> tuple[lis
 def test_no_equilibrium_of_a_cable_is_folded_in_silence(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen = list[tuple[Model, Equilibrium]]()
-    judge = Diagnostics.equilibrium
+    seen = list[tuple[Model, State]]()
+    judge = Diagnostics.found_by
 
-    def keep(self: Diagnostics, found: Equilibrium) -> None:
-        seen.append((self._model, found))
-        judge(self, found)
+    def keep(self: Diagnostics, pushed: bool, slack: int, state: State) -> None:
+        seen.append((self._model, state))
+        judge(self, pushed, slack, state)
 
-    monkeypatch.setattr(Diagnostics, "equilibrium", keep)
+    monkeypatch.setattr(Diagnostics, "found_by", keep)
     count, silent, refused, cpu = Counter[str](), list[str](), Counter[str](), list[float]()
     noted = list[str]()
     for seed in range(SCENES):

@@ -39,7 +39,8 @@ from hybrid.kernels.run.entry import assembly, block_rows, workspace
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, State
 from hybrid.model.build import Model, build
-from hybrid.solve.statics import solve_statics
+from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest
 from hybrid.solve.stepper import Stepper
 
 Floats = NDArray[np.float64]
@@ -113,6 +114,13 @@ def order(errors: Sequence[float]) -> Floats:
 # --- to look at every step, and at the discrete equations --------------------------------------
 
 
+def at_rest(model: Model, t: float = 0.0, start: State | None = None) -> LinesAtRest:
+    """The equilibrium in space of a line by itself."""
+    scale, first = model.tension_scale, model.start if start is None else start
+    x = JoinedLine(model.line, model.sea.at(t), model.ends.at(t), model.length, scale, 1e-6 * scale, (-1, -1))
+    return lines_at_rest(Group([x]), [("the first shape", NetworkState([first]))])
+
+
 def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State]]:
     """Every step of a scene, without a file: (t, state); the arrays are overwritten two steps later.
 
@@ -125,9 +133,7 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
     )
     old = model.start.copy()
     if what.initial.kind == "equilibrium":
-        old = solve_statics(
-            model.line, model.sea.at(0.0), model.ends.at(0.0), model.start, model.length, model.tension_scale
-        ).state
+        old = at_rest(model).state.lines[0]
     if kick:
         kick(old, model)
     stepper.consistent_accelerations(

@@ -25,9 +25,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.model.build import build
+from hybrid.model.network import build_system
 from hybrid.scene.schema import Scene
-from hybrid.solve.statics import solve_statics
+from hybrid.scene.short_form import network_of
+from hybrid.simulation.equilibrium import equilibrium_of
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 from arbiter import ArbiterError, static
@@ -96,12 +97,10 @@ def one_march(scene: Scene) -> Slopes:
 
 def production(scene: Scene) -> Slopes:
     """The elimination along s; the clamp itself stands first."""
-    model = build(scene)
-    found = solve_statics(
-        model.line, model.sea.at(0.0), model.ends.at(0.0), model.start, model.length, model.tension_scale
-    )
-    chords = found.state.e
-    middle, slope = 0.5 * (model.line.s[1:] + model.line.s[:-1]), chords[:, 2] / np.linalg.norm(chords, axis=1)
+    network = network_of(scene)
+    model = build_system(network)
+    chords, s = equilibrium_of(network, model, 0.0).state.lines[0].e, model.models[0].line.s
+    middle, slope = 0.5 * (s[1:] + s[:-1]), chords[:, 2] / np.linalg.norm(chords, axis=1)
     return np.concatenate([[0.0], middle]), np.concatenate([[SLOPE], slope])
 
 

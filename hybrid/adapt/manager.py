@@ -38,7 +38,7 @@ from hybrid.kernels.mesh.cell_lengths import FADE
 from hybrid.kernels.mesh.stiffness_ramp import shares
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
-from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match, blank_transfer, transfer
+from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.layout import Layout, LineOnBase, edges, on_other_parts
 from hybrid.model.material import Material, tension_floor
@@ -586,13 +586,6 @@ Clamp = tuple[Floats, Floats]  # first director and tangent
 states = Packed(blank_state, given=("turn", "slow", "wake", "peak", "grip", "sheave", "soil"))
 
 
-class Remapped(NamedTuple):
-    """A state on new nodes, and the lengths (N,) m that its cells have now; their true ones are in the line."""
-
-    state: State
-    lengths: Floats
-
-
 def transfer_to(
     old: Layout,
     new: Layout,
@@ -628,13 +621,3 @@ def transfer_to(
         line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,
         frames, held, np.array([shifts]), blank_match(line.h.size, target.h.size),
     )  # fmt: skip
-
-
-def remap(
-    old: Layout, new: Layout, line: Line, target: Line, state: State, kinks: np.ndarray, twist: Floats,
-    clamps: Sequence[Clamp | None] = (None, None),
-) -> Remapped:  # fmt: skip
-    """Carry a state: arguments as of transfer_to."""
-    job = transfer_to(old, new, line, target, state, kinks, twist, clamps)
-    transfer(Table(blank_transfer()._replace(**job._asdict())).numbers)
-    return Remapped(job.out, job.match.lengths)

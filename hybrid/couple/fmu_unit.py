@@ -127,12 +127,10 @@ class SceneUnit:
         try:
             if name in ("moment", "force") and self._is_cable:
                 return simulation.forces()[list(self._points).index(part) + 2 * (name == "moment")]
-            if simulation.closed:
-                return np.full(3, np.nan)
+            point = simulation.point(part)
         except ValueError as error:  # an exception here would end the master
             self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
             return np.full(3, np.nan)
-        point = simulation.point(part)
         return {"force": point.force, "node_position": point.position, "node_velocity": point.velocity}[name]
 
     def _apply(self, step: float) -> None:

@@ -60,9 +60,9 @@ from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.plane import in_space
 from hybrid.model.resolution import Resolution
 from hybrid.scene.network_scene import Network
+from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.line_result import observer_of
 from hybrid.simulation.network_run import NetworkRun
-from hybrid.simulation.run_start import joined_lines
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.run import batch_of_rows

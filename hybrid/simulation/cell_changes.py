@@ -47,6 +47,7 @@ from hybrid.simulation.cell_views import (
     Shaped,
     blank_joined,
     blank_single,
+    copy_fields,
 )
 from hybrid.simulation.envelope import marks_on
 from hybrid.simulation.kind_changes import carries_all
@@ -311,18 +312,18 @@ class CellChanges:
         self._at.side, self._at.cells = k, n
         parity, at = int(owner.count.parity), self._on.layout(k, n)
         for which in (0, 1):
-            _copy(owner.states[which], self._on.state(k, which, n))
+            copy_fields(owner.states[which], self._on.state(k, which, n))
             if owner.push.size:
                 self._on.push(k, which, n)[:] = owner.pushes[which]
         zones = self._on.zones(k, n)
-        _copy(switching.zones, zones, (*OF_BASE, "kinds"))
-        _copy(switching.zones.kinds, zones.kinds, ("free",))
-        _copy(model.line, self._on.line(k, n), ("bits", "plane", "torsion"))
-        _copy(model.sea.values, self._on.sea_on(n), REST_OF_SEA)
-        _copy(owner.stepper.work, self._on.work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
+        copy_fields(switching.zones, zones, (*OF_BASE, "kinds"))
+        copy_fields(switching.zones.kinds, zones.kinds, ("free",))
+        copy_fields(model.line, self._on.line(k, n), ("bits", "plane", "torsion"))
+        copy_fields(model.sea.values, self._on.sea_on(n), REST_OF_SEA)
+        copy_fields(owner.stepper.work, self._on.work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
         if self._watch is not None:
-            _copy(self._watch.itself, self._on.itself._replace(width=self._on.width(n)), ("tree", "stack"))
-        _copy(owner.books, self._on.books(n), tuple(x for x in Books._fields if x not in Kept._fields))
+            copy_fields(self._watch.itself, self._on.itself._replace(width=self._on.width(n)), ("tree", "stack"))
+        copy_fields(owner.books, self._on.books(n), tuple(x for x in Books._fields if x not in Kept._fields))
         at.place[:], at.s[:], at.of[:], at.rods[:] = layout.places, model.line.s, layout.base_of_cell, layout.rod_cells
         self._on.sides[k].first[:] = self._on.base[:] = layout.first
         owner.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
@@ -420,9 +421,3 @@ class CellChanges:
             self._watch.itself = itself
             self._watch.table.hold(line=line, old=old, new=new, itself=itself)
         owner.take(model, work)
-
-
-def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
-    for name in old._fields:
-        if name not in but:
-            getattr(new, name)[:] = getattr(old, name)

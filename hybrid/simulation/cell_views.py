@@ -255,3 +255,10 @@ def blank_joined(n: int) -> Joined:
 
 def blank_single(n: int) -> Single:
     return Single(np.zeros(n + 1, np.int8))
+
+
+def copy_fields(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
+    """Copy the arrays of a named tuple into those of another one, but for these."""
+    for name in old._fields:
+        if name not in but:
+            getattr(new, name)[:] = getattr(old, name)

@@ -1,58 +1,94 @@
-"""Equilibria of lines that touch themselves: whether one does, and the damped motion with contact that leads to it."""
+"""Equilibria of lines that touch themselves or each other.
+
+Whether they do, and the damped motion with contact that leads to them.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import chain, pairwise
 
 import numpy as np
 
-from hybrid.errors import Complaint, ComputationError, SceneError
+from hybrid.errors import Complaint, Outcome, SceneError
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
-from hybrid.kernels.state.report import OBSTACLES, SELF_CONTACT
+from hybrid.kernels.state.report import FRICTION, MAY_TOUCH, OBSTACLES, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.initial_shape import GIVEN
+from hybrid.model.initial_shape import GIVEN, HUNG, first_state, hung
+from hybrid.model.lines_contact import touching_among
+from hybrid.model.network import NetworkModel
 from hybrid.model.self_reach import touching
+from hybrid.scene.network_scene import Network
+from hybrid.simulation.lines_contact import JUMP, crossed, jumps, shared_of, watched_pairs
 from hybrid.simulation.self_watch import diameters, least_bending
-from hybrid.solve.contact_statics import settled_system
+from hybrid.solve.contact_statics import settled_system, touching_solver
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
-from hybrid.solve.network_solver import NO_BODIES
+from hybrid.solve.lines_at_rest import Group, LinesAtRest
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.search import Start, Tally, in_slower_currents, is_in_current
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.statics import Equilibrium
+from hybrid.solve.shared_contact import SharedContact
 
-# Parts of a straight way between two shapes, and by how much the Gauss integral of two lines jumps where one passes
-# through the other: by 1, and by far less in a part of a way on which none does.
-PARTS, JUMP = 48, 0.5
-FLAT = 1e-9  # volume, over the lengths, of chords that lie in one plane but for round-off, as neighbours do
 MOST_NODES = 300  # of a line that is looked at for whether it passes through itself
-KEPT = 1e-3  # turns by which the link of a line between two clamps may change
+# Turns by which the link of a line between two clamps may change; and those by which an equilibrium without contact may
+# differ from its start, whose shape may have a writhe of its own.
+KEPT = 1e-3
+OF_SHAPE = 0.5
+# Parts of a current by whose equilibria lines come to that in all of it.
+SLOWER = tuple(np.linspace(0.875, 0.0, 8).tolist())
 
 
-def gauss_integral(a: Floats, b: Floats) -> float:
-    """Gauss integral of two polylines (n, 3) m and (m, 3) m: half the sum of their signed crossings over all views."""
-    p, q = a[:-1, None], a[1:, None]
-    r, s = b[None, :-1], b[None, 1:]
-    pr, ps, qr, qs = (y - x for x, y in ((p, r), (p, s), (q, r), (q, s)))
-    normals = [np.cross(x, y) for x, y in ((pr, ps), (ps, qs), (qs, qr), (qr, pr))]
-    n = [x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-300) for x in normals]
-    angles = [np.arcsin(np.clip(np.einsum("ijk,ijk->ij", n[i], n[(i + 1) % 4]), -1.0, 1.0)) for i in range(4)]
-    volume = np.einsum("ijk,ijk->ij", np.cross(s - r, q - p), pr)
-    largest = np.prod([np.linalg.norm(x, axis=-1) for x in np.broadcast_arrays(s - r, q - p, pr)], axis=0)
-    side = np.where(np.abs(volume) > FLAT * largest, np.sign(volume), 0.0)
-    return float((side * sum(angles)).sum() / (4.0 * math.pi))
+def with_contact(
+    model: NetworkModel, group: Group, without: Callable[[], LinesAtRest], starts: Callable[[], Iterator[Start]]
+) -> tuple[NetworkModel, LinesAtRest]:
+    """Return an equilibrium without contact or, where that will not do, with it; and the model that it is of.
 
+    With contact it is that to which a damped motion leads from the first start that is apart; the last start is the
+    equilibrium without contact.  That is done for lines that contact is asked for, and that would touch, have lost
+    turns of their ends or have passed through each other on the way from their first shapes.  It is done, too, for one
+    by itself that may touch and has lost turns on all ways.
 
-def jumps(a: Floats, b: Floats) -> float:
-    """Largest jump of the Gauss integral of two polylines (2, n, 3) and (2, m, 3) m, first and last, on the straight
-
-    way between these.
+    starts: begins anew at every call.  An equilibrium within itself comes back where no start is apart.
     """
-    parts = np.linspace(0.0, 1.0, PARTS + 1)
-    found = [gauss_integral((1.0 - x) * a[0] + x * a[1], (1.0 - x) * b[0] + x * b[1]) for x in parts]
-    return float(np.abs(np.diff(found)).max())
+    try:
+        found = without()
+    except LineFailed as failed:
+        if failed.outcome == Outcome.TURNS_LOST:
+            model, group = letting_touch(model, group)
+        if not any(_touch(group.lines)) or (first := _first_apart(model, group, starts())) is None:
+            raise
+        try:
+            return model, settle(model, group, first)
+        except LineFailed as too:
+            tried = "\n              ".join(x for x in (failed.detail, too.detail) if x)
+            raise LineFailed(failed.line, failed.outcome, None, failed.s, tried) from None
+    if not any(_touch(group.lines)):
+        return model, found
+    first_shapes = _before_current(model)
+    lost = _has_lost(group.lines, first_shapes, found)
+    lost = lost or _passes_another(model, group, first_shapes, found.state)
+    each = zip(_touch(group.lines), model.models, found.state.lines, strict=True)
+    lost = lost or any(touches and passes_itself(x, state) for touches, x, state in each)
+    if not (lost or _largest_energy(model, group, found.state)):
+        return model, found
+    last: list[Start] = [] if lost else [("the equilibrium without contact", found.state)]
+    before = [("lines hung in still water", first_shapes)] if model.touching is not None else []
+    first = _first_apart(model, group, chain(before, starts(), last))
+    return model, found if first is None else settle(model, group, first)
+
+
+def letting_touch(model: NetworkModel, group: Group) -> tuple[NetworkModel, Group]:
+    """Let a line by itself touch itself where it may, and no scene asks for that."""
+    if not (group.is_alone and group.lines[0].line.bits & MAY_TOUCH):
+        return model, group
+    line = touching(group.lines[0].line, 0.0)
+    own = replace(model.models[0], line=line)
+    return replace(model, models=(own,)), group._replace(lines=[group.lines[0]._replace(line=line)])
 
 
 def passes_itself(model: Model, state: State) -> bool:
@@ -80,28 +116,124 @@ def nearness(model: Model, t: float, state: State) -> Floats:
     return near
 
 
-def settled_from(model: Model, t: float, start: State, near: bool = False) -> Equilibrium:
-    """The equilibrium with contact of one line that a damped motion reaches from a start that is apart.
+def _passes_another(model: NetworkModel, group: Group, first: NetworkState, found: NetworkState) -> bool:
+    """Whether a line passes through another one from its first shape to an equilibrium that knows no contact.
 
-    t: s, of its loads; near: that start is next to an equilibrium, which Newton's method with contact is asked for
-    before anything moves.  ComputationError: the motion does not come to rest, has lost turns, or ends with a catenary
-    that is not taut.
+    Where a current acts by the equilibria while it grows, as far as there are any: two lines that pass through each
+    other twice, first in a weak current and again in a strong one, do not on the straight way.
     """
-    line = touching(model.line, 0.0)
-    scales = model.length, model.tension_scale, model.slack_floor
-    x, first = JoinedLine(line, model.sea.at(t), model.ends.at(t), *scales, (-1, -1)), NetworkState([start])
-    keeps = keeps_turns([x], first, KEPT)
-    try:
-        found = settled_system([x], 0, NO_BODIES, first, lambda: ([contact_of(model)], None), keeps, near)
-    except LineFailed as failed:
-        raise ComputationError(failed.outcome, None, failed.s, failed.detail) from None
-    how = found.path, found.iterations, found.residual
-    return Equilibrium(found.state.lines[0], *how, False, touches=True, unjudged=found.unjudged)
+    if model.touching is None:
+        return False
+    way = [found]
+    if any(is_in_current(group.lines[k].line, group.lines[k].sea) for k in model.touching.lines):
+        smooth = [x._replace(line=x.line._replace(bits=x.line.bits & ~FRICTION)) for x in group.lines]
+        solver = NetworkSolver(smooth, group.points, group.bodies.copy())
+        way += in_slower_currents(solver, found, SLOWER, Tally()) or []
+    return any(True for a, b in pairwise((first, *way[::-1])) for _ in crossed(model.touching, a, b))
 
 
-def is_apart(model: Model, t: float, state: State) -> bool:
-    """Whether no part of a line at rest is in another one."""
-    return math.isfinite(contact_of(model).energy_of(model.line, model.ends.at(t), state))
+def crossings(system: Network, model: NetworkModel, rest: NetworkState) -> list[tuple[int, int]]:
+    """Numbers of lines, two each, without contact, that cross on the straight way from first shapes to an equilibrium.
+
+    A first shape says on which side of another line one lies where the scene gives it, or it hangs between held places.
+    """
+    known = [
+        x.start_shape == GIVEN or not (system.is_joined(line.start) or system.is_joined(line.end))
+        for x, line in zip(model.models, system.lines.values(), strict=True)
+    ]
+    pairs = [(a, b) for a, b in watched_pairs(system, model) if known[a] and known[b]]
+    among = touching_among(system, model.scenes, pairs)
+    if among is None:
+        return []
+    return [*crossed(among, _before_current(replace(model, touching=among)), rest)]
+
+
+def _before_current(model: NetworkModel) -> NetworkState:
+    """The first shapes of all lines, of those that touch others as they hang in still water.
+
+    They say on which side of another line each lies: a current that comes then drives it against the other one, and
+    not through it.
+    """
+    states = [x.start for x in model.models]
+    for k in model.touching.lines if model.touching is not None else ():
+        x, scene = model.models[k], model.scenes[model.names[k]]
+        sea = x.sea.values
+        if x.start_shape == HUNG and is_in_current(x.line, sea):
+            shape = hung(scene, x.line, sea._replace(current=np.zeros_like(sea.current)))
+            if shape is not None:
+                states[k] = first_state(scene, x.line, x.cable, x.sea, x.tension_scale, shape)[0]
+    return NetworkState(states, model.body_places)
+
+
+def settle(model: NetworkModel, group: Group, start: NetworkState, near: bool = False) -> LinesAtRest:
+    """The equilibrium with contact that a damped motion reaches from a start that is apart; near: as of that."""
+    lines, keeps = group.lines, keeps_turns(group.lines, start, KEPT)
+    return settled_system(lines, group.points, group.bodies.copy(), start, lambda: contacts_of(model), keeps, near)
+
+
+def contacts_of(model: NetworkModel) -> tuple[list[SelfContact | None], SharedContact | None]:
+    """Contact without friction of each line that it is asked for, and of lines with each other."""
+    own = [contact_of(x) if touches_alone(model, k) else None for k, x in enumerate(model.models)]
+    return own, shared_of(model)
+
+
+def touches_alone(model: NetworkModel, number: int) -> bool:
+    """Whether contact is asked for of a line with itself, and not with others."""
+    others = model.touching.lines if model.touching is not None else ()
+    return bool(model.models[number].line.bits & SELF_CONTACT) and number not in others
+
+
+def energy_of(x: JoinedLine, model: Model, state: State) -> float:
+    """Energy, J, of contact of a line at rest; infinite: parts are in each other."""
+    return contact_of(model).energy_of(x.line, x.ends, state)
+
+
+def _touch(lines: Iterable[JoinedLine]) -> list[bool]:
+    return [bool(x.line.bits & SELF_CONTACT) for x in lines]
+
+
+def _largest_energy(model: NetworkModel, group: Group, state: NetworkState) -> float:
+    """Of all lines that contact is asked for, J."""
+    each = enumerate(zip(group.lines, model.models, state.lines, strict=True))
+    found = [energy_of(*x) for k, x in each if touches_alone(model, k)]
+    if model.touching is not None:
+        found.append(energy_between(model, group.lines, group.bodies, state)[0])
+    return max(found)
+
+
+def energy_between(
+    model: NetworkModel, lines: Sequence[JoinedLine], bodies: Floats, state: NetworkState
+) -> tuple[float, SharedContact]:
+    """Energy, J, of contact of lines with each other at rest, and that contact; infinite: they are in each other."""
+    solver = touching_solver(lines, len(model.free), bodies, lambda: ([], shared_of(model)))
+    assert solver.shared is not None
+    return solver.contact_energy(state), solver.shared
+
+
+def nearness_in(model: NetworkModel, lines: Sequence[JoinedLine], found: LinesAtRest, t: float) -> dict[int, Floats]:
+    """How near nodes (N+1,) of lines at rest are to what they may touch, by number: above 1, nearer than two diameters.
+
+    Lines that touch neither themselves nor others are not in it.
+    """
+    each = enumerate(zip(model.models, found.state.lines, strict=True))
+    near = {k: nearness(x, t, state) for k, (x, state) in each if touches_alone(model, k)}
+    if model.touching is not None:
+        bodies = found.bodies
+        solver = touching_solver(lines, len(model.free), bodies, lambda: ([], shared_of(model)))
+        assert solver.shared is not None
+        near |= solver.shared.look_ahead(1.0)
+        solver.contact_energy(found.state)
+    return near
+
+
+def _first_apart(model: NetworkModel, group: Group, starts: Iterable[Start]) -> NetworkState | None:
+    """The first start in which no line is within itself, or another."""
+    return next((state for _, state in starts if math.isfinite(_largest_energy(model, group, state))), None)
+
+
+def _has_lost(lines: Sequence[JoinedLine], hung: NetworkState, found: LinesAtRest) -> bool:
+    """Whether an equilibrium that knows no contact has lost turns, against its lines hung between first places."""
+    return bool(keeps_turns(lines, hung, OF_SHAPE)(found.state)[1])
 
 
 def keeps_turns(

@@ -1,244 +1,377 @@
-"""Equilibria of a scene: found at once, or from a coarser mesh."""
+"""Equilibria of networks are sought of joined lines together, and of others one by one.
+
+One search for either (solve.lines_at_rest): on the side of obstacles where lines begin, with the turns of their ends,
+on fewer cells first, with contact where that keeps them apart, then with friction that has settled as the scene says.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.errors import ComputationError, Outcome
+from hybrid.errors import Complaint, Outcome, SceneError
+from hybrid.kernels.junctions.bodies import NUMBERS
+from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
 from hybrid.kernels.mesh.zone_criteria import twist_of_rods
-from hybrid.kernels.state.report import FRICTION, MAY_TOUCH, OBSTACLES, PLANAR, SELF_CONTACT
-from hybrid.kernels.state.state import Line, State
+from hybrid.kernels.state.report import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
+from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.initial_shape import GIVEN, HUNG, reasons_against
-from hybrid.model.plane import leaves_plane, planar, untwist
+from hybrid.model.network import NetworkModel, balanced_places, starts_between
+from hybrid.model.plane import as_kept, leaves_plane, planar
 from hybrid.scene.analysis import Equilibrium as StaticStart
+from hybrid.scene.base import dotted
+from hybrid.scene.network_scene import Network, floating_groups
+from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.contact_equilibrium import is_apart, settled_from
+from hybrid.simulation.contact_equilibrium import letting_touch, settle, with_contact
 from hybrid.simulation.diagnostics import borne_strain
-from hybrid.simulation.slack_bends import slack_remedy
+from hybrid.simulation.run_start import named
 from hybrid.solve.flaws import ON_BED, behind_obstacles, passed_obstacles, rubs_on
-from hybrid.solve.search import PUSHED
-from hybrid.solve.stability import is_stable
-from hybrid.solve.statics import Equilibrium, Search, solve_statics
+from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, joined_ends
+from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest, settled_with_friction
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.search import PUSHED, Start
 
 # Turns that close the frames of the initial shape, at most, and round-off; the twist of a cell, rad, that is resolved.
 CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
-# Cells from which on the equilibrium of a coarser mesh is sought first.
+# Cells of a line from which on the equilibrium of a coarser mesh is sought first.
 MANY = 1000
+# Equilibria until the water around members is that of the place found, and what of the largest wetted part, velocity
+# and acceleration there counts as the same.
+MOST_ROUNDS, SAME_WATER = 40, 1e-8
+# Lengths of its line from a held point to the first place of another, beyond which that is named where no equilibrium
+# is found; nearer ones are found.
+FAR = 3.0
 
 
-def equilibrium_of(scene: LineScene, model: Model, t: float) -> Equilibrium:
-    """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size.
+class _Asked(NamedTuple):
+    """What an equilibrium is sought of, with the loads of t (s); rubs: whether friction acts."""
 
-    Of a line that may touch itself and has lost turns of its ends on all ways, on which it passed through itself, that
-    to which a damped motion with contact leads.
+    system: Network
+    model: NetworkModel
+    t: float
+    bodies: Floats
+    rubs: bool
+
+    @property
+    def ways(self) -> dict[int, str]:
+        """How friction settles, by number of the lines of which it does."""
+        return ways_to_settle(self.model) if self.rubs else {}
+
+    def starts(self) -> Iterator[Start]:
+        """Shapes from which the equilibrium is looked for."""
+        model, system = self.model, self.system
+        yield _first_shapes(model)
+        if len(model.places) + len(model.body_places):
+            system = system.searched()
+            places = balanced_places(system, model)
+            if places is not None:
+                yield "lines hung between places that balance", NetworkState(*starts_between(system, *places, model))
+
+
+def equilibrium_of(system: Network, model: NetworkModel, t: float, friction: bool = True) -> LinesAtRest:
+    """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found.
+
+    friction: whether it settles on the bed, of lines that ask for that.
     """
+    if floating := [Complaint(dotted(x.at), str(x.given), x.expected, x.fix) for x in floating_groups(system)]:
+        raise SceneError(floating)
+    numbers = model.body_numbers(t)
     try:
-        return _without_contact(scene, model, t)
-    except ComputationError as failed:
-        may_touch = failed.outcome == Outcome.TURNS_LOST and model.line.bits & MAY_TOUCH
-        if not may_touch or not is_apart(model, t, model.start):
-            raise
-        try:
-            return settled_from(model, t, model.start)
-        except ComputationError as too:
-            tried = "\n              ".join(x for x in (failed.detail, too.detail) if x)
-            raise ComputationError(
-                failed.outcome, None, failed.s, tried, first=slack_remedy(model, failed.outcome, failed.s)
-            ) from None
+        if _are_alone(model):
+            return _one_by_one(model, t, lambda k, x: _at_rest(_Asked(system, x, t, numbers, friction)))
+        return _in_its_water(_Asked(system, model, t, numbers, friction))
+    except LineFailed as failed:
+        raise named(_with_reasons(failed, model), model, _nearer(system)) from None
 
 
-def _without_contact(scene: LineScene, model: Model, t: float) -> Equilibrium:
-    """Equilibrium of a line that nothing keeps from passing through itself."""
-    try:
-        found = _as_laid(scene, model, t)
-        count_turns(scene, model, t, found.state)
-        return found
-    except ComputationError as failed:
-        flexible = float(model.line.h[model.line.spin == 0].max(initial=0.0))
-        reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])), flexible)
-        first = slack_remedy(model, failed.outcome, failed.s)
-        if not reasons and not first:
-            raise
-        roads = [x for x in failed.detail.splitlines() if x.endswith(" in all)")]
-        ways = f"{len(roads)} ways to an equilibrium were" if len(roads) > 1 else "1 way to an equilibrium was"
-        tried = f"{ways} tried, the last: {roads[-1].strip()}"
-        because = "\n              ".join([*reasons, tried]) if reasons else failed.detail
-        raise ComputationError(failed.outcome, None, failed.s, because, first=first) from None
+def solve_from(
+    found: LinesAtRest, model: NetworkModel, t: float, bodies: Floats, start: NetworkState, name: str
+) -> LinesAtRest:
+    """Find the equilibrium with the loads of time t (s) from a start next to another one.
 
-
-def count_turns(
-    scene: LineScene, model: Model, t: float, state: State, given: tuple[float, float] | None = None,
-    keeps_link: bool = False,
-) -> None:  # fmt: skip
-    """ComputationError where a rod between two ends that hold it is not twisted by the turns of the scene.
-
-    given: those of its start and end, of a line of several; None: as of the scene.  What its ends are clamped to may
-    have turned by less than half a turn.  keeps_link: whether a damped motion with contact has kept the link of the
-    start, of which a loop has a part.
-
-    What closes the frames of the initial shape comes to at most half a turn, and the shape itself takes the writhe of
-    the equilibrium, less than half a turn unless the cable forms a loop.
+    It is found as that was: with contact, or with friction that has settled likewise.
     """
-    by_end = given or (scene.ends.start.held_turns, scene.ends.end.held_turns)
-    asked, name = by_end[1] - by_end[0], "end" if by_end[1] else "start"
-    if not asked or model.cable.swivels.size:  # which lets it turn back
-        return
-    where, s = f"ends.{name}.turns: {by_end[name == 'end']:g}", model.length if name == "end" else 0.0
-    if not model.line.element[1:-1].all():
-        if keeps_link:
-            return
-        _count_link(model, t, state, where, s)
-        return
-    frames = model.ends.at(t).frame
-    wound, found = (twist_of_rods(model.line, frames, x.e, x.a1) / (2.0 * np.pi) for x in (model.start, state))
-    if abs(wound - asked) > CLOSING:
-        least = int(np.ceil(2.0 * np.pi * abs(asked) / MOST_TWIST))
-        detail = f"{where}; {model.cells} cells cannot hold {asked:g} turns, which take at least {least} equal ones"
-        raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
-    if abs(found - wound) > 0.5 and not keeps_link:
-        detail = f"{where}; the rods start with {wound:.4g} turns, those of the equilibrium have {found:.4g}"
-        raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
+    if found.alone:
+        return _one_by_one(model, t, lambda k, x: solve_from(found.alone[k], x, t, bodies, _only(start, k), name))
+    group = group_of(model, t, bodies)
+    if found.settled:
+        model, group = letting_touch(model, group)
+        return _keep_turns(model, t, settle(model, group, start, near=True))
+    if found.with_friction and not found.pulled:  # where the lines were laid, which nothing else leads to
+        ways = dict.fromkeys(found.with_friction, "start")
+        return _keep_turns(model, t, settled_with_friction(group, ways, (name, start)))
+    again = lines_at_rest(group, [(name, start)], rubs=bool(found.with_friction))
+    again = _keep_turns(model, t, replace(again, not_settled=found.not_settled))
+    ways = {k: way for k, way in ways_to_settle(model).items() if k in found.with_friction}
+    return _with_friction(model, t, group, again, ways, (name, start))
 
 
-def _count_link(model: Model, t: float, state: State, where: str, s: float) -> None:
-    """ComputationError where a line with zones has passed through itself, or around a clamp, and lost turns so."""
-    if not holds_twist(model.line):
-        return
-    ends = model.ends.at(t)
-    wound, found = (link_of(model.line, ends, x.r, x.e, x.a1, x.turn)[LINK] for x in (model.start, state))
-    if abs(found - wound) > 0.5:
-        detail = f"{where}; the line starts with a link of {wound:.4g} turns, that of the equilibrium is {found:.4g}"
-        raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
+# --- which lines, and one by one ------------------------------------------------------------------------
 
 
-def solve_model(model: Model, t: float, start: State, search: Search) -> Equilibrium:
-    """Equilibrium of a model with the loads of time t: in its plane where it holds in space too, else in space."""
-    sea, ends = model.sea.at(t), model.ends.at(t)
-    rest = model.length, model.tension_scale, model.slack_floor
-    if model.line.bits & PLANAR:
-        start = _untwisted(model, model.line, start)
-        search = search._replace(others=[(x, _untwisted(model, model.line, y)) for x, y in search.others])
-    elif model.plane is not None and not leaves_plane(model.plane, start, model.length):
-        line = planar(model.line, model.plane)
-        flat = _untwisted(model, line, start)
+def joined_lines(model: NetworkModel, t: float) -> list[JoinedLine]:
+    """The lines with their ends and their sea at t (s), whose arrays `ends.at` and `sea.at` overwrite."""
+    lines = []
+    for x, joints, fairleads, seats in zip(model.models, model.joints, model.fairleads, model.seats, strict=True):
+        ends, floor, slackens = joined_ends(x.ends.at(t), joints), x.slack_floor, x.slack == "warn"
+        lines.append(
+            JoinedLine(
+                x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens,
+                model.rides, borne_strain(x) if x.line.bits & OBSTACLES else np.zeros(0),
+                x.payout is not None or x.layout is not None,
+                x.payout is not None and x.payout.holds_tension,
+            )
+        )  # fmt: skip
+    return lines
+
+
+def group_of(model: NetworkModel, t: float, bodies: Floats) -> Group:
+    """The lines of a model at t (s), as their search takes them."""
+    first = model.models[0]
+    return Group(joined_lines(model, t), len(model.free), bodies, first.plane, first.cable.held_tangent)
+
+
+def _are_alone(model: NetworkModel) -> bool:
+    """Whether each line is joined to nothing that moves and asks for no contact: what it finds, no other line knows."""
+    joined = bool(model.free or len(model.body_places)) or model.touching is not None
+    return not (joined or any(x.line.bits & SELF_CONTACT for x in model.models))
+
+
+def _one_by_one(model: NetworkModel, t: float, search: Callable[[int, NetworkModel], LinesAtRest]) -> LinesAtRest:
+    """Return the equilibria that a search finds of each line by itself as one."""
+    found = list[LinesAtRest]()
+    for k, x in enumerate(model.models):
+        of = slice(k, k + 1)
+        own = replace(
+            model, names=model.names[of], models=(replace(x, line=as_kept(x.line, x.plane, x.kept_in)),),
+            joints=model.joints[of], fairleads=model.fairleads[of], seats=model.seats[of], turns=model.turns[of],
+        )  # fmt: skip
         try:
-            at_once = search._replace(quick=True, take_slack=False, others=())
-            found = solve_statics(line, sea, ends, flat, *rest, model.start_shape, at_once)
-            judged = line if found.with_friction else line._replace(bits=line.bits & ~FRICTION)
-            if is_stable(judged, sea, ends, found.state, model.length, model.tension_scale):
-                return found
-        except ComputationError:  # there are more ways in space
-            pass
-    return solve_statics(model.line, sea, ends, start, *rest, model.start_shape, search)
+            found.append(search(k, own))
+        except LineFailed as failed:
+            raise LineFailed(k, failed.outcome, None, failed.s, failed.detail, first=failed.first) from None
+    return _together(model, t, found)
 
 
-def solve_like(model: Model, t: float, start: State, like: Equilibrium) -> Equilibrium:
-    """The equilibrium near a start, found as another one was: with friction on the bed, or in contact with itself."""
-    if like.touches:
-        return settled_from(model, t, start, near=True)
-    if like.with_friction and not like.pulled:
-        return solve_model(model, t, start, Search("start"))
-    found = solve_model(model, t, start, Search())
-    if not like.pulled:
-        return replace(found, not_settled=like.not_settled)
-    try:  # travel is of the size of strains, which other cells do not keep
-        return pulled_from(found, lambda: solve_model(model, t, found.state, Search("pull")))
-    except ComputationError as failed:
-        return replace(found, not_settled=failed.outcome.cause)
+def _only(states: NetworkState, k: int) -> NetworkState:
+    return NetworkState([states.lines[k]], states.bodies)
 
 
-def _untwisted(model: Model, line: Line, start: State) -> State:
-    """A start for a planar line: in its plane nothing would turn back the twist of frames about a fold."""
-    out = start.copy()
-    untwist(line, model.ends.values, model.cable.held_tangent, out)
-    return out
+def _together(model: NetworkModel, t: float, found: Sequence[LinesAtRest]) -> LinesAtRest:
+    """Equilibria of all lines as one."""
+    rubs = frozenset(k for k, x in enumerate(found) if x.with_friction)
+    states = NetworkState([x.state.lines[0] for x in found], model.body_places)
+
+    def solver() -> NetworkSolver:
+        lines = []
+        for k, (x, own, one) in enumerate(zip(joined_lines(model, t), model.models, states.lines, strict=True)):
+            line = x.line._replace(bits=x.line.bits & ~WAVES & ~(0 if k in rubs else FRICTION))
+            if own.plane is not None and not leaves_plane(own.plane, one, own.length):
+                line = planar(line, own.plane)  # in which it was found, so that nothing is compiled for space
+            lines.append(x._replace(line=line))
+        made = NetworkSolver(lines, 0, model.body_numbers(t))
+        made.evaluate_forces(states, made.anchor)
+        return made
+
+    path = max(found, key=lambda x: len(x.path)).path  # of the line that took most ways
+    return LinesAtRest(
+        states, path, sum(x.iterations for x in found), max(x.residual for x in found), solver,
+        any(x.settled for x in found), next((x.unjudged for x in found if x.unjudged), ""), rubs,
+        frozenset(k for k, x in enumerate(found) if x.blurred), tuple(found),
+        {k: x.not_settled.get(0, "") for k, x in enumerate(found)},
+    )  # fmt: skip
 
 
-def _as_laid(scene: LineScene, model: Model, t: float) -> Equilibrium:
-    """Equilibrium with friction that has settled as the scene says; as it says nothing, that is where it can."""
-    way = settling(scene, model)
-    try:
-        found = _by_coarser(scene, model, t) or _statics(scene, model, t, "start" if way == "start" else "")
-    except ComputationError:
-        if way != "pull":
-            raise
-        return _statics(scene, model, t, "start")
-    on = rubs_on(model.line, model.sea.values, model.ends.values.held, found.state)
-    if found.with_friction or not (way == "pull" or (way == "usual" and on == [ON_BED])):
+# --- one search -----------------------------------------------------------------------------------------
+
+
+def _in_its_water(asked: _Asked) -> LinesAtRest:
+    """Find the equilibrium of lines with bodies, whose members feel the water where they rest."""
+    model, t, numbers = asked.model, asked.t, asked.bodies
+    found = _at_rest(asked)
+    if not any(body.members for body in model.bodies):
         return found
-    try:
-        return pulled_from(found, lambda: _statics(scene, model, t, "pull", start=found.state))
-    except ComputationError as failed:
-        if way == "usual":
-            return replace(found, not_settled=failed.outcome.cause)
-        return _statics(scene, model, t, "start")
+    part, before = 1.0, None
+    for _ in range(MOST_ROUNDS):
+        there = numbers.copy()
+        model.stir(t, found.state.bodies, 0.0, there)
+        if _same_water(there, numbers):
+            return found
+        change = there - numbers
+        if before is not None:  # Aitken's factor, for members that the water lifts out of it or pulls under
+            more = change - before
+            part = float(np.clip(-part * (before * more).sum() / max((more * more).sum(), 1e-300), 0.05, 1.0))
+        numbers += part * change
+        before = change
+        found = solve_from(found, model, t, numbers, found.state, "members where they came to rest")
+    told = f"the place of a body and the water around its members do not agree after {MOST_ROUNDS} equilibria; "
+    raise LineFailed(-1, Outcome.NOT_CONVERGED, None, None, told + "take a nearer initial_guess, or more pieces")
 
 
-def pulled_from(found: Equilibrium, pull: Callable[[], Equilibrium]) -> Equilibrium:
-    """The equilibrium with friction that a pull leads to from one without it, with what is known of that."""
-    laid = pull()
-    how = f"{laid.path[-1]}, {PUSHED}" if found.pushed else laid.path[-1]
-    return replace(laid, path=(*found.path[:-1], *laid.path[:-1], how), iterations=found.iterations + laid.iterations)
+def _same_water(there: Floats, taken: Floats) -> bool:
+    """Whether wetted parts, velocity and acceleration of the water in numbers of bodies are the same."""
+    now, then = (x[:, NUMBERS:].reshape(-1, PIECE) for x in (there, taken))
+    return all(
+        np.abs(now[:, a:b] - then[:, a:b]).max() <= SAME_WATER * np.abs(now[:, a:b]).max()
+        for a, b in ((WET, WATER), (WATER, PUSH), (PUSH, PIECE))
+    )
 
 
-def _statics(
-    scene: LineScene, model: Model, t: float, settle: str = "", quick: bool = False, start: State | None = None
-) -> Equilibrium:
-    """The equilibrium by the ways of `Search`, from the start of the model or another."""
-    lies = bool(model.line.bits & OBSTACLES)
-    borne = borne_strain(model) if lies else np.zeros(0)
-    search = Search(settle, quick, model.slack == "warn" and not quick, model.other_starts, borne=borne)
+def _at_rest(asked: _Asked) -> LinesAtRest:
+    """The equilibrium with contact, and with friction that has settled."""
+    model, t, group = asked.model, asked.t, group_of(asked.model, asked.t, asked.bodies)
+    model, found = with_contact(model, group, partial(_without_contact, asked, group), asked.starts)
+    found = _keep_turns(model, t, found)
+    if found.settled or found.with_friction:
+        return found
+    return _with_friction(model, t, group, found, asked.ways, _first_shapes(model))
 
-    def keeps_turns(state: State) -> bool:
+
+def _without_contact(asked: _Asked, group: Group) -> LinesAtRest:
+    """Find the equilibrium of lines that nothing keeps from passing through each other.
+
+    Friction has not settled yet, but where it holds lines from the start.
+    """
+    model, ways = asked.model, asked.ways
+    touch = any(x.line.bits & SELF_CONTACT for x in group.lines)
+    if not touch and ways and {*ways.values()} == {"start"}:
+        found = settled_with_friction(group, ways, _first_shapes(model))
+    else:
+        found = (None if touch or "start" in ways.values() else _by_coarser(asked)) or _on_its_side(asked, group)
+    return found if touch else _keep_turns(model, asked.t, found)
+
+
+def _first_shapes(model: NetworkModel) -> Start:
+    shape = "lines hung between the first places" if len(model.models) > 1 else model.models[0].start_shape
+    return shape, NetworkState([x.start for x in model.models], model.body_places)
+
+
+def _other_shapes(model: NetworkModel) -> list[Start]:
+    """The first shapes with arcs, then with straight spans."""
+    lines = " of lines" if len(model.models) > 1 else ""
+    return [
+        (name + lines, NetworkState([dict(x.other_starts).get(name, x.start) for x in model.models], model.body_places))
+        for name in dict.fromkeys(name for x in model.models for name, _ in x.other_starts)
+    ]
+
+
+def _on_its_side(asked: _Asked, group: Group, start: Start | None = None, quick: bool = False) -> LinesAtRest:
+    """Find the equilibrium with the turns of ends, on the side of obstacles where lines begin.
+
+    Where no way leads to that side, the other one may be meant.  start: from which alone an equilibrium is sought, on
+    any side; quick: as of `lines_at_rest`.
+    """
+    model, t = asked.model, asked.t
+    first = _first_shapes(model) if start is None else start
+    turned = [k for k, x in enumerate(group.lines) if any(model.turns[k]) and not x.line.bits & SELF_CONTACT]
+    # of lines with too few cells no way keeps turns
+    turned = [k for k in turned if not lost_turns(model, t, k, first[1].lines[k])[0]]
+
+    def lost(states: NetworkState) -> tuple[Outcome, int, int]:
+        k = next((k for k in turned if lost_turns(model, t, k, states.lines[k])[0]), -1)
+        return (Outcome.OK if k < 0 else Outcome.TURNS_LOST), k, -1
+
+    def elsewhere(states: NetworkState) -> tuple[Outcome, int, int]:
+        why = lost(states)
+        if why[0] != Outcome.OK:
+            return why
+        for k, x in enumerate(model.models):
+            node = next((node for _, node in _crossed_obstacles(x, states.lines[k])), -1)
+            if node >= 0:
+                return Outcome.BURIED, k, node
+        return Outcome.OK, -1, -1
+
+    others = _other_shapes(model) if start is None else []
+    rubs = asked.rubs and not any(x.line.bits & SELF_CONTACT for x in group.lines)
+    search = partial(lines_at_rest, group, others=others, quick=quick, rubs=rubs)
+    if start is None and any(_has_side(x) for x in model.models):
         try:
-            count_turns(scene, model, t, state)
-        except ComputationError:
-            return False
-        return True
-
-    counts = bool(scene.ends.turns) and keeps_turns(model.start)  # else too few cells: no way helps
-
-    def refused(state: State) -> tuple[Outcome, int]:
-        return (Outcome.TURNS_LOST if counts and not keeps_turns(state) else Outcome.OK), -1
-
-    def elsewhere(state: State) -> tuple[Outcome, int]:
-        outcome, cell = refused(state)
-        if outcome != Outcome.OK:
-            return outcome, cell
-        sea = model.sea.values
-        through = passed_obstacles(sea, model.start.r, state.r)
-        others = behind_obstacles(model.line, sea, state) if model.start_shape == HUNG else through
-        node = next((node for _, node in others), -1)
-        return (Outcome.BURIED, node) if node >= 0 else (Outcome.OK, -1)
-
-    solve = partial(solve_model, model, t, model.start if start is None else start)
-    if lies and model.start_shape in (HUNG, GIVEN):
-        try:
-            return solve(search._replace(refused=elsewhere))
-        except ComputationError:  # where no way leads to the side of the span, or of the shape, the other may be meant
+            return search(asked.starts(), refused=elsewhere)
+        except LineFailed:
             if quick:
                 raise
-    return solve(search._replace(refused=refused if counts else None))
+    return search(asked.starts() if start is None else [start], refused=lost if turned else None)
 
 
-def _settles(scene: LineScene, model: Model, t: float) -> bool:
-    """Whether friction holds the cable where it starts, so that no other start will do."""
-    return bool(model.line.bits & FRICTION) and (settling(scene, model) == "start" or not model.ends.at(t).held.any())
+def _has_side(model: Model) -> bool:
+    """Whether the first shape of a line says on which side of obstacles it lies."""
+    there = model.line.bits & OBSTACLES and len(model.sea.values.obstacles)
+    return bool(there) and model.start_shape in (HUNG, GIVEN)
+
+
+def _crossed_obstacles(model: Model, state: State) -> Iterable[tuple[int, int]]:
+    """Obstacles on whose other side a line has come to lie, and a node there."""
+    if not _has_side(model):
+        return ()
+    if model.start_shape == HUNG:
+        return behind_obstacles(model.line, model.sea.values, state)
+    return passed_obstacles(model.sea.values, model.start.r, state.r)
+
+
+def _by_coarser(asked: _Asked) -> LinesAtRest | None:
+    """The equilibrium of lines of many cells: by Newton at once, or from that of a coarser mesh, easier to find.
+
+    Of very many the coarser one comes first: where Newton fails at once, that costs more than all the rest.
+    None: neither is, or there are few cells.
+    """
+    model = asked.model
+    fewer = [coarser(x) for x in model.models]
+    if not any(fewer):
+        return None
+    coarse = replace(model, models=tuple(x or y for x, y in zip(fewer, model.models, strict=True)))
+    group = group_of(model, asked.t, asked.bodies)
+    ways = [partial(_on_its_side, asked, group, quick=True), partial(_from_coarser, asked, group, coarse)]
+    for way in ways if max(x.cells for x in model.models) <= MANY else ways[::-1]:
+        try:
+            return way()
+        except LineFailed:
+            pass
+    return None
+
+
+def _from_coarser(asked: _Asked, group: Group, coarse: NetworkModel) -> LinesAtRest:
+    """From the equilibrium of lines with fewer cells; LineFailed: there is none, or it leads to none."""
+    easier = asked._replace(model=coarse)
+    found = _by_coarser(easier) or _on_its_side(easier, group_of(coarse, asked.t, asked.bodies))
+    each = zip(found.state.lines, coarse.models, asked.model.models, strict=True)
+    states = [state if few is full else refined(state, few.line, full.line) for state, few, full in each]
+    shape = f"the equilibrium with {coarse.cells} cells{f', {PUSHED}' if found.pushed else ''}"
+    return _on_its_side(asked, group, (shape, NetworkState(states, found.state.bodies)), quick=True)
+
+
+# --- friction -------------------------------------------------------------------------------------------
+
+
+def ways_to_settle(model: NetworkModel) -> dict[int, str]:
+    """How friction settles (`settling`), by number of the lines of which it does.
+
+    A line that nothing else holds is held where it starts, so that no other start will do.
+    """
+    touching = set(model.touching.lines) if model.touching is not None else set()
+    found = dict[int, str]()
+    for k, (name, x) in enumerate(zip(model.names, model.models, strict=True)):
+        found[k] = settling(model.scenes[name], x, k in touching or model.rides.size > 0)
+        if x.line.bits & FRICTION and max(model.joints[k]) < 0 and not x.ends.values.held.any():
+            found[k] = "start"
+    return {k: way for k, way in found.items() if way}
 
 
 def settling(scene: LineScene, model: Model, touches: bool = False) -> str:
-    """How friction is to settle, as of `Search`: a shape that the scene gives is where the line was laid.
+    """How friction is to settle, as of `settled_with_friction`.
 
-    "usual": as "pull" on a bed alone, where that leads anywhere, else not, which a scene has that says nothing of it.
-    What is paid out was laid under tension; and friction of what moves or touches other lines (touches) is not known in
-    equilibria.
+    A shape that the scene gives is where the line was laid.  "usual": as "pull" on a bed alone, where that leads
+    anywhere, else not, which a scene has that says nothing of it.  What is paid out was laid under tension; and
+    friction of what moves or touches other lines (touches) is not known in equilibria.
     """
     asked, line = scene.initial, model.line
     if not line.bits & FRICTION or not isinstance(asked, StaticStart) or asked.friction == "neglected":
@@ -250,27 +383,114 @@ def settling(scene: LineScene, model: Model, touches: bool = False) -> str:
     return "usual" if hangs and not meets and model.payout is None else ""
 
 
-def _by_coarser(scene: LineScene, model: Model, t: float) -> Equilibrium | None:
-    """The equilibrium of a line of many cells: by Newton at once, or from that of a coarser mesh, easier to find.
+def _with_friction(
+    model: NetworkModel, t: float, group: Group, found: LinesAtRest, ways: Mapping[int, str], first: Start
+) -> LinesAtRest:
+    """The equilibrium in which friction has settled from one without it, in these ways (`settling`) of lines.
 
-    Of very many the coarser one comes first: where Newton fails at once, that costs more than all the rest.
-    None: neither is, or there are few cells.
+    first: from where lines come to rest where a scene asks for that.  LineFailed: none is found where one is asked for.
     """
-    fewer = coarser(model)
-    if fewer is None or _settles(scene, model, t):
-        return None
-    ways = [partial(_statics, scene, model, t, quick=True), partial(_from_coarser, scene, model, fewer, t)]
-    for way in ways if model.cells <= MANY else ways[::-1]:
-        try:
-            return way()
-        except ComputationError:
-            pass
-    return None
+    asked = {k: way for k, way in ways.items() if way != "usual"}
+    here = [(x.line, x.sea, x.ends.held, state) for x, state in zip(group.lines, found.state.lines, strict=True)]
+    ways = {k: way for k, way in ways.items() if k in asked or rubs_on(*here[k]) == [ON_BED]}
+    if not ways:
+        return found
+    try:
+        laid = settled_with_friction(group, ways, first, found)
+        return _keep_turns(model, t, replace(laid, not_settled=found.not_settled))
+    except LineFailed as failed:
+        if len(asked) == len(ways):
+            raise
+        why = {**found.not_settled, **dict.fromkeys(ways.keys() - asked.keys(), failed.outcome.cause)}
+    if asked:
+        found = _keep_turns(model, t, settled_with_friction(group, asked, first, found))
+    return replace(found, not_settled=why)
 
 
-def _from_coarser(scene: LineScene, model: Model, fewer: Model, t: float) -> Equilibrium:
-    """From the equilibrium of the model with fewer cells; ComputationError: there is none, or it leads to none."""
-    coarse = _by_coarser(scene, fewer, t) or _statics(scene, fewer, t)
-    start = refined(coarse.state, fewer.line, model.line)
-    shape = f"the equilibrium with {fewer.cells} cells{f', {PUSHED}' if coarse.pushed else ''}"
-    return _statics(scene, replace(model, start=start, start_shape=shape, other_starts=()), t, quick=True)
+# --- turns ----------------------------------------------------------------------------------------------
+
+
+def _keep_turns(model: NetworkModel, t: float, found: LinesAtRest) -> LinesAtRest:
+    """The same equilibrium; LineFailed where a line has lost turns by which its ends, which hold it, twist it.
+
+    A motion with contact keeps them by itself, in the writhe of loops as well (solve.contact_statics).
+    """
+    for k, (x, state) in enumerate(zip(model.models, found.state.lines, strict=True)):
+        turns = bool(model.seats[k, :, TURNS].any())
+        keeps_link = found.settled and bool(x.line.bits & SELF_CONTACT) and not turns
+        lost, s = lost_turns(model, t, k, state, keeps_link)
+        if lost and turns:
+            lost += "; what it is clamped to may turn by less than half a turn until then (initial_rotation)"
+        if lost:
+            raise LineFailed(k, Outcome.TURNS_LOST, None, s, lost)
+    return found
+
+
+def lost_turns(network: NetworkModel, t: float, k: int, state: State, keeps_link: bool = False) -> tuple[str, float]:
+    """Tell how a line is not twisted by the turns that its ends have, and where (m); "": it is.
+
+    What its ends are clamped to may have turned by less than half a turn.  keeps_link: whether a damped motion with
+    contact has kept the link of the start, of which a loop has a part.
+
+    What closes the frames of the initial shape comes to at most half a turn, and the shape itself takes the writhe of
+    the equilibrium, less than half a turn unless the cable forms a loop.
+    """
+    model, by_end = network.models[k], network.turns[k]
+    asked, last = by_end[1] - by_end[0], bool(by_end[1])
+    if not asked or model.cable.swivels.size:  # which lets it turn back
+        return "", 0.0
+    where = f"lines.{network.names[k]}.connections.{'end' if last else 'start'}.turns: {by_end[last]:g}"
+    s = model.length if last else 0.0
+    if not model.line.element[1:-1].all():  # zones: whether it has passed through itself, or around a clamp
+        if keeps_link or not holds_twist(model.line):
+            return "", s
+        ends = model.ends.at(t)
+        wound, has = (link_of(model.line, ends, x.r, x.e, x.a1, x.turn)[LINK] for x in (model.start, state))
+        text = f"{where}; the line starts with a link of {wound:.4g} turns, that of the equilibrium is {has:.4g}"
+        return (text if abs(has - wound) > 0.5 else ""), s
+    frames = model.ends.at(t).frame
+    wound, has = (twist_of_rods(model.line, frames, x.e, x.a1) / (2.0 * np.pi) for x in (model.start, state))
+    if abs(wound - asked) > CLOSING:
+        least = int(np.ceil(2.0 * np.pi * abs(asked) / MOST_TWIST))
+        return f"{where}; {model.cells} cells cannot hold {asked:g} turns, which take at least {least} equal ones", s
+    text = f"{where}; the rods start with {wound:.4g} turns, those of the equilibrium have {has:.4g}"
+    return (text if abs(has - wound) > 0.5 and not keeps_link else ""), s
+
+
+# --- what is said where none is found -------------------------------------------------------------------
+
+
+def _nearer(system: Network) -> str:
+    """What to try first where a point is looked for farther away than a line to a held point reaches; else empty."""
+    worst, text = FAR, ""
+    for name, place in system.guesses.items():
+        for line, end in system.lines_at(name):
+            other = system.lines[line].end if end == "start" else system.lines[line].start
+            if not system.is_held(other):
+                continue
+            length = sum(section.length for section in system.lines[line].sections)
+            away = math.dist(place, system.first_place(other))
+            if away > worst * length:
+                point, worst = system.points[name], away / length
+                key = f"bodies.{point.body}" if isinstance(point, Fairlead) else f"points.{name}"
+                text = (
+                    f"{key}.initial_guess nearer: {away:.6g} m from points.{other}, line {line} is {length:.6g} m long"
+                )
+    return text
+
+
+def _with_reasons(failed: LineFailed, model: NetworkModel) -> LineFailed:
+    """Add the reasons against an equilibrium of a line that is joined to nothing that moves."""
+    k = failed.line
+    if k < 0 or max(model.joints[k]) >= 0:
+        return failed
+    x, name = model.models[k], model.names[k]
+    flexible = float(x.line.h[x.line.spin == 0].max(initial=0.0))
+    reasons = reasons_against(model.scenes[name], (bool(x.line.spin[0]), bool(x.line.spin[-1])), flexible)
+    roads = [line for line in failed.detail.splitlines() if line.endswith(" in all)")]
+    if not reasons or not roads:
+        return failed
+    ways = f"{len(roads)} ways to an equilibrium were" if len(roads) > 1 else "1 way to an equilibrium was"
+    tried = f"{ways} tried, the last: {roads[-1].strip()}"
+    detail = "\n              ".join([*reasons, tried]).replace("ends.", f"lines.{name}.connections.")
+    return LineFailed(k, failed.outcome, None, failed.s, detail, first=failed.first)

@@ -32,10 +32,10 @@ from hybrid.scene.attachments import sphere_diameter
 from hybrid.scene.network_scene import Network
 from hybrid.scene.plane import OUT
 from hybrid.scene.points import FixedPoint, FreePoint
+from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.run_points import Sampled, times
-from hybrid.simulation.run_start import equilibrium_of_system
 from hybrid.solve.joined import LineFailed
 
 # Of the height of a point: what it must be below the surface to be under water, beyond round-off.
@@ -221,7 +221,7 @@ def _at_surface(system: Network, point: FreePoint, name: str, place: Floats, z: 
 
     try:
         model = build_system(fixed)
-        found = equilibrium_of_system(fixed, model, np.inf, friction=False)
+        found = equilibrium_of(fixed, model, np.inf, friction=False)
     except (ComputationError, SceneError, ValueError):  # ValueError: lines that do not reach so far make no scene
         return ", and its lines pull it down by as much"
     pull = 0.0

@@ -99,13 +99,13 @@ def rods_at_rest(network: Network, resolution: NetworkResolution, moves: bool) -
 
     moves: the equilibrium is that with which a motion begins, else that under full loads.
     """
-    from hybrid.simulation.run_start import equilibrium_of_system
+    from hybrid.simulation.equilibrium import equilibrium_of
 
     with at_once():
         model = build_system(network, resolution=resolution)
         states: Sequence[State] = [x.start for x in model.models]
         if not (moves and network.starts_as_placed):
-            states = equilibrium_of_system(network, model, 0.0 if moves else np.inf).state.lines
+            states = equilibrium_of(network, model, 0.0 if moves else np.inf).state.lines
     return dict(zip(model.names, zip(model.models, states, strict=True), strict=True))
 
 

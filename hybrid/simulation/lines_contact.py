@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator
 from itertools import combinations
 
@@ -29,12 +30,15 @@ from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching, joined_ends_of
 from hybrid.model.network import NetworkModel
 from hybrid.scene.network_scene import Network
-from hybrid.simulation.contact_equilibrium import JUMP, jumps
 from hybrid.simulation.self_watch import diameters, least_bending
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.shared_contact import SharedContact, TouchingLine
 
 PASSED = "lines pass through each other"  # kind of an event
+# Parts of a straight way between two shapes, and by how much the Gauss integral of two lines jumps where one passes
+# through the other: by 1, and by far less in a part of a way on which none does.
+PARTS, JUMP = 48, 0.5
+FLAT = 1e-9  # volume, over the lengths, of chords that lie in one plane but for round-off, as neighbours do
 
 
 def shared_of(model: NetworkModel, rubs: bool = False) -> SharedContact | None:
@@ -48,6 +52,30 @@ def strand_in(x: Model) -> TouchingLine:
     """What contact takes of the line of a model."""
     grows = 0.0 if x.payout is None else float(np.diff(x.payout.nodes).max())
     return TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale, grows)
+
+
+def gauss_integral(a: Floats, b: Floats) -> float:
+    """Gauss integral of two polylines (n, 3) m and (m, 3) m: half the sum of their signed crossings over all views."""
+    p, q = a[:-1, None], a[1:, None]
+    r, s = b[None, :-1], b[None, 1:]
+    pr, ps, qr, qs = (y - x for x, y in ((p, r), (p, s), (q, r), (q, s)))
+    normals = [np.cross(x, y) for x, y in ((pr, ps), (ps, qs), (qs, qr), (qr, pr))]
+    n = [x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-300) for x in normals]
+    angles = [np.arcsin(np.clip(np.einsum("ijk,ijk->ij", n[i], n[(i + 1) % 4]), -1.0, 1.0)) for i in range(4)]
+    volume = np.einsum("ijk,ijk->ij", np.cross(s - r, q - p), pr)
+    largest = np.prod([np.linalg.norm(x, axis=-1) for x in np.broadcast_arrays(s - r, q - p, pr)], axis=0)
+    side = np.where(np.abs(volume) > FLAT * largest, np.sign(volume), 0.0)
+    return float((side * sum(angles)).sum() / (4.0 * math.pi))
+
+
+def jumps(a: Floats, b: Floats) -> float:
+    """Largest jump of the Gauss integral of two polylines (2, n, 3) and (2, m, 3) m, first and last, on the straight
+
+    way between these.
+    """
+    parts = np.linspace(0.0, 1.0, PARTS + 1)
+    found = [gauss_integral((1.0 - x) * a[0] + x * a[1], (1.0 - x) * b[0] + x * b[1]) for x in parts]
+    return float(np.abs(np.diff(found)).max())
 
 
 def crossed(touching: Touching, first: NetworkState, last: NetworkState) -> Iterator[tuple[int, int]]:

@@ -30,10 +30,10 @@ from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
 from hybrid.scene.short_form import network_of, short_form
+from hybrid.simulation.contact_equilibrium import contacts_of
 from hybrid.simulation.envelope import marks_of
-from hybrid.simulation.lines_contact_equilibrium import contacts_of
+from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.run_contact import refuse_within_itself
-from hybrid.simulation.run_start import equilibrium_of_system
 from hybrid.solve.contact_statics import touching_solver
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
@@ -129,7 +129,7 @@ def _stiffness_at(system: Network, at: str) -> Stiffness:
 
 def _equilibrium(system: Network, model: NetworkModel) -> LinesAtRest:
     """Under full loads, without friction.  SceneError: a line that contact is asked for is within itself in it."""
-    found = equilibrium_of_system(system, model, np.inf, friction=False)
+    found = equilibrium_of(system, model, np.inf, friction=False)
     if not found.settled:
         refuse_within_itself(model, found.solver.lines, found.state, moves=False)
     return found

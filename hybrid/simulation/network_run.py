@@ -29,6 +29,7 @@ from hybrid.model.sections import OutputPoints
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import LineScene
+from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.events import (
     Sink,
 )
@@ -56,7 +57,7 @@ from hybrid.simulation.run_file import Asked, file_of
 from hybrid.simulation.run_of_lines import WatchedLines, change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.run_points import Sampled
 from hybrid.simulation.run_quantities import Rotations, RunQuantities
-from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, joined_lines, named
+from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, named
 from hybrid.simulation.run_zones import RunZones, Start, managers_for, start_at_rest, zones_as_placed
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
 from hybrid.solve.joined import LineFailed, NetworkState

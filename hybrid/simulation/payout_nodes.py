@@ -49,7 +49,7 @@ from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.line import lines
 from hybrid.outputs.joined_lines import Output
-from hybrid.simulation.cell_views import REST_OF_SEA, Kept, Shaped, blank_kept, seas
+from hybrid.simulation.cell_views import REST_OF_SEA, Kept, Shaped, blank_kept, copy_fields, seas
 from hybrid.simulation.envelope import marks_on
 from hybrid.simulation.line_of_run import OfRun, OneOfMany, by_itself, ends_alone
 from hybrid.solve.stepper import HEAVY
@@ -313,17 +313,17 @@ class NodeChanges:
         self._at.on, self._at.cells = 0, n
         parity = int(owner.count.parity)
         for which in (0, 1):
-            _copy(owner.states[which], self._state(0, which, n), ("turn",))
+            copy_fields(owner.states[which], self._state(0, which, n), ("turn",))
             if owner.push.size:
                 self._push(0, which, n)[:] = owner.pushes[which]
-        _copy(model.line, self._line(0, n), ("bits", "plane", "torsion", *TENSION_TORQUE))
-        _copy(model.sea.values, self._sea_on(n), REST_OF_SEA)
-        _copy(owner.stepper.work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
-        _copy(self._paying.reel, self._reel(0, n), OF_REEL)
+        copy_fields(model.line, self._line(0, n), ("bits", "plane", "torsion", *TENSION_TORQUE))
+        copy_fields(model.sea.values, self._sea_on(n), REST_OF_SEA)
+        copy_fields(owner.stepper.work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
+        copy_fields(self._paying.reel, self._reel(0, n), OF_REEL)
         self._base[:] = owner.books.base
         if self._watch is not None:
-            _copy(self._watch.itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
-        _copy(owner.books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
+            copy_fields(self._watch.itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
+        copy_fields(owner.books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
         owner.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
         self._calls.solver = owner.solver_address()
         f.put_paid(self._following.numbers)
@@ -389,9 +389,3 @@ def is_plain(line: Line) -> bool:
     """Whether a line has nothing that a node which enters or leaves would have to carry in Python."""
     laws = "torsion", "tension_twist", "law", "bend_law", "slip_law", "wake_law", "moved"
     return not any(getattr(line, name).size for name in laws) and not line.bits & REMEMBERS
-
-
-def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
-    for name in old._fields:
-        if name not in but:
-            getattr(new, name)[:] = getattr(old, name)

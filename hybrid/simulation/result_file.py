@@ -40,7 +40,6 @@ from hybrid.model.sections import NEAR, SECTION_LIMITS, limits_along, outer_diam
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.envelope import Envelope
-from hybrid.solve.statics import Equilibrium
 from hybrid.store.array_contents import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.capacity import CORNERS
 from hybrid.store.code_checks import ROWS
@@ -74,7 +73,7 @@ def result_recorder(
     observer: Observer,
     target: Target,
     texts: Mapping[str, Text],
-    found: Equilibrium | LinesAtRest | None,
+    found: LinesAtRest | None,
     envelope: Envelope,
     outputs: int = 0,
     mode: WriteMode = AT_ONCE,

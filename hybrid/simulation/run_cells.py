@@ -13,8 +13,8 @@ from hybrid.model.build import Model
 from hybrid.model.coarsen import refined
 from hybrid.model.network import NetworkModel
 from hybrid.scene.network_scene import Network
+from hybrid.simulation.equilibrium import equilibrium_of, solve_from
 from hybrid.simulation.initial_zones import MOST_ROUNDS, on_fewer, planned_cells, with_fewer_cells
-from hybrid.simulation.run_start import equilibrium_of_system, solve_from
 from hybrid.simulation.zone_switching import on_layout
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
@@ -38,7 +38,7 @@ def equilibrium_on_cells(system: Network, model: NetworkModel, managers: Mapping
     if fewer:
         try:
             few = _with(model, {k: with_fewer_cells(model.models[k]) for k in fewer})
-            found = equilibrium_of_system(system, few, t)
+            found = equilibrium_of(system, few, t)
             if not found.settled:
                 model, found = _on_planned_cells(few, found, fewer, t)
                 return _with_catenaries(model, found, managers, t)
@@ -48,7 +48,7 @@ def equilibrium_on_cells(system: Network, model: NetworkModel, managers: Mapping
         layout = model.models[k].layout
         assert layout is not None
         manager.set_layout(layout)
-    return _with_catenaries(model, equilibrium_of_system(system, model, t), managers, t)
+    return _with_catenaries(model, equilibrium_of(system, model, t), managers, t)
 
 
 def _may_have_fewer(model: NetworkModel, k: int, manager: DomainManager) -> bool:

@@ -22,9 +22,8 @@ from hybrid.model.lines_contact import touching_among
 from hybrid.model.network import NetworkModel
 from hybrid.model.self_reach import contact_bits, touching, touching_no_more
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.contact_equilibrium import contact_of
+from hybrid.simulation.contact_equilibrium import contact_of, crossings, energy_between, touches_alone
 from hybrid.simulation.lines_contact import PASSED, LinesWatch, pair_text, shared_of
-from hybrid.simulation.lines_contact_equilibrium import crossings, energy_between, touches_alone
 from hybrid.simulation.old_checkpoints import of_line
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines, change_lines

@@ -28,6 +28,8 @@ from hybrid.model.network import NetworkModel
 from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.cell_changes import CellChanges
+from hybrid.simulation.contact_equilibrium import nearness_in
+from hybrid.simulation.equilibrium import joined_lines, solve_from
 from hybrid.simulation.initial_zones import (
     MOST_ROUNDS,
     STRICTER,
@@ -36,12 +38,10 @@ from hybrid.simulation.initial_zones import (
     zones_without_equilibrium,
 )
 from hybrid.simulation.kind_changes import LineKinds, carries_all, copy_into
-from hybrid.simulation.lines_contact_equilibrium import nearness_in
 from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_cells import equilibrium_on_cells, following
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.run_start import joined_lines, solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest

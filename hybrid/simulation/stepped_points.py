@@ -342,7 +342,11 @@ class SteppedPoints(SettableObstacles):
 
     @one_thread
     def point(self, name: str) -> PointState:
-        """Where a point is, and the force of its lines on it; of a free point without the loads on itself."""
+        """Where a point is, and the force of its lines on it; of a free point without the loads on itself.
+
+        ValueError: a step has failed.
+        """
+        self._check_sound()
         here, force = self._ends_at(name), np.zeros(3)
         for line, k in here:
             force += self._run.solver.work[line].report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]

@@ -28,7 +28,6 @@ from hybrid.simulation.layer_mesh import layered, rods_at_rest
 from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, with_survey
 from hybrid.simulation.network_run import NetworkRun, Recording, static_system
 from hybrid.simulation.run_file import Asked
-from hybrid.simulation.run_start import named
 from hybrid.simulation.saving import Saved, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.set_obstacles import ONE_STEP
 from hybrid.simulation.stepped import SLIVER, end_of_step, in_space, iterations_allowed, one_thread
@@ -113,7 +112,6 @@ class Simulation(SteppedPoints):
         self._courses, self._moved = {}, {}
         self._seen = int(self._run.loop.counts.output)  # outputs that readers of the file have been shown
         self._final = 0  # how often what had been recorded was made final
-        self._here: Saved | None = None  # what was saved of the state as it is now
 
     def _read_scene(self, scene: Any) -> None:
         """The network to compute, whose ends are set, of a scene in either form."""
@@ -164,16 +162,13 @@ class Simulation(SteppedPoints):
         """Steps to a time `until` (s), where one ends; returns it.  Points that are set reach their place there.
 
         ValueError: a time that has passed, or beyond the duration; a step has failed and nothing was restored.
-        ComputationError: a step failed.  A cable goes on after `restore`.  Several lines are then, once `save` has been
-        called, back at the time from which they were to advance, with all points at rest that are not set again, and
-        can go on in a shorter step; else the simulation is over, and its result is written.
+        ComputationError: a step failed; the simulation goes on after `restore`.
         """
         self._check_open()
         self._check_sound()
         until = self._checked_time(until)
         if self._final and any(recorder.full for recorder in recorders(self._run)):
             self._commit()
-        before = self._before() if self._final and self._form is None else None
         self._start_courses(self.t, until)
         try:
             self._go_to(until)
@@ -182,7 +177,7 @@ class Simulation(SteppedPoints):
                 self._run.keep()
                 self._seen = made
         except LineFailed as failed:
-            raise (self._fail(failed) if before is None else self._undo(failed, before)) from None
+            raise self._fail(failed) from None
         if any(not x.is_reported and x.contradiction() for x in self._ends_set()):
             text = contradictions(self._set_from_outside())
             self._run.noted.event(0.0, *self._run.file.span, "implausible", text)
@@ -255,8 +250,7 @@ class Simulation(SteppedPoints):
         self._check_sound()
         defer(self._run)
         self._commit()
-        self._here = self._kept()
-        return self._here
+        return self._kept()
 
     @one_thread
     def restore(self, saved: Any) -> None:
@@ -277,7 +271,7 @@ class Simulation(SteppedPoints):
             commit(self._run)
         except LineFailed as failed:
             raise self._fail(failed) from None
-        self._final, self._here = self._final + 1, None
+        self._final += 1
 
     def _kept(self) -> Saved:
         paths = {name: [end.keep() for end in ends] for name, ends in self._driven.items()}
@@ -292,11 +286,6 @@ class Simulation(SteppedPoints):
             obstacles=self._kept_courses(),
             **kept(self._run),
         )
-
-    def _before(self) -> Saved:
-        """What a step that fails goes back to."""
-        before, self._here = self._here or self._kept(), None
-        return before
 
     def _bring_back(self, saved: Saved) -> None:
         for name in self._places.keys() - saved.paths.keys():  # what has been set since, for the first time
@@ -313,7 +302,7 @@ class Simulation(SteppedPoints):
         self._follow(saved.paths)  # with the frames of then
         for model in self._run.model.models:
             model.ends.at(self.t)
-        self._stops, self._next, self._here = [*saved.stops], dict(saved.next), saved
+        self._stops, self._next = [*saved.stops], dict(saved.next)
         self._wound, self._failed = dict(saved.wound), None
 
     def _follow(self, paths: Mapping[str, list[Floats]]) -> None:
@@ -322,26 +311,10 @@ class Simulation(SteppedPoints):
             for end, path in zip(self._driven[name], rows, strict=True):
                 end.bring_back(path)
 
-    def _undo(self, failed: LineFailed, before: Saved) -> ComputationError:
-        """Be back where the step began that has failed."""
-        error = named(failed, self._run.model)
-        self._bring_back(before)
-        self._next.clear()
-        self._wound.clear()
-        self._courses.clear()
-        return ComputationError(
-            error.outcome, error.t, error.s, f"{error.detail}; the simulation is back at t = {self.t:.6g} s",
-            first="set the points again and advance in a shorter step",
-        )  # fmt: skip
-
     # --- the end ----------------------------------------------------------------------------------
 
     def _fail(self, failed: LineFailed) -> ComputationError:
-        """What the failure of a step becomes: of several lines the simulation is over."""
-        if self._form is None:
-            self._closed = True
-            with self._stack:
-                return self._end_with(failed)
+        """What the failure of a step becomes, after which `restore` leads on."""
         error = self._error_of(failed)
         self._failed = failed, error
         return error

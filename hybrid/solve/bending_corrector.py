@@ -35,7 +35,7 @@ from hybrid.kernels.watch.neglected_moments import Bending
 MOST = 0.1
 # Part of the error by which a rod's end is moved to see how its forces answer, to first order as all else is here.
 SMALL = 1e-4
-# dvd'/dr' of an equilibrium, over tension scale / (mass x length): holds what would drift freely, as in solve.statics.
+# dvd'/dr' of an equilibrium, over tension scale / (mass x length): holds what would drift freely, as at rest.
 ANCHOR = 1e-12
 
 

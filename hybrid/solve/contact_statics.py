@@ -248,7 +248,7 @@ def settled_system(
             if taken.outcome == Outcome.OK and not lost:
                 return LinesAtRest(
                     states, tuple(path), total + iterations, taken.residual, found, settled=True,
-                    unjudged=falls.unjudged,
+                    unjudged=falls.unjudged, blurred=frozenset(found.blurred),
                 )  # fmt: skip
             if taken.outcome == Outcome.UNSTABLE and falls.is_new(states):
                 break

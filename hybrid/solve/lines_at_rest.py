@@ -1,19 +1,29 @@
-"""The equilibrium of lines that meet at points, without friction and with it (solve.statics)."""
+"""Equilibria of lines, of one or of several that meet, are sought without friction and with it.
+
+A line that is joined to nothing that moves is a group of one: it is solved by itself (solve.line_solver), and sought in
+its plane first where it lies in one.  Ways and their order are those of solve.search.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain
+from itertools import chain, islice
+from typing import NamedTuple
 
 from hybrid.errors import Outcome
-from hybrid.kernels.state.report import FRICTION, WAVES
+from hybrid.kernels.state.report import FRICTION, PLANAR, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats
-from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.model.plane import leaves_plane, planar, untwist
+from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
+from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.network_solver import NO_BODIES, NetworkSolver
-from hybrid.solve.search import PUSHED, Attempt, Start, Tally, attempts, first_sound, pulled, stuck, summary_of
-from hybrid.solve.statics import Equilibrium
+from hybrid.solve.search import PULLED, PUSHED, Attempt, Start, Tally, attempts, first_sound, pulled, stuck, summary_of
+from hybrid.solve.stability import is_stable
+
+# Why an equilibrium is not the one that is sought: as of `first_sound`.
+Refused = Callable[[NetworkState], tuple[Outcome, int, int]]
 
 
 @dataclass(frozen=True)
@@ -28,8 +38,9 @@ class LinesAtRest:
     made: NetworkSolver | Callable[[], NetworkSolver]  # whose reports are those of the solution, or what makes it
     settled: bool = False  # True where a damped motion with contact led there
     unjudged: str = ""  # where settled: why it is not known that it would stay
-    with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction on the bed took part
-    alone: tuple[Equilibrium, ...] = ()  # of each line where all are joined to nothing that moves: found one by one
+    with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction took part
+    blurred: frozenset[int] = frozenset()  # and of those of which round-off hides whether they buckle
+    alone: tuple[LinesAtRest, ...] = ()  # of each line where all are joined to nothing that moves: found one by one
     # By number of those that leave friction to the program, why it did not.
     not_settled: Mapping[int, str] = field(default_factory=dict)
 
@@ -47,19 +58,19 @@ class LinesAtRest:
         return self.made if isinstance(self.made, NetworkSolver) else self.made()
 
     @property
-    def blurred(self) -> set[int]:
-        """Numbers of lines of which round-off hides whether they buckle."""
-        return {k for k, x in enumerate(self.alone) if x.blurred} if self.alone else self.solver.blurred
-
-    @property
     def presses_bodies(self) -> bool:
         """Whether lines touch a body that is free."""
         return not self.alone and self.solver.presses_bodies
 
     @property
     def pushed(self) -> bool:
-        """Whether it is beside an equilibrium that is not stable."""
+        """Whether it, or one on fewer cells that it was found from, is beside an equilibrium that is not stable."""
         return PUSHED in self.path[-1]
+
+    @property
+    def pulled(self) -> bool:
+        """Whether it was pulled tight from where it lay without tension."""
+        return self.path[-1].startswith(PULLED)
 
     @property
     def summary(self) -> str:
@@ -67,52 +78,139 @@ class LinesAtRest:
         return summary_of(self.path, self.iterations)
 
 
-def lines_at_rest(
-    lines: Sequence[JoinedLine], points: int, bodies: Floats, starts: Iterable[Start], others: Iterable[Start] = (),
-    refused: Callable[[NetworkState], tuple[Outcome, int, int]] | None = None,
-) -> LinesAtRest:  # fmt: skip
-    """Equilibrium of lines without friction; starts, others: as of `attempts`; refused: as of `first_sound`.
+class Group(NamedTuple):
+    """Lines that are sought together; points: how many free points there are; bodies: (B, NUMBERS), what they are."""
 
-    LineFailed: no way leads to lines under tension.
+    lines: Sequence[JoinedLine]
+    points: int = 0
+    bodies: Floats = NO_BODIES
+    plane: Floats | None = None  # (3, 3) in which a line by itself lies at first; None: it lies in none
+    guides: tuple[bool, bool] = (False, False)  # ends of that which hold a tangent
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether it is one line that is joined to nothing that moves, and touches nothing that does."""
+        x, more = self.lines[0], len(self.lines) > 1 or self.points or len(self.bodies)
+        return not more and max(x.joints) < 0 and not x.line.bits & SELF_CONTACT
+
+    def solver(self, rough: Iterable[int] = (), slackens: bool = True) -> LineSolver | NetworkSolver:
+        """Of the lines without waves, and all but those of the numbers `rough` without friction.
+
+        slackens: whether a slack solution will do where a line asks for that; with friction it is not taken.
+        """
+        rough, lines = {*rough}, []
+        for k, x in enumerate(self.lines):
+            bits = x.line.bits & ~(WAVES | (0 if k in rough else FRICTION))
+            slack = x.slackens and slackens and not rough
+            lines.append(x._replace(line=x.line._replace(bits=bits), slackens=slack))
+        return LineSolver(lines[0]) if self.is_alone else NetworkSolver(lines, self.points, self.bodies.copy())
+
+    def begun(self, start: NetworkState) -> NetworkState:
+        """Untwist the start of a planar line: in its plane nothing would turn back a twist."""
+        if not (self.is_alone and self.lines[0].line.bits & PLANAR):
+            return start
+        out = start.copy()
+        untwist(self.lines[0].line, self.lines[0].ends, self.guides, out.lines[0])
+        return out
+
+
+def lines_at_rest(
+    group: Group, starts: Iterable[Start], others: Sequence[Start] = (), refused: Refused | None = None,
+    quick: bool = False, rubs: bool = True,
+) -> LinesAtRest:  # fmt: skip
+    """Equilibrium of lines without friction; where none is found, with that which keeps them where they start.
+
+    starts, others: as of `attempts`; refused: as of `first_sound`; quick: nothing but Newton from the first start, and
+    no slack solution; rubs: whether friction is tried.  LineFailed: no way leads to lines under tension.
     """
-    solver, tally = NetworkSolver(_with_bits(lines, ()), points, bodies), Tally()
-    return _found(*first_sound(attempts(solver, starts, others, tally), tally, refused), solver, tally)
+    starts = iter(starts)
+    name, first = next(starts)
+    rough = [k for k, x in enumerate(group.lines) if x.line.bits & FRICTION]
+
+    def search(group: Group, quick: bool) -> LinesAtRest:
+        smooth, tally = group.solver(slackens=not quick), Tally()
+        begun, more = ([(name, group.begun(state)) for name, state in x] for x in ([(name, first)], others))
+        roads = [attempts(smooth, begun if quick else chain(begun, _begun(group, starts)), more, tally)]
+        if quick:
+            roads = [islice(roads[0], 1)]
+        elif rough and rubs:
+            roads.append(_lazily(lambda: stuck(group.solver(rough), rough, begun[0][1], name, tally)))
+        return _found(*first_sound(chain(*roads), tally, refused), tally)
+
+    return _in_plane_first(group, first, search, quick)
 
 
 def settled_with_friction(
-    lines: Sequence[JoinedLine], points: int, bodies: Floats, ways: Mapping[int, str], found: LinesAtRest,
-    first: NetworkState,
-) -> LinesAtRest:  # fmt: skip
+    group: Group, ways: Mapping[int, str], first: Start, found: LinesAtRest | None = None
+) -> LinesAtRest:
     """The equilibrium with friction of the lines named in `ways`, by number.
 
     ways: "pull": laid without tension along the equilibrium without friction (`found`), or where a current acts along
     that in still water, then pulled tight, all such lines together; "start", and where that fails: at rest after a
     damped motion from the first shapes; "usual" for all: pulled tight, and nothing else.  LineFailed.
     """
-    solver, tally, tried = NetworkSolver(_with_bits(lines, ways), points, bodies), Tally(), list[Iterable[Attempt]]()
-    tally.total = found.iterations
-    if "start" not in ways.values():
-        smooth = NetworkSolver(_with_bits(lines, ()), points, bodies)
-        tried.append(pulled(smooth, solver, [*ways], found.state, tally))
-    if set(ways.values()) != {"usual"}:
-        tried.append(stuck(solver, ways, first, "the first shapes", tally))
-    return _found(*first_sound(chain(*tried), tally, before=found.path), solver, tally, frozenset(ways))
+    lays = found is not None and "start" not in ways.values()
+
+    def search(group: Group, quick: bool) -> LinesAtRest:
+        solver, tally, tried = group.solver(ways), Tally(), list[Iterable[Attempt]]()
+        if found is not None:
+            tally.total = found.iterations
+        if lays:
+            assert found is not None
+            tried.append(pulled(group.solver(), solver, [*ways], group.begun(found.state), tally))
+        if not lays or (set(ways.values()) != {"usual"} and not quick):
+            tried.append(stuck(solver, ways, group.begun(first[1]), first[0], tally))
+        before = found.path[:-1] if found is not None else ()
+        laid = _found(*first_sound(chain(*tried), tally, before=before), tally)
+        if found is None or not found.pushed or not laid.pulled:
+            return laid
+        return replace(laid, path=(*laid.path[:-1], f"{laid.path[-1]}, {PUSHED}"))
+
+    return _in_plane_first(group, found.state if lays and found is not None else first[1], search)
 
 
-def _with_bits(lines: Sequence[JoinedLine], rough: Iterable[int]) -> list[JoinedLine]:
-    """Lines without waves, and all but those of the numbers `rough` without friction.
-
-    With friction a slack solution is not taken.
-    """
-    rough, found = {*rough}, []
-    for k, x in enumerate(lines):
-        bits = x.line.bits & ~(WAVES | (0 if k in rough else FRICTION))
-        found.append(x._replace(line=x.line._replace(bits=bits), slackens=x.slackens and not rough))
-    return found
+def _begun(group: Group, starts: Iterable[Start]) -> Iterator[Start]:
+    return ((name, group.begun(state)) for name, state in starts)
 
 
-def _found(
-    path: tuple[str, ...], tried: Attempt, solver: NetworkSolver, tally: Tally, rough: frozenset[int] = frozenset()
+def _lazily(road: Callable[[], Iterator[Attempt]]) -> Iterator[Attempt]:
+    """A road that is made when it is taken."""
+    yield from road()
+
+
+def _in_plane_first(
+    group: Group, start: NetworkState, search: Callable[[Group, bool], LinesAtRest], quick: bool = False
 ) -> LinesAtRest:
-    residual = solver.evaluate_forces(tried.states, solver.anchor).residual
-    return LinesAtRest(tried.states, path, tally.total, residual, solver, with_friction=rough)
+    """What a search finds at once in the plane of a line, if that holds in space, too; else in space.
+
+    search: of a group; and whether it tries only its first way.
+    """
+    x = group.lines[0]
+    plane = group.plane if group.is_alone and not x.line.bits & PLANAR else None
+    if plane is None or leaves_plane(plane, start.lines[0], x.length):
+        return search(group, quick)
+    line = planar(x.line, plane)
+    try:
+        found = search(group._replace(lines=(x._replace(line=line),)), True)
+        judged = line if found.with_friction else line._replace(bits=line.bits & ~FRICTION)
+        if is_stable(judged, x.sea, x.ends, found.state.lines[0], x.length, x.scale):
+            return found
+    except LineFailed:  # there are more ways in space
+        pass
+    return search(group, quick)
+
+
+def _found(path: tuple[str, ...], tried: Attempt, tally: Tally) -> LinesAtRest:
+    solver, states = tried.solver, tried.states
+    rough = frozenset(k for k, x in enumerate(solver.lines) if x.line.bits & FRICTION)
+    residual = solver.proof(states)
+
+    def made() -> NetworkSolver:
+        several = NetworkSolver(solver.lines, 0)
+        several.evaluate_forces(states, several.anchor)
+        return several
+
+    return LinesAtRest(
+        states, path, tally.total, residual, solver if isinstance(solver, NetworkSolver) else made,
+        with_friction=rough, blurred=frozenset(solver.blurred),
+    )  # fmt: skip

@@ -55,14 +55,10 @@ from hybrid.kernels.step.step_law import REFUSED
 from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.joined import JoinedLine, JointJobs, NetworkState, NetworkTaken, Rooms
+from hybrid.solve.line_solver import BALANCED, BALANCING, MOST_ITERATIONS
 from hybrid.solve.self_contact import SelfContact, left_over
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING
-from hybrid.solve.statics import (
-    BALANCED,
-    BALANCING,
-    MOST_ITERATIONS,
-)
 from hybrid.solve.stepper import HEAVY, REACH, lie_on_bed, workspace_of
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
 
@@ -873,11 +869,11 @@ class NetworkSolver:
         return taken
 
     def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> NetworkSolver:
-        """As of `solve.statics.Solver`, without contact."""
+        """As of `solve.search.Solver`, without contact."""
         return NetworkSolver(lines, len(self.net), self.bodies if bodies is None else bodies)
 
     def turned(self, start: NetworkState) -> None:
-        """As of `solve.statics.Solver`: chords are not turned."""
+        """As of `solve.search.Solver`: chords are not turned."""
 
     def newton(self, start: NetworkState) -> tuple[NetworkTaken, NetworkState]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.

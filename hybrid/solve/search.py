@@ -1,6 +1,7 @@
 """Ways to equilibria of lines, of one or of several that meet: Newton from the shapes given, then slow roads.
 
-One search for all; what solves differs: a line that nothing moves (solve.statics), or a network (solve.network_solver).
+One search for all; what solves differs: a line that nothing moves (solve.line_solver), or several that meet
+(solve.network_solver).
 """
 
 from __future__ import annotations
@@ -81,6 +82,7 @@ class Solver(Protocol):
     scale: float  # N
     length: float  # m, of the longest line
     settling: float  # damping of their motion to rest, as of solve.stability.damped
+    blurred: set[int]  # numbers of lines of the last equilibrium of which round-off hides whether they buckle
 
     def newton(self, start: NetworkState) -> Solution:
         """Static Newton from `start`, which stays; not OK too where what was found is no equilibrium."""

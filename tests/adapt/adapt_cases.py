@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from problems import Scene, free, pinned, scene, straight
 
-from hybrid.adapt.manager import Allowed, DomainManager, Remapped, Times, remap
+from hybrid.adapt.manager import Allowed, DomainManager, Times, transfer_to
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh.zone_transfer import blank_transfer, transfer
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
@@ -128,6 +130,22 @@ def drifting(s: Floats) -> Floats:
 
 
 # --- remapping -----------------------------------------------------------------------------------------
+
+
+class Remapped(NamedTuple):
+    """A state on new nodes, and the lengths (N,) m that its cells have now; their true ones are in the line."""
+
+    state: State
+    lengths: Floats
+
+
+def remap(
+    old: Layout, new: Layout, line: Line, target: Line, state: State, kinks: np.ndarray, twist: Floats,
+) -> Remapped:  # fmt: skip
+    """Carry a state: arguments as of transfer_to."""
+    job = transfer_to(old, new, line, target, state, kinks, twist)
+    transfer(Table(blank_transfer()._replace(**job._asdict())).numbers)
+    return Remapped(job.out, job.match.lengths)
 
 
 def carried(

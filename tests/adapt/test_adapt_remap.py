@@ -24,6 +24,7 @@ from adapt_cases import (
     layout,
     moved,
     on,
+    remap,
     state_on,
     turns,
     twists,
@@ -368,8 +369,6 @@ def test_closing_twist_is_spread_evenly(angle):
 
 def test_intrinsic_twist_is_followed():
     """`twist` asks for a twist of the frames per length; it is had between all new cells."""
-    from hybrid.adapt.manager import remap
-
     what, old = cable(), even(8, "C" * 8)
     line = on(what, old)
     state = state_on(line, SHAPES["helix"][0])

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from problems import pinned, scene
+from problems import at_rest, pinned, scene
 
 import hybrid
 from hybrid.model.build import build
 from hybrid.model.coarsen import FEWEST, coarser, refined
-from hybrid.solve.statics import solve_statics
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -22,12 +21,6 @@ def hanging(cells, **more):
     what = scene(section, pinned(), pinned(7.0, 0, 0), cells=cells, gravity=10.0, **more).model_dump(exclude_none=True)
     what["cable"] |= clump
     return build(hybrid.validate_scene(what))
-
-
-def solved(model, start=None):
-    return solve_statics(
-        model.line, model.sea.at(0.0), model.ends.at(0.0), start or model.start, model.length, model.tension_scale
-    )
 
 
 def test_places_that_matter_keep_their_nodes():
@@ -53,10 +46,10 @@ def test_a_refined_equilibrium_is_nearly_one():
     for cells in (160, 320):
         fine = hanging(4 * cells)
         coarse = coarser(fine)
-        start = refined(solved(coarse).state, coarse.line, fine.line)
+        start = refined(at_rest(coarse).state.lines[0], coarse.line, fine.line)
         assert np.abs(np.einsum("ij,ij->i", start.a1, start.e)).max() < 1e-12
-        found = solved(fine, start)
-        shifts.append(np.abs(found.state.r - start.r).max())
+        found = at_rest(fine, start=start)
+        shifts.append(np.abs(found.state.lines[0].r - start.r).max())
         assert len(found.path) == 1
     assert 3.0 < shifts[0] / shifts[1] < 5.0
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.errors import ComputationError, Outcome
+from hybrid.errors import Outcome
 from hybrid.simulation import equilibrium
-from hybrid.simulation.contact_equilibrium import gauss_integral
+from hybrid.simulation.lines_contact import gauss_integral
+from hybrid.solve.joined import LineFailed
 
 WIDTH, LENGTH = 0.02, 8.0
 LEGS = {"zones": [{"catenary": 3.0}, {"rod": 2.0}, {"catenary": 3.0}]}
@@ -164,7 +165,7 @@ def test_a_line_that_loses_its_turns_without_contact_is_found_with_it(monkeypatc
     """Where nothing is asked of contact: the equilibrium, and whether it stays, are those of a line that asks for it."""
 
     def lost(*_: object) -> NoReturn:
-        raise ComputationError(Outcome.TURNS_LOST, None, 0.0, "on all ways")
+        raise LineFailed(0, Outcome.TURNS_LOST, None, 0.0, "on all ways")
 
     tables = twisted("rod") | {"mesh": {"cells": 80}}
     asked = hybrid.static(tables)

@@ -272,7 +272,7 @@ def test_a_stop_is_heard_while_the_equilibrium_is_searched(
         os.kill(os.getpid(), signal.SIGINT)
         reached.append("the end of a long search")
 
-    monkeypatch.setattr(run_cells, "equilibrium_of_system", long)
+    monkeypatch.setattr(run_cells, "equilibrium_of", long)
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(scene, tmp_path / "run.h5")
     assert not reached and not list(tmp_path.iterdir())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,10 @@ from scipy.spatial.transform import Rotation
 
 import hybrid
 from hybrid.model.build import build
+from hybrid.model.network import build_system
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Motion
+from hybrid.scene.short_form import network_of
 from hybrid.simulation import equilibrium
 from tests.said import both_ways, line_of, said
 
@@ -89,12 +92,12 @@ def test_too_few_cells_for_the_turns_are_refused():
 
 
 def test_an_equilibrium_that_has_lost_a_turn_is_refused(monkeypatch):
-    scene = taut(second={"turns": 3})
-    model = build(scene)
+    model = build_system(network_of(taut(second={"turns": 3})))
     lost = build(taut(second={"turns": 2})).start
-    with pytest.raises(hybrid.ComputationError, match=r"(?s)ends.end.turns: 3;.*start with 3 turns.*have 2\n.*try"):
-        equilibrium.count_turns(scene, model, 0.0, model.start._replace(a1=lost.a1))
-    equilibrium.count_turns(scene, model, 0.0, model.start)
+    (state,) = (x.start for x in model.models)
+    text, s = equilibrium.lost_turns(model, 0.0, 0, state._replace(a1=lost.a1))
+    assert s == 100.0 and re.search(r"connections.end.turns: 3;.*start with 3 turns.*have 2$", text)
+    assert equilibrium.lost_turns(model, 0.0, 0, state)[0] == ""
 
 
 REFUSED = {

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from problems import at_rest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -19,7 +20,6 @@ from hybrid.model.build import build
 from hybrid.model.network import build_system
 from hybrid.scene.short_form import network_of
 from hybrid.simulation.network_run import NetworkRun
-from hybrid.solve.statics import solve_statics
 
 LENGTH, CELLS, A, B = 100.0, 40, [0.0, 0.0, 0.0], [70.0, 10.0, -20.0]
 SECTION = {
@@ -85,10 +85,7 @@ def test_offsets_of_a_point_to_which_lines_are_clamped() -> None:
 def test_a_rod_cut_at_any_node_is_the_same_rod(cuts: list[int], flips: tuple[int, ...], normal: Any) -> None:
     """Points are first looked for 15 m and more beside their places; the axes of points are found as well."""
     model = build(hybrid.validate_scene(in_one_piece(normal)))
-    ends = model.ends.at(np.inf)
-    whole = solve_statics(
-        model.line, model.sea.at(np.inf), ends, model.start, LENGTH, model.tension_scale
-    ).state  # fmt: skip
+    whole = at_rest(model, np.inf).state.lines[0]
     found = equilibrium(in_pieces(cuts, flips, normal)).found
     assert found is not None and found.iterations <= 20 and len(found.path) == 1
     edges = [0, *cuts]

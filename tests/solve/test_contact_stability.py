@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.network import build_system
-from hybrid.simulation.run_start import equilibrium_of_system
+from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.solve.contact_stability import ContactStability, contact_stiffness
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.search import PUSHED
@@ -50,7 +50,7 @@ def on_top(joined: bool = False, aside: float = 0.0) -> Tables:
 
 def equilibrium(tables: Tables) -> LinesAtRest:
     system = system_of(tables)
-    return equilibrium_of_system(system, build_system(system), np.inf)
+    return equilibrium_of(system, build_system(system), np.inf)
 
 
 def test_the_stiffness_of_contact_is_the_derivative_of_its_forces() -> None:

@@ -9,11 +9,15 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome
-from hybrid.model.build import Model, build
-from hybrid.scene.schema import Scene
-from hybrid.simulation.equilibrium import equilibrium_of, solve_model
+from hybrid.kernels.state.state import Line, State
+from hybrid.model.network import NetworkModel, build_system
+from hybrid.scene.network_scene import Network
+from hybrid.scene.short_form import network_of
+from hybrid.simulation.equilibrium import equilibrium_of, group_of
 from hybrid.solve.flaws import FOLDED, folds
-from hybrid.solve.statics import Search
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.lines_at_rest import lines_at_rest
+from hybrid.solve.network_solver import NO_BODIES
 
 
 def hairpin(cells: int, model: str = "rod", apart: float = 0.0, **more: Any) -> dict[str, Any]:
@@ -27,23 +31,29 @@ def hairpin(cells: int, model: str = "rod", apart: float = 0.0, **more: Any) -> 
     return {"cable": cable, "ends": ends, "initial": "equilibrium", "model": model, "mesh": {"cells": cells}}
 
 
-def model_of(tables: dict[str, Any]) -> tuple[Scene, Model]:
-    scene = hybrid.validate_scene(tables)
-    return scene, build(scene)
+def model_of(tables: dict[str, Any]) -> tuple[Network, NetworkModel]:
+    network = network_of(hybrid.validate_scene(tables))
+    return network, build_system(network)
+
+
+def rest_of(tables: dict[str, Any]) -> tuple[Line, State]:
+    network, model = model_of(tables)
+    return model.models[0].line, equilibrium_of(network, model, 0.0).state.lines[0]
 
 
 def test_no_rod_stands_on_a_fold() -> None:
     """Newton's first answer on 21 cells turns by 173 deg into a cell that presses with 10.1 N, more than its weight."""
-    scene, model = model_of(hairpin(21))
+    _, model = model_of(hairpin(21))
+    first = NetworkState([model.models[0].start])
     with pytest.raises(ComputationError) as refused:
-        solve_model(model, 0.0, model.start, Search(quick=True))
+        lines_at_rest(group_of(model, 0.0, NO_BODIES), [("the first shape", first)], quick=True)
     assert refused.value.outcome == Outcome.FOLDED
     assert refused.value.s == pytest.approx(10.0, abs=2.0)
     assert "would show the bend" in str(refused.value)
-    found = equilibrium_of(scene, model, 0.0)
-    assert found.state.T.min() > -9.81 * 20.0 / 21.0
-    assert np.degrees(folds(model.line, found.state).max()) == pytest.approx(98.5, abs=1.0)
-    assert found.state.r[:, 2].min() == pytest.approx(-10.0, abs=0.5)
+    line, state = rest_of(hairpin(21))
+    assert state.T.min() > -9.81 * 20.0 / 21.0
+    assert np.degrees(folds(line, state).max()) == pytest.approx(98.5, abs=1.0)
+    assert state.r[:, 2].min() == pytest.approx(-10.0, abs=0.5)
 
 
 @pytest.mark.parametrize(("kind", "lowest"), [("rod", -9.98), ("catenary", -9.99)])
@@ -59,11 +69,10 @@ def test_a_line_that_hangs_in_a_fold_is_right_to_a_cell_and_says_so(kind: str, l
 def test_a_point_load_makes_a_true_kink(model: str) -> None:
     """A clump, in air, and a float without mass, in water that nothing drags, pull a line into two strands."""
     clump = {"attachments": [{"kind": "clump", "at": 10.0, "mass": 100.0}]}
-    scene, built = model_of(hairpin(20, model, 0.4, **clump))
-    state = equilibrium_of(scene, built, 0.0).state
+    line, state = rest_of(hairpin(20, model, 0.4, **clump))
     chords = state.e / np.linalg.norm(state.e, axis=1)[:, None]
     assert chords[9] @ chords[10] < np.cos(FOLDED)
-    assert folds(built.line, state)[10] == 0.0
+    assert folds(line, state)[10] == 0.0
     assert "unresolved bend" not in {
         event.kind for event in hybrid.static(hairpin(20, "catenary", 0.4, **clump)).events
     }
@@ -72,8 +81,7 @@ def test_a_point_load_makes_a_true_kink(model: str) -> None:
 def test_a_float_without_mass_is_a_point_load() -> None:
     lift = {"attachments": [{"kind": "float", "at": 10.0, "buoyancy": 2000.0}]}
     tables = hairpin(20, "rod", 0.4, **lift) | {"environment": {"fluid": {"density": 1000.0}}}
-    scene, built = model_of(tables)
-    state = equilibrium_of(scene, built, 0.0).state
+    line, state = rest_of(tables)
     chords = state.e / np.linalg.norm(state.e, axis=1)[:, None]
     assert chords[9] @ chords[10] < np.cos(FOLDED)
-    assert folds(built.line, state)[10] == 0.0
+    assert folds(line, state)[10] == 0.0

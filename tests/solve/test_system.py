@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from problems import at_rest
 from scipy.optimize import root
 
 import hybrid
@@ -16,7 +18,6 @@ from hybrid.model.build import Model, build
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.solve.joined import JoinedLine, NetworkState, joined_ends
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper
 
 LENGTH, CELLS = 100.0, 40
@@ -45,8 +46,7 @@ class Cut:
         self.line, self.flips = self.whole.line._replace(element=element), flips
         self.edges = [0, *cuts, CELLS]
         self.sea, self.ends = self.whole.sea.at(np.inf), self.whole.ends.at(np.inf)
-        found = solve_statics(self.line, self.sea, self.ends, self.whole.start, LENGTH, self.whole.tension_scale)
-        self.state = found.state
+        self.state = at_rest(replace(self.whole, line=self.line), np.inf).state.lines[0]
         off = np.random.default_rng(1).uniform(-0.6, 0.6, (len(cuts), 3))
         places = [A, *(self.state.r[list(cuts)] + off), B]
         lines, self.start = [], []

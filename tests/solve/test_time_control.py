@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from problems import at_rest
 from test_time_order import scene
 
 import hybrid
@@ -15,7 +16,6 @@ from hybrid.kernels.step.generalized_alpha import before_fixed, radius_of_step, 
 from hybrid.kernels.step.step_control import end_of_try, halve, passes, take_past
 from hybrid.kernels.step.step_law import FIRST, LEAST, MOST, REFUSED, step_end
 from hybrid.model.build import build
-from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper
 
 DURATION = 2.0  # s
@@ -33,9 +33,7 @@ def motion(model, rho, steps, carried=True):
     what = scene(model, 0.01, rho)
     made = build(what)
     stepper = Stepper(made.line, made.length, made.tension_scale)
-    old = solve_statics(
-        made.line, made.sea.at(0.0), made.ends.at(0.0), made.start, made.length, made.tension_scale
-    ).state
+    old = at_rest(made).state.lines[0]
     stepper.consistent_accelerations(made.sea.at(0.0), made.ends.at(0.0), made.ends.acceleration(0.0, 1e-5), old)
     new = old.copy()
     t, before, radius, out = 0.0, 0.0, rho, {}

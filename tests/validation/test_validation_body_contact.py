@@ -22,7 +22,7 @@ from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody, turned
 from hybrid.scene.network_scene import Network
 from hybrid.scene.read import as_scene
-from hybrid.simulation.run_start import joined_lines
+from hybrid.simulation.equilibrium import joined_lines
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.network_solver import NetworkSolver
 

@@ -22,8 +22,8 @@ from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.network_scene import Network
 from hybrid.scene.read import as_scene
+from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import shared_of
-from hybrid.simulation.run_start import joined_lines
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
 from tests.validation.test_validation_body_contact import MASS, on_two_lines, pushed

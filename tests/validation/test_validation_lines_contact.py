@@ -18,8 +18,8 @@ from hybrid.errors import SceneError
 from hybrid.kernels.junctions.lines_distance import APART, HAVE_MET
 from hybrid.kernels.state.books import Clock
 from hybrid.model.network import build_system
+from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import LinesWatch
-from hybrid.simulation.run_start import joined_lines
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
 from tests.simulation.test_system_contact import HOSE, system

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from problems import (
     GREENHILL_CLAMPED,
+    at_rest,
     build,
     greenhill_clamped,
     lowest,
     order,
     positive_definite,
     ring,
-    solve_statics,
     stiffness,
     twist_uniformly,
     twisted_taut_rod,
@@ -25,9 +25,7 @@ from scipy.optimize import brentq
 def critical_torque(load: float, cells: int, torsional_stiffness: float) -> float:
     """Torque over 2 sqrt(EI T) at which the straight, evenly twisted rod buckles."""
     model = build(twisted_taut_rod(load, cells, torsional_stiffness))
-    taut = solve_statics(
-        model.line, model.sea.at(0.0), model.ends.at(0.0), model.start, model.length, model.tension_scale
-    ).state
+    taut = at_rest(model).state.lines[0]
 
     def stable(ratio: float) -> bool:
         state = taut.copy()

@@ -1,44 +1,24 @@
-"""Equilibrium of one line by the same march: Newton's method, within the search that all lines have (solve.search)."""
+"""Equilibrium of one line that nothing moves: Newton's method, within the search that all lines have (solve.search)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import chain, islice
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from hybrid.errors import ComputationError, Outcome
+from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.laws.soil import settle_in_soil
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import Limits
-from hybrid.kernels.state.report import FRICTION, RESIDUAL, RESIDUAL_NODE, WAVES
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.state.report import FRICTION, RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.step import friction_axes
-from hybrid.solve.flaws import (
-    buckling_line,
-    flaw_of_lines,
-)
-from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, NetworkTaken
-from hybrid.solve.search import (
-    PULLED,
-    PUSHED,
-    Attempt,
-    Solution,
-    Tally,
-    attempts,
-    first_sound,
-    pulled,
-    stuck,
-    summary_of,
-)
-from hybrid.solve.stability import DAMPING as SETTLING
-from hybrid.solve.stability import (
-    Stability,
-    stop,
-)
+from hybrid.solve.flaws import buckling_line, flaw_of_lines
+from hybrid.solve.joined import JoinedLine, NetworkState, NetworkTaken
+from hybrid.solve.search import Solution
+from hybrid.solve.stability import DAMPING, Stability, stop
 from hybrid.solve.stepper import Stepper, Taken, workspace_of
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
@@ -49,40 +29,10 @@ DRIFTED = 10.0  # lengths that a line has gone from its start where it has drift
 MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at a time: 8 pi are 40 turns of that size
 
 
-@dataclass(frozen=True)
-class Equilibrium:
-    """A static solution: how it was found (`path`), iterations, and its proof, the largest force out of balance (N)."""
-
-    state: State
-    path: tuple[str, ...]
-    iterations: int
-    residual: float
-    with_friction: bool  # True when friction took part
-    blurred: bool = False  # True when round-off of the bending of very short cells hides whether it buckles
-    touches: bool = False  # whether a damped motion with contact with itself led there
-    unjudged: str = ""  # where that is so: why it is not known that it would stay
-    not_settled: str = ""  # why friction has not settled where a scene leaves that to the program
-
-    @property
-    def pushed(self) -> bool:
-        """Whether it, or one on fewer cells that it was found from, is beside an equilibrium that is not stable."""
-        return PUSHED in self.path[-1]
-
-    @property
-    def pulled(self) -> bool:
-        """Whether it was pulled tight from where it lay without tension."""
-        return self.path[-1].startswith(PULLED)
-
-    @property
-    def summary(self) -> str:
-        """How it was found, in one line."""
-        return summary_of(self.path, self.iterations)
-
-
 class LineSolver:
     """Solves for one line that is joined to nothing that moves with it, in space or in its plane."""
 
-    settling = SETTLING
+    settling = DAMPING
     bodies: Floats = np.zeros((0, NUMBERS))
 
     def __init__(self, x: JoinedLine) -> None:
@@ -176,73 +126,3 @@ class LineSolver:
     def is_balanced(self, states: NetworkState, residual: float) -> bool:
         """As of `Solver`."""
         return residual <= BALANCED * (float(np.abs(states.lines[0].T).max()) + self.scale)
-
-
-class Search(NamedTuple):
-    """How an equilibrium is searched, and which one counts.
-
-    settle: on a bed with friction, "start": let it come to rest from the start and try nothing else, "pull": pull it
-    tight from where it would lie without tension along the equilibrium without friction, which is the start; quick: try
-    nothing but Newton from the start; take_slack: whether a slack solution will do; others: further starts with their
-    names; refused: why a state in balance is not the one that is sought, and its cell or node; the next way is tried
-    then.  borne: (N,) strain that cells bear, of a line that may lie on obstacles.
-    """
-
-    settle: str = ""
-    quick: bool = False
-    take_slack: bool = False
-    others: Sequence[tuple[str, State]] = ()
-    refused: Callable[[State], tuple[Outcome, int]] | None = None
-    borne: Floats = np.zeros(0)
-
-
-ALL_WAYS = Search()
-
-
-def solve_statics(
-    line: Line,
-    sea: Sea,
-    ends: Ends,
-    start: State,
-    length: float,
-    scale: float,
-    floor: float | None = None,
-    shape: str = "the starting shape",
-    search: Search = ALL_WAYS,
-) -> Equilibrium:
-    """Equilibrium of a line from a starting shape, however poor.
-
-    length: m; scale: the tension scale, N; floor: what counts as no tension in motion, N (None: 1e-6 of the scale);
-    shape: what the start is, for people.  ComputationError: no way leads to one; with `search.take_slack` a slack
-    solution is taken when there is no taut one.
-    """
-    floor, rubs = 1e-6 * scale if floor is None else floor, bool(line.bits & FRICTION)
-    bits = line.bits & ~WAVES
-    x = JoinedLine(line._replace(bits=bits), sea, ends, length, scale, floor, (-1, -1), borne=search.borne)
-    without = x._replace(line=line._replace(bits=bits & ~FRICTION), slackens=search.take_slack)
-    rough, smooth = LineSolver(x), LineSolver(without)  # with friction a slack solution is not taken
-    first, tally = NetworkState([start]), Tally()
-    others = [(name, NetworkState([other])) for name, other in search.others]
-    settle = "start" if rubs and not ends.held.any() else search.settle if rubs else ""
-    refused = search.refused
-
-    def not_sought(states: NetworkState) -> tuple[Outcome, int, int]:
-        outcome, where = refused(states.lines[0]) if refused is not None else (Outcome.OK, -1)
-        return outcome, 0, where
-
-    roads: list[Iterator[Attempt]] = []
-    if not settle:
-        plain = attempts(smooth, [(shape, first)], others, tally)
-        roads.append(islice(plain, 1) if search.quick else plain)
-    elif settle == "pull":
-        roads.append(pulled(smooth, rough, [0], first, tally))
-    if rubs and settle != "pull" and (settle or not search.quick):
-        roads.append(stuck(rough, [0], first, shape, tally))
-    try:
-        path, tried = first_sound(chain(*roads), tally, not_sought)
-    except LineFailed as failed:
-        raise ComputationError(failed.outcome, None, failed.s, failed.detail) from None
-    solver = smooth if tried.solver is smooth else rough
-    state, residual = tried.states.lines[0], solver.proof(tried.states)
-    rubbed = bool(solver.lines[0].line.bits & FRICTION)
-    return Equilibrium(state, path, tally.total, residual, rubbed, bool(solver.blurred))
