@@ -26,7 +26,7 @@ from hybrid.scene.schema import missing_time
 from hybrid.scene.short_form import network_of
 from hybrid.simulation.case import Case, CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
-from hybrid.simulation.progress import Listener, ProgressReporter, interrupts, listener_of, tell_of_compiling
+from hybrid.simulation.progress import Listener, ProgressReporter, announce_compiling, interrupts, listener_of
 from hybrid.simulation.restart import remaining
 from hybrid.store.array_contents import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target, locked
@@ -185,7 +185,7 @@ def _supervised(case: Case, progress: bool | Listener) -> Iterator[None]:
     """Hear of interrupts, and report the progress, until a run is done."""
     duration, listener = case.scene.require_time().duration, listener_of(progress)
     if listener is not None:
-        tell_of_compiling(listener, kernels_of(case.scene))
+        announce_compiling(listener, kernels_of(case.scene))
     with interrupts() as interrupted, ProgressReporter(listener, duration) as reporter:
         case.progress, case.interrupted = reporter, interrupted
         yield

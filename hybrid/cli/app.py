@@ -141,7 +141,7 @@ def session(as_json: bool, quiet: bool) -> Iterator[Console]:
         except (Exception, KeyboardInterrupt) as error:
             # Where a stop comes while modules are imported or compiled, it can end as any exception.
             stopped = bool(heard) or isinstance(error, KeyboardInterrupt)
-            code = INTERRUPTED if stopped else tell(console, error)
+            code = INTERRUPTED if stopped else report_error(console, error)
             if stopped:
                 console.interrupted()
     if code:
@@ -199,7 +199,7 @@ def _ran_out(error: BaseException) -> bool:
     return False
 
 
-def tell(console: Console, error: BaseException) -> int:
+def report_error(console: Console, error: BaseException) -> int:
     """Say what went wrong; gives the exit code."""
     from hybrid.errors import ComputationError, ResultError, ResultHeld, SceneError
 

@@ -39,8 +39,8 @@ from hybrid.cli.app import (
     load,
     output_option,
     picture_beside,
+    report_error,
     session,
-    tell,
     words,
 )  # fmt: skip
 from hybrid.cli.console import guard_output, raise_lost_output
@@ -64,8 +64,8 @@ def run(
         picture = picture_beside(target, plot)
         cold = console.compiling(asked)
         begin = clock.perf_counter()
-        with console.progress() as tell:
-            result = hybrid.run(asked, target, progress=tell, overwrite=not keep)
+        with console.progress() as show:
+            result = hybrid.run(asked, target, progress=show, overwrite=not keep)
         _ended(console, asked, result, target, clock.perf_counter() - begin, duration, cold, picture)
 
 
@@ -92,8 +92,8 @@ def resume(
         left = remaining(result.resolve(), until, changed, start)
         cold = console.compiling(left.scene)
         begin = clock.perf_counter()
-        with console.progress() as tell:
-            more = hybrid.resume(result, output, until=until, settings=changed, start=start, progress=tell)
+        with console.progress() as show:
+            more = hybrid.resume(result, output, until=until, settings=changed, start=start, progress=show)
         computed = left.scene.require_time().duration - left.reached
         _ended(console, left.scene, more, target, clock.perf_counter() - begin, computed, cold, picture)
 
@@ -328,5 +328,5 @@ def main(arguments: list[str] | None = None) -> None:
     except OSError as error:
         from hybrid.cli.console import Console
 
-        code = tell(Console("--json" in arguments, False), error)
+        code = report_error(Console("--json" in arguments, False), error)
     sys.exit(code)

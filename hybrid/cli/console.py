@@ -83,7 +83,7 @@ class Console:
 
     def note(self, text: str) -> None:
         if not (self.quiet or self.as_json):
-            self._tell(text, "yellow", wrap=True)
+            self._print_error(text, "yellow", wrap=True)
 
     def compiling(self, scene: Scene, static: bool = False) -> bool:
         """Whether kernels of a scene have to be compiled first, which takes long; if so, say it beforehand.
@@ -111,7 +111,7 @@ class Console:
             else:
                 self._out.print(Trimmed(made.table() if isinstance(made, Grid) else made))
 
-    def _tell(self, text: str, style: str, wrap: bool = False) -> None:
+    def _print_error(self, text: str, style: str, wrap: bool = False) -> None:
         """A line of the error stream; in colour, and wrapped between words, where somebody reads it."""
         if sys.stderr.isatty() or COLOURED & set(os.environ):
             self._err.print(text, style=style, soft_wrap=not (wrap and self._err.is_terminal))
@@ -165,7 +165,7 @@ class Console:
         with Progress(*columns, console=self._err, transient=True, auto_refresh=False) as bar:
             task, last = bar.add_task(""), -BAR_EVERY
 
-            def tell(run: StudyProgress) -> None:
+            def show(run: StudyProgress) -> None:
                 nonlocal last
                 now = clock.monotonic()
                 if now - last < BAR_EVERY and 0.0 < run.part < 1.0:
@@ -174,7 +174,7 @@ class Console:
                 what = run.what + (f", {run.part:.0%}" if run.part else "")
                 bar.update(task, total=run.total, completed=run.done, description=what, refresh=True)
 
-            yield tell
+            yield show
 
     @contextmanager
     def study_running(self) -> Iterator[Callable[[StudyRunning], None] | None]:
@@ -189,7 +189,7 @@ class Console:
         with Progress(*columns, TimeElapsedColumn(), console=self._err, transient=True, disable=not shown) as bar:
             task, begun, told = bar.add_task("starting workers"), [-1, 0.0], [0.0]
 
-            def tell(now: StudyRunning) -> None:
+            def show(now: StudyRunning) -> None:
                 ended = now.done + now.failed
                 if begun[0] < 0:  # what an earlier call has done says nothing of the pace
                     begun[:] = [ended, now.elapsed]
@@ -202,29 +202,29 @@ class Console:
                     told[0] = now.elapsed
                     self._err.print(", ".join([f"{ended} of {now.total} cases", *parts]), soft_wrap=True)
 
-            yield tell
+            yield show
 
     def _json_study(self) -> Callable[[StudyProgress], None]:
         last = ""
 
-        def tell(run: StudyProgress) -> None:
+        def show(run: StudyProgress) -> None:
             nonlocal last
             if run.what != last:
                 last = run.what
                 self.json("progress", done=run.done, total=run.total, what=run.what)
 
-        return tell
+        return show
 
     def _json_progress(self) -> Callable[[Progress], None]:
         last = -JSON_EVERY
 
-        def tell(progress: Progress) -> None:
+        def show(progress: Progress) -> None:
             nonlocal last
             if progress.wall - last >= JSON_EVERY or progress.t >= progress.duration:
                 last = progress.wall
                 self.json("progress", **asdict(progress))
 
-        return tell
+        return show
 
     def events(self, events: list[Event]) -> None:
         """The first event of each kind, those that matter most first; changes of zones only in JSON."""
@@ -262,7 +262,7 @@ class Console:
             elif t is not None:
                 text += f"; `hybrid resume {self.written}` goes on"
         self.json("done", file=self.written, status="interrupted", t=t, pending=pending)
-        self._tell(f"interrupted; {text}", "yellow")
+        self._print_error(f"interrupted; {text}", "yellow")
 
     def refused(self, error: SceneError) -> None:
         """Everything that is wrong with the scene."""
@@ -280,7 +280,7 @@ class Console:
     def error(self, kind: str, text: str, **facts: Any) -> None:
         self.json("error", kind=kind, message=text, **facts)
         for line in text.splitlines():
-            self._tell(line, "" if line.startswith(" ") else "bold red", wrap=True)
+            self._print_error(line, "" if line.startswith(" ") else "bold red", wrap=True)
 
 
 def _width(stream: TextIO) -> int | None:

@@ -414,7 +414,7 @@ class CellChanges:
         owner.table.hold(
             line=line, sea=sea, old=old, new=new, was=owner.pushes[0], now=owner.pushes[1], work=work, books=books,
         )  # fmt: skip
-        switching.take(model, zones)
+        switching.set_model(model, zones)
         switching.table.hold(line=line, sea=sea, old=old, new=new, zones=zones)
         if self._watch is not None:
             itself = self._on.itself._replace(width=self._on.width(n), tree=self._on.itself.tree[: boxes_of(n)])

@@ -90,11 +90,11 @@ def note_loops(t: Floats, values: Mapping[str, Floats], s: Floats, known: Loops,
     if not known.formed and not (change > LOOP).any():  # most batches
         return known
     for k in range(len(writhe)):
-        known = _follow_loop(t, values, s, k, known, event)
+        known = _track_loop(t, values, s, k, known, event)
     return known
 
 
-def _follow_loop(
+def _track_loop(
     t: Floats, values: Mapping[str, Floats], s: Floats, k: int, known: Loops, event: Callable[..., None]
 ) -> Loops:
     """What is remembered of loops after output k, with an event where one has formed or opened."""

@@ -130,7 +130,7 @@ class LineKinds:
         end_switch(self._switch.numbers)
         renew(self._renew.numbers)
         self.model = replace(model, layout=layout, zones=layout.zones)
-        switching.take(self.model, switching.zones)
+        switching.set_model(self.model, switching.zones)
         return float(numbers[AFTER] - numbers[BEFORE])
 
 

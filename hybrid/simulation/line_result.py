@@ -317,7 +317,7 @@ class LineResult:
     def note_start(self, x: JoinedLine, state: State, t: float | None) -> None:
         """What a first state leaves open, be it an equilibrium or not."""
         self.judge(t, sharpest(x.line, x.ends, state), state)
-        if self._itself.look(t or 0.0, state, self.events.event) & NEARS:
+        if self._itself.check(t or 0.0, state, self.events.event) & NEARS:
             self.meets_itself(t or 0.0, 0.0)
 
     def is_near_itself(self, t: float, state: State, step: float) -> bool:
@@ -326,7 +326,7 @@ class LineResult:
 
     def meets_itself(self, t: float, dt: float) -> None:
         """An event, unless there was one, where contact could not begin after the step of dt (s) to t (s)."""
-        self.envelope.itself.tell_again(t, dt, self.events.event)
+        self.envelope.itself.report_meeting(t, dt, self.events.event)
 
     @property
     def outputs_join(self) -> bool:
@@ -381,7 +381,7 @@ class LineResult:
         """Go on with other kinds of the same cells, in the same arrays, after what waited has been recorded."""
         self.model = model
         self.diagnostics.follow(model)
-        self._itself.take(model)
+        self._itself.set_model(model)
 
     def adopt_cells(self, model: Model) -> None:
         """Go on with other cells, which steps have changed to with the books, of which some outputs may wait."""
@@ -417,7 +417,7 @@ class LineResult:
         else:
             found = sum(bit for flag, bit in WATCHED.items() if seen & flag)
         hides = bool(found & HIDES) and not self.lets_touch
-        found = self._itself.tell(found, t, dt, state, self.events.event) | (NEARS if hides else 0)
+        found = self._itself.judge(found, t, dt, state, self.events.event) | (NEARS if hides else 0)
         self.nears_itself, self.parts_itself = bool(found & NEARS), bool(found & PARTS)
 
     def watch_itself_no_more(self, solver: NetworkSolver) -> None:
@@ -607,7 +607,7 @@ class LineResult:
         self.envelope.note_broken(values, self.recorder.recorded(), self.events.event)
         if self.contact is not None and (tries := self.contact.given_up):
             self.events.event(t, 0.0, self.model.length, "steps cut", energy_gains_text(tries), value=float(tries))
-        self.envelope.itself.tell_unkept(self.model, self.events.event)
+        self.envelope.itself.report_too_near(self.model, self.events.event)
 
     def checkpoint(self, work: Work, t: float) -> dict[str, Any]:
         """What the rest of the run depends on beside the state at t (s), between two steps, with no output waiting."""

@@ -336,10 +336,10 @@ class PayingOut:
         """Let the line of a model whose zones have changed have the length of now, at t (s)."""
         assert model.layout is not None
         if self.plan.follows:
-            self._take_cells(model.layout)
+            self._set_cells(model.layout)
         self._fit(model.line, self.reel, float(self.reel.numbers.length), t)
 
-    def _take_cells(self, layout: Layout) -> None:
+    def _set_cells(self, layout: Layout) -> None:
         """Go on with other cells far from the winch: what the reel knows of those near it stays."""
         old, self._nodes = self.reel, self.plan.nodes_of(layout)
         self.reel = reel = self._blank(layout.base_of_cell.size - self.rides)

@@ -148,7 +148,7 @@ class PaidZones:
         given[[0, -1]] = np.where(self._turning, 1, given[[0, -1]])
         manager.cable = paying.plan.held_as(model.cable)
         change_base(manager, model.layout, source, cells, given, model.on_base, anew)
-        self.switching.take_cells(model)
+        self.switching.set_cells(model)
 
     def moving(self) -> MovingZones:
         """What the kernels of payout know of them."""

@@ -80,7 +80,7 @@ def listener_of(progress: bool | Listener) -> Listener | None:
     return (notebook_bar() if in_notebook() else None) or StatusLine()
 
 
-def tell_of_compiling(listener: Listener | None, kernels: Sequence[str]) -> None:
+def announce_compiling(listener: Listener | None, kernels: Sequence[str]) -> None:
     """Say that kernels, as file.function, must be compiled first, if so: nothing else is heard for as long as it takes.
 
     A listener of the caller's own is called with steps alone.

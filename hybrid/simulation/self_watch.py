@@ -147,21 +147,21 @@ class SelfWatch:
         """Contact is not computed again before parts have come apart; where they meet until then, that is told."""
         self.itself.found.waits, self.itself.found.told = 1.0, 0.0
 
-    def tell_hidden(self, t: float, model: Model, state: State, event: Callable[..., None]) -> None:
+    def report_hidden(self, t: float, model: Model, state: State, event: Callable[..., None]) -> None:
         """An event for a bend that hides how near parts are."""
         ahead = self.itself.ahead
         i, j, node = int(ahead.hidden_i), int(ahead.hidden_j), int(ahead.sharp)
         s = float(model.line.s[node])
         event(t, s, s, "unresolved bend", hidden_text(model, state, i, j, node))
 
-    def tell_again(self, t: float, dt: float, event: Callable[..., None]) -> None:
+    def report_meeting(self, t: float, dt: float, event: Callable[..., None]) -> None:
         """The event of a line that meets itself, where contact could not begin, unless it has been told."""
         found = self.itself.found
         if found.clearance < 0.0 and found.told == 0.0:
             found.told = 1.0
-            self.tell(t, dt, event)
+            self.report(t, dt, event)
 
-    def tell(self, t: float, dt: float, event: Callable[..., None]) -> None:
+    def report(self, t: float, dt: float, event: Callable[..., None]) -> None:
         """An event for what was found; dt: s, the step in which it was, 0: in none."""
         found = self.itself.found
         distance, width = float(found.distance), float(found.distance - found.clearance)
@@ -178,7 +178,7 @@ class SelfWatch:
             text = meeting_text(s, other, distance, width, dt, why, remedy)
             event(t, s, other, "line meets itself", text, value=distance, threshold=width)
 
-    def tell_unkept(self, model: Model, event: Callable[..., None]) -> None:
+    def report_too_near(self, model: Model, event: Callable[..., None]) -> None:
         """At the end of a run: an event where a line whose contact is computed has come nearer than contact lets it."""
         found, s = self.itself.found, model.line.s
         distance = float(found.least_distance)
@@ -255,7 +255,7 @@ class LineWatch:
         """Go on with a line of other cells, of which steps know."""
         self._model, self._job = model, None
 
-    def take(self, model: Model) -> None:
+    def set_model(self, model: Model) -> None:
         """Go on with a line of the same cells."""
         self._model = model
         for job in (self._job, self.running):
@@ -269,17 +269,17 @@ class LineWatch:
         self._address = watch_itself.address(job.numbers)
         return int(watch_itself(job.numbers)), {"itself": self._address}
 
-    def look(self, t: float, state: State, event: Callable[..., None]) -> int:
-        """As `tell`, of a state at t (s) from which no step has been made."""
+    def check(self, t: float, state: State, event: Callable[..., None]) -> int:
+        """As `judge`, of a state at t (s) from which no step has been made."""
         watch = self._watch
         if not watch.on:
             return 0
         if not is_bent(state) and watch.itself.ahead.asked != WIDER:
             watch.itself.found.told = 0.0
             return 0
-        return self.tell(self._look(t, state, state.r), t, 0.0, state, event)
+        return self.judge(self._search(t, state, state.r), t, 0.0, state, event)
 
-    def tell(self, found: int, t: float, dt: float, state: State, event: Callable[..., None]) -> int:
+    def judge(self, found: int, t: float, dt: float, state: State, event: Callable[..., None]) -> int:
         """An event if surfaces have met in the step of dt (s) to a state at t (s), or a bend hides it, by what a look
 
         has `found`; NEARS where the line is so near itself, in place of an event, that its contact has to begin, PARTS
@@ -287,11 +287,11 @@ class LineWatch:
         """
         told = self._watch.itself.found
         if found & HIDES:
-            self._watch.tell_hidden(t, self._model, state, event)
+            self._watch.report_hidden(t, self._model, state, event)
         if found & NEARS:
             told.told = 0.0 if found & MEETS else told.told
         elif found & MEETS:
-            self._watch.tell(t, dt, event)
+            self._watch.report(t, dt, event)
         return found & (NEARS | PARTS)
 
     def is_near(self, t: float, state: State, step: float) -> bool:
@@ -299,9 +299,9 @@ class LineWatch:
         watch = self._watch
         if not (watch.on and watch.asks and is_bent(state)):
             return False
-        return watch.foresees(state, step, lambda: self._look(t, state, state.r))
+        return watch.foresees(state, step, lambda: self._search(t, state, state.r))
 
-    def _look(self, t: float, state: State, before: Floats) -> int:
+    def _search(self, t: float, state: State, before: Floats) -> int:
         """MEETS and NEARS of kernels.contact.self_distance."""
         if self._job is None:
             self._job = self._bind()

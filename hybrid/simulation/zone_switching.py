@@ -92,24 +92,24 @@ class ZoneSwitching:
         base = manager.layout.base
         self.kinks = np.zeros(base.size, bool)
         self.kinks[model.cable.point_nodes(base)] = True
-        self._take_line(model.line, model.line.h)
+        self._set_line(model.line, model.line.h)
 
-    def take_cells(self, model: Model) -> None:
+    def set_cells(self, model: Model) -> None:
         """Go on with a model whose line has all of its stiffness and its true lengths: cells have come or gone."""
         assert model.layout is not None
         self.model = model
         self.kinks = np.zeros(model.layout.base.size, bool)
         self.kinks[model.cable.point_nodes(model.layout.base)] = True
-        self._take_line(model.line, model.line.h)
+        self._set_line(model.line, model.line.h)
         self.zones.true[:] = np.diff(model.line.s)
 
-    def take(self, model: Model, zones: Zones) -> None:
+    def set_model(self, model: Model, zones: Zones) -> None:
         """Go on with a model of the same zones in other cells, which have been changed to."""
         assert model.layout is not None
         self.model = model
         self.manager.take(model.layout, zones)
 
-    def _take_line(self, line: Line, lengths: Floats) -> None:
+    def _set_line(self, line: Line, lengths: Floats) -> None:
         """A line with all of its stiffness and its true lengths; lengths: (N,) m, that its cells have now."""
         zones = self.zones
         zones.stiff[:], zones.true[:], zones.lengths[:] = line.kb, line.h, lengths
@@ -202,7 +202,7 @@ class ZoneSwitching:
         """
         line, manager, most = self.model.line, self.manager, MOST_RESCUES
         if how.outcome == Outcome.OK:
-            self._follow()
+            self._update_criteria()
             if manager.user is not None:
                 manager.ask_user(line, tried, end)
             cells = manager.cells_to_reject if manager.loudest > REJECT_RATIO else NONE
@@ -216,7 +216,7 @@ class ZoneSwitching:
             most = 1  # after that, a smaller step
         return self._force_rod(cells, why) if rescues < most and cells.size else None
 
-    def _follow(self) -> None:
+    def _update_criteria(self) -> None:
         """After a try, or a step, that nobody else has followed."""
         if not (self.compiled or self._followed):
             follow_zones(self.table.numbers)
@@ -234,7 +234,7 @@ class ZoneSwitching:
     def book_step(self, t: float, state: State) -> Change | None:
         """After an accepted step: what should change."""
         manager = self.manager
-        self._follow()
+        self._update_criteria()
         change = manager.review(t, state) if manager.review_due(t) else None
         if change is None and self.zones.counts.cells_due:
             change = manager.same_zones()

@@ -111,7 +111,7 @@ def shape(
     for k, point in enumerate(points):
         at = view.project(_place(np.array([point]), result.s, position[-1]))
         items.append(Marks(*at, "o", face=_colour(k), edge=_colour(k), size=2.6))
-    return framed(result, view, items, _at(result, -1))
+    return framed(result, view, items, _time_text(result, -1))
 
 
 def framed(result: Result, view: View, items: list[Item], when: str = "") -> Panel:
@@ -228,7 +228,7 @@ def profiles(
     up = ",\n".join(
         [name_of, *(title_of(n) for n, _ in drawn[1:])]
     )  # on the axis; a title has to leave room for others
-    title = title or (name_of if drawn[1:] else title_of(names[0])) + _at(result, output)
+    title = title or (name_of if drawn[1:] else title_of(names[0])) + _time_text(result, output)
     y = Axis(up, unit, bottom, top, peak * factor)
     return Panel("-".join(names), title, _along(result), y, items, legend=len(drawn) > 1)
 
@@ -448,7 +448,7 @@ def _place(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray
     return np.column_stack([np.interp(where, s, position[:, k]) for k in range(3)])
 
 
-def _at(result: Result, output: int) -> str:
+def _time_text(result: Result, output: int) -> str:
     return f" at t = {short(result.times[output], 5)} s" if len(result.times) > 1 else ""
 
 

@@ -102,7 +102,7 @@ def moment(result: Result, t: float) -> str:
     return f", t = {short(t, 5)} s" if len(result.times) > 1 else ""
 
 
-def _at(values: np.ndarray, k: int) -> tuple[int, int]:
+def _output_and_point(values: np.ndarray, k: int) -> tuple[int, int]:
     """Output and point of the k-th value of an array (nt, ns)."""
     return divmod(k, values.shape[1])
 
@@ -379,13 +379,13 @@ def _hockling(result: Result) -> Fact:
     ratio, loops = np.where(without[:, None], ratio, 0.0), f" {loops}" * bool(loops)
     pressed, pressing = _not_in_tension(result, tension)
     if not ratio.any():
-        i, k = _at(torque, int(np.abs(torque).argmax()))
+        i, k = _output_and_point(torque, int(np.abs(torque).argmax()))
         text = f"The torque, at most {amount(abs(float(torque[i, k])), 'N m', 3)}, "
         small = "needs next to no tension to keep the cable straight." if pressed else "is far too small for loops."
         text += f"{'was judged at no output without a loop.' if not without.any() else small}{pressing}{loops}"
         values = {"torque": abs(float(torque[i, k])), "needed": float(needed.max()), "ratio": 0.0}
         return Fact("hockling", title, f"{text} {HOCKLING}.", "note" if pressed or loops else "plain", values)
-    i, k = _at(ratio, int(ratio.argmax()))
+    i, k = _output_and_point(ratio, int(ratio.argmax()))
     t, s = float(result.times[i]), float(found.s[k])
     values = {
         "torque": float(torque[i, k]), "needed": float(needed[i, k]),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import hybrid
-from hybrid.cli.app import FAILED, REFUSED, tell
+from hybrid.cli.app import FAILED, REFUSED, report_error
 from hybrid.cli.commands import main
 from hybrid.cli.console import Console
 
@@ -65,6 +65,6 @@ def test_memory_that_has_run_out_is_told_behind_what_fails_after_it(capsys: pyte
             raise MemoryError("Unable to allocate 4.00 GiB")
         finally:
             raise ValueError("I/O operation on closed file")
-    assert tell(Console(False, False), late.value) == FAILED
+    assert report_error(Console(False, False), late.value) == FAILED
     said = capsys.readouterr().err
     assert said.startswith("not enough memory\n") and "fewer cells" in said and "bug" not in said
