@@ -29,6 +29,8 @@ STARTED = pytest.StashKey[list[subprocess.Popen[bytes]]]()
 # are started, and reading the sources takes each of them a second.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+# Each process has a core of its own at best: threads of linear algebra would wait for each other, at full load.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @pytest.hookimpl(tryfirst=True)

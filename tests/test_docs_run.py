@@ -227,13 +227,12 @@ from _pytest.mark import deselect_by_keyword, deselect_by_mark
 
 def pytest_collection_finish(session):
     found = {}
-    for text in json.loads(os.environ["QUOTED"]):
+    for text, files in json.loads(os.environ["QUOTED"]).items():
         words = shlex.split(text)[1:]
-        files = [w for i, w in enumerate(words) if not w.startswith("-") and words[i - 1] not in ("-k", "-m")]
         option = session.config.option
         option.keyword = words[words.index("-k") + 1] if "-k" in words else ""
         option.markexpr = words[words.index("-m") + 1] if "-m" in words else "not slow and not bench"
-        items = [i for i in session.items if not files or any(i.nodeid.startswith(f) for f in files)]
+        items = [i for i in session.items if any(i.nodeid.startswith(f) for f in files)]
         deselect_by_keyword(items, session.config)
         deselect_by_mark(items, session.config)
         found[text] = len(items)
@@ -244,37 +243,34 @@ def pytest_collection_finish(session):
 KNOWN = {"-k", "-m", "-s", "-q", "--write-validation", "--write-extremes"}
 
 
+def named_files(text: str) -> list[str]:
+    """Files and folders in a pytest command."""
+    words = shlex.split(text)[1:]
+    return [x for i, x in enumerate(words) if not x.startswith("-") and words[i - 1] not in ("-k", "-m")]
+
+
 @pytest.fixture(scope="module")
 def collected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """How many tests each quoted pytest command selects, and the names of all tests: collected once."""
+    """How many tests each quoted pytest command selects, and the names of all in the files that they name."""
     folder = tmp_path_factory.mktemp("collected")
     (folder / "select_quoted.py").write_text(SELECT, encoding="utf-8")
     commands = [text for _, text in quoted("pytest")]
     commands += [f"pytest bench -m bench {text}" for _, text in quoted("-k")]
     commands.append("pytest bench -m bench -k no_such_test_anywhere")
+    files = {text: named_files(text) for text in commands}
+    assert all(files.values()), "a command that names no file or folder"
     here = os.environ | {
-        "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}", "QUOTED": json.dumps(commands), "FOUND": str(folder / "found.json"),
+        "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}", "QUOTED": json.dumps(files), "FOUND": str(folder / "found.json"),
     }  # fmt: skip
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-p",
-        "select_quoted",
-        "--collect-only",
-        "-qq",
-        "-m",
-        "",
-        "tests",
-        "bench",
-    ]
+    command = [sys.executable, "-m", "pytest", "-p", "select_quoted", "--collect-only", "-qq", "-m", ""]
+    command += sorted({name for names in files.values() for name in names})
     done = subprocess.run(command, cwd=ROOT, env=here, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     found: dict[str, Any] = json.loads((folder / "found.json").read_text(encoding="utf-8"))
     return found
 
 
-@pytest.mark.slow  # all tests are collected once more
+@pytest.mark.slow  # a third of the tests is collected once more
 def test_quoted_tests_exist(collected: dict[str, Any]) -> None:
     selected = dict(collected["selected"])
     assert selected.pop("pytest bench -m bench -k no_such_test_anywhere") == 0, "or this test could not fail"

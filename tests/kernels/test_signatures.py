@@ -21,8 +21,9 @@ from numba.core.registry import cpu_target
 from hybrid.kernels.machine import compiler
 from hybrid.kernels.machine.compile import inner
 
-# No other process compiles beside it, of which this one would read nothing.
-ALONE = "import os; os.cpu_count = lambda: 1"
+# No other process compiles beside it, of which this one would read nothing.  Garbage, of which numba leaves much, is not
+# looked for.
+ALONE = "import gc, os; gc.disable(); os.cpu_count = lambda: 1"
 
 # Prints the signatures of all that this process has compiled or loaded.
 ALL_SIGNATURES = """

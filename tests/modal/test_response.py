@@ -260,11 +260,11 @@ def test_one_line_of_a_system_is_the_cable():
 
 @pytest.mark.slow
 def test_a_storm_as_in_hours_of_it():
-    """The mean of six hours: 610, 613, 616, 632, 650 N.  Not said to be valid: of the 6.9 % that are left out of tension about
+    """The mean of six hours: 605, 607, 614, 627, 645 N.  Not said to be valid: of the 6.9 % that are left out of tension about
 
     half comes true in general, here less.
     """
-    response, here, there = compare(hung(STORM), 3600.0, seeds=range(1, 7), step=0.15, late=0.05)
+    response, here, there = compare(hung(STORM, cells=30), 3600.0, seeds=range(1, 7), step=0.15, late=0.05)
     print(here, there)
     np.testing.assert_allclose(here, there, rtol=0.03)
     assert not response.valid_for("tension") and not response.valid_for("curvature")
