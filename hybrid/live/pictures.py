@@ -159,8 +159,7 @@ MOST_NODES = 1201  # of a line whose cells are marked: more would be one grey ba
 
 def around(result: Result) -> dict[str, Any]:
     """The box that is drawn, m, seabed and still water in it, and what is too far to be drawn."""
-    every = AllLines(result).as_result if result.lines else result
-    box, planes, far = box_and_planes(every, moving=False)
+    box, planes, far = box_and_planes(AllLines(result).as_result, moving=False)
     return {"box": _plain(box.T), "planes": [plane for plane in planes if plane], "far": far}
 
 
@@ -231,7 +230,7 @@ def _clearance(line: Result, position: np.ndarray) -> np.ndarray | None:
 
 
 def _marks(result: Result, outputs: list[int]) -> list[list[dict[str, Any]]]:
-    """Points that are marked, at each output: ends, attachments and touchdown of a cable; points and bodies."""
+    """Points and bodies, at each output; attachments and touchdown of a line alone, and its ends without points."""
     out: list[list[dict[str, Any]]] = [[] for _ in outputs]
 
     def mark(name: str, symbol: str, colour: str, places: np.ndarray) -> None:
@@ -241,22 +240,25 @@ def _marks(result: Result, outputs: list[int]) -> list[list[dict[str, Any]]]:
             if len(at):
                 out[k].append({"name": name, "symbol": symbol, "colour": colour, "at": _plain(at)})
 
-    if result.lines:
-        for name in points_of(result):
-            mark(f"point {name}", "circle", INK, result[f"points/{name}/position"][outputs][:, None])
-        for name in bodies_of(result):
-            mark(f"body {name}", "square", BODY, result[f"bodies/{name}/position"][outputs][:, None])
+    points = points_of(result)
+    for name in points:
+        mark(f"point {name}", "circle", INK, result[f"points/{name}/position"][outputs][:, None])
+    for name in bodies_of(result):
+        mark(f"body {name}", "square", BODY, result[f"bodies/{name}/position"][outputs][:, None])
+    line, *others = (x for _, x in result.each_line())
+    if others:
         return out
-    s, position = result.s, result.position[outputs]
-    if "attached" in result and len(s) > 1:
-        where = np.clip(result["attached"], s[0], s[-1])
-        mark("float, clump, body", "circle", BODY, result.at(s=where, names=["position"])["position"][outputs])
-    if "touchdown_position" in result:
-        places, edges = result["touchdown_position"][outputs].copy(), result["touchdown"][outputs]
+    s, position = line.s, line.position[outputs]
+    if "attached" in line and len(s) > 1:
+        where = np.clip(line["attached"], s[0], s[-1])
+        mark("float, clump, body", "circle", BODY, line.at(s=where, names=["position"])["position"][outputs])
+    if "touchdown_position" in line:
+        places, edges = line["touchdown_position"][outputs].copy(), line["touchdown"][outputs]
         places[np.abs(edges - s[[0, -1]]) <= 0.005 * (s[-1] - s[0])] = np.nan
         mark("touchdown", "diamond", BED, places)
-    mark("start (s = 0)", "square", INK, position[:, :1])
-    mark("end", "diamond", INK, position[:, -1:])
+    if not points:
+        mark("start (s = 0)", "square", INK, position[:, :1])
+        mark("end", "diamond", INK, position[:, -1:])
     return out
 
 

@@ -37,13 +37,22 @@ class AllLines:
     """The lines of a result as one cable, for what asks only where it is and what is around."""
 
     def __init__(self, result: Result) -> None:
-        self.lines = dict(result.lines)
-        self._around = next(iter(self.lines.values()))
+        self.lines = dict(result.each_line())
+        self._around, *others = self.lines.values()
+        self.alone = None if others else self._around  # the only line: it is shown in detail, by its zones
         self.outputs = min(len(result.times), *(len(line.times) for line in self.lines.values()))
         self.times = result.times[: self.outputs]
-        self.position = np.concatenate([x.position[: self.outputs] for x in self.lines.values()], axis=1)
-        self.s = np.arange(self.position.shape[1], dtype=float)
         self._result = result
+
+    @cached_property
+    def position(self) -> np.ndarray:
+        """Places of all points (nt, n, 3), m."""
+        return np.concatenate([x.position[: self.outputs] for x in self.lines.values()], axis=1)
+
+    @property
+    def s(self) -> np.ndarray:
+        """Numbers of the points, in place of arc lengths."""
+        return np.arange(self.position.shape[1], dtype=float)
 
     @cached_property
     def worst(self) -> list[str]:

@@ -1,10 +1,11 @@
-"""The cable in space for a report: frames of its shape, what colours it, and what is around it.
+"""Lines in space for a report: frames of their shapes, what colours them, and what is around.
 
 Numbers only; the page turns them into a picture that moves.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from hybrid.store.reader import Result
 from hybrid.view.decimate import Kept, Store
 from hybrid.view.figure import BED, BODY, INK, LEVEL, SAND, TOUCHDOWN, WATER, colour_of, prefix, short
+from hybrid.view.lines import AllLines, arms_of, bodies_of, points_of
 from hybrid.view.obstacles import surfaces
 from hybrid.view.plotly_backend import colour_scale
 from hybrid.view.projections import STILL, bed_heights
@@ -25,26 +27,35 @@ PATCHES = 40  # of an uneven seabed, along x and along y
 _NEAR = 1.0  # of the largest extent: a seabed or a surface farther from the cable is not drawn
 
 
-def scenery(result: Result, store: Store, shown: Kept) -> dict[str, Any]:
-    """Everything the moving picture needs; {} without outputs."""
-    if not len(shown.frames):
+def scenery(result: Result, every: AllLines, shown: dict[str, Kept], store: Store) -> dict[str, Any]:
+    """Everything the moving picture needs: all lines and arms of bodies as one curve with gaps; {} without outputs."""
+    frames = next(iter(shown.values())).frames
+    if not len(frames):
         return {}
-    position = result.position
-    box, planes, far = box_and_planes(result)
+    box, planes, far = box_and_planes(every.as_result)
     factors = np.maximum(_OPEN * np.ptp(box, axis=0).max() / np.ptp(box, axis=0), 1.0)
-    rows = np.ix_(shown.frames, shown.points)
-    frames = position[rows].transpose(2, 0, 1)
+    arms = [arms_of(result, name, frames) for name in bodies_of(result)]
+    lines = {name: every.lines[name].position[np.ix_(frames, shown[name].points)] for name in every.colours}
+    places = _with_gaps([*lines.values(), *arms])
+    along = [every.lines[name].s[None, shown[name].points] for name in lines]
+    s = _with_gaps(along + [np.full((1, x.shape[1]), np.nan) for x in arms])
     return {
-        "times": [float(t) for t in result.times[shown.frames]],
-        "s": store.add(result.s[shown.points]),
-        **{axis: store.add(frames[k]) for k, axis in enumerate("xyz")},
-        "colours": _colours(result, store, shown),
-        "marks": _marks(result, store, shown),
+        "times": [float(t) for t in every.times[frames]],
+        "s": store.add(s[0]),
+        **{axis: store.add(places[..., k]) for k, axis in enumerate("xyz")},
+        "colours": _colours(every, store, shown, [x.shape[1] for x in arms]),
+        "marks": _marks(result, every, store, frames),
         "planes": planes,
         "far": far,
         "box": box.T.tolist(), "factors": factors.tolist(), "ink": INK,
-        "speed": speed_of(result),
+        "speed": speed_of(every.as_result),
     }  # fmt: skip
+
+
+def _with_gaps(pieces: list[np.ndarray], between: float = np.nan) -> np.ndarray:
+    """Arrays (frames, points, ...) one behind the other along their points, with a gap between them."""
+    gap = np.full_like(pieces[0][:, :1], between)
+    return np.concatenate([x for piece in pieces for x in (gap, piece)][1:], axis=1)
 
 
 def box_and_planes(result: Result, moving: bool | None = None) -> tuple[np.ndarray, list[dict[str, Any]], list[str]]:
@@ -74,28 +85,61 @@ def speed_of(result: Result, seconds: float = 12.0) -> float:
 # ---- colours --------------------------------------------------------------------------------------
 
 
-def _colours(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
-    """Ways to colour the cable: by zone, tension, curvature."""
+def _colours(every: AllLines, store: Store, shown: dict[str, Kept], arms: list[int]) -> list[dict[str, Any]]:
+    """Ways to colour the curve: by zone, tension and curvature of a line alone, else by line and tension.
+
+    arms: points of each body's arms, behind the lines.
+    """
+
+    def along(values: list[np.ndarray], beyond: float = 0.0) -> np.ndarray:
+        """Values of the lines in their order, and one for the arms."""
+        rows = len(values[0])
+        return _with_gaps([*values, *(np.full((rows, n), beyond, values[0].dtype) for n in arms)], beyond)
+
+    if every.alone is not None:
+        return _colours_of(every.alone, store, next(iter(shown.values())), along)
+    frames = next(iter(shown.values())).frames
+    named = [(every.label(name), colour) for name, colour in every.colours.items()] + [("bodies", INK)] * bool(arms)
+    numbers = [np.full((len(frames), len(shown[name].points)), k) for k, name in enumerate(every.colours)]
+    by_line = _by_kind("line", along(numbers, len(every.lines)), named, store)
+    by_line["legend"] = [list(x) for x in dict.fromkeys(named)]
+    tensions = [every.lines[name].tension[np.ix_(frames, shown[name].points)] for name in every.colours]
+    tension = np.nan_to_num(along(tensions))
+    factor, unit = prefix("N", float(np.abs(tension).max()))
+    low, high = float(tension.min() * factor), float(tension.max() * factor)
+    by_tension = {"key": "tension", "label": f"tension ({unit})", "values": store.add(tension * factor), "unit": unit}
+    shades = colour_scale(COLOURS["catenary"][_FROM_SHADE:])
+    return [by_line, by_tension | {"scale": shades, "low": low, "high": high or 1.0, "log": False}]
+
+
+def _by_kind(key: str, numbers: np.ndarray, named: list[tuple[str, str]], store: Store) -> dict[str, Any]:
+    """A way to colour the curve by the number of a name with its colour."""
+    count = len(named)
+    steps = [[(k + d) / count, colour] for k, (_, colour) in enumerate(named) for d in (0, 1)]
+    look = {"key": key, "label": key, "values": store.add(numbers, "u1"), "scale": steps}
+    return look | {"legend": [list(x) for x in named], "low": -0.5, "high": count - 0.5}
+
+
+def _colours_of(
+    line: Result, store: Store, shown: Kept, along: Callable[[list[np.ndarray]], np.ndarray]
+) -> list[dict[str, Any]]:
+    """Those of a line alone; along: values on the curve from those on the line."""
     rows = np.ix_(shown.frames, shown.points)
-    kinds = list(dict.fromkeys(zone.kind for zones in result.zones for zone in zones))
+    kinds = list(dict.fromkeys(zone.kind for zones in line.zones for zone in zones))
     out: list[dict[str, Any]] = []
     if kinds:
-        of = np.array([_kinds(result.zones[i], kinds, result.s[shown.points]) for i in shown.frames])
-        steps = [[(k + d) / len(kinds), colour_of(kind)] for k, kind in enumerate(kinds) for d in (0, 1)]
-        legend = [[kind, colour_of(kind)] for kind in kinds]
-        out.append(
-            {"key": "zone", "label": "zone", "values": store.add(of, "u1"), "scale": steps, "legend": legend}
-            | {"low": -0.5, "high": len(kinds) - 0.5}
-        )
-    straight = STILL / (float(np.ptp(result.s)) or 1.0)
+        of = np.array([_kinds(line.zones[i], kinds, line.s[shown.points]) for i in shown.frames])
+        out.append(_by_kind("zone", along([of]), [(kind, colour_of(kind)) for kind in kinds], store))
+    straight = STILL / (float(np.ptp(line.s)) or 1.0)
     for name, shades in (("tension", COLOURS["catenary"]), ("curvature", COLOURS["rod"])):
-        if name not in result:
+        if name not in line:
             continue
-        values = result[name]
-        factor, unit = prefix(result.units[name], float(np.abs(values).max()))
+        values = line[name]
+        factor, unit = prefix(line.units[name], float(np.abs(values).max()))
         low, high, log = span_of(values * factor, bends=name == "curvature", straight=straight * factor)
+        on_curve = store.add(along([values[rows] * factor]))
         out.append(
-            {"key": name, "label": f"{name} ({unit})", "values": store.add(values[rows] * factor), "unit": unit}
+            {"key": name, "label": f"{name} ({unit})", "values": on_curve, "unit": unit}
             | {"scale": colour_scale(shades[_FROM_SHADE:]), "low": low, "high": high, "log": log}
         )
     return out
@@ -111,26 +155,34 @@ def _kinds(zones: list[Any], kinds: list[str], s: np.ndarray) -> np.ndarray:
 # ---- what is on the cable, and around it ----------------------------------------------------------
 
 
-def _marks(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
-    """Points that move with the cable: its ends, what is attached, touchdown."""
-    s, position = result.s, result.position[shown.frames]
+def _marks(result: Result, every: AllLines, store: Store, frames: np.ndarray) -> list[dict[str, Any]]:
+    """Points that move: bodies, what is attached to a line alone, touchdown; then points, or the ends of that line.
+
+    The page lists all but the last two in its legend.
+    """
 
     def mark(name: str, places: np.ndarray, symbol: str, colour: str, size: float) -> dict[str, Any]:
         moves = {axis: store.add(places[..., k]) for k, axis in enumerate("xyz")}
         return {"name": name, "symbol": symbol, "colour": colour, "size": size} | moves
 
-    marks = []  # the ends come last, over a body that they carry
-    if "attached" in result and len(s) > 1:
-        where = np.clip(result["attached"], s[0], s[-1])  # output points may cover a part of the cable
-        places = result.at(s=where, names=["position"])["position"][shown.frames]
+    places_of = {name: result[f"bodies/{name}/position"][frames][:, None] for name in bodies_of(result)}
+    marks = [mark(f"body {name}", places, "square", BODY, 6) for name, places in places_of.items()]
+    if every.alone is None:
+        places = np.stack([result[f"points/{n}/position"][frames] for n in points_of(result)], axis=1)
+        return [*marks, mark("points", places, "circle", INK, 3), mark("", places[:, :0], "circle", INK, 1)]
+    line = every.alone
+    s, position = line.s, line.position[frames]
+    if "attached" in line and len(s) > 1:
+        where = np.clip(line["attached"], s[0], s[-1])  # output points may cover a part of the cable
+        places = line.at(s=where, names=["position"])["position"][frames]
         marks.append(mark("float, clump, body", places, "circle", BODY, 10))
-    if "touchdown_position" in result:
-        places, edges = result["touchdown_position"][shown.frames].copy(), result["touchdown"][shown.frames]
+    if "touchdown_position" in line:
+        places, edges = line["touchdown_position"][frames].copy(), line["touchdown"][frames]
         places[np.abs(edges - s[[0, -1]]) <= 0.005 * (s[-1] - s[0])] = np.nan  # ends have marks of their own
         if np.isfinite(places).any():
             marks.append(mark("touchdown", places, "diamond", TOUCHDOWN, 5))
     ends = mark("start", position[:, :1], "square", INK, 5), mark("end", position[:, -1:], "diamond", INK, 4)
-    return [*marks, *ends]
+    return [*marks, *ends]  # the ends come last, over a body that they carry
 
 
 def _planes(result: Result, box: np.ndarray) -> list[dict[str, Any]]:

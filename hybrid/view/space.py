@@ -15,7 +15,6 @@ from hybrid.store.reader import Result
 from hybrid.view.decimate import Kept, Store, even
 from hybrid.view.figure import short
 from hybrid.view.lines import AllLines
-from hybrid.view.lines_report import scenery as lines_scenery
 from hybrid.view.scenery import scenery
 
 if TYPE_CHECKING:
@@ -39,9 +38,9 @@ class Arrays(Store):
 def plot_space(result: Result, colour: str | None = None) -> Figure:
     """The cable, or all lines, in space (m, inertial frame, z up) as a plotly figure with a slider over time.
 
-    colour: "zone", "tension" or "curvature" of the short form, "line" or "tension" of named lines; None: by zone, or by
-    line.  Of long runs at most 81 moments and about 121 points are in it.  ResultError: a result without an output, or
-    a colour that it does not have.
+    colour: "zone", "tension" or "curvature" of one line, "line" or "tension" of several; None: by zone, or by line.
+    Of long runs at most 81 moments and about 121 points are in it.  ResultError: a result without an output, or a
+    colour that it does not have.
     """
     from plotly.graph_objects import Figure
 
@@ -66,17 +65,12 @@ def plot_space(result: Result, colour: str | None = None) -> Figure:
 
 def _scene(result: Result) -> dict[str, Any]:
     """What there is to draw, with arrays; {} without outputs."""
-    if not result.lines:
-        nt, ns = len(result.times), len(result.s)
-        return scenery(result, Arrays(), Kept(even(nt, MOST_FRAMES), even(ns, MOST_POINTS), nt, ns))
     every = AllLines(result)
-    if not every.outputs:
-        return {}
     frames, each = even(every.outputs, MOST_FRAMES), max(5, MOST_POINTS // len(every.lines))
     shown = {
         name: Kept(frames, even(len(line.s), each), every.outputs, len(line.s)) for name, line in every.lines.items()
     }
-    return lines_scenery(result, every, shown, Arrays())
+    return scenery(result, every, shown, Arrays())
 
 
 def _moment(scene: dict[str, Any], way: dict[str, Any] | None, k: int) -> list[dict[str, Any]]:

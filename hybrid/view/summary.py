@@ -58,14 +58,22 @@ class Fact(NamedTuple):
 def facts_of(result: Result) -> list[Fact]:
     """All facts, in the order of importance to a reader: warnings, loads, limits, errors, status.
 
-    Of lines with names those of all together: warnings, and how it ended.
+    Of several lines those of all together: warnings, and how it ended.
     """
+    (name, line), *others = result.each_line()
     facts = [*_warnings(result), *_quantities(result)]
-    if len(result.times) and not result.lines:
-        makers: tuple[Callable[[Result], Fact], ...] = (_tension, _bend, _slack, _limits, _hockling, _seabed, _errors)
-        facts += [make(result) for make in makers]
-        facts += [_pressed(result, *x) for x in PRESSED if f"{GROUP}/{x[0]}_max" in result]
+    if not others:
+        facts += [*(_quantities(line) if name else ()), *facts_of_line(line)]
     return [*facts, _status(result)]
+
+
+def facts_of_line(line: Result) -> list[Fact]:
+    """Loads, limits and errors of a line; none without an output."""
+    if not len(line.times):
+        return []
+    makers: tuple[Callable[[Result], Fact], ...] = (_tension, _bend, _slack, _limits, _hockling, _seabed, _errors)
+    facts = [make(line) for make in makers]
+    return facts + [_pressed(line, *x) for x in PRESSED if f"{GROUP}/{x[0]}_max" in line]
 
 
 def attention(facts: list[Fact]) -> list[Fact]:

@@ -36,8 +36,8 @@ from hybrid.view.lines import (
     rotations,
     views_of_lines,
 )
-from hybrid.view.lines_report import _extreme_text
 from hybrid.view.report import html
+from hybrid.view.report_tables import _extreme_text
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 ENDS = {"start": 0, "end": 11.5}
@@ -206,7 +206,7 @@ def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None
     index = json.loads(re.search(r'id="index">(.*?)</script>', text, re.S)[1])  # type: ignore[index]
     scene = index["scene"]
     assert [x[0] for x in scene["colours"][0]["legend"]] == [*PLACES, "bodies"]
-    assert scene["x"]["shape"] == [21, 3 * 14 + 8] and scene["s"]["shape"] == [3 * 14 + 8]
+    assert scene["x"]["shape"] == [21, 3 * 14 + 7] and scene["s"]["shape"] == [3 * 14 + 7]  # gaps between, none behind
     assert [mark["name"] for mark in scene["marks"]] == ["body spar", "points", ""]
     for name, line in result.lines.items():
         most = line.envelope["tension_max"].max()
@@ -218,6 +218,22 @@ def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None
     first = text.split("Look at this first")[1].split("</ul>")[0]
     assert "Line east: largest tension" in first and "north" not in first
     assert "None, beside limits that are broken." in text and "None were given." not in text
+
+
+@pytest.mark.parametrize("form", [as_scene, network_of])
+def test_a_report_of_one_line_has_all_that_is_known_of_it(form: Callable[[Any], hybrid.Scene], tmp_path: Path) -> None:
+    """Of a line with a name cards of loads, zones over time, and energies were left out."""
+    ends = {name: {"kind": "pinned", "position": [x, 0, 0]} for name, x in ENDS.items()}
+    section = SECTION | {"length": 12, "bending_stiffness": 5.0, "diameter": 0.05}
+    asked = {"cable": {"sections": [section]}, "ends": ends, "model": "adaptive", "mesh": {"cells": 40}}
+    asked |= {"initial": "equilibrium", "time": {"duration": 0.4, "step": 0.1}, "output": {"every": 0.1, "points": 11}}
+    text = html(hybrid.run(form(as_scene(asked)), tmp_path / "run.h5"))
+    found = re.findall(r'<section id="(\w+)"', text)
+    assert {"verdict", "cable", "zones", "histories", "ranges", "energy"} <= set(found)
+    assert all(f'id="fact-{key}"' in text for key in ("tension", "bend", "slack", "hockling", "seabed"))
+    index = json.loads(re.search(r'id="index">(.*?)</script>', text, re.S)[1])  # type: ignore[index]
+    assert [x["key"] for x in index["scene"]["colours"]] == ["zone", "tension", "curvature"]
+    assert [x["name"] for x in index["scene"]["marks"]] == ["start", "end"]
 
 
 def test_the_table_of_a_run_judges_each_line(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -246,18 +262,21 @@ def test_zones_and_the_search_are_said_of_one_line_and_of_many(
     assert rows[0].startswith("found by") and any(x.startswith("residual force") for x in rows)
 
 
-def test_the_stress_of_pipes_is_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As the only limit of a line it went by in the table of commands and in the report."""
+@pytest.mark.parametrize(("names", "title"), [(["l"], "Von mises."), (["l", "m"], "Line l: von mises.")])
+def test_the_stress_of_pipes_is_judged(
+    names: list[str], title: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As the only limit of a line it went by in the table of commands and in the report, which names several lines."""
     pipe = {"bending_stiffness": 1.5e4, "diameter": 0.04, "pipe": {"wall": 0.004, "max_stress": 1e6}}
     line = {"start": "a", "end": "b", "sections": [SECTION | pipe], "mesh": {"cells": 12}}
     points = {"a": {"position": [0, 0, -60]}, "b": {"position": [100, 0, 0]}}
     path = tmp_path / "pipe.h5"
-    result = hybrid.static({"points": points, "lines": {"l": line}}, path)
+    result = hybrid.static({"points": points, "lines": dict.fromkeys(names, line)}, path)
     show_equilibrium(Console(False, False), result)
     assert re.search(r"von_mises of \S+ Pa, above the 1e\+06 Pa allowed; BROKEN", capsys.readouterr().out)
     text = html(result)
-    assert "Line l: von mises." in text and "None, beside limits that are broken." in text
-    assert "<td>max_stress</td><td>broken</td>" in text and "1 of 1 broken" in text
+    assert title in text and "None, beside limits that are broken." in text
+    assert "<td>max_stress</td><td>broken</td>" in text and f"{len(names)} of {len(names)} broken" in text
 
 
 @pytest.mark.long
