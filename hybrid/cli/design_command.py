@@ -248,11 +248,13 @@ def sensitivity(
 
 def _results(scene: Scene, motion: bool) -> list[str]:
     """What engineers ask first."""
-    tensions = [f"{x}/tension@{end}".lstrip("/") for x in scene.lines for end in ("start", "end")]
+    from hybrid.designs.wanted import of_line
+
+    tensions = [f"{of_line(x)}tension@{end}" for x in scene.lines for end in ("start", "end")]
     if motion:
         return [f"max {name}" for name in tensions]
-    bends = not scene.line_names and scene.scene_of("").model.kind != "catenary"
-    return [*tensions, *["max curvature"] * bends]
+    bent = [x for x in scene.lines if scene.scene_of(x).model.kind != "catenary"]
+    return [*tensions, *(f"max {of_line(x)}curvature" for x in bent)]
 
 
 def _numbers(scene: Scene) -> list[str]:

@@ -26,6 +26,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import Spread
+from hybrid.scene.short_form import short_form
 
 # Parts of a number by which runs differ: differences of second order by both, from which one of fourth order follows.
 # Of steps that are solved to rounding: of forces at anchors with friction 1e-3 left 4e-5, or found no step, and 3e-4
@@ -127,7 +128,7 @@ def followed(
     smooth: as of `Motion`, with all peaks of each result in turn, so that W is more.
     """
     each_step = any(x.over == "t" for x in wanted)
-    more = Motion.more(wanted) if smooth and not asked.line_names else None
+    more = places_of_lines(asked, wanted) if smooth else None
 
     def others_in(course: Course) -> NetworkOthers:
         own = with_outputs(asked, course, each_step=each_step)
@@ -170,6 +171,13 @@ def by_differences(
     return Slopes(base.values, slopes, errors, len(numbers) * (DIFFERENCES,))
 
 
+def places_of_lines(scene: Scene, wanted: Sequence[Wanted]) -> dict[str, list[float]]:
+    """Places that are wanted, m, of lines of the network by name."""
+    asked = [x for x in wanted if x.at is not None and np.isfinite(x.at)]
+    names = short_form(scene).names.items()
+    return {name: [float(x.at or 0.0) for x in asked if x.line == called] for name, called in names}
+
+
 class Motion:
     """A run, and results of it; beside a base run extremes are where and when those of that are.
 
@@ -187,7 +195,7 @@ class Motion:
         """
         self.course, self.smooth = course, smooth
         self._smooth: dict[Wanted, Floats] = {}  # extremes of parabolas, where they have been asked for
-        more = self.more(wanted) if smooth else None
+        more = places_of_lines(scene, wanted) if smooth else None
         self._cables = {k: x.cable for k, x in scene.lines.items()}
         each_step = any(x.over == "t" for x in wanted)
         with replay(scene, course, finer, more, each_step, begun) as result:
@@ -206,11 +214,6 @@ class Motion:
             self.peaks = [peaks(self._table(x), x.over, where) for x, where in each]
         if not smooth:
             self._histories, self._smooth = {}, {}
-
-    @staticmethod
-    def more(wanted: Sequence[Wanted]) -> list[float]:
-        """Places that are wanted, m."""
-        return [x.at for x in wanted if x.at is not None and np.isfinite(x.at)]
 
     def beside(self, seen: Mapping[str, Seen], wanted: Sequence[Wanted]) -> Floats:
         """The same results of other outputs, by line, of a scene with another number.

@@ -11,6 +11,7 @@ from hybrid.designs.edges import NAMES as EDGES
 from hybrid.designs.equilibria import AnyScene
 from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.problem import cable_of
+from hybrid.designs.wanted import of_line
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
@@ -72,7 +73,7 @@ def measurements(task: TaskFile[Design], scene: AnyScene) -> Measurements:
             if has_place(result):
                 s = _arc_length(task, cells, cable_of(scene, name).length, line)
                 at = "@end" if s == cable_of(scene, name).length else f"@{s!r}"  # it stays the end of another length
-            of = f"{f'{name}/' if name else ''}{result}{at}"
+            of = f"{of_line(name)}{result}{at}"
             key = (case, of if time is None else f"t={time!r} {of}{IN_MOTION}")
             if time is not None:
                 histories.setdefault((case, of), []).append((time, len(rows)))
@@ -153,7 +154,7 @@ def _columns(task: TaskFile[Design], table: Table, scene: AnyScene) -> dict[str,
             expected = f"a column of x, y, z, or one of: {', '.join([*whole, *vectors])}"
             raise SceneError([Complaint("measured.file", name, expected, line=1)], asked.file)
     needed = ["s"] if asked.at is None and (not columns or any(map(has_place, columns.values()))) else []
-    needed += ["line"] if scene.line_names else []
+    needed += ["line"] if len(scene.lines) > 1 else []
     needed += ["case"] if len(task.asked.cases) > 1 else []
     header = ",".join(table.header)
     for name in needed:
@@ -180,7 +181,7 @@ def _where(task: TaskFile[Design], cells: dict[str, str], scene: AnyScene, line:
     """Case and line of a row; "": there is one."""
     asked, cases = task.asked.measured, task.asked.cases
     assert asked is not None
-    case, name = cells.get("case", next(iter(cases), "")), cells.get("line", "")
+    case, name = cells.get("case", next(iter(cases), "")), cells.get("line", next(iter(scene.lines)))
     if case not in (list(cases) or [""]):
         raise SceneError([Complaint("case", case, f"one of: {', '.join(cases)}", line=line)], asked.file)
     if name not in scene.lines:

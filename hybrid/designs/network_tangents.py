@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.designs.replay import at_nodes
+from hybrid.designs.replay import Places, at_nodes
 from hybrid.designs.tangents import (
     AT_START,
     MOST_SAMPLED,
@@ -96,12 +96,12 @@ class NetworkOthers:
 
     def __init__(
         self, system: Network, scenes: Sequence[tuple[Network, Network | None]], steps: Sequence[float],
-        lines: Mapping[str, Resolution], more: Sequence[float] | None = None,
+        lines: Mapping[str, Resolution], more: Places | None = None,
     ) -> None:  # fmt: skip
         """Tangents of a run, by scenes whose numbers differ by a step.
 
         system: of the run; scenes: with more of each number by a step, and with less (None: it is not computed); lines:
-        how finely, by name; more: arc lengths of outputs beside nodes, of one line; None: as the scene asks.
+        how finely, by name; more: arc lengths of outputs beside nodes; None: as the scene asks.
         """
         self._system, self._more = system, more
         self._scenes, self._steps, self._resolution = list(scenes), list(steps), NetworkResolution(lines)
@@ -374,7 +374,7 @@ class NetworkOthers:
             name, x = model.names[l], model.models[l]
             scene = system.scene_of(name, system.carried(name), system.guesses)
             if self._more is not None:
-                output = scene.output.model_copy(update={"points": at_nodes(x.line.s, self._more)})
+                output = scene.output.model_copy(update={"points": at_nodes(x.line.s, self._more.get(name, ()))})
                 scene = scene.model_copy(update={"output": output})
             observer = observer_of(scene, x, True)
             observer = observer.on(line_like(x, self._model.models[l]), x.sea.values, x.zones, x.hinges)

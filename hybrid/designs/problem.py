@@ -15,6 +15,7 @@ from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.nearest import Space
 from hybrid.designs.numbers import PART as KEY_PART
 from hybrid.designs.numbers import computing, number_of
+from hybrid.designs.wanted import of_line
 from hybrid.errors import SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
@@ -323,11 +324,9 @@ def _result(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, 
         fix = "a target, which takes it as it is"
         expected = "a result that changes evenly: where contact begins goes by the nodes that come to the bed"
         raise task.refusal([Finding((*at, "quantity"), expected, fix)])
-    names = scene.line_names
-    if names and asked.line not in names:
-        raise task.refusal([Finding((*at, "line"), f"one of: {', '.join(names)}")])
-    if not names and asked.line is not None:
-        raise task.refusal([Finding((*at, "line"), "nothing: the scene has one line")])
+    if (asked.line or "") not in scene.lines:
+        expected = "nothing: the scene has one line" if "" in scene.lines else f"one of: {', '.join(scene.lines)}"
+        raise task.refusal([Finding((*at, "line"), expected)])
     place = f"@sections[{asked.section}]" if asked.section is not None else ""
     if asked.at is not None:
         place = f"@{asked.at}" if isinstance(asked.at, str) else f"@{asked.at!r}"
@@ -340,13 +339,13 @@ def _result(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, 
     if asked.over is not None:
         if _has_places(asked) and asked.at is None and asked.over not in ("max", "min"):
             raise task.refusal([Finding((*at, "at"), f"the place whose {asked.over} is meant", "at: end")])
-        return f"{asked.over} {f'{asked.line}/' if asked.line else ''}{asked.quantity}{place}{IN_MOTION}"
+        return f"{asked.over} {of_line(asked.line or '')}{asked.quantity}{place}{IN_MOTION}"
     if _has_places(asked) and asked.at is None and not take:
         raise task.refusal([Finding((*at, "at"), "a place, or take: max or min along the line", "at: end")])
     if take and at[0] != "limits" and not _has_places(asked):
         raise task.refusal([Finding((*at, "take"), f"nothing: {asked.quantity} has one value for the whole line")])
     extreme = f"{take} " if _has_places(asked) and asked.at is None else ""
-    return f"{extreme}{f'{asked.line}/' if asked.line else ''}{asked.quantity}{place}"
+    return f"{extreme}{of_line(asked.line or '')}{asked.quantity}{place}"
 
 
 def _has_places(asked: OfEquilibrium) -> bool:

@@ -21,7 +21,7 @@ from hybrid.model.sections import NEAR
 from hybrid.scene.network_scene import Network
 from hybrid.scene.read import read_text, scene_text
 from hybrid.scene.root import Scene
-from hybrid.scene.short_form import LINE, network_of, short_form
+from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.network_run import Recording, run_system
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import kept_resolution
@@ -33,10 +33,13 @@ from hybrid.store.reader import Result, open_result, written_result
 SOLVED_TO = 0.0
 
 
+Places = Mapping[str, Sequence[float]]  # m, arc lengths, of lines of the network by name
+
+
 class Course(NamedTuple):
     """How a run is replayed: how finely each line is computed, by name in the network, with places of its nodes.
 
-    scene: as it was computed: the model of one cable is that which the run has chosen; dimension: of its network, 3: no
+    scene: as it was computed: models of lines are those which the run has chosen; dimension: of its network, 3: no
     plane of a line is known, which other numbers may move; tolerance: of Newton's method in steps.
     """
 
@@ -56,12 +59,10 @@ class Course(NamedTuple):
     def network(self, scene: Any) -> Network:
         """The network that computes a scene with other numbers in a replay; its errors are not estimated."""
         made = scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})
-        if not scene.line_names:
-            made = network_of(made.model_copy(update={"model": self.scene.model}))
-        elif scene.output.errors:  # lines pass each other as where these are estimated
-            made = made.model_copy(update={"contact": passing_each_other(self.scene).contact})
-        found: Network = made.model_copy(update={"dimension": self.dimension})
-        return found  # runs of several lines estimate no errors by themselves
+        network = network_of(made.with_lines({name: {"model": x.model} for name, x in self.scene.lines.items()}))
+        if scene.output.errors:  # lines pass each other as where these are estimated
+            network = passing_each_other(network)
+        return network.model_copy(update={"dimension": self.dimension})
 
 
 def course_of(scene: Any) -> Course:
@@ -102,7 +103,7 @@ def refuse_push(result: Result) -> None:
 
 
 def replay(
-    scene: Scene, course: Course, finer: bool = False, more: Sequence[float] | None = None,
+    scene: Scene, course: Course, finer: bool = False, more: Places | None = None,
     each_step: bool = False, begun: Callable[..., None] | None = None,
 ) -> Result:  # fmt: skip
     """A run into memory, in the steps and on the nodes of a course.
@@ -121,21 +122,22 @@ def replay(
 
 
 def with_outputs(
-    scene: Scene, course: Course, more: Sequence[float] | None = None, each_step: bool = False,
+    scene: Scene, course: Course, more: Places | None = None, each_step: bool = False,
     finer: bool = False,
 ) -> Network:  # fmt: skip
     """The network that computes a scene in a replay.
 
-    more: of one cable: outputs are at its nodes and these arc lengths, m; None: where the scene asks for them;
+    more: outputs of lines are at their nodes and these arc lengths, m; None: where the scene asks for them;
     each_step: there are outputs at every step, or about as often where steps are not equal, in place of when the scene
     asks for them.
     """
     first, output, network = next(iter(course.lines.values())), dict[str, Any](), course.network(scene)
     if each_step:
         output["every"] = float(np.median(np.diff([0.0, *first.ends]))) if first.ends else first.step
-    if more is not None and not scene.line_names:
-        (model,) = build_system(network, NetworkResolution(course.resolutions(finer))).models
-        output["points"] = {LINE: at_nodes(model.line.s, more)}
+    if more is not None:
+        built = build_system(network, NetworkResolution(course.resolutions(finer)))
+        each = zip(built.names, built.models, strict=True)
+        output["points"] = {name: at_nodes(model.line.s, more.get(name, ())) for name, model in each}
     return network.model_copy(update={"output": network.output.model_copy(update=output)})
 
 

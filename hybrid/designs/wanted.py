@@ -55,18 +55,21 @@ class Wanted(NamedTuple):
         return np.asarray(value[..., AXES.index(self.axis)] if self.axis else np.linalg.norm(value, axis=-1))
 
 
+def of_line(name: str) -> str:
+    """What results of a line begin with; nothing for a line without a name."""
+    return f"{name}/" if name else ""
+
+
 def parse_wanted(asked: Scene, text: str, moves: bool) -> Wanted:
     """The parts of a result, of a run (moves) or of its equilibrium.  SceneError: it is none."""
-    found, names = NAME.match(text), asked.line_names
+    found, first = NAME.match(text), next(iter(asked.lines))
     over, line, name, axis, at = found.groups() if found is not None else ("", "", "", "", "")
     known = bool(over) if moves else over in (None, "max", "min")
     if found is None or not known or (line or "") not in asked.lines:
-        of, example = ("LINE/", f"{names[0]}/tension@end") if names else ("", "tension@end")
+        of, example = of_line(first and "LINE"), f"{'max ' * moves}{of_line(first)}tension@end"
         ways = f"max, min, mean, std, last or t=TIME, and {of}NAME@S" if moves else f"{of}NAME@S, max or min {of}NAME"
-        expected = (
-            f"{ways}{' of ' if names else ''}{', '.join(names)}, such as {f'max {example}' if moves else example}"
-        )
-        raise SceneError([Complaint("of", text, expected, f"max {example}" if moves else example)])
+        expected = f"{ways}{' of ' if first else ''}{', '.join(asked.lines)}, such as {example}"
+        raise SceneError([Complaint("of", text, expected, example)])
     time = math.nan
     if (over or "").startswith("t="):
         over, time = "t", _time_of(asked, text, over.removeprefix("t="))

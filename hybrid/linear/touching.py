@@ -9,7 +9,7 @@ to it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -381,20 +381,14 @@ class Rest:
     floats: tuple[BodyModel, ...] = ()
     touching: TouchingLines | None = None
     may_touch: Touching | None = None
-    tips: Mapping[tuple[str, int], str] = field(default_factory=dict)  # points that are one end (0, 1) alone
+    tips: Mapping[tuple[str, int], str] = field(default_factory=dict)  # points that are one end (0, 1) alone, in words
 
 
 def rest_of(scene: Any, resolution: NetworkResolution) -> Rest:
     """The equilibrium of a scene on such cells; ComputationError: there is none."""
     system, form = network_of(scene), short_form(scene)
-    if scene.line_names:
-        return _network_at_rest(system, resolution)
     with form.said():
-        return replace(_network_at_rest(system, resolution), tips={})
-
-
-def _network_at_rest(system: Network, resolution: NetworkResolution) -> Rest:
-    run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
+        run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
     assert run.found is not None
     bodies = (*(body.name for body in run.model.bodies), *run.model.rigid)
     found = run.found.solver  # which knows neither waves nor friction
@@ -406,7 +400,7 @@ def _network_at_rest(system: Network, resolution: NetworkResolution) -> Rest:
     touching = TouchingLines(found, friction_between(model)) if run.found.settled else None
     return Rest(
         solver, run.state, tuple(model.names), model.models, tuple(model.free), bodies, model.bodies, touching,
-        model.touching, _tips(system, model),
+        model.touching, {end: form.text(f"point {point}") for end, point in _tips(system, model).items()},
     )  # fmt: skip
 
 

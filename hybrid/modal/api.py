@@ -225,7 +225,7 @@ class _Shape:
             for k, carried in enumerate(x.carried):
                 if point := self.found.tips.get((x.name, k)):
                     mass = mass - carried
-                    out[f"point {point}"] = float(part.ravel() @ (carried @ part.ravel()))
+                    out[point] = float(part.ravel() @ (carried @ part.ravel()))
             for word, moved in _directions(x, part).items():
                 out[name + word] = float(moved.ravel() @ (mass @ moved.ravel()))
         first = network.size - 3 * network.points - 6 * network.bodies

@@ -226,11 +226,6 @@ class NetworkTables(Scene):
     )
 
     @property
-    def line_names(self) -> tuple[str, ...]:
-        """Names of the lines; none where the one line has no name."""
-        return tuple(self.lines)
-
-    @property
     def motions(self) -> list[Motion]:
         """How points and bodies are moved."""
         held = (getattr(x, "motion", None) for x in (*self.points.values(), *self.bodies.values()))

@@ -151,8 +151,10 @@ __all__ = [
 ]  # fmt: skip
 
 
+# What a scene with `cable` and `ends` is read as, and how the model of each line of a network sees that line
+# (`Network.scene_of`).  What computes a whole scene takes its network (`short_form.network_of`).
 class LineScene(Scene):
-    """A cable, what holds it, what acts on it, and what is asked: one line without names."""
+    """One line without a name, its ends, the world around it, and what is asked."""
 
     instead: ClassVar[Mapping[str, str]] = {"solver": "leave it out: every scene is solved by elimination"}
     asked_nothing: ClassVar[Mapping[str, Any]] = {"solver": "elimination"}
@@ -193,7 +195,6 @@ class LineScene(Scene):
     # What the long form has as well, so that nobody has to ask which of the two it is.
     points: ClassVar[Mapping[str, Any]] = {}
     bodies: ClassVar[Mapping[str, Any]] = {}
-    line_names: ClassVar[tuple[str, ...]] = ()
     free: ClassVar[tuple[str, ...]] = ()
 
     @property

@@ -125,7 +125,7 @@ class Case:
         self.scene: Any = scene  # what is computed, as the user wrote it
         # Whether its line has no name: what leaving bending out does is followed along its run, which moves no ends.
         # Lines that are joined move each other, and are compared with rods.
-        self.flat = not scene.line_names
+        self.flat = "" in scene.lines
         self.criterion = with_names(criterion, self.names)
         self.changes: tuple[LoadChange[Any], ...] = tuple(changes)
         lines, kept = self.lines, points or {}

@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
+from hybrid.scene.read import scene_text
+from hybrid.scene.short_form import network_of
 
 EI, MASS = "cable.sections[0].bending_stiffness", "cable.sections[0].mass"
 G, W = 9.81, 0.05
@@ -63,6 +65,14 @@ def test_stiffness_and_its_deviation(folder):
     assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * estimate.deviation, rel=1e-3)
     assert not found.apart and found.count == 1
     assert abs(estimate.by_cells) < 1e-3 * TRUE and estimate.by_cells != 0.0
+
+
+def test_the_only_line_needs_no_column_of_its_name(folder):
+    named = scene_text(network_of(hybrid.load_scene("rod.yaml")))
+    Path("rod.yaml").write_text(named)
+    Path("design.yaml").write_text(DESIGN.replace(EI, EI.replace("cable", "lines.cable")))
+    (estimate,) = hybrid.design("design.yaml").estimates
+    assert estimate.value == pytest.approx(TRUE, rel=1e-6)
 
 
 def test_only_the_ratio_of_stiffness_and_mass_is_known(folder):

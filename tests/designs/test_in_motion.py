@@ -19,6 +19,7 @@ from hybrid.designs.tangents import Unfollowed
 from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.scene.read import as_scene
+from hybrid.scene.short_form import network_of
 
 G, A, PERIOD = 9.81, 1.0, 8.0
 W = 2.0 * np.pi / PERIOD
@@ -154,6 +155,26 @@ def test_a_replay_is_the_run_and_its_derivatives_those_of_short_steps(model, mes
     theirs = in_motion(hybrid.validate_scene(short), of, [key])
     np.testing.assert_allclose(ours.derivatives, theirs.derivatives, rtol=0.05)
     assert (ours.errors < 1e-6 * np.abs(ours.derivatives)).all()
+
+
+@pytest.mark.parametrize("form", [lambda scene: scene, network_of], ids=["cable", "named"])
+def test_a_replay_has_the_model_that_was_chosen(form):
+    """Of a scene that names none, with other numbers."""
+    section = {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e8, "bending_stiffness": 10.0}
+    made = heaved(cable={"sections": [section]}, time={"duration": 0.2, "step": 0.1})
+    course = course_of(form(hybrid.validate_scene(made)))
+    del made["model"]
+    (line,) = course.network(form(hybrid.validate_scene(made))).lines.values()
+    assert line.chosen_model.kind == "catenary"
+
+
+def test_peaks_of_a_named_line_are_those_of_all_its_nodes():
+    """As of a cable: with three outputs along it the bend at the touchdown was none of them."""
+    more = {"time": {"duration": 0.5, "step": 0.05}, "output": {"points": 3, "every": 0.1}}
+    cable, found = hybrid.validate_scene(on_the_bed("rod") | more), []
+    for scene, of in ((cable, "max curvature"), (network_of(cable), "max cable/curvature")):
+        found.append(Motion(scene, [parse_wanted(scene, of, moves=True)], course_of(scene), smooth=True).values[0])
+    assert found[1] == pytest.approx(found[0], rel=1e-9) and found[0] > 0.0
 
 
 def test_cells_of_a_layer_are_those_of_the_run_that_laid_them():

@@ -151,6 +151,16 @@ def two_strings(cells):
     return {"environment": {"gravity": 0.0}, "points": points, "lines": lines}
 
 
+def as_cable(made):
+    """The same tether without a name of its line."""
+    line, points = made["lines"].pop("l"), made.pop("points")
+    end = points["p"] | {"kind": "body"}
+    ends = {"start": {"kind": "pinned", "position": points["a"]["position"]}, "end": end}
+    of_line = {"model": line["model"], "mesh": line["mesh"], "initial": "equilibrium"}
+    del made["lines"]
+    return made | {"cable": {"sections": line["sections"]}, "ends": ends} | of_line
+
+
 def tether(cells, point, **more):
     """50 m that weigh nothing in water, 40 kg/m with the water that moves along, under what weighs 4000 kg with it."""
     section = {
@@ -168,6 +178,7 @@ BODY = {"mass": 4000.0, "inertia": [1e3] * 3, "volume": 8.0, "initial_guess": [0
 ENDS_OF_STRINGS = {
     "point of two lines": (two_strings(10), 1.0, "point p", 2),
     "point with added mass": (tether(10, FLOAT), 0.5, "point p", 1),
+    "end with added mass": (as_cable(tether(10, FLOAT)), 0.5, "ends.end", 1),
     "body": (tether(10, EYE, bodies={"b": BODY}), 0.5, "body b", 1),
 }
 
