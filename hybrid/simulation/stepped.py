@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Zone
-from hybrid.scene.schema import LineScene
+from hybrid.scene.root import SomeScene
 
 
 class CableState(NamedTuple):
@@ -99,7 +99,7 @@ def numbers(x: Any, name: str) -> Floats:
         raise ValueError(f"{name}: expected numbers, found {x!r:.60}") from None
 
 
-def in_space(scene: LineScene) -> LineScene:
+def in_space(scene: SomeScene) -> SomeScene:
     return scene if scene.dimension is not None else scene.model_copy(update={"dimension": 3})
 
 

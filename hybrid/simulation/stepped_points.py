@@ -25,9 +25,10 @@ from hybrid.model.ends import STILL, DrivenEnd, EndConditions, rotation_vector
 from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.model.sea import Surroundings
+from hybrid.scene.base import dotted
 from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead
-from hybrid.scene.short_form import ENDS, LINE, ShortForm
+from hybrid.scene.short_form import ENDS, ShortForm
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.set_obstacles import Course, SettableObstacles
 from hybrid.simulation.stepped import CableState, EndForces, numbers, one_thread, triple, vector
@@ -52,11 +53,12 @@ class PointState(NamedTuple):
 
 
 def of_line(method: Callable[Concatenate[Any, str, P], R]) -> Callable[..., R]:
-    """A method that takes the name of a line first, which is left out where the scene is in the short form."""
+    """A method that takes the name of a line first, which is left out where the line has none."""
 
     @wraps(method)
     def named(self: SteppedPoints, *args: Any, **options: Any) -> R:
-        return method(self, *args, **options) if self._form is None else method(self, LINE, *args, **options)
+        given: Any = args if all(self._form.names.values()) else (*self._form.names, *args)
+        return method(self, *given, **options)
 
     return named
 
@@ -65,7 +67,7 @@ class SteppedPoints(SettableObstacles):
     """The points and lines of a scene that is stepped from outside."""
 
     _system: Network  # what is computed
-    _form: ShortForm | None  # of a scene in the short form
+    _form: ShortForm  # what points and lines are called in the scene
     _run: NetworkRun
     _driven: dict[str, list[DrivenEnd]]  # of points that are set, for each end there
     _next: dict[str, Course]  # where points are to be at the end of the next step
@@ -193,8 +195,7 @@ class SteppedPoints(SettableObstacles):
         if turned and not self._turns_alone(name):
             raise ValueError(f"{said} holds no direction of a line: it has no frame")
         if self._is_moved(name):
-            what = "end" if self._form is not None else "point"
-            raise ValueError(f"{said} has a motion in the scene: leave it out to set the {what} from outside")
+            raise ValueError(f"{said} has a motion in the scene: leave that out to set it from outside")
 
     def _check_plane(self, name: str, what: str, vector: Floats) -> None:
         normal = self._run.model.models[0].kept_in
@@ -242,16 +243,14 @@ class SteppedPoints(SettableObstacles):
         here = self._places.get(name) if isinstance(name, str) else None
         if here is not None:
             return here
-        if self._form is not None:
-            raise ValueError(f"end: expected 'start' or 'end', found {name!r:.60}")
-        raise ValueError(f"name: expected a point of the scene ({', '.join(self._places)}), found {name!r:.60}")
+        raise ValueError(f"name: expected {' or '.join(map(repr, self._places))}, found {name!r:.60}")
 
     def _conditions_at(self, name: str) -> list[tuple[EndConditions, int]]:
         return [(self._run.model.models[line].ends, k) for line, k in self._ends_at(name)]
 
     def _key_of(self, name: str) -> str:
         """A point, by its key in the scene."""
-        return f"points.{name}" if self._form is None else f"ends.{name}"
+        return dotted(self._form.place(("points", name)))
 
     def _is_on_body(self, name: str) -> bool:
         return isinstance(self._system.points[name], Fairlead)
@@ -308,13 +307,12 @@ class SteppedPoints(SettableObstacles):
         k, run = self._line(name), self._run
         reels = {} if run.payout is None else run.payout.lines
         if k not in reels:
-            where = f"lines.{name}.connections" if self._form is None else "the scene"
-            more = "" if self._form is None else " ends.end.payout (nor ends.start.payout)"
-            raise ValueError(f"{where} has no{more or ' payout'}: the length of its line stays")
+            where = self._form.text(f"line {name}")
+            raise ValueError(f"{where} has no `payout` at an end: its length stays")
         from hybrid.simulation.payout import length_asked
 
         side = ENDS[reels[k].plan.side]
-        where = f"ends.{side}.payout" if self._form is not None else f"lines.{name}.connections.{side}.payout"
+        where = dotted(self._form.place(("lines", name, "connections", side, "payout")))
         self._wound[k] = length_asked(run.scenes[k], reels[k], length, rate, where)
 
     # --- what it is now ---------------------------------------------------------------------------

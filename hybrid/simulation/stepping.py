@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -18,7 +18,6 @@ from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.ends import DrivenEnd, contradictions
 from hybrid.model.network import NetworkResolution
-from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.network_scene import Network
 from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.scene.schema import missing_time
@@ -61,11 +60,6 @@ def layers_at_rest(system: Network) -> NetworkResolution:
         outputs = {key: line[key] for key in ("position", "curvature", "tension")}
         lines[name] = with_survey(lines[name], scene, Survey.of(scene, lines[name], model, line.s, outputs))
     return NetworkResolution(lines)
-
-
-def _that_are_set(line: Any) -> Any:
-    """A line, or a cable, whose ends may be set anywhere."""
-    return line.model_copy(update={"contact": line.contact.of_ends_that_are_set()})
 
 
 class Simulation(SteppedPoints):
@@ -117,21 +111,16 @@ class Simulation(SteppedPoints):
         """The network to compute, whose ends are set, of a scene in either form."""
         if scene.time is None:
             raise SceneError([missing_time()])
-        if scene.points:
-            lines = {name: _that_are_set(line) for name, line in scene.lines.items()}
-            self.scene = self._system = scene.model_copy(update={"lines": lines})
-            self._form = None
-        else:
-            self.scene = _that_are_set(in_space(scene))
-            check_motions(self.scene)
-            self._system, self._form = network_of(self.scene), short_form(self.scene)
+        contact = {name: {"contact": x.contact.of_ends_that_are_set()} for name, x in scene.lines.items()}
+        self.scene = in_space(scene.with_lines(contact))
+        self._system, self._form = network_of(self.scene), short_form(self.scene)
 
     def _begun(self, most: int, criterion: UserCriterion | None) -> NetworkRun:
         """The run at its start; most: iterations that a step may take.  ComputationError."""
         compile_beside(self.scene)
         # in space points may be set anywhere
         recording = Recording(planes=self._system.dimension == 2, asked=Asked(self.scene))
-        with nullcontext() if self._form is None else self._form.said():
+        with self._form.said():
             cells, text = layers_at_rest(self._system), scene_text(self.scene)
             run = NetworkRun(self._system, self._target, text, True, cells, recording, criterion)
         run.loop.counts.most_iterations, run.loop.most_rows, run.read_every = most, ROWS_OUTSIDE, READ_OUTSIDE
