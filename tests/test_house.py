@@ -245,12 +245,12 @@ def test_files_are_as_long_as_a_subject() -> None:
 
 # Rules of writing, and in how many places each is broken: only less.
 BROKEN = {
-    "docstring whose first line is no whole sentence": 50,
+    "docstring whose first line is no whole sentence": 26,
     "name from the list of banned words": 120,
-    "more than two constants in a line": 24,
+    "more than two constants in a line": 16,
     "constructor above 40 lines": 6,
     "function above 60 lines": 18,
-    "fmt: skip": 448,
+    "fmt: skip": 447,
 }
 # Words that do not say what a thing is or does; the second ones only where they are the whole name.
 BANNED = {"calm", "follow", "found", "haste", "its", "look", "looks", "loudest", "pace", "patience", "said",

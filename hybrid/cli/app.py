@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from hybrid.scene.root import Scene
     from hybrid.store.reader import Result
 
-REFUSED, FAILED, INTERRUPTED = 1, 2, 130
+# Exit codes.
+REFUSED = 1  # the input was refused
+FAILED = 2  # a computation failed
+INTERRUPTED = 130  # 128 + SIGINT
 _ELSEWHERE = "a folder you may write to, with free space"
 # What a disk says of a file, and what to try: no bug, wherever it is raised.
 DISK_ERRORS = {

@@ -49,9 +49,9 @@ def zones_in_short(zones: tuple[Zone, ...], width: int) -> str:
 
 
 class ProgressLine:
-    """Draws one line over itself on a terminal or in a notebook, gone when all passes are done; elsewhere a line now
+    """Draws one line over itself on a terminal or in a notebook, gone when all passes are done.
 
-    and then.
+    Elsewhere a line now and then.
     """
 
     def __init__(self, console: Console | None = None) -> None:

@@ -130,9 +130,10 @@ def _rows_beside(
     points: dict[str, Any], bodies: dict[str, Any], held: list[dict[str, Any]], end: float | None,
     meetings: list[tuple[float, str]],
 ) -> Iterator[tuple[str, str]]:  # fmt: skip
-    """end: s, time of the last output, of which points and bodies are; None: of an equilibrium; meetings: of lines,
+    """Rows of points and bodies, of lines that meet, and of what is held.
 
-    when (s) and where they touched first, and with what force.
+    end: s, time of the last output, of which points and bodies are; None: of an equilibrium; meetings: of lines, when
+    (s) and where they touched first, and with what force.
     """
     last = "" if end is None else f"at t = {end:.5g} s: "
     yield from _shown(points, "point", last + "{}", _of_point)

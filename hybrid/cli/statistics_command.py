@@ -54,8 +54,10 @@ def stats(
     ] = None,
     line: LineName = None, quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Statistics of a result: mean, standard deviation, extremes, period, most probable maximum (MPM) and P90 in 3 h,
-    fatigue damage and fatigue life; where each is largest, or at the places of --at."""
+    """Statistics of a result, where each quantity is largest or at the places of --at.
+
+    Mean, standard deviation, extremes, period, most probable maximum (MPM) and P90 in 3 h, fatigue damage and life.
+    """
     if not 0.0 < hours < inf:
         raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
     _refuse_alone(curve, strength, section, (mooring, factors, pretension))

@@ -47,10 +47,9 @@ def lowest_node(s: np.ndarray, r: np.ndarray) -> int:
 
 
 def extremes_facts(result: Result) -> dict[str, Any]:
-    """Largest and smallest tension (N), smallest bend radius (m), largest contact force (N/m) where something touches,
+    """Extremes of a result with s (m) and t (s), and the limits of sections.
 
-    with s (m) and t (s), and the limits of sections.
-
+    Largest and smallest tension (N), smallest bend radius (m), largest contact force (N/m) where something touches.
     Of every accepted step where the file has its envelope, and of the outputs.
     """
     from hybrid.store.envelope import largest_contact

@@ -22,8 +22,11 @@ MOST_POINTS = 4_000_000
 
 
 class Depths(Table):
-    """Depths of the bed at the points of a grid, between them a smooth surface that never leaves the range of the four
-    depths around; beyond the grid the bed goes on straight."""
+    """Depths of the bed at the points of a grid.
+
+    Between them the bed is a smooth surface that never leaves the range of the four depths around; beyond the grid it
+    goes on straight.
+    """
 
     x: tuple[Number, ...] = Field(default=(), description="x of the grid's lines, rising [m]")
     y: tuple[Number, ...] = Field(default=(), description="y of the grid's lines, rising [m]")

@@ -414,9 +414,9 @@ def _neighbours(system: NetworkTables) -> Neighbours:
 def _held_pairs(
     placed: Mapping[str, Any], motions: Mapping[str, Motion | None], beside: Neighbours
 ) -> Iterator[tuple[str, str, float, tuple[str, ...]]]:
-    """Each two points that are held and that lines or bodies join: the one that moves, if one does, the other, how far
+    """Each two points that are held and that lines or bodies join, in the order of the scene.
 
-    (m) it may be, and the lines between them.  In the order of the scene.
+    The one that moves, if one does, the other, how far (m) it may be, and the lines between them.
     """
     order = {name: i for i, name in enumerate(placed)}
     ways = {name: _reaches(beside, name) for name in placed}
@@ -428,9 +428,9 @@ def _held_pairs(
 
 
 def _reaches(beside: Neighbours, begin: str) -> Mapping[str, tuple[float, tuple[str, ...]]]:
-    """How far (m) each point may at most be from one that is held, along lines and bodies that are free, and which
+    """How far (m) each point may at most be from one that is held, and by which lines.
 
-    lines these are.
+    Along lines and bodies that are free.
     """
     reach: dict[str, tuple[float, tuple[str, ...]]] = {}
     queue: list[tuple[float, str, tuple[str, ...]]] = [(0.0, begin, ())]

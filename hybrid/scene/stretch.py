@@ -97,8 +97,10 @@ TensionStrain = Annotated[
 
 
 class DynamicStiffness(Table):
-    """Stiffness of a fibre rope against changes of tension faster than its relaxation: constant + per_tension x mean
-    tension. What is slower follows axial_stiffness, or tension_strain."""
+    """Stiffness of a fibre rope against changes of tension faster than its relaxation.
+
+    It is constant + per_tension x mean tension. What is slower follows axial_stiffness, or tension_strain.
+    """
 
     constant: Positive = Field(description="dynamic stiffness without mean tension, above the static one [N]")
     per_tension: NonNegative = Field(default=0.0, description="by how much it grows with the mean tension: N per N [-]")
@@ -220,9 +222,10 @@ TRIED, PLACES = 21, 101
 
 
 class Syrope(Table):
-    """Tension over strain at rest of polyester: the original curve while the mean tension is the highest so far, below
+    """Tension over strain at rest of polyester (Syrope).
 
-    it a working curve that ends there; needs dynamic_stiffness, which says what a mean tension is.
+    It is the original curve while the mean tension is the highest so far, below it a working curve that ends there;
+    needs dynamic_stiffness, which says what a mean tension is.
     """
 
     curve: TensionStrain = Field(
@@ -297,9 +300,10 @@ class Syrope(Table):
         return highest / self.k1 if self.by_stiffness else (1.0 - self.k1) * strain
 
     def first_fault(self, dynamic: DynamicStiffness) -> tuple[int, Finding] | None:
-        """What is wrong beside a dynamic stiffness, at any highest tension, and the row of `curve` at which that piece
+        """What is wrong beside a dynamic stiffness, and the row of `curve` at which that piece begins.
 
-        begins: that it is less than a static one; that a working curve gives back more than the original one took up.
+        At any highest tension: it is less than a static one; a working curve gives back more than the original one took
+        up.
         """
         parts, slope, area = self.shape(np.linspace(0.0, 1.0, PLACES))
         for row, highest, strain, stiffness in self._pieces():
@@ -323,9 +327,9 @@ class Syrope(Table):
         return None
 
     def _pieces(self) -> list[tuple[int, Floats, Floats, float]]:
-        """Of each piece of the original curve that may be reached: its first row; highest tensions (N), strains there,
+        """Pieces of the original curve that may be reached.
 
-        its stiffness (N).
+        Of each its first row; highest tensions (N), strains there, its stiffness (N).
         """
         found = []
         for row, ((x, T), (y, U)) in enumerate(pairwise(self.rows)):

@@ -69,9 +69,9 @@ def gauss_integral(a: Floats, b: Floats) -> float:
 
 
 def jumps(a: Floats, b: Floats) -> float:
-    """Largest jump of the Gauss integral of two polylines (2, n, 3) and (2, m, 3) m, first and last, on the straight
+    """Largest jump of the Gauss integral of two polylines on their straight ways.
 
-    way between these.
+    a (2, n, 3), b (2, m, 3): m, first and last nodes of each.
     """
     parts = np.linspace(0.0, 1.0, PARTS + 1)
     found = [gauss_integral((1.0 - x) * a[0] + x * a[1], (1.0 - x) * b[0] + x * b[1]) for x in parts]
@@ -171,9 +171,10 @@ class LinesWatch:
         return even.numbers, odd.numbers, watch_lines.address(even.numbers)
 
     def begin(self, system: Network) -> set[tuple[int, int]]:
-        """Look at the start, to which the jobs of even parity lead; lines that meet at a point or body and lie in each
+        """Check the start, to which the jobs of even parity lead.
 
-        other there, by a narrow angle, are returned: of these nothing is said.
+        Returns lines that meet at a point or body and lie in each other there, by a narrow angle: these are not
+        reported.
         """
         watch_lines(self._jobs[0].numbers)
         lines = list(system.lines.values())

@@ -136,9 +136,9 @@ def _equilibrium(system: Network, model: NetworkModel) -> LinesAtRest:
 
 
 def _stiffness(solver: NetworkSolver, state: NetworkState, first: int, size: int, points: int) -> Floats | None:
-    """(size, size) N/m, N/rad, .. of the point or body that begins at `first` of `NetworkSolver.compliance`; points:
-    how many there are.  None: the system is singular.
+    """Stiffness (size, size) N/m, N/rad, .. of one point or body; None: the system is singular.
 
+    It begins at `first` of `NetworkSolver.compliance`; points: how many there are.
     From the factors; where a torque passes through catenaries, which they know roughly, or lines touch themselves or
     bodies, from equilibria under small forces and moments both ways.
     """
@@ -234,10 +234,10 @@ def _place_of(solver: NetworkSolver, state: NetworkState, before: NetworkState, 
 
 
 def offsets(scene: SceneLike, at: str, distances: Sequence[float], heading: float = 0.0) -> Offsets:
-    """Forces of the lines on `point:NAME` or `body:NAME` held at distances (m) from its equilibrium along a heading
-    (deg, counter-clockwise from the x axis), at the height and rotation that it has there; a point to which lines are
-    clamped keeps their directions.
+    """Forces of the lines on `point:NAME` or `body:NAME` held at distances (m) from its equilibrium.
 
+    Along a heading (deg, counter-clockwise from the x axis), at the height and rotation that it has there; a point to
+    which lines are clamped keeps their directions.
     Errors: as of `stiffness`; the distance at which no equilibrium is found is in the message.
     """
     asked = as_scene(scene)

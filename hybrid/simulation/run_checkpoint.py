@@ -120,9 +120,10 @@ def _of_today(run: KeptRun, saved: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def lines_of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:
-    """Lines of a checkpoint with what earlier programs did not have: mean tensions, the end of a report, answers to
+    """Lines of a checkpoint with what earlier programs did not have.
 
-    torques, what diagnostics remember, and a spectral radius of their own; rho: that of all lines.
+    Mean tensions, the end of a report, answers to torques, what diagnostics remember, and a spectral radius of their
+    own; rho: that of all lines.
     """
     if not (isinstance(lines, dict) and all(isinstance(x, dict) for x in lines.values())):
         return lines

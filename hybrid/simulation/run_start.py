@@ -29,9 +29,10 @@ from hybrid.solve.stepper import Stepper
 def begin_as_placed(
     model: NetworkModel, scenes: Sequence[LineScene], state: NetworkState, events: Sequence[EventLog]
 ) -> None:
-    """Make a start that is no equilibrium ready, of each line as of one cable: clamps that its shape does not fit are
+    """Make a start that is no equilibrium ready, line by line.
 
-    reached smoothly, what is drawn is noted, and what lies still on the seabed has the friction that keeps it there.
+    Clamps that its shape does not fit are reached smoothly, what is drawn is noted, and what lies still on the seabed
+    has the friction that keeps it there.
     """
     each = zip(model.names, model.models, model.joints, scenes, state.lines, events, strict=True)
     for name, x, joints, scene, one, log in each:

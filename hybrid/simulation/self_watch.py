@@ -280,10 +280,10 @@ class LineWatch:
         return self.judge(self._search(t, state, state.r), t, 0.0, state, event)
 
     def judge(self, found: int, t: float, dt: float, state: State, event: Callable[..., None]) -> int:
-        """An event if surfaces have met in the step of dt (s) to a state at t (s), or a bend hides it, by what a look
+        """Report surfaces that have met in the step of dt (s) to a state at t (s), or a bend that hides it.
 
-        has `found`; NEARS where the line is so near itself, in place of an event, that its contact has to begin, PARTS
-        where it may end.
+        found: bits of the search.  Returns NEARS where the line is so near itself, in place of an event, that its
+        contact has to begin, PARTS where it may end.
         """
         told = self._watch.itself.found
         if found & HIDES:

@@ -28,8 +28,10 @@ Refused = Callable[[NetworkState], tuple[Outcome, int, int]]
 
 @dataclass(frozen=True)
 class LinesAtRest:
-    """A static solution: the state, how it was found (`path`), iterations, and its proof, the largest force
-    out of balance at a node or a point (N)."""
+    """A static solution: the state, the search that found it, and its proof.
+
+    path: how it was found; then iterations, and the largest residual force at a node or a point (N).
+    """
 
     state: NetworkState
     path: tuple[str, ...]

@@ -525,11 +525,11 @@ def damped_bodies(bodies: Floats, time_scale: float) -> Floats:
 
 
 def laid_without_tension(line: Line, sea: Sea, ends: Ends, state: State) -> State:
-    """A copy of an equilibrium whose stretches on the bed and on obstacles have their unstretched length, without
+    """A copy of an equilibrium whose stretches on the bed and on obstacles have their unstretched length.
 
-    friction yet.  A stretch keeps its path, and its place at a held end that lies there, too; one without such an end,
-    or with two, keeps the place of its middle.  The displacement of a node from here is the travel that friction
-    opposes (docs/theory.md, T17b).
+    It has no friction yet.  A stretch keeps its path, and its place at a held end that lies there, too; one without
+    such an end, or with two, keeps the place of its middle.  The displacement of a node from here is the travel that
+    friction opposes (docs/theory.md, T17b).
     """
     laid, cells = state.copy(), line.h.size
     laid.slip[:] = 0.0

@@ -106,9 +106,10 @@ NEARLY = 0.99
 
 
 def trapped_loop(result: Result, found: Along, torque: np.ndarray) -> dict[str, float] | None:
-    """The loop that the largest torque (nt, n) N m would trap, as it pops out: tension (N), bend radius (m), and that
+    """The loop that the largest torque (nt, n) N m would trap, as it pops out.
 
-    over the one allowed, where it is smallest.  None: no diameter is known, or no loop is trapped.
+    Tension (N), bend radius (m), and that over the one allowed, where it is smallest.  None: no diameter is known, or
+    no loop is trapped.
     """
     diameter, stiffness = found.of(result, "diameter"), found.of(result, "bending_stiffness")
     if diameter is None or stiffness is None:

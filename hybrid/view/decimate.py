@@ -13,7 +13,9 @@ from hybrid.store.reader import Result
 
 # A screen is some 1000 pixels wide and a play of the motion lasts seconds: more frames, points or places on a curve
 # are not visible.  Frames times points: a page has up to ten such arrays of 4 bytes, and is to stay below 8 MB.
-MOST_FRAMES, MOST_POINTS, MOST_VALUES = 1000, 251, 80_000
+MOST_FRAMES = 1000
+MOST_POINTS = 251
+MOST_VALUES = 80_000  # frames times points
 MOST_ON_CURVE = 1200
 # On paper a panel is two to four inches wide: a curve that turns more than so often in each of so many stretches is a
 # block of ink.

@@ -13,7 +13,9 @@ from hybrid.view.figure import BED, GREY, Axis, Item, Line, Marks, Page, Panel, 
 from hybrid.view.modes_page import oblique_view
 from hybrid.view.save import save_figure
 
-COLUMNS, WIDE, HIGH = 2, 4.0, 2.9  # panels beside each other, and the size of one in inches
+COLUMNS = 2  # panels beside each other
+WIDE = 4.0  # inches, of one,
+HIGH = 2.9  # and its height
 # Of its widest extent in plan: lines that are no wider across are drawn in one upright plane.
 FLAT = 0.05
 NUMBERS = 6  # of unknowns in the head

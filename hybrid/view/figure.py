@@ -18,14 +18,18 @@ import numpy as np
 # Colours are those of Okabe and Ito, which stay apart for colour-blind eyes. A zone kind has
 # one colour on a whole page; grey is what was earlier; sand and water are pale, behind everything.
 
-INK, GREY, ALARM = "#222222", "#6E6E6E", "#C00000"
+INK = "#222222"
+GREY = "#6E6E6E"  # what was earlier
+ALARM = "#C00000"
 KIND_COLOURS = {
     "rod": "#D55E00",
     "catenary": "#0072B2",
     "corrected": "#009E73",  # of 0.6
 }  # kinds that are not named here are drawn in ink
 STONE, STONE_EDGE = "#D9D4CF", "#7A726B"
-SAND, BED, BODY = "#EEE5D0", "#8C6D31", "#F0E442"
+SAND = "#EEE5D0"
+BED = "#8C6D31"
+BODY = "#F0E442"
 WATER, LEVEL = "#EFF6FA", "#4A90C2"
 DOUBT = "#8E63B5"  # of estimated errors
 TOUCHDOWN = "#CC79A7"  # where contact begins and ends

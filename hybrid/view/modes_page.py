@@ -18,7 +18,9 @@ from hybrid.view.save import PAGES, REPORT_MARK, check_target, save_figure, writ
 
 # Pictures of mode shapes: the equilibrium, and the line at both ends of its swing.
 
-COLUMNS, SHAPE_WIDE, SHAPE_HIGH = 3, 2.8, 2.5  # panels beside each other, and the size of one in inches
+COLUMNS = 3  # panels beside each other
+SHAPE_WIDE = 2.8  # inches, of one,
+SHAPE_HIGH = 2.5  # and its height
 # Views are from this azimuth beside the widest direction of the lines, and from this height, deg.
 AZIMUTH, HEIGHT = 35.0, 20.0
 SWING = 0.12  # of the largest extent of the scene: the largest shift that is drawn
@@ -105,10 +107,13 @@ def oblique_view(position: Mapping[str, Any]) -> Any:
 
 # Natural modes that swing: a section of a report, and a page of their own.
 
-# Points of a line that are drawn, and places at which the turn of its sections is; size of a picture.
-MOST_POINTS, TICKS, WIDE, HIGH = 120, 15, 320.0, 240.0
-# Part of the kinetic energy in twist from which turns are drawn; the largest turn, rad, and the tick, of the picture.
-TWISTS, TURN, TICK = 0.05, 1.0, 0.03
+MOST_POINTS = 120  # of a line that are drawn
+TICKS = 15  # places at which the turn of its sections is drawn
+WIDE = 320.0  # of a picture,
+HIGH = 240.0  # and its height
+TWISTS = 0.05  # part of the kinetic energy in twist from which turns are drawn
+TURN = 1.0  # rad, the largest
+TICK = 0.03  # of the picture
 SHOWN, LEAST = 3, 0.05  # parts of the energy in the table, and the least of them
 EXPLAINED = (
     "About the equilibrium, without drag and damping. Grey: at rest; blue: the mode as it swings, not to scale, each "

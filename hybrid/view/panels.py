@@ -152,9 +152,9 @@ def cable(result: Result, view: View, output: int, *, joints: bool = False) -> l
 
 
 def sea(result: Result, view: View) -> list[Item]:
-    """Water below its surface and sand below the bed, out to the rims of the panel, whatever these will be; and
+    """Water below its surface, sand below the bed, and obstacles that rest.
 
-    obstacles that rest.
+    Out to the rims of the panel, whatever these will be.
     """
     bed, box = bed_in(view, result), extent_in(view, result)
     middle, far = box.mean(axis=1), 30.0 * float(np.ptp(box, axis=1).max())  # more than any panel shows

@@ -255,8 +255,9 @@ def plot_summary(
 
 
 def plot_zones(result: Result, path: str | Path | None = None, *, overwrite: bool = False) -> Figure:
-    """One page: the zones along s over time, rods by their curvature and catenaries by their tension, and the share
-    of rod.
+    """One page of zones: along s over time, and the share of rod.
+
+    Rods are drawn by their curvature and catenaries by their tension.
 
     path: where to save it, as .png, .pdf or .svg (see plot_summary). Also drawn, where the file has them: where the
     cable touches down, what is attached to it, and where zones were split, merged or a step retried.

@@ -213,8 +213,10 @@ def space_html(scene: dict[str, Any], poster: str, moves: bool, notice: str, cap
 
 
 def figure_html(k: int, panel: Panel, before: int = 1) -> str:
-    """A graph with its title and caption; k: its place in the index; before: figures before that of place 0, such as
-    the cable in space."""
+    """A graph with its title and caption.
+
+    k: its place in the index; before: figures before that of place 0, such as the cable in space.
+    """
     title = panel.title[:1].upper() + panel.title[1:]
     wide = ' class="wide"' * (panel.aspect is not None)
     return f"<figure{wide}><h3>{escape(title)}</h3>{plot_html(k, panel)}{caption_html(k, panel, before)}</figure>"
