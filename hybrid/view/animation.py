@@ -18,6 +18,7 @@ from hybrid.store.reader import Result
 from hybrid.view.along import along
 from hybrid.view.decimate import even
 from hybrid.view.figure import Band, Item, Line, Panel, colour_of, prefix, short
+from hybrid.view.lines import AllLines, bodies_in, film_page
 from hybrid.view.panels import cable, framed, page_of, profiles, sea
 from hybrid.view.projections import View, aspect_of, pieces_of, views_of
 from hybrid.view.save import COMMENT, check_target, write_file
@@ -104,11 +105,11 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int, width
     """Pixels (height, width, 4) of every frame; width: of the page, inches."""
     from hybrid.view.matplotlib_backend import film
 
-    if result.lines:
-        from hybrid.view.lines import film_page
-
+    whole, alone = result, AllLines(result).alone
+    if alone is None:
         page, shown = film_page(result, factor)
         return film(page, shown, frames, dpi)
+    result = alone
     views = dict(zip(("shape", "second"), views_of(result), strict=False))
     names, profile = list(views), _tension_range(result)
     panels = {name: _still(result, view) for name, view in views.items()} | {"tension": profile}
@@ -120,7 +121,7 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int, width
     # both sides even in pixels, as x264 wants them
     size = tuple(2.0 * round(0.5 * x * dpi) / dpi for x in (width, 5.12 if width >= _NARROW else 1.04 * width))
     look = {"mosaic": mosaic, "heights": heights, "legend": ["shape"], "size": size}
-    page = page_of(result, [f"{factor:g} × real time"], panels=panels, **look)
+    page = page_of(whole, [f"{factor:g} × real time"], panels=panels, **look)
     span = float(np.ptp(result.times)) / max(len(result.times) - 1, 1)
     places = int(np.clip(1 - np.floor(np.log10(span)), 0, 6))
     curves = along(result, "tension")
@@ -128,7 +129,7 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int, width
     left = np.where(np.diff(curves.s, append=np.inf) == 0.0, np.nextafter(curves.s, -np.inf), curves.s)
 
     def moving(i: int) -> tuple[str, dict[str, list[Item]]]:
-        shapes = {name: cable(result, view, i) for name, view in views.items()}
+        shapes = {name: [*cable(result, view, i), *bodies_in(whole, view, i)] for name, view in views.items()}
         tension: list[Item] = []
         for kind, s in pieces_of(result, i):
             last = np.nextafter(s[-1], -np.inf)  # the value on the left, where zones meet

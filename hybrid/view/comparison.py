@@ -18,7 +18,7 @@ from hybrid.view import report_parts as parts
 from hybrid.view.along import along, worst
 from hybrid.view.decimate import Store, script_json
 from hybrid.view.figure import ZERO, Axis, Item, Line, Panel, prefix, short, title_of
-from hybrid.view.panels import RANGES, refuse_several
+from hybrid.view.panels import RANGES, only_line
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.projections import views_of
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
@@ -49,8 +49,8 @@ def write_comparison(
         results = {f"{k}: {'in memory' if x.file is None else x.file.stem}": x for k, x in enumerate(results, 1)}
     if not 2 <= len(results) <= len(COLOURS):
         raise ResultError(f"a comparison is of 2 to {len(COLOURS)} results, and {len(results)} were given")
+    results = {name: only_line(result, "a comparison") for name, result in results.items()}
     for result in results.values():
-        refuse_several(result, "a comparison")
         if not len(result.times):
             raise ResultError("a comparison needs results with an output, and one has none")
     target = check_target(path, PAGES, overwrite=overwrite)

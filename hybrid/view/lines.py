@@ -151,10 +151,16 @@ def shapes(result: Result, every: AllLines, view: View, output: int = -1) -> lis
     for name, colour in every.colours.items():
         width = 1.0 if colour == OTHERS else 1.8
         items.append(Line(*view.project(every.lines[name].position[output]), every.label(name), colour, width))
-    items += [Line(*view.project(arms_of(result, name, [output])[0]), "", INK, 0.9) for name in bodies_of(result)]
     points = np.array([result[f"points/{name}/position"][output] for name in points_of(result)])
     items.append(Marks(*view.project(points), "o", "points", size=3.5))
-    for name in bodies_of(result):
+    return items + bodies_in(result, view, output)
+
+
+def bodies_in(result: Result, view: View, output: int) -> list[Item]:
+    """Bodies at an output, with arms to their fairleads; none of a cable."""
+    names = bodies_of(result)
+    items: list[Item] = [Line(*view.project(arms_of(result, name, [output])[0]), "", INK, 0.9) for name in names]
+    for name in names:
         at = result[f"bodies/{name}/position"][[output]]
         items.append(Marks(*view.project(at), "s", "origins of bodies", BODY, size=8.0))
     return items

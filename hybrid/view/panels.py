@@ -490,9 +490,10 @@ def page_of(result: Result, facts: list[str], **more: Any) -> Page:
     )
 
 
-def refuse_several(result: Result, what: str) -> None:
-    """ResultError where something of one line is asked of several."""
-    if result.lines:
-        name = next(iter(result.lines))
+def only_line(result: Result, what: str) -> Result:
+    """The line of a result of one; ResultError where something of one line is asked of several."""
+    (name, line), *others = result.each_line()
+    if others:
         advice = f"result.lines['{name}'], or --line {name}"
-        raise ResultError(f"{what}: of one line, and the result is of {len(result.lines)}\n    try:      {advice}")
+        raise ResultError(f"{what}: of one line, and the result is of {len(others) + 1}\n    try:      {advice}")
+    return line

@@ -30,7 +30,8 @@ from hybrid.view.figure import (
     short,
     title_of,
 )
-from hybrid.view.panels import energy, page_of, profiles, refuse_several, shape, touchdown
+from hybrid.view.lines import AllLines, bodies_in, page
+from hybrid.view.panels import energy, only_line, page_of, profiles, shape, touchdown
 from hybrid.view.panels import history as over_time
 from hybrid.view.projections import (
     Numbers,
@@ -62,7 +63,7 @@ def plot_quantity(
     file has them.  spectrum: of the histories, by Welch's method.  times: from and to, s.
     ax: matplotlib axes to draw on; None: those of a new figure, `ax.figure`.  ResultError: what is not there.
     """
-    refuse_several(result, "a quantity")
+    result = only_line(result, "a quantity")
     if not len(result.times):
         raise ResultError("the result has no output to draw")
     if envelope and (spectrum or at is not None or times is not None):
@@ -82,20 +83,18 @@ def plot_shape(
     result: Result, *, view: str | None = None, times: list[float] | None = None, ax: Axes | None = None
 ) -> Axes:
     """Draw the last shape over earlier ones, as `plot` does, and return the axes; view: two of x, y, z."""
-    refuse_several(result, "a shape")
+    result = only_line(result, "a shape")
     return draw_on(shape(result, view=view, times=times), ax)
 
 
 def plot_zone_map(result: Result, *, ax: Axes | None = None) -> Axes:
     """Draw the zones along s over time, without the page around them, and return the axes."""
-    refuse_several(result, "zones along s")
-    return draw_on(zone_map(result), ax)
+    return draw_on(zone_map(only_line(result, "zones along s")), ax)
 
 
 def plot_energy(result: Result, *, work: bool = False, ax: Axes | None = None) -> Axes:
     """Draw where the energy is, or with `work` where it came from, over time, and return the axes."""
-    refuse_several(result, "energies")
-    panel = energy(result, "work" if work else "energy")
+    panel = energy(only_line(result, "energies"), "work" if work else "energy")
     if panel is None:
         raise ResultError("the result has no energies over time")
     return draw_on(panel, ax)
@@ -241,17 +240,16 @@ def plot_summary(
     which arc lengths to follow (m); else those recorded as `history`, else the middle and
     the ends that move. A static result shows curvature and tangent in place of histories; a
     cable that touches a seabed also shows the force of contact and, over time, where it does.
-    Of several lines all are drawn, with points and bodies; times and history are of one line, `result.lines[name]`.
+    Bodies are drawn with it.  Of several lines all are drawn, with points and bodies; times and history are of one:
+    `result.lines[name]`.
     """
     from hybrid.view.matplotlib_backend import draw_page
 
-    if result.lines:
-        from hybrid.view.lines import page
-
-        if times is not None or history is not None:
-            refuse_several(result, "times and history")
-        return save_figure(draw_page(page(result)), path, overwrite=overwrite)
-    return save_figure(draw_page(_summary(result, times, history)), path, overwrite=overwrite)
+    if times is not None or history is not None:
+        only_line(result, "times and history")
+    alone = AllLines(result).alone
+    made = page(result) if alone is None else _summary(result, alone, times, history)
+    return save_figure(draw_page(made), path, overwrite=overwrite)
 
 
 def plot_zones(result: Result, path: str | Path | None = None, *, overwrite: bool = False) -> Figure:
@@ -264,25 +262,26 @@ def plot_zones(result: Result, path: str | Path | None = None, *, overwrite: boo
     """
     from hybrid.view.matplotlib_backend import draw_page
 
-    refuse_several(result, "zones along s")
+    line = only_line(result, "zones along s")
     more: dict[str, Any] = {}
-    if len(result.times):
-        zones = zone_map(result)
+    if len(line.times):
+        zones = zone_map(line)
         rows = [["map", item.name] for item in zones.items if isinstance(item, Map)] or [["map", "."]]
-        more = {"panels": {"map": zones, "share": share_of_rod(result)}, "mosaic": [*rows, ["share", "."]]}
+        more = {"panels": {"map": zones, "share": share_of_rod(line)}, "mosaic": [*rows, ["share", "."]]}
         more |= {"widths": [1.0, 0.022], "legend": ["map"]}
         more["heights"] = [*(3.0 / len(rows) for _ in rows), 0.8]
     return save_figure(
-        draw_page(page_of(result, [x for x in (counted(result), why_rods(result)) if x], **more)),
+        draw_page(page_of(result, [x for x in (counted(line), why_rods(line)) if x], **more)),
         path,
         overwrite=overwrite,
     )
 
 
-def _summary(result: Result, times: Numbers | None, history: Numbers | None) -> Page:
+def _summary(whole: Result, result: Result, times: Numbers | None, history: Numbers | None) -> Page:
+    """The page of a line alone, with the bodies of the whole result."""
     earlier = telling_times(result) if times is None else np.sort(np.asarray(times, dtype=float))
     if not len(result.times):
-        return page_of(result, _facts(result, earlier))
+        return page_of(whole, _facts(result, earlier))
     views, lies = views_of(result), touches_bed(result)
     pages, drawn = (_ONE_VIEW_BED, _TWO_VIEWS_BED) if lies else (_ONE_VIEW, _TWO_VIEWS), aspect_of(views, result)
     mosaic, widths, heights, _ = min(pages[len(views) - 1], key=lambda page: abs(math.log(page[3] / drawn)))
@@ -290,6 +289,8 @@ def _summary(result: Result, times: Numbers | None, history: Numbers | None) -> 
     panels: dict[str, Panel] = {
         name: shape(result, times=earlier, view=view, points=points) for name, view in zip("sS", views, strict=False)
     }
+    for name, view in zip(panels, views, strict=False):
+        panels[name] = panels[name]._replace(items=[*panels[name].items, *bodies_in(whole, view, -1)])
     bent = "bending_moment" in result and not set(result["zones/kind"]) <= {"catenary"}
     names: list[Any] = ["tension", ("bending_moment", "torque")] if bent else ["tension"]
     angles = ("theta", "phi") if len(views) > 1 else ("theta" if views[0].up_label == "z" else "phi",)
@@ -306,7 +307,7 @@ def _summary(result: Result, times: Numbers | None, history: Numbers | None) -> 
         panels |= {"T": touchdown(result)} if lies else {}
     legend = ["s", "h"] if len(points) else ["s"]
     look = {"mosaic": mosaic, "widths": widths, "heights": heights, "legend": legend}
-    return page_of(result, _facts(result, earlier), panels=panels, **look)
+    return page_of(whole, _facts(result, earlier), panels=panels, **look)
 
 
 def _facts(result: Result, earlier: np.ndarray) -> list[str]:

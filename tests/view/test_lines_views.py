@@ -36,6 +36,7 @@ from hybrid.view.lines import (
     rotations,
     views_of_lines,
 )
+from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape
 from hybrid.view.report import html
 from hybrid.view.report_tables import _extreme_text
 
@@ -220,14 +221,27 @@ def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None
     assert "None, beside limits that are broken." in text and "None were given." not in text
 
 
-@pytest.mark.parametrize("form", [as_scene, network_of])
-def test_a_report_of_one_line_has_all_that_is_known_of_it(form: Callable[[Any], hybrid.Scene], tmp_path: Path) -> None:
-    """Of a line with a name cards of loads, zones over time, and energies were left out."""
+@pytest.fixture(scope="module", params=[as_scene, network_of])
+def alone(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
+    """A line without a name, and the same with one."""
     ends = {name: {"kind": "pinned", "position": [x, 0, 0]} for name, x in ENDS.items()}
     section = SECTION | {"length": 12, "bending_stiffness": 5.0, "diameter": 0.05}
     asked = {"cable": {"sections": [section]}, "ends": ends, "model": "adaptive", "mesh": {"cells": 40}}
     asked |= {"initial": "equilibrium", "time": {"duration": 0.4, "step": 0.1}, "output": {"every": 0.1, "points": 11}}
-    text = html(hybrid.run(form(as_scene(asked)), tmp_path / "run.h5"))
+    return hybrid.run(request.param(as_scene(asked)), tmp_path_factory.mktemp("alone") / "run.h5")
+
+
+def test_a_line_alone_is_drawn_in_all_detail(alone: hybrid.Result) -> None:
+    """With a name it was refused where zones, energies, a history or a quantity are drawn, as of several lines."""
+    titles = [x.get_title(loc="left") for x in hybrid.plot(alone, history=[3.0]).axes]
+    assert {"tension over time", "curvature at t = 0.4 s"} <= set(titles)
+    assert len(hybrid.plot_zones(alone).axes) > 1
+    assert plot_energy(alone).lines and plot_shape(alone).lines and plot_quantity(alone, "curvature").lines
+
+
+def test_a_report_of_one_line_has_all_that_is_known_of_it(alone: hybrid.Result) -> None:
+    """Of a line with a name cards of loads, zones over time, and energies were left out."""
+    text = html(alone)
     found = re.findall(r'<section id="(\w+)"', text)
     assert {"verdict", "cable", "zones", "histories", "ranges", "energy"} <= set(found)
     assert all(f'id="fact-{key}"' in text for key in ("tension", "bend", "slack", "hockling", "seabed"))
