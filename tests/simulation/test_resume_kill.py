@@ -27,7 +27,7 @@ RESUME = OFTEN + "hybrid.resume(sys.argv[1])"
 SCENES = {
     "touchdown": ["time.duration=200", "output.every=0.5"],
     "laying": ["output.every=0.25"],
-    "06_whip": ["time={duration: 2}", "accuracy=1%"],
+    "06_whip": ["time={duration: 4}", "accuracy=1%"],
 }
 
 
