@@ -44,7 +44,7 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import network_of, short_form
-from hybrid.simulation.network_run import static_system
+from hybrid.simulation.new_run import static_system
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver

@@ -22,7 +22,7 @@ from hybrid.scene.network_scene import Network
 from hybrid.scene.read import read_text, scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.short_form import network_of, short_form
-from hybrid.simulation.network_run import Recording, run_system
+from hybrid.simulation.new_run import Recording, run_system
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import kept_resolution
 from hybrid.store.array_contents import MemoryTarget

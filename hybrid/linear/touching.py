@@ -58,7 +58,7 @@ from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
 from hybrid.scene.short_form import network_of, short_form
-from hybrid.simulation.network_run import static_system
+from hybrid.simulation.new_run import static_system
 from hybrid.solve.contact_stability import contact_stiffness
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.network_solver import NetworkSolver

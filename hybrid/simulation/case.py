@@ -44,7 +44,8 @@ from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.layer_mesh import rods_at_rest
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
-from hybrid.simulation.network_run import NetworkRun, Recording, start_of
+from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.new_run import Recording, new_run, start_of
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter, at_once
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import is_cut_off, kept_resolution
@@ -489,7 +490,7 @@ class Case:
             if recording.source is None:
                 recording = recording._replace(start=self._first_state(resolution))
             texts, end = self._texts, (self.criterion, changes)
-            return NetworkRun(network, target, texts[0], self.moves, resolution, recording, *end)
+            return new_run(network, target, texts[0], self.moves, resolution, recording, *end)
 
     def _first_state(self, resolution: NetworkResolution) -> Start:
         """The first state, which may have been kept for a run of this resolution."""

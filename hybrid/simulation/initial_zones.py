@@ -124,7 +124,7 @@ def _given(scene: LineScene, model: Model, pace: float) -> np.ndarray:
     assert model.layout is not None
     if model.payout is None:
         return given_zones(scene, model.layout)
-    from hybrid.simulation.payout_zones import rods_at_winch
+    from hybrid.simulation.run_payout import rods_at_winch
 
     paid = model.payout
     return rods_at_winch(scene, paid, model, paid.count(paid.first), pace, fastest(paid.law))

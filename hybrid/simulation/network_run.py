@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from time import monotonic
 from time import process_time as clock_now
 from typing import TYPE_CHECKING, Any, NamedTuple
-from weakref import proxy
 
 import numpy as np
 
@@ -18,48 +15,35 @@ from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.report import SELF_CONTACT
-from hybrid.kernels.state.state import Floats, Moves, Work, state_for
+from hybrid.kernels.state.state import Floats, Moves, Work
 from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
 from hybrid.model.failure import Weakness
-from hybrid.model.network import NetworkModel, NetworkResolution, build_system
-from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on, output_times
-from hybrid.model.sections import OutputPoints
+from hybrid.model.network import NetworkModel
+from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.equilibrium import joined_lines
-from hybrid.simulation.events import (
-    Sink,
-)
 from hybrid.simulation.failure import write_snapshot
-from hybrid.simulation.floating_watch import FloatingWatch
-from hybrid.simulation.line_result import FORCE_COLUMNS, WAITING, LineResult, Wanted
+from hybrid.simulation.line_result import WAITING
 from hybrid.simulation.lone_planes import LonePlanes
-from hybrid.simulation.parts import EVERY_STEP, Parts
-from hybrid.simulation.progress import RESULT, ProgressReporter, at_once
-from hybrid.simulation.restart import LoadChange
-from hybrid.simulation.restore import kept_resolution, other_program, refused, require_same
+from hybrid.simulation.parts import EVERY_STEP
+from hybrid.simulation.progress import ProgressReporter
+from hybrid.simulation.restore import other_program, refused, require_same
 from hybrid.simulation.run_checkpoint import (
     content,
-    files_of,
-    kept_changes,
     restore,
 )
 from hybrid.simulation.run_contact import (
-    RunContact,
     refuse_within_itself,
 )
 from hybrid.simulation.run_cuts import Cuts
 from hybrid.simulation.run_failures import Failures
-from hybrid.simulation.run_file import Asked, file_of
-from hybrid.simulation.run_of_lines import WatchedLines, change_loads_of_lines, loaded_as, with_loads_of
-from hybrid.simulation.run_points import Sampled
-from hybrid.simulation.run_quantities import Rotations, RunQuantities
+from hybrid.simulation.run_of_lines import change_loads_of_lines
+from hybrid.simulation.run_record import RecordedRun
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, named
-from hybrid.simulation.run_zones import RunZones, Start, managers_for, start_at_rest, zones_as_placed
-from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
+from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.joined import LineFailed, NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
@@ -67,226 +51,74 @@ from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.store.array_contents import Target
 from hybrid.store.checkpoint import read_checkpoint
-from hybrid.store.format import Text
 from hybrid.store.hdf5_file import opened
-from hybrid.store.stored_rows import ComparisonRecorder
-from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
+from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:
     from hybrid.simulation.run_payout import RunPayout
 
-_NO_ZONES: Mapping[int, DomainManager] = {}
-# Steps times cells from one checkpoint to the next, about 5 s of computing.
-WORK = 10_000_000
 # Steps that Python has a part in, between two reports of the progress.
 LOOK = 16
-READ_EVERY = 0.01  # s of the wall, after which the time of the processor is read again
 
 
-class Recording(NamedTuple):
-    """What there is beside a run: around it, before it and after it.
+class First(NamedTuple):
+    """What a run begins with: the network as it is loaded then, and its first state."""
 
-    mode: how a file is written; source: the result to go on with, from its checkpoint, in place of a start; pending:
-    what is to come when it is complete (store.records); notes: events (kind, text) of the whole of the run; begun:
-    called behind the first output; planes: whether lines that are joined to nothing are computed in the planes in
-    which they lie; start: the first state, if it is known; points: of outputs of lines by name, None: those of
-    their scenes; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself
-    where lines come near themselves, else that is only noticed; error: whether that of leaving bending out is followed,
-    of lines whose resolution says so; asked: what the network was made of, by whose names it gets its file.
+    system: Network
+    model: NetworkModel
+    state: NetworkState  # blank, where it is that of a checkpoint
+    found: LinesAtRest | None  # the equilibrium from which it starts
+    managers: Mapping[int, DomainManager]  # of zones, by the number of the line
+    scenes: list[LineScene]  # of the lines
+    changed: int  # how many changes of loads have been made
+    resumed: bool  # whether the state is that of a checkpoint
+
+
+class NetworkRun(RecordedRun):
+    """The motion, or the equilibrium, of one network: its arrays, its steps, and the parts that change them.
+
+    `new_run.new_run` makes it.
     """
 
-    mode: WriteMode = AT_ONCE
-    source: Path | None = None
-    pending: str = ""
-    notes: Sequence[tuple[str, str]] = ()
-    begun: Callable[[NetworkRun], None] | None = None
-    planes: bool = False
-    start: Start | None = None
-    points: Mapping[str, OutputPoints] | None = None
-    until: float | None = None
-    touches: bool = True
-    error: bool = False
-    asked: Asked | None = None
-
-
-ALONE = Recording()
-
-
-class NetworkRun:
-    """One system, computed into a file or into memory."""
+    cuts: Cuts
+    failures: Failures
+    solver: NetworkSolver
+    other: NetworkState  # the state after the next step
+    planes: LonePlanes | None = None
+    zones: RunZones | None = None
+    payout: RunPayout | None = None  # of lines that are paid out
+    notes: Sequence[tuple[str, str]] = ()  # events (kind, text) of the whole of the run
+    begun: Callable[[NetworkRun], None] | None = None  # called behind the first output
+    loaded = 0.0  # s, loads that have stopped by then act no more
+    leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
+    stepped_outside = False  # whether steps are asked for one by one (simulation.stepping)
+    _fitted: tuple[object, ...] | None = None  # what steps are attached to that have come to a stop
+    _loaded = np.nan  # `loaded`, of the loads that act on bodies in compiled steps
 
     def __init__(
-        self, system: Network, target: Target | None, text: Text, moves: bool,
-        resolution: NetworkResolution | None = None, recording: Recording = ALONE,
-        criterion: UserCriterion | None = None, changes: Sequence[LoadChange[Network]] = (),
-    ) -> None:  # fmt: skip
-        """target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether
+        self, first: First, loop: NetworkSteps, target: Target | None, criterion: UserCriterion | None, kept: bool
+    ) -> None:
+        """As yet without lines, parts and a file.
 
-        its motion is wanted, else its equilibrium under full loads; resolution: how finely, None: as the scene asks
-        for, or the checkpoint says; criterion: one more for zones that move (adapt.zone_rules); changes: loads and
-        motions of these systems hold from some time on.
+        loop: its steps, with outputs to its end; target: None: it is only to be compared with; criterion: one more for
+        zones that move (adapt.zone_rules); kept: whether it writes checkpoints.
         """
-        source, planes = recording.source, recording.planes
-        self._notes, self._begun = recording.notes, recording.begun
-        self.end = (recording.until or system.require_time().duration) if moves else 0.0
-        self.changes: Sequence[LoadChange[Network]] = [
-            replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < self.end
-        ]
-        self.criterion, me = (
-            criterion,
-            proxy(self),
-        )  # for parts: in a circle a run would wait for the search for garbage
-        self.system, self.target, self.moves = system, target, moves
-        self.kept = recording.mode.before is not None and isinstance(target, Path)
-        self.changed = 0  # how many of the changes have been made
-        if source is not None:
-            resolution, self.changed = kept_resolution(system, source), kept_changes(source, len(self.changes))
-        first = self.model = recording.start.model if recording.start else build_system(system, resolution=resolution)
-        if self.changed:
-            self.system = self.changes[self.changed - 1].scene
-            self.model = loaded_as(first, self.system, 0.0)
-        self.resolution = self.model.resolution
-        one = self.resolution.one
-        follow = (one.step, one.shortest) if moves and one.local is not None else (0.0, 0.0)
-        names, scenes = first.names, line_scenes(system, first)
-        self.scenes = [scenes[name] for name in names]
-        self.times: Sequence[float] = output_times(self.scenes[0]) if moves else []
-        if moves and one.every > 1:  # a run to compare with has as many times fewer
-            self.times = [*self.times[one.every - 1 : -1 : one.every], self.times[-1]]
-        if moves and self.end < self.times[-1]:
-            self.times = [*(t for t in self.times if t < self.end), self.end]
-        rho = system.require_time().rho_inf if moves else 0.0
-        turn = min(x.turn for x in self.resolution.lines.values())
-        self.loop = NetworkSteps(rho, [0.0, *self.times], *follow, turn)
-        self.found: LinesAtRest | None = None
-        managers, self._begins = _NO_ZONES, source is None  # whether there is a start, and no checkpoint
-        if source is not None:
-            blank = [state_for(x.line) for x in self.model.models]
-            self.state = NetworkState(blank, np.zeros_like(self.model.body_places))
-            managers = managers_for(scenes, first, criterion)  # as at the start, whatever loads came later
-            for k, x in managers.items():
-                x.load(self.model.models[k].ends.moments)
-        else:
-            self.model, self.found, managers = recording.start or start_of(system, self.model, moves, criterion)
-            placed = NetworkState([x.start for x in self.model.models], self.model.body_places)
-            self.state = (placed if self.found is None else self.found.state).copy()
-        self.start_from(self.state.bodies if self._begins else self.model.body_places)
-        self.payout: RunPayout | None = None  # of lines that are paid out
-        if moves and any(x.payout is not None for x in self.model.models):
-            from hybrid.simulation.run_payout import RunPayout
-
-            self.payout = RunPayout(me)
-        reels = self.payout.lines if self.payout is not None else {}
-        self.rotations = Rotations(system, self.model)
-        self.file, points = file_of(me, text, recording), recording.points or {}
-        self.lines = list[LineResult]()
-        for k, (name, scene, model, state) in enumerate(
-            zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
-        ):
-            manager, error = managers.get(k), recording.error and model.follows_error
-            record = partial(self.file.line_recorder, manager=manager) if target is not None else None
-            wanted = Wanted(record, points.get(name), error, _torque_of(manager))
-            shown, outputs = self.file.scene_of(scene), len(self.times)
-            self.lines.append(LineResult(k, name, shown, model, self.found, state, outputs, wanted, reels.get(k)))
-            self.lines[k].manager = manager
-        if self._begins:
-            for line in self.lines:
-                line.diagnostics.begin()
-        self.contact = RunContact(me, recording.touches, target is not None)
-        self.planes = LonePlanes(me, self.loop.counts, system.dimension == 2) if planes and moves else None
-        shaken = zip(scenes.items(), self.resolution.lines.values(), strict=True)
-        steps = {name: VibrationSteps(scene, x) for (name, scene), x in shaken}
-        self.vibrations = VibrationsOfLines(steps, self.loop.clock)
-        self.quantities = RunQuantities(system, self.file.of_quantities(scenes))
-        if moves:
-            self.quantities.keep_ranges(self.lines)
-        self.cpu = 0.0  # s, of the processor, in earlier parts of the run
-        self._logged = 0.0  # s, likewise, when steps were logged last
-        self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
-        self._fitted: tuple[object, ...] | None = None  # what steps are attached to that have come to a stop
+        self.system, self.model, self.state, self.found = first.system, first.model, first.state, first.found
+        self.scenes, self.resolution, self.changed = first.scenes, first.model.resolution, first.changed
+        self.loop, self.times, self._begins = loop, loop.outputs[1:].tolist(), not first.resumed
+        self.target, self.criterion, self.kept, self.moves = target, criterion, kept, bool(self.times)
+        self.end = self.times[-1] if self.times else 0.0
         self._moved: list[Moves] = []  # by which ends move in compiled steps
-        self._loaded = np.nan  # and `loaded`, of the loads that act there on bodies
-        self.failures, self.cuts, self.floating = Failures(me), Cuts(me, target is None), FloatingWatch(me, moves)
-        self.zones = RunZones(me, managers, self.payout) if managers and moves else None
-        self.parts = Parts(
-            x for x in (self.planes, WatchedLines(me), self.contact, self.cuts, self.zones, self.payout, self.failures,
-                        self.vibrations, self.quantities, self.rotations, self.floating) if x is not None
-        )  # fmt: skip
-        self.loaded = 0.0  # s, loads that have stopped by then act no more
-        self._checked = -1  # steps at the last checkpoint
-        self._between = False  # whether the state is that between two steps
-        self.stepped_outside = False  # whether steps are asked for one by one (simulation.stepping)
         self._begin = clock_now()
-        self.read_every = READ_EVERY
-        self._read = -np.inf, 0.0  # s of the wall, when the time of the processor was read last, and that
-        self.recorder = self._go_on(source) if source is not None else self.file.begin()
+        self.start_from(first.model.body_places if first.resumed else first.state.bodies)
 
-    # --- where it is --------------------------------------------------------------------------------
+    # --- checkpoints ----------------------------------------------------------------------------------
 
-    @property
-    def t(self) -> float:
-        """Time of the state, s."""
-        return float(self.loop.clock.now)
+    def content(self) -> Mapping[str, Any]:
+        """What a checkpoint keeps."""
+        return content(self)
 
-    @property
-    def steps(self) -> int:
-        """Steps so far."""
-        return int(self.loop.counts.steps)
-
-    @property
-    def last_step(self) -> float:
-        """Length, s, of the step that led to the state; 0: it is a start."""
-        return float(self.loop.clock.last_dt)
-
-    @property
-    def last_rho(self) -> float:
-        """Its spectral radius."""
-        return float(self.loop.clock.last_rho)
-
-    @property
-    def interval(self) -> float:
-        """What the step took (s) that led to the state, of which outputs within the next are made, too; 0: unknown."""
-        return float(self.loop.clock.now - self.loop.clock.previous)
-
-    def stand_at(self, t: float, steps: int, last_step: float, last_rho: float, interval: float) -> None:
-        """Be between two steps, at t (s)."""
-        clock = self.loop.clock
-        clock.now, clock.last_dt, clock.last_rho, self.loop.counts.steps = t, last_step, last_rho, steps
-        for line in self.lines:
-            line.books.counts.repeats = 0  # of a step that was tried when it was taken back
-        self.loop.stand_between(interval, self.resolution.one.step)
-        self._logged = self._spent()
-
-    # --- the file -----------------------------------------------------------------------------------
-
-    @property
-    def turned(self) -> bool:
-        """Whether moments are given at points."""
-        return any(getattr(point, "moment", None) is not None for point in self.system.points.values())
-
-    @property
-    def files(self) -> dict[str, str]:
-        """Digests of the files of motions and loads, by path, of all that holds at some time."""
-        found = files_of(self.system)
-        for x in self.changes:
-            found |= files_of(x.scene)
-        return found
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """Arc lengths (m) of its events."""
-        return self.file.span
-
-    @property
-    def noted(self) -> Sink:
-        """What notes events of the whole run."""
-        return self.file.noted
-
-    def note(self, kind: str, text: str, **more: float) -> None:
-        """Note an event of the whole run, now."""
-        self.noted.event(self.t, *self.span, kind, text, **more)
-
-    def _go_on(self, source: Path) -> Recorder:
+    def go_on(self, source: Path) -> Recorder:
         """Be where the checkpoint of a result is, and write behind its rows; ResultError: that cannot be."""
         with opened(source) as file:
             point = read_checkpoint(file)
@@ -305,72 +137,6 @@ class NetworkRun:
             recorder.event(point.t, *self.file.span, OTHER_PROGRAM, why)
         self._begin, self._checked = clock_now() - self.cpu, self.steps
         return recorder
-
-    @property
-    def is_due(self) -> bool:
-        """Whether the file is to be brought up to date, by the clock."""
-        return not isinstance(self.recorder, ComparisonRecorder) and self.recorder.due
-
-    def keep(self, last: bool = False) -> None:
-        """Keep a checkpoint where one is due, by the work done, and bring the file up to date; last: it is the end."""
-        if isinstance(self.recorder, ComparisonRecorder):
-            return
-        new = self.kept and self._between and self.steps != self._checked
-        new = new and (self._checked < 0 or last or (self.steps - self._checked) * self.model.cells >= WORK)
-        if not (new or self.recorder.due):
-            return
-        begin = monotonic()
-        self.record_samples()
-        self.write_log()
-        self.ends_of_now()
-        for line in self.lines:
-            line.write_down()
-            line.write_envelope(self.t)
-        self.recorder.replace(self.quantities.range_values())
-        self.gather_events()
-        made = monotonic() - begin
-        if new and isinstance(self.recorder, Recorder):
-            begins_late = self._checked < 0 and self.recorder.is_late
-            self.cpu, self._checked = clock_now() - self._begin, self.steps
-            self.recorder.checkpoint(lambda: content(self))
-            if begins_late and not self.recorder.due:
-                return
-        if not last:
-            self.recorder.flush(made)
-
-    def gather_events(self) -> None:
-        """Record the events of the lines, in the result of the system with their names, as they happened."""
-        self.contact.note_meetings()
-        self.file.gather()
-
-    def _output(self) -> None:
-        """Record points, bodies and lines as they are, where an output is due."""
-        while not self.loop.sample():
-            self.record_samples()
-        self.record_samples()
-
-    def record_samples(self) -> None:
-        """Record what has been sampled of points, bodies and lines."""
-        count = int(self.loop.counts.samples)
-        if not count:
-            return
-        self.loop.counts.samples = 0
-        states = [line.sampled(count) for line in self.lines]
-        seen = Sampled(states, self.loop.body_samples[:count])
-        self.file.save(seen)
-        for look in self.parts.at_output:
-            look(seen)
-        for line, x in zip(self.lines, states, strict=True):
-            line.output(x)
-
-    def _close(self, status: str, message: str) -> None:
-        """Close all, with the events of the lines in the result of the points too."""
-        for line in self.lines:
-            line.finish(self.t, status)
-        self.gather_events()
-        for part in self.parts:
-            part.finish(status)
-        self.file.close(status, message)
 
     # --- what is computed ---------------------------------------------------------------------------
 
@@ -399,11 +165,6 @@ class NetworkRun:
             self._close("complete", text)
         except LineFailed as failed:
             raise self.failed(failed) from None
-
-    @property
-    def touches(self) -> bool:
-        """Whether contact of a line with itself is computed."""
-        return any(model.line.bits & SELF_CONTACT for model in self.model.models)
 
     def record_motion(self, reporter: ProgressReporter, interrupted: Callable[[], bool]) -> None:
         """Compute the motion and record it; KeyboardInterrupt after `interrupted`, with the file complete till then."""
@@ -511,7 +272,7 @@ class NetworkRun:
         for point, text in blended_of_lines(self.system):
             if text:
                 self.noted.event(0.0, *self.file.place(point), "motion blended in", text)
-        for kind, text in self._notes:
+        for kind, text in self.notes:
             self._note(kind, text)
         self.balance()
         for part in self.parts:
@@ -533,8 +294,8 @@ class NetworkRun:
         self.renew_other()
         self._attach()
         self._output()
-        if self._begun is not None:
-            self._begun(self)
+        if self.begun is not None:
+            self.begun(self)
         self.gather_events()
         self._between = True
         self.loop.set_quota(LOOK if self.loop.counts.asks else ROWS)
@@ -724,33 +485,6 @@ class NetworkRun:
         for line in self.lines:
             line.books.counts.repeats = int(still)
 
-    def ends_of_now(self) -> None:
-        """Let ends and sea be as they are now: compiled steps have moved them without Python."""
-        if not self.loop.counts.asks & b.ASK_BEFORE:
-            for model in self.model.models:
-                model.ends.at(self.t)
-                model.sea.at(self.t)
-
-    def _spent(self) -> float:
-        """Processor time of the run, s, to within `read_every`: to read it may take as long as ten steps."""
-        wall = monotonic()
-        if wall - self._read[0] > self.read_every:
-            self._read = wall, clock_now() - self._begin
-        return max(self._read[1], self._logged)
-
-    def write_log(self) -> None:
-        """Log the steps that have been made since this was called last."""
-        rows = self.loop.rows()
-        if not len(rows):
-            return
-        now = self._spent()
-        cpu = np.linspace(self._logged, now, len(rows) + 1)[1:]
-        self._logged = now
-        for log in self.parts.log:
-            log(rows[:, :, FORCE_COLUMNS])
-        for k, line in enumerate(self.lines):
-            line.log(np.column_stack([rows[:, k], cpu]))
-
     def _after_step(self) -> None:
         """What parts note of a step, and change after it."""
         notices = int(self.loop.counts.notices) | EVERY_STEP
@@ -787,19 +521,6 @@ class NetworkRun:
         if self.loop.due:
             self._attach()
             self._output()
-
-    def finish(self, status: str = "complete", message: str = "") -> None:
-        """Write what waits, and close the file."""
-        self.write_log()
-        for write in (self.record_samples, *(line.write_down for line in self.lines)):
-            if status == "complete":
-                write()
-            else:
-                with suppress(LineFailed):
-                    write()
-        if status != "failed":
-            self.keep(last=True)
-        self._close(status, message or f"{self.steps} steps")
 
     def failed(self, failed: LineFailed) -> ComputationError:
         """What a failure becomes: a file with all that there is, and an error that names the line."""
@@ -891,51 +612,3 @@ class NetworkRun:
         taken = self.solver.forces_in_motion(self.state, self.t)
         if taken.outcome != Outcome.OK:
             raise LineFailed(taken.line, taken.outcome, self.t, None, after)
-
-
-def line_scenes(system: Network, model: NetworkModel) -> dict[str, LineScene]:
-    """Scenes of the lines of a system by name, between points as they are first looked for."""
-    guesses, known = system.guesses, model.scenes
-    return {name: system.scene_of(name, system.carried(name), guesses, scene=known[name]) for name in model.names}
-
-
-def start_of(system: Network, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:
-    """The first state of a system, with its zones; moves: whether a motion begins there, else it is at rest."""
-    scenes = line_scenes(system, model)
-    if moves and system.starts_as_placed:
-        model, managers = zones_as_placed(scenes, model, criterion)
-        return Start(model, None, managers)
-    with at_once():
-        return start_at_rest(system, scenes, model, moves, criterion)
-
-
-def _torque_of(manager: DomainManager | None) -> Callable[[], float] | None:
-    """What gives the torque of a line as far as its rods do not carry it, N m; None: its zones stay."""
-    return None if manager is None else lambda: float(manager.torque)
-
-
-def run_system(
-    system: Network, target: Target | None, text: str, reporter: ProgressReporter,
-    interrupted: Callable[[], bool], name: str = RESULT, resolution: NetworkResolution | None = None,
-    recording: Recording = ALONE, criterion: UserCriterion | None = None,
-    changes: Sequence[LoadChange[Network]] = (),
-) -> NetworkRun:  # fmt: skip
-    """Compute the motion of a system into a file with checkpoints, into memory, or (target None) to be compared with.
-
-    name: of the pass; resolution, recording, criterion, changes: as of `NetworkRun`.
-    """
-    mode = recording.mode._replace(before=recording.mode.before or {})  # it can be resumed
-    recording = recording._replace(mode=mode, planes=True)
-    run = NetworkRun(system, target, text, True, resolution, recording, criterion, changes)
-    reporter.begin(name, run.resolution.one)
-    run.record_motion(reporter, interrupted)
-    return run
-
-
-def static_system(
-    system: Network, target: Target | None, text: Text, resolution: NetworkResolution | None = None, pending: str = ""
-) -> NetworkRun:
-    """Compute the equilibrium of a system under full loads; target, resolution, pending: as of `run_system`."""
-    run = NetworkRun(system, target, text, False, resolution, Recording(pending=pending))
-    run.record_equilibrium()
-    return run

@@ -63,7 +63,7 @@ class Filing(Protocol):
     def source(self) -> Any: ...
 
 
-class RecordedRun(RunOfLines, Protocol):
+class FiledRun(RunOfLines, Protocol):
     """A run, as its file sees it."""
 
     target: Target | None
@@ -85,7 +85,7 @@ def _notes(pending: str, manager: DomainManager | None) -> dict[str, str]:
 class LinesFile:
     """Points, bodies and pairs, with the result of each line in a group of its own."""
 
-    def __init__(self, run: RecordedRun, text: Text, asks: Filing) -> None:
+    def __init__(self, run: FiledRun, text: Text, asks: Filing) -> None:
         self._run, self._text, self._asks = run, text, asks
         self._memory: dict[str, MemoryTarget] = {}  # of the lines, where the result is kept in arrays
 
@@ -227,7 +227,7 @@ class LinesFile:
 class CableFile(LinesFile):
     """The result of the only line, which the scene of a cable was made into, as that of the cable."""
 
-    def __init__(self, run: RecordedRun, text: Text, asks: Filing) -> None:
+    def __init__(self, run: FiledRun, text: Text, asks: Filing) -> None:
         super().__init__(run, text, asks)
         assert asks.asked is not None
         self._asked, self._form = asks.asked, short_form(asks.asked.scene)
@@ -307,7 +307,7 @@ class CableFile(LinesFile):
         self._line.recorder.close(status, message)
 
 
-def file_of(run: RecordedRun, text: Text, asks: Filing) -> LinesFile:
+def file_of(run: FiledRun, text: Text, asks: Filing) -> LinesFile:
     """What a run is recorded in, by the names that its lines have in the scene; text: the scene."""
     form = CableFile if asks.asked is not None and "" in asks.asked.scene.lines else LinesFile
     return form(run, text, asks)

@@ -50,8 +50,7 @@ from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
-    from hybrid.simulation.payout_zones import PaidZones
-    from hybrid.simulation.run_payout import RunPayout
+    from hybrid.simulation.run_payout import PaidZones, RunPayout
     from hybrid.solve.network_solver import NetworkSolver
     from hybrid.solve.network_steps import NetworkSteps
 
@@ -274,7 +273,7 @@ class RunZones(Part):
 
     def _pay(self, payout: RunPayout) -> None:
         """Zones know of the winches of their lines, and these of them."""
-        from hybrid.simulation.payout_zones import PaidZones
+        from hybrid.simulation.run_payout import PaidZones
 
         run = self._run
         for x in self.lines:

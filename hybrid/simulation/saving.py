@@ -14,7 +14,7 @@ from hybrid.model.network import NetworkModel
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.run_checkpoint import checkpoint, set_state
-from hybrid.simulation.set_obstacles import Course
+from hybrid.simulation.stepped import Course
 from hybrid.solve.joined import NetworkState
 from hybrid.store.writer import Recorder
 

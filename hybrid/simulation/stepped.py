@@ -1,16 +1,19 @@
-"""What `hybrid.Simulation` gives out and takes in: states, forces, vectors that are checked."""
+"""What `hybrid.Simulation` gives out and takes in: states, forces, vectors that are checked, obstacles that are set."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from math import isfinite
 from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.obstacle_rows import SEEN_FORCE, SEEN_MOMENT, SEEN_TURN
+from hybrid.kernels.state.state import Floats, State, obstacles_now
+from hybrid.model.ends import STILL, DrivenEnd, rotation_vector
 from hybrid.model.mesh import Zone
+from hybrid.model.sea import Surroundings
 from hybrid.scene.root import SomeScene
 
 
@@ -110,3 +113,124 @@ def iterations_allowed(most: Any) -> int:
     if isinstance(most, bool) or not isinstance(most, int | np.integer) or most < 1:
         raise ValueError(f"most_iterations: expected a whole number of at least 1, found {most!r:.60}")
     return int(most)
+
+
+# Obstacles that a program outside moves, and what it reads there.
+
+# Of a step: what is set for so long at most is set for one step.
+ONE_STEP = 1.5
+Course = tuple[Triple, Triple | None, Triple]  # where an obstacle is to be, how fast, and how far it turns on the way
+
+
+class ObstacleState(NamedTuple):
+    """Place (3,) m of an obstacle, its rotation (3, 3) since t = 0, and the load of all lines.
+
+    Inertial: force (3,) N, and moment (3,) N m about its place.
+    """
+
+    position: Floats
+    rotation: Floats
+    force: Floats
+    moment: Floats
+
+
+class SettableObstacles:
+    """The obstacles of a scene that is stepped from outside."""
+
+    lock: Any
+    scene: Any
+    _courses: dict[str, Course]  # of those that are set for the next step
+    _moved: dict[str, None]  # those that have been set at all, in order
+
+    @property
+    def t(self) -> float:
+        """Time of the state, s."""
+        raise NotImplementedError
+
+    def _check_open(self) -> None:
+        raise NotImplementedError
+
+    def _states(self) -> list[tuple[Surroundings, State]]:
+        """The sea around each line, and the state of that."""
+        raise NotImplementedError
+
+    @one_thread
+    def set_obstacle(
+        self, name: str, position: Sequence[float] | Floats | None = None,
+        velocity: Sequence[float] | Floats | None = None, rotation: Floats | None = None,
+    ) -> None:  # fmt: skip
+        """Where an obstacle is to be at the end of the next step or `advance`, which it reaches smoothly.
+
+        name: of one with `from_outside`; position: (3,) m of its place `at`, inertial, None: where it is; velocity:
+        (3,) m/s there, None: as of `set_end`; rotation: (3, 3), about that place, since t = 0, None: as it is; less
+        than half a turn on the way.  One that is not set again stays where it is.  ValueError: there is no such one.
+        """
+        self._check_open()
+        now = self._obstacle_paths(name)[0].at(self.t)
+        there = triple(now[0] if position is None else position, "position")
+        speed, turn = None if velocity is None else triple(velocity, "velocity"), STILL
+        if rotation is not None:
+            wanted = numbers(rotation, "rotation")
+            proper = wanted.shape == (3, 3) and np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6)
+            if not (proper and np.linalg.det(wanted) > 0.0):
+                raise ValueError("rotation: expected a rotation matrix (3, 3), right-handed")
+            turn = triple(rotation_vector(now[2].T @ wanted), "rotation")
+        self._courses[name], self._moved[name] = (there, speed, turn), None
+
+    @one_thread
+    def obstacle(self, name: str) -> ObstacleState:
+        """Where an obstacle is now, and what the lines do to it.  ValueError: there is no such, or none moves."""
+        if name not in self.scene.obstacles:
+            raise ValueError(f"name: expected {_one_of(self.scene.obstacles)}, found {name!r:.60}")
+        if not any(x.moves for x in self.scene.obstacles.values()):
+            raise ValueError("no obstacle of the scene moves: write `from_outside: true` at one to read them")
+        k, found = list(self.scene.obstacles).index(name), []
+        for around, state in self._states():
+            around.roll_as(state)
+            found.append(obstacles_now(around.at(self.t), state)[k])
+        first, acting = found[0], np.sum(found, axis=0)
+        rotation = first[SEEN_TURN:SEEN_FORCE].reshape(3, 3).copy()
+        return ObstacleState(
+            first[:SEEN_TURN].copy(), rotation, acting[SEEN_FORCE:SEEN_MOMENT].copy(), acting[SEEN_MOMENT:].copy()
+        )
+
+    def _obstacle_paths(self, name: str) -> list[DrivenEnd]:
+        """An obstacle that is set from outside, as each line knows it."""
+        found = [around.driven[name] for around, _ in self._states() if name in around.driven]
+        if not found:
+            known = [x for x, obstacle in self.scene.obstacles.items() if obstacle.from_outside]
+            raise ValueError(f"name: expected {_one_of(known)} that has from_outside, found {name!r:.60}")
+        return found
+
+    def _move_obstacles(self, now: float, until: float, one_step: bool) -> None:
+        """Those that have been set are on their way from `now` to `until` (s); one_step: whether in one step."""
+        for name in self._moved:
+            ends = self._obstacle_paths(name)
+            course = self._courses.pop(name, None)
+            for end in ends:
+                if course is None:
+                    end.stay(now, until, one_step)
+                else:
+                    end.set(now, until, *course, one_step)
+
+    def _kept_courses(self) -> tuple[dict[str, Floats], dict[str, None], dict[str, Course]]:
+        """What is set of obstacles, in copies."""
+        paths = {name: ends[0].keep() for name, ends in self._all_driven()}
+        return paths, dict(self._moved), dict(self._courses)
+
+    def _bring_back_courses(self, kept: tuple[Mapping[str, Floats], Mapping[str, None], Mapping[str, Course]]) -> None:
+        """Be set as when `_kept_courses` was called."""
+        paths, moved, courses = kept
+        self._moved, self._courses = dict(moved), dict(courses)
+        for name, path in paths.items():
+            for end in self._obstacle_paths(name):
+                end.bring_back(path)
+
+    def _all_driven(self) -> Iterator[tuple[str, list[DrivenEnd]]]:
+        for name, x in self.scene.obstacles.items():
+            if x.from_outside:
+                yield name, self._obstacle_paths(name)
+
+
+def _one_of(names: Any) -> str:
+    return f"an obstacle of the scene ({', '.join(names) or 'there is none'})"

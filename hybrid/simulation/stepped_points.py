@@ -30,8 +30,16 @@ from hybrid.scene.network_scene import Network
 from hybrid.scene.points import Fairlead
 from hybrid.scene.short_form import ENDS, ShortForm
 from hybrid.simulation.network_run import NetworkRun
-from hybrid.simulation.set_obstacles import Course, SettableObstacles
-from hybrid.simulation.stepped import CableState, EndForces, numbers, one_thread, triple, vector
+from hybrid.simulation.stepped import (
+    CableState,
+    Course,
+    EndForces,
+    SettableObstacles,
+    numbers,
+    one_thread,
+    triple,
+    vector,
+)
 from hybrid.solve.joined import LineFailed
 from hybrid.solve.stepper import workspace_of
 

@@ -25,11 +25,11 @@ from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.layer_mesh import layered, rods_at_rest
 from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, with_survey
-from hybrid.simulation.network_run import NetworkRun, Recording, static_system
+from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.new_run import Recording, new_run, static_system
 from hybrid.simulation.run_file import Asked
 from hybrid.simulation.saving import Saved, bring_back, commit, defer, kept, recorders
-from hybrid.simulation.set_obstacles import ONE_STEP
-from hybrid.simulation.stepped import SLIVER, end_of_step, in_space, iterations_allowed, one_thread
+from hybrid.simulation.stepped import ONE_STEP, SLIVER, end_of_step, in_space, iterations_allowed, one_thread
 from hybrid.simulation.stepped_points import SteppedPoints
 from hybrid.solve.joined import LineFailed
 from hybrid.solve.network_steps import ROWS_OUTSIDE
@@ -122,7 +122,7 @@ class Simulation(SteppedPoints):
         recording = Recording(planes=self._system.dimension == 2, asked=Asked(self.scene))
         with self._form.said():
             cells, text = layers_at_rest(self._system), scene_text(self.scene)
-            run = NetworkRun(self._system, self._target, text, True, cells, recording, criterion)
+            run = new_run(self._system, self._target, text, True, cells, recording, criterion)
         run.loop.counts.most_iterations, run.loop.most_rows, run.read_every = most, ROWS_OUTSIDE, READ_OUTSIDE
         run.stepped_outside = True
         try:

@@ -11,7 +11,7 @@ import numpy as np
 
 import hybrid
 import hybrid.accuracy.refinement
-import hybrid.simulation.network_run
+import hybrid.simulation.run_record
 import hybrid.solve.run
 from hybrid.kernels.machine.cache import cache_folder
 from hybrid.simulation import progress as reports
@@ -70,7 +70,7 @@ class Stopping:
         monkeypatch.setattr(hybrid.accuracy.refinement, "LITTLE", np.inf)  # an event that goes by clocks
         monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)  # a step a call
         if checkpoints:  # every few steps; they are otherwise some seconds apart
-            monkeypatch.setattr(hybrid.simulation.network_run, "WORK", FEW_STEPS)
+            monkeypatch.setattr(hybrid.simulation.run_record, "WORK", FEW_STEPS)
         self.left, self.heard = -1, 0
 
     def __call__(self, progress: hybrid.simulation.progress.Progress) -> None:

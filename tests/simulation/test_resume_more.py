@@ -12,7 +12,7 @@ import pytest
 from bits import Stopping, differences
 
 import hybrid
-import hybrid.simulation.network_run
+import hybrid.simulation.run_record
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.short_form import network_of
@@ -261,9 +261,9 @@ def test_a_full_disk_loses_nothing(part, tmp_path):
         import resource
         from hybrid.cli.commands import main
         from hybrid.store import writer as record
-        import hybrid.simulation.network_run
+        import hybrid.simulation.run_record
         import hybrid.solve.run
-        hybrid.simulation.network_run.WORK = 0
+        hybrid.simulation.run_record.WORK = 0
         record._PART = 0.0
         record.pause = lambda made: 0.0
         hybrid.solve.run.CELL_STEPS = 1
@@ -461,8 +461,8 @@ def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
 
 def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeypatch):
     """By the work done: a run whose file is flushed at every pause has the same ones as one that never is."""
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 20 * 40)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 20 * 40)  # 40 steps of 20 cells
+    monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 20 * 40)
+    monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 20 * 40)  # 40 steps of 20 cells
     monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 20 * 7)  # a pause every 7 steps
     places, kept, keep = [], [], record.Recorder.checkpoint
 

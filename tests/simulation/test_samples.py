@@ -12,6 +12,7 @@ import pytest
 
 import hybrid
 import hybrid.simulation.network_run
+import hybrid.simulation.run_record
 from hybrid.errors import SceneError
 from hybrid.simulation import line_result, network_run, progress
 from hybrid.store.recorder import BaseRecorder
@@ -248,7 +249,7 @@ def test_a_run_that_stops_between_outputs_goes_on_bit_for_bit(
         scene["time"] = {"duration": 0.9}
         scene["accuracy"] = {"tension": "5%"}
     monkeypatch.setattr(hybrid.simulation.network_run, "ROWS", 1)
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 1)
+    monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 1)
     monkeypatch.setattr(progress, "REPORT_EVERY", -1.0)
     whole, path, heard = tmp_path / "whole.h5", tmp_path / "run.h5", 0
     hybrid.run(scene, whole).close()

@@ -10,7 +10,7 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
-import hybrid.simulation.network_run
+import hybrid.simulation.run_record
 from hybrid.errors import ResultError, SceneError
 from tests.combinations.pairs import as_network, scene_of
 
@@ -167,7 +167,7 @@ def test_a_run_goes_on_beyond_its_end_as_if_it_had_been_that_long(tmp_path: Path
 @pytest.mark.long
 def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every line has an output as soon as the points have it; extremes are those up to now."""
-    monkeypatch.setattr(hybrid.simulation.network_run, "WORK", 0)  # the file is written whenever the run looks
+    monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 0)  # the file is written whenever the run looks
     monkeypatch.setattr(hybrid.simulation.progress, "REPORT_EVERY", 0.0)
     path, seen = tmp_path / "run.h5", []
 

@@ -15,7 +15,7 @@ from hybrid.errors import Outcome, SceneError
 from hybrid.kernels.junctions import bodies as k
 from hybrid.model.bodies import angles_of, body_model, frame_of
 from hybrid.scene.bodies import FreeBody
-from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.new_run import new_run
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
 
@@ -117,7 +117,7 @@ def test_damping_takes_the_energy_that_it_says() -> None:
 
 def spun(rho: float, steps: int) -> tuple[NetworkSolver, NetworkState, list[np.ndarray]]:
     """A torque-free body that tumbles about its middle axis, beside a line that it does not touch."""
-    run = NetworkRun(hybrid.Scene.model_validate(moored()), io.BytesIO(), "", moves=False)
+    run = new_run(hybrid.Scene.model_validate(moored()), io.BytesIO(), "", moves=False)
     x = run.found.solver.lines[0]
     ends = x.ends._replace(held=np.ones(2, np.int8), position=run.found.state.lines[0].r[[0, -1]])
     held = x._replace(joints=(-1, -1), ends=ends)

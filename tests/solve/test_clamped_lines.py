@@ -20,6 +20,7 @@ from hybrid.model.build import build
 from hybrid.model.network import build_system
 from hybrid.scene.short_form import network_of
 from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.new_run import new_run
 
 LENGTH, CELLS, A, B = 100.0, 40, [0.0, 0.0, 0.0], [70.0, 10.0, -20.0]
 SECTION = {
@@ -68,7 +69,7 @@ def in_pieces(
 
 
 def equilibrium(tables: dict[str, Any]) -> NetworkRun:
-    return NetworkRun(hybrid.Scene.model_validate(tables), io.BytesIO(), "", moves=False)
+    return new_run(hybrid.Scene.model_validate(tables), io.BytesIO(), "", moves=False)
 
 
 def test_offsets_of_a_point_to_which_lines_are_clamped() -> None:

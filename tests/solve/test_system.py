@@ -16,6 +16,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import Model, build
 from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.new_run import new_run
 from hybrid.solve.joined import JoinedLine, NetworkState, joined_ends
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import Stepper
@@ -134,7 +135,7 @@ def equilibrium(tables: dict[str, Any]) -> NetworkRun:
     """The equilibrium of a system, not yet written."""
     import io
 
-    return NetworkRun(hybrid.Scene.model_validate(tables), io.BytesIO(), "", moves=False)
+    return new_run(hybrid.Scene.model_validate(tables), io.BytesIO(), "", moves=False)
 
 
 def test_a_bridle_without_weight_against_its_force_polygon() -> None:

@@ -1,0 +1,243 @@
+"""A new run of a network: its start, or that of a checkpoint, and with it its lines, its parts and its file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+from weakref import proxy
+
+import numpy as np
+
+from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.zone_rules import UserCriterion
+from hybrid.kernels.state.state import state_for
+from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.model.plan import output_times
+from hybrid.model.sections import OutputPoints
+from hybrid.scene.network_scene import Network
+from hybrid.scene.schema import LineScene
+from hybrid.simulation.floating_watch import FloatingWatch
+from hybrid.simulation.line_result import LineResult, Wanted
+from hybrid.simulation.lone_planes import LonePlanes
+from hybrid.simulation.network_run import First, NetworkRun
+from hybrid.simulation.parts import Part, Parts
+from hybrid.simulation.progress import RESULT, ProgressReporter, at_once
+from hybrid.simulation.restart import LoadChange
+from hybrid.simulation.restore import kept_resolution
+from hybrid.simulation.run_checkpoint import kept_changes
+from hybrid.simulation.run_contact import RunContact
+from hybrid.simulation.run_cuts import Cuts
+from hybrid.simulation.run_failures import Failures
+from hybrid.simulation.run_file import Asked, file_of
+from hybrid.simulation.run_of_lines import WatchedLines, loaded_as, with_loads_of
+from hybrid.simulation.run_quantities import Rotations, RunQuantities
+from hybrid.simulation.run_zones import RunZones, Start, managers_for, start_at_rest, zones_as_placed
+from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
+from hybrid.solve.joined import NetworkState
+from hybrid.solve.network_steps import NetworkSteps
+from hybrid.store.array_contents import Target
+from hybrid.store.format import Text
+from hybrid.store.writer import AT_ONCE, WriteMode
+
+if TYPE_CHECKING:  # what a run without winches does not load
+    pass
+
+
+class Recording(NamedTuple):
+    """What there is beside a run: around it, before it and after it.
+
+    mode: how a file is written; source: the result to go on with, from its checkpoint, in place of a start; pending:
+    what is to come when it is complete (store.records); notes: events (kind, text) of the whole of the run; begun:
+    called behind the first output; planes: whether lines that are joined to nothing are computed in the planes in
+    which they lie; start: the first state, if it is known; points: of outputs of lines by name, None: those of
+    their scenes; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself
+    where lines come near themselves, else that is only noticed; error: whether that of leaving bending out is followed,
+    of lines whose resolution says so; asked: what the network was made of, by whose names it gets its file.
+    """
+
+    mode: WriteMode = AT_ONCE
+    source: Path | None = None
+    pending: str = ""
+    notes: Sequence[tuple[str, str]] = ()
+    begun: Callable[[NetworkRun], None] | None = None
+    planes: bool = False
+    start: Start | None = None
+    points: Mapping[str, OutputPoints] | None = None
+    until: float | None = None
+    touches: bool = True
+    error: bool = False
+    asked: Asked | None = None
+
+
+ALONE = Recording()
+
+
+def new_run(
+    system: Network, target: Target | None, text: Text, moves: bool,
+    resolution: NetworkResolution | None = None, recording: Recording = ALONE,
+    criterion: UserCriterion | None = None, changes: Sequence[LoadChange[Network]] = (),
+) -> NetworkRun:  # fmt: skip
+    """A run that stands at its start, or at a checkpoint.
+
+    target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether its
+    motion is wanted, else its equilibrium under full loads; resolution: how finely, None: as the scene asks for, or the
+    checkpoint says; criterion: one more for zones that move (adapt.zone_rules); changes: loads and motions of these
+    systems hold from some time on.
+    """
+    end = (recording.until or system.require_time().duration) if moves else 0.0
+    changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < end]
+    if recording.source is None:
+        first = _at_start(system, resolution, recording.start, moves, criterion)
+    else:
+        first = _at_checkpoint(system, recording.source, changes, criterion)
+    kept = recording.mode.before is not None and isinstance(target, Path)
+    run = NetworkRun(first, _steps(first, moves, end), target, criterion, kept)
+    run.changes, run.notes, run.begun = changes, recording.notes, recording.begun
+    _equip(run, first, system, text, recording)
+    run.recorder = run.file.begin() if recording.source is None else run.go_on(recording.source)
+    return run
+
+
+def _at_start(
+    system: Network, resolution: NetworkResolution | None, start: Start | None, moves: bool,
+    criterion: UserCriterion | None,
+) -> First:  # fmt: skip
+    """The equilibrium of a system, or its lines as they are placed, unless its start is known."""
+    if start is None:
+        start = start_of(system, build_system(system, resolution=resolution), moves, criterion)
+    state = NetworkState([x.start for x in start.model.models], start.model.body_places)
+    state = (state if start.found is None else start.found.state).copy()
+    scenes = line_scenes(system, start.model)
+    return First(system, start.model, state, start.found, start.managers, [*scenes.values()], 0, False)
+
+
+def _at_checkpoint(
+    system: Network, source: Path, changes: Sequence[LoadChange[Network]], criterion: UserCriterion | None
+) -> First:
+    """Blank states of the lines of a system, which is loaded as where the checkpoint of a result is."""
+    model = build_system(system, resolution=kept_resolution(system, source))
+    changed = kept_changes(source, len(changes))
+    scenes = line_scenes(system, model)
+    managers = managers_for(scenes, model, criterion)  # as at the start, whatever loads came later
+    if changed:
+        system = changes[changed - 1].scene
+        model = loaded_as(model, system, 0.0)
+    for k, x in managers.items():
+        x.load(model.models[k].ends.moments)
+    state = NetworkState([state_for(x.line) for x in model.models], np.zeros_like(model.body_places))
+    return First(system, model, state, None, managers, [*scenes.values()], changed, True)
+
+
+def _steps(first: First, moves: bool, end: float) -> NetworkSteps:
+    """The steps of a run to its end (s), 0 where nothing moves, with outputs on the way."""
+    resolution = first.model.resolution
+    one, times = resolution.one, list[float]()
+    turn = min(x.turn for x in resolution.lines.values())
+    if not moves:
+        return NetworkSteps(0.0, [0.0], most_turn=turn)
+    times = output_times(first.scenes[0])
+    if one.every > 1:  # a run to compare with has as many times fewer
+        times = [*times[one.every - 1 : -1 : one.every], times[-1]]
+    if end < times[-1]:
+        times = [*(t for t in times if t < end), end]
+    follow = (one.step, one.shortest) if one.local is not None else (0.0, 0.0)
+    return NetworkSteps(first.system.require_time().rho_inf, [0.0, *times], *follow, turn)
+
+
+def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording: Recording) -> None:
+    """Give a run its file, its lines and its parts; system: with the loads of its start."""
+    me = proxy(run)  # for parts: in a circle a run would wait for the search for garbage
+    moves, named = run.moves, dict(zip(first.model.names, first.scenes, strict=True))
+    parts: list[Part] = []
+    if moves and any(x.payout is not None for x in run.model.models):
+        from hybrid.simulation.run_payout import RunPayout
+
+        run.payout = RunPayout(me)
+        parts.append(run.payout)
+    run.rotations = Rotations(system, run.model)
+    run.file = file_of(me, text, recording)
+    _add_lines(run, first, recording)
+    run.contact = RunContact(me, recording.touches, run.target is not None)
+    if recording.planes and moves:
+        run.planes = LonePlanes(me, run.loop.counts, system.dimension == 2)
+        parts.append(run.planes)
+    shaken = zip(named.items(), run.resolution.lines.values(), strict=True)
+    vibrations = {name: VibrationSteps(scene, x) for (name, scene), x in shaken}
+    run.quantities = RunQuantities(system, run.file.of_quantities(named))
+    if moves:
+        run.quantities.keep_ranges(run.lines)
+    run.failures, run.cuts = Failures(me), Cuts(me, run.target is None)
+    if first.managers and moves:
+        run.zones = RunZones(me, first.managers, run.payout)
+        parts.append(run.zones)
+    parts += [WatchedLines(me), run.contact, run.cuts, run.failures, VibrationsOfLines(vibrations, run.loop.clock)]
+    run.parts = Parts([*parts, run.quantities, run.rotations, FloatingWatch(me, moves)])
+
+
+def _add_lines(run: NetworkRun, first: First, recording: Recording) -> None:
+    """Give a run its lines, each with what records it."""
+    reels, points = run.payout.lines if run.payout is not None else {}, recording.points or {}
+    run.lines = []
+    every = zip(run.model.names, first.scenes, run.model.models, run.state.lines, strict=True)
+    for k, (name, scene, model, state) in enumerate(every):
+        manager, error = first.managers.get(k), recording.error and model.follows_error
+        record = partial(run.file.line_recorder, manager=manager) if run.target is not None else None
+        wanted = Wanted(record, points.get(name), error, _torque_of(manager))
+        shown, outputs = run.file.scene_of(scene), len(run.times)
+        line = LineResult(k, name, shown, model, run.found, state, outputs, wanted, reels.get(k))
+        run.lines.append(line)
+        line.manager = manager
+    if not first.resumed:
+        for line in run.lines:
+            line.diagnostics.begin()
+
+
+def line_scenes(system: Network, model: NetworkModel) -> dict[str, LineScene]:
+    """Scenes of the lines of a system by name, between points as they are first looked for."""
+    guesses, known = system.guesses, model.scenes
+    return {name: system.scene_of(name, system.carried(name), guesses, scene=known[name]) for name in model.names}
+
+
+def start_of(system: Network, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:
+    """The first state of a system, with its zones; moves: whether a motion begins there, else it is at rest."""
+    scenes = line_scenes(system, model)
+    if moves and system.starts_as_placed:
+        model, managers = zones_as_placed(scenes, model, criterion)
+        return Start(model, None, managers)
+    with at_once():
+        return start_at_rest(system, scenes, model, moves, criterion)
+
+
+def _torque_of(manager: DomainManager | None) -> Callable[[], float] | None:
+    """What gives the torque of a line as far as its rods do not carry it, N m; None: its zones stay."""
+    return None if manager is None else lambda: float(manager.torque)
+
+
+def run_system(
+    system: Network, target: Target | None, text: str, reporter: ProgressReporter,
+    interrupted: Callable[[], bool], name: str = RESULT, resolution: NetworkResolution | None = None,
+    recording: Recording = ALONE, criterion: UserCriterion | None = None,
+    changes: Sequence[LoadChange[Network]] = (),
+) -> NetworkRun:  # fmt: skip
+    """Compute the motion of a system into a file with checkpoints, into memory, or (target None) to be compared with.
+
+    name: of the pass; resolution, recording, criterion, changes: as of `new_run`.
+    """
+    mode = recording.mode._replace(before=recording.mode.before or {})  # it can be resumed
+    recording = recording._replace(mode=mode, planes=True)
+    run = new_run(system, target, text, True, resolution, recording, criterion, changes)
+    reporter.begin(name, run.resolution.one)
+    run.record_motion(reporter, interrupted)
+    return run
+
+
+def static_system(
+    system: Network, target: Target | None, text: Text, resolution: NetworkResolution | None = None, pending: str = ""
+) -> NetworkRun:
+    """Compute the equilibrium of a system under full loads; target, resolution, pending: as of `run_system`."""
+    run = new_run(system, target, text, False, resolution, Recording(pending=pending))
+    run.record_equilibrium()
+    return run
