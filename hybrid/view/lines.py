@@ -46,8 +46,9 @@ class AllLines:
 
     @cached_property
     def position(self) -> np.ndarray:
-        """Places of all points (nt, n, 3), m."""
-        return np.concatenate([x.position[: self.outputs] for x in self.lines.values()], axis=1)
+        """Places of all points (nt, n, 3), m; of a line alone no copy, which may be large."""
+        each = [x.position[: self.outputs] for x in self.lines.values()]
+        return each[0] if len(each) == 1 else np.concatenate(each, axis=1)
 
     @property
     def s(self) -> np.ndarray:
