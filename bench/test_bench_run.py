@@ -259,7 +259,7 @@ def test_switches_of_zones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
         return inside
 
-    for method in ("wants_more_rod", "accepted", "_switch"):
+    for method in ("wants_retry", "note_step", "_switch"):
         monkeypatch.setattr(RunZones, method, timed(method, getattr(RunZones, method)))
     from test_bench_cells import CASES, DRIFT, scene_of
 

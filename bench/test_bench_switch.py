@@ -96,17 +96,17 @@ def four_lines() -> Text:
 def test_switch_of_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each line that changes, what follows for all of them included; the outputs that it has to write before apart."""
     monkeypatch.setattr(initial_zones, "shares_asked", lambda *_: {CURVATURE: SHARE})
-    written, changing, attaching, adapt = list[float](), list[float](), list[float](), RunZones.adapt
+    written, changing, attaching, change = list[float](), list[float](), list[float](), RunZones.after_step
 
     def without_outputs(zones: RunZones) -> None:
         begin, before = process_time(), sum(written)
-        adapt(zones)
+        change(zones)
         changing.append(1e6 * (process_time() - begin) - (sum(written) - before))
         outputs.append(sum(written) - before)
 
     outputs, changed = list[float](), 0
     hybrid.run(four_lines())  # the first compiles
-    monkeypatch.setattr(RunZones, "adapt", without_outputs)
+    monkeypatch.setattr(RunZones, "after_step", without_outputs)
     monkeypatch.setattr(NetworkRun, "_attach", timed(NetworkRun._attach, attaching, process_time))
     monkeypatch.setattr(LineResult, "write_down", timed(LineResult.write_down, written, process_time))
     for _ in range(ROUNDS):
