@@ -65,9 +65,12 @@ def stats(
         from hybrid.store.histories import component_of, usual_names
 
         if opened.lines and (names is None or not all(component_of(opened, name)[0] in opened for name in names)):
-            own = ",".join(usual_names(opened))
-            fix = f"--line {next(iter(opened.lines))}" + (f", or --names {own}" if own else "")
-            raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      {fix}")
+            first, *others = opened.lines
+            if others:
+                own = ",".join(usual_names(opened))
+                fix = f"--line {first}" + (f", or --names {own}" if own else "")
+                raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      {fix}")
+            opened = opened.lines[first]
         from hybrid.store.envelope import stored_window
         from hybrid.store.statistics_table import rows_of, values_of
 

@@ -239,6 +239,13 @@ def test_a_line_alone_is_drawn_in_all_detail(alone: hybrid.Result) -> None:
     assert plot_energy(alone).lines and plot_shape(alone).lines and plot_quantity(alone, "curvature").lines
 
 
+def test_statistics_are_those_of_the_only_line(alone: hybrid.Result) -> None:
+    """With a name it was to be named in the command, too."""
+    told = CliRunner().invoke(app, ["stats", str(alone.file), "--json"])
+    rows = [json.loads(x) for x in told.output.splitlines()]
+    assert told.exit_code == 0 and {"tension", "curvature"} <= {x.get("quantity") for x in rows}
+
+
 def test_a_report_of_one_line_has_all_that_is_known_of_it(alone: hybrid.Result) -> None:
     """Of a line with a name cards of loads, zones over time, and energies were left out."""
     text = html(alone)
