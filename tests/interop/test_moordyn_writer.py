@@ -14,7 +14,8 @@ import hybrid
 from hybrid.interop.moordyn import export_moordyn, import_moordyn
 from hybrid.interop.moordyn.writer import deck_of
 from hybrid.scene.network_scene import Network
-from hybrid.scene.read import read_text, scene_text
+from hybrid.scene.read import as_scene, read_text, scene_text
+from hybrid.scene.short_form import network_of
 
 
 class Straight:
@@ -214,3 +215,14 @@ def test_clamps_of_several_lines_are_rods_and_come_back(tmp_path: Path) -> None:
     held["end"]["bend_stiffness"] = 1e3
     with pytest.raises(hybrid.SceneError, match=r"lines\.pipe\.connections\.end"):
         back(Network.model_validate(tables), tmp_path)
+
+
+@pytest.mark.parametrize(("form", "where"), [(as_scene, "ends.end"), (lambda x: network_of(as_scene(x)), "points.end")])
+def test_a_guided_end_is_refused(form: Any, where: str) -> None:
+    section = {"length": 12.0, "mass": 2.0, "bending_stiffness": 5.0}
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "guided", "tangent": [1, 0, 0]}}
+    straight = {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}
+    made = {"cable": {"sections": [section]}, "ends": ends, "initial": straight, "model": "rod", "mesh": {"cells": 12}}
+    scene = form(made | {"time": {"duration": 0.02, "step": 0.01}})
+    with pytest.raises(hybrid.SceneError, match=rf"{where}\n.*guided"):
+        deck_of(hybrid.run(scene))

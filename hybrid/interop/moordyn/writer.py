@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
 from textwrap import shorten
 from typing import Any, Protocol
@@ -25,6 +25,7 @@ from hybrid.interop.moordyn.bodies import body_row
 from hybrid.interop.moordyn.tables import NEAR
 from hybrid.scene.cable import Section
 from hybrid.scene.read import read_text
+from hybrid.scene.short_form import network_of, short_form
 
 Triple = tuple[float, float, float]
 NO_BED = 1e4  # m under the surface, where a scene has none
@@ -100,15 +101,16 @@ def deck_of(result: Computed) -> WrittenDeck:
     SceneError, with every complaint, if the scene has what MoorDyn has not.
     """
     scene, _ = read_text(result.scene_text)
-    shapes = {name: _shape(line) for name, line in result.lines.items()} or {"": _shape(result)}
-    writer = _Writer(scene, shapes)
+    form, lines = short_form(scene), result.lines or {"": result}
+    writer = _Writer(network_of(scene), {name: _shape(lines[called]) for name, called in form.names.items()})
     for name in scene.bodies:
         place, turned = (result[f"bodies/{name}/{key}"][0].tolist() for key in ("position", "rotation"))
         writer.add_body(name, place, turned)
     text = writer.text()
     if writer.complaints:
-        raise SceneError(list(dict.fromkeys(writer.complaints)), shorten(scene.title, 60, placeholder=" …"))
-    return WrittenDeck(text, tuple(dict.fromkeys(writer.notes)))
+        found = [replace(x, where=form.text(x.where)) for x in writer.complaints]
+        raise SceneError(list(dict.fromkeys(found)), shorten(scene.title, 60, placeholder=" …"))
+    return WrittenDeck(text, tuple(dict.fromkeys(map(form.text, writer.notes))))
 
 
 def _shape(result: Any) -> _Shape:
@@ -160,8 +162,7 @@ class _Writer:
         self._sea()
         made = {name: self._free_or_fixed(name) for name in self.scene.points}
         for name, line in self.scene.lines.items():
-            ends = self._joined_ends(name, line, made) if name else [self._end(end) for end in ("start", "end")]
-            self._line(self.scene.key_of(name), name, line.cable, ends)
+            self._line(f"lines.{name}", name, line.cable, self._joined_ends(name, line, made))
         types = "".join(f"{name} {' '.join(map(_number, values))}\n" for values, name in self.types.items())
         numbered = "".join(f"{i} {row}\n" for i, row in enumerate(self.bodies.values(), 1))
         bodies = _BODIES + numbered if self.bodies else ""
@@ -206,7 +207,8 @@ class _Writer:
     def _options(self) -> Iterator[tuple[str, float]]:
         environment, bed = self.scene.environment, self.scene.environment.seabed
         depth = self.surface - bed.z if bed is not None else NO_BED
-        near = [width for width, low in self.widths if self.scene.points and low < self.surface - (1.0 - NEAR) * depth]
+        several = len(self.scene.lines) > 1  # a deck of one chain of lines is read on the largest width
+        near = [width for width, low in self.widths if several and low < self.surface - (1.0 - NEAR) * depth]
         width = max(near or [width for width, _ in self.widths], default=NO_DIAMETER)
         if bed is not None and any(x != width for x, _ in self.widths):
             self.notes.append(
@@ -238,10 +240,11 @@ class _Writer:
 
     def _joined(self, name: str, end: str, made: str) -> str:
         """What the end of a line is attached to: its point, which is made, or a rod that holds its direction there."""
-        held, line = self.scene.clamp(name, end), self.scene.lines[name]
-        if held is None:
+        held = self.scene.clamp(name, end)
+        if held is None or made == "0" or not self._bends(name, end):
             return made
-        where, point = f"lines.{name}.connections.{end}", self.scene.points[getattr(line, end)]
+        called = getattr(self.scene.lines[name], end)
+        where, point = f"lines.{name}.connections.{end}", self.scene.points[called]
         if point.kind == "free" or held.bend_stiffness is not None:
             expected = "a clamp without a spring at a fixed point or a fairlead, because a deck has no others"
             self._refuse(where, "clamped", expected, "leave the clamp out, for a comparison")
@@ -254,7 +257,14 @@ class _Writer:
             a = self._moved(shape.place_at(0.0 if end == "start" else shape.s[-1]))
         else:
             kind, a = f"Body{1 + list(self.bodies).index(point.body)}", point.place
-        return self._rod(kind, a, held.tangent, end)
+        rod = self._rod(kind, a, held.tangent, end)
+        if not made:
+            self.names.append(f"rod {rod[1:-1]}: {called}")
+        return rod
+
+    def _bends(self, name: str, end: str) -> bool:
+        """Whether a line resists bending at an end."""
+        return bool(self.scene.lines[name].sections[0 if end == "start" else -1].weakest_bending)
 
     def _rod(self, kind: str, a: Triple, tangent: Triple, end: str) -> str:
         """A rod without segments along a tangent, and its end that holds that end of a line."""
@@ -404,12 +414,20 @@ class _Writer:
         return str(len(self.points))
 
     def _free_or_fixed(self, name: str) -> str:
+        """What the deck has at a point; "": rods that hold the lines there, which come with them."""
         point = self.scene.points[name]
         line, end = self.scene.lines_at(name)[0]
         shape = self.shapes[line]
         if getattr(point, "break_at", None) is not None:
             self.notes.append(f"points.{name}.break_at is left out")
+        if point.kind == "guided":
+            expected = "a pinned, clamped or free end, or a body"
+            self._refuse(f"points.{name}", point.kind, expected, "MoorDyn has no guided ends")
+            return "0"
         if point.kind == "fixed":
+            here = self.scene.lines_at(name)
+            if all(self.scene.clamp(*x) is not None and self._bends(*x) for x in here):
+                return ""  # there are rods alone
             kind = "Coupled" if point.motion is not None else "Fixed"
             made = self._point(kind, shape.place_at(0.0 if end == "start" else shape.s[-1]), _Lump())
         elif point.kind == "free":
@@ -430,39 +448,6 @@ class _Writer:
         if end.kind == "body":
             lump.add(end, end.volume if self.fluid is not None else 0.0)
         return self._point("Free", place, lump)
-
-    def _end(self, name: str) -> str:
-        end, shape = getattr(self.scene.ends, name), self.shapes[""]
-        place = shape.place_at(0.0 if name == "start" else shape.s[-1])
-        kind = "Coupled" if end.prescribed_motion is not None else "Fixed"
-        if end.release is not None:
-            self.notes.append(f"ends.{name}.release_at is left out")
-        if getattr(end, "payout", None) is not None:
-            self.notes.append(f"ends.{name}.payout is left out: the line of the deck keeps its length at t = 0")
-        if end.kind in ("free", "body"):
-            made = self._loose(f"ends.{name}", end, place)
-        elif end.kind == "pinned":
-            made = self._point(kind, place, _Lump())
-        elif end.kind == "clamped":
-            made = self._clamp(end, name, kind, place)
-        else:
-            self._refuse(
-                f"ends.{name}", end.kind, "a pinned, clamped or free end, or a body", "MoorDyn has no guided ends"
-            )
-            return "0"
-        self.names.append(f"{'rod ' + made[1:-1] if made.startswith('R') else 'point ' + made}: {name}")
-        return made
-
-    def _clamp(self, end: Any, name: str, kind: str, place: Triple) -> str:
-        section = self.scene.cable.sections[0 if name == "start" else -1]
-        if not section.weakest_bending:
-            return self._point(kind, place, _Lump())
-        if end.bend_stiffness is not None:
-            expected = "a clamp without a spring, because a deck has no others"
-            self._refuse(f"ends.{name}.bend_stiffness", f"{end.bend_stiffness:g}", expected, "leave it out")
-        if not end.swivel:
-            self.notes.append(f"ends.{name} holds the twist; MoorDyn has none")
-        return self._rod(kind, self._moved(place), end.tangent, name)
 
 
 def _section_at(bounds: Sequence[float], s: float) -> int:
