@@ -247,7 +247,7 @@ def _without_contact(asked: _Asked, group: Group) -> LinesAtRest:
     if not touch and ways and {*ways.values()} == {"start"}:
         found = settled_with_friction(group, ways, _first_shapes(model))
     else:
-        found = (None if touch or "start" in ways.values() else _by_coarser(asked)) or _on_its_side(asked, group)
+        found = (None if touch or "start" in ways.values() else _by_coarser(asked, group)) or _on_its_side(asked, group)
     return found if touch else _keep_turns(model, asked.t, found)
 
 
@@ -318,7 +318,7 @@ def _crossed_obstacles(model: Model, state: State) -> Iterable[tuple[int, int]]:
     return passed_obstacles(model.sea.values, model.start.r, state.r)
 
 
-def _by_coarser(asked: _Asked) -> LinesAtRest | None:
+def _by_coarser(asked: _Asked, group: Group) -> LinesAtRest | None:
     """The equilibrium of lines of many cells: by Newton at once, or from that of a coarser mesh, easier to find.
 
     Of very many the coarser one comes first: where Newton fails at once, that costs more than all the rest.
@@ -329,7 +329,6 @@ def _by_coarser(asked: _Asked) -> LinesAtRest | None:
     if not any(fewer):
         return None
     coarse = replace(model, models=tuple(x or y for x, y in zip(fewer, model.models, strict=True)))
-    group = group_of(model, asked.t, asked.bodies)
     ways = [partial(_on_its_side, asked, group, quick=True), partial(_from_coarser, asked, group, coarse)]
     for way in ways if max(x.cells for x in model.models) <= MANY else ways[::-1]:
         try:
@@ -342,9 +341,10 @@ def _by_coarser(asked: _Asked) -> LinesAtRest | None:
 def _from_coarser(asked: _Asked, group: Group, coarse: NetworkModel) -> LinesAtRest:
     """From the equilibrium of lines with fewer cells; LineFailed: there is none, or it leads to none."""
     easier = asked._replace(model=coarse)
-    found = _by_coarser(easier) or _on_its_side(easier, group_of(coarse, asked.t, asked.bodies))
+    few = group_of(coarse, asked.t, asked.bodies)
+    found = _by_coarser(easier, few) or _on_its_side(easier, few)
     each = zip(found.state.lines, coarse.models, asked.model.models, strict=True)
-    states = [state if few is full else refined(state, few.line, full.line) for state, few, full in each]
+    states = [state if x is full else refined(state, x.line, full.line) for state, x, full in each]
     shape = f"the equilibrium with {coarse.cells} cells{f', {PUSHED}' if found.pushed else ''}"
     return _on_its_side(asked, group, (shape, NetworkState(states, found.state.bodies)), quick=True)
 

@@ -70,6 +70,16 @@ def test_still_water_changes_nothing_where_no_current_acts() -> None:
     assert np.abs(one.position[0, :, 1]).max() < 1e-9
 
 
+@pytest.mark.long
+def test_a_network_is_found_that_friction_keeps_where_it_comes_to_rest() -> None:
+    """Two lines, too long for where they hang from a buoy: no way without friction leads to an equilibrium."""
+    found = hybrid.static(random_network(479)[1])
+    assert "settled with friction from" in found.attributes["static_path"]
+    largest = max(float(line.tension.max()) for line in found.lines.values())
+    assert found.attributes["static_residual"] < 1e-6 * largest
+    assert "unresolved bend" in {event.kind for event in found.lines["l0"].events}
+
+
 def test_friction_of_a_network_settles_while_its_current_grows() -> None:
     """A row of knots, buoys and lines that no step of the growing current led through at once."""
     found = hybrid.static(random_network(60)[1])
