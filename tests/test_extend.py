@@ -83,12 +83,9 @@ def test_what_needs_no_change_holds_as_it_is(tmp_path: Path) -> None:
 
 # After the proofs, in the process that has compiled the kernels: what carries the fields of a line, with the one that was
 # added, and the signatures of all that was read meanwhile.
-# Of the errors of neglected bending, which no proof follows, numba reads the kernel without making machine code.
 WALKS = """
-import numba, pytest
-from hybrid.kernels.watch.bending_error import advance_error
+import pytest
 assert pytest.main(["-q", "-n", "0", "-p", "no:cacheprovider", {walk!r}]) == 0, "a field that is not carried"
-advance_error.part.compile((numba.types.int64[::1],))
 """
 
 

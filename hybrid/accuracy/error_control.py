@@ -20,7 +20,7 @@ import numpy as np
 from hybrid.accuracy.error_order import COARSER
 from hybrid.accuracy.finer_result import NOT_KEPT, is_no_better, not_kept_text
 from hybrid.accuracy.line_errors import LineErrors
-from hybrid.accuracy.model_errors import Comparable, model_errors_of, with_model_errors
+from hybrid.accuracy.model_errors import Comparable, goes_by_cells, with_model_errors
 from hybrid.accuracy.refinement import COSTLY_ACCURACY, costly
 from hybrid.accuracy.run_forecast import Budget
 from hybrid.errors import ComputationError
@@ -38,8 +38,6 @@ Beside = AbstractContextManager[Sequence[Callable[[], Samples]]]
 class Compares(Comparable, Protocol):
     """What computes the runs that a result is compared with; all raise ComputationError."""
 
-    @property
-    def names(self) -> Mapping[str, str]: ...
     def beside(self, samples: Sequence[Callable[[], Samples]]) -> Beside:
         """Several of them at the same time (simulation.case)."""
 
@@ -247,9 +245,8 @@ class ErrorController:
             if anew:  # runs to compare with have other zones, or no contact
                 self._compare(resolution)
                 anew = self._is_compared
-            follows = all(x.follow for x in resolution.lines.values())
             judged = self._estimated(result, before, anew)
-            self._judge(result, judged, bool(stricter) and not anew and not follows)
+            self._judge(result, judged, bool(stricter) and not anew)
         except KeyboardInterrupt:  # in a run to compare with: the finer result stays beside, until it is resumed
             for name, x in self.lines.items():
                 x.go_back(kept[name])
@@ -307,11 +304,9 @@ class ErrorController:
         for line in self.lines.values():
             line.comparisons = None
         found: list[Samples | None] = [None, None, None]
-        follows = not any(x.follow for x in resolution.lines.values())  # else the result knows what bending does
-        plain = NetworkResolution({name: replace(x, follow=False) for name, x in resolution.lines.items()})
-        each = comparison_resolutions(plain, self.case.moves)
+        each = comparison_resolutions(resolution, self.case.moves)
         which = (0, 1, 2) if self.case.moves else (0, 2)  # without steps the second is the first
-        samples = [partial(self.case.sample, each[k], model=follows and k == 0) for k in which]
+        samples = [partial(self.case.sample, each[k]) for k in which]
         with self.case.beside(samples) as runs:
             for k, run in zip(which, runs, strict=True):
                 try:
@@ -322,30 +317,26 @@ class ErrorController:
                         return
                 if not k and (first := found[0]) is not None:
                     self._touching = {name for name, x in first.items() if x.touches}
-                    found[0] = with_model_errors(self.case, first, self.runs)
+        first = found[0]
+        if first is not None and not goes_by_cells(self.case, first):  # when no run beside reads the scene any more
+            found[0] = with_model_errors(self.case, first, self.runs)
         for name, line in self.lines.items():
             one, second, third = (None if x is None else x[name] for x in found)
             assert one is not None
             line.comparisons = one, second, third
 
     def _renew_model_errors(self, result: Samples) -> None:
-        """Zones are others than those whose model error is known: follow it on the mesh of the result."""
-        try:
-            found = model_errors_of(self.case, result, self.runs)
-        except ComputationError as error:
-            text = f"the effect of neglected bending is that of a run before: {str(error).splitlines()[0]}"
-            for line in self.lines.values():
-                line.note("error uncertain", text)
-            return
+        """What leaving bending out changes in the result, on its own cells."""
+        found = with_model_errors(self.case, result, self.runs)
         for name, line in self.lines.items():
-            if line.estimate is not None:
+            if line.estimate is not None and found[name] is not result[name]:
                 line.takes_model_errors(found[name])
 
     def _in_shorter_steps(self) -> Samples | None:
         """The first of the runs to compare with in steps as short as those of the result; None: it fails."""
         coarse = {name: x.comparisons[0] for name, x in self.lines.items() if x.comparisons is not None}
         finely = {k: x.resolution.coarser(1.0, 1.0 / COARSER) for k, x in coarse.items()}
-        finely = {k: replace(x, every=coarse[k].every, follow=False) for k, x in finely.items()}
+        finely = {k: replace(x, every=coarse[k].every) for k, x in finely.items()}
         try:
             return self._counted(self.case.sample(NetworkResolution(finely)))
         except ComputationError:

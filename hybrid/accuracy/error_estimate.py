@@ -28,7 +28,6 @@ from hybrid.accuracy.error_order import (
     as_halved,
     at_all_outputs,
     blended,
-    bounded,
     confirmed_order,
     exceeds,
     falls,
@@ -36,7 +35,6 @@ from hybrid.accuracy.error_order import (
     magnitude,
     order,
     refinement,
-    scaled,
     squares,
     start_change,
     start_order,
@@ -45,10 +43,10 @@ from hybrid.accuracy.error_order import (
     with_neighbours,
 )
 from hybrid.accuracy.snap_scatter import Between
-from hybrid.model.material import NO_DOUBT
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_sample import (
     END_FORCES,
+    NOT_ESTIMATED,
     RIGHT,
     Notes,
     Outputs,
@@ -110,7 +108,7 @@ class Estimate:
 
         None: it failed, or nothing moves.  from_rest: it begins from an equilibrium, or is one.  rubs: on obstacles.
         """
-        doubt = self._take(result)
+        self._take(result)
         self.shares_mixed = set[str]()
         both = [name for name in result.values if name in coarse.values]
         self._from_rest, self._rubs = from_rest, rubs
@@ -130,7 +128,6 @@ class Estimate:
         self.changes = {name: (found.change, found.before) for name, found in fall.items()}
         self.start = start_change(result, coarse), start_change(coarse, coarsest)
         self.set_model_errors(coarse)
-        self.notes += doubt
         self._coarse, self._of_steps = coarse, self._pair(rough, coarse)
         self.by_step: dict[str, np.ndarray] | None = (
             None  # errors by the time step, with their sign, once they are kept
@@ -235,27 +232,19 @@ class Estimate:
             del self._coarse, self._of_steps
         return self.by_step, self.by_mesh
 
-    def _take(self, result: RunSample) -> Notes:
-        """Take over a result, the model error that it knows of itself bounded if it is implausible: what to say."""
+    def _take(self, result: RunSample) -> None:
+        """Take over a result."""
         self.run, self._errors = result, None
         self._ratios: list[tuple[RunSample, RunSample, float]] = []  # `usual_ratio` of runs compared from here on
         # Times as large as they were thought to be, by an order that is known now, are errors of the run before.
         self.revised: dict[str, float] = {}
-        self._bound, doubt = bounded(result)
-        return doubt
 
     def set_model_errors(self, coarse: RunSample) -> None:
         """Take the model error of a coarser run: it hardly depends on cells and steps."""
-        self._errors, (self._model_bound, doubt) = None, bounded(coarse)
-        self.notes: Notes = (*coarse.notes, *doubt)
+        self._errors, self._model_every = None, coarse.every
+        self.notes: Notes = coarse.notes
         self._model: Mapping[str, Outputs] = {name: x for name, x in coarse.model_error.items() if len(x)}
-        self._model_every, self._model_doubt = coarse.every, coarse.doubt
         self._model_of = coarse.cells, coarse.every, coarse.catenary
-
-    @property
-    def doubt(self) -> np.ndarray:
-        """Where a linear estimate of the model error knows least (`RunSample.doubt`)."""
-        return self.run.doubt if self.run.model_error else self._model_doubt
 
     def set_apart(self, finer: RunSample) -> None:
         """A finer run is no better, and either may be wrong: the error is nowhere less than what they differ by."""
@@ -272,12 +261,14 @@ class Estimate:
         return before.size == after.size and bool((np.abs(before - after) > most).any())
 
     def lacks_model_errors(self) -> bool:
-        """Whether zones of the result have moved otherwise than those of the run that its model error is known by, or
+        """Whether the model error is not known, or of a run whose zones have moved otherwise, or of much longer cells.
 
-        its cells are so much shorter that it is another line.  Zones of coarse cells are rod where fine ones need not.
+        Zones of coarse cells are rod where fine ones need not be.
         """
         now, (cells, every, then) = self.run.catenary, self._model_of
-        if self.run.resolution.follow or self.run.model_error or not now.any():
+        if not (self._model or NOT_ESTIMATED in dict(self.notes)):
+            return True
+        if not now.any():
             return False
         if self.run.cells > LEAST_RATIO * COARSER * cells or not then.size:
             return True
@@ -288,7 +279,7 @@ class Estimate:
         """A finer run has become the result."""
         by_step, by_mesh = self._keep()
         before = self.run
-        self.notes = tuple(dict.fromkeys((*self.notes, *self._take(result))))
+        self._take(result)
         self.start = start_change(result, before), self.start[0]
         finer, shorter = result.cells / before.cells, self._shorter(result, before)
         other_zones = result.resolution.zones != before.resolution.zones
@@ -420,19 +411,11 @@ class Estimate:
         return ((SEVERAL, text),)
 
     def _model_error(self, quantity: str, a: int, b: int) -> np.ndarray | None:
-        """Errors of neglecting bending: what the run says of itself, else those of a coarser run."""
-        if quantity in self.run.model_error:
-            factors = self._bound[a:b] if self._bound is not None else None
-            return scaled(np.asarray(self.run.model_error[quantity][a:b]), factors)
+        """Errors of neglecting bending, of a coarser run."""
         if quantity not in self._model:
             return None
         known, own = around(every_of(self._count, self._model_every), a, b)
-        return at_all_outputs(self._model_at(quantity, own), known, a, b)
-
-    def _model_at(self, quantity: str, own: slice) -> np.ndarray:
-        """Errors of neglecting bending of the coarser run, at its own outputs."""
-        factors = self._model_bound[own] if self._model_bound is not None else None
-        return scaled(np.asarray(self._model[quantity][own]), factors)
+        return at_all_outputs(np.asarray(self._model[quantity][own]), known, a, b)
 
     @property
     def _count(self) -> int:
@@ -450,8 +433,7 @@ class Estimate:
         shapes: dict[str, dict[str, tuple[int, ...]]] = {cause: {} for cause in ("mesh", "time", "model", "total")}
         for quantity, name, shape in self._quantities():
             step, mesh = self._knows(name)
-            model = quantity in self.run.model_error or quantity in self._model
-            known = {"mesh": mesh, "time": mesh and step, "model": model, "total": mesh}
+            known = {"mesh": mesh, "time": mesh and step, "model": quantity in self._model, "total": mesh}
             size = shape[: 0 if quantity in END_FORCES.values() else 1]  # of vectors their length
             for cause in [cause for cause, there in known.items() if there]:
                 shapes[cause][quantity] = (self._count, *size)
@@ -460,9 +442,9 @@ class Estimate:
     def _quantities(self) -> Iterator[tuple[str, str, tuple[int, ...]]]:
         """All that have errors, the output that they are of (empty: it is not compared), and the shape of one of it."""
         names = {(END_FORCES | RIGHT).get(name, name): name for name in self.order}
-        for quantity in dict.fromkeys([*names, *self._model, *self.run.model_error]):
+        for quantity in dict.fromkeys([*names, *self._model]):
             name = names.get(quantity, "")
-            of = self.run.values[name] if name else (self.run.model_error or self._model)[quantity]
+            of = self.run.values[name] if name else self._model[quantity]
             yield quantity, name, of.shape[1:]
 
     def _knows(self, name: str) -> tuple[bool, bool]:
@@ -522,7 +504,7 @@ class Estimate:
         """All of it, as named arrays and plain values."""
         by_step, by_mesh = self._keep()
         known = every_of(self._count, self._model_every)
-        model = {name: at_all_outputs(self._model_at(name, slice(None)), known, 0, self._count) for name in self._model}
+        model = {name: at_all_outputs(np.asarray(x), known, 0, self._count) for name, x in self._model.items()}
         changes = {name: np.array(x) for name, x in self.changes.items()}
         found: Tree = {
             "order": self.order,
@@ -539,7 +521,7 @@ class Estimate:
         of = dict(zip(MODEL_OF, self._model_of, strict=True))
         found |= {"notes": self.notes, "run": self.run.checkpoint(), "model_of": of}
         between = {name: {"errors": x.errors, "order": x.order} for name, x in self.between.items()}
-        return found | {"doubt": self._model_doubt, "between": between}
+        return found | {"between": between}
 
     @classmethod
     def restored(cls, tree: Any, scene: LineScene, shape: tuple[int, int, int]) -> Self:
@@ -559,10 +541,7 @@ class Estimate:
         self.changes = {name: (float(x[0]), float(x[1])) for name, x in changes.items()}
         late, cells, model = (restored_outputs(tree[name], shape) for name in ("late", "cells", "model"))
         self.by_step, self.by_mesh, self._model, self._model_every = late, cells, model, 1
-        (self._bound, _), self._model_bound = bounded(self.run), None  # what is kept of a coarser run is bounded
         older = dict(zip(MODEL_OF, (1, 1, np.zeros(0)), strict=True))  # checkpoints of 0.6 do not say
-        sure = np.array(NO_DOUBT)  # of checkpoints of 0.6
-        self._model_doubt = matched({"doubt": tree.get("doubt", sure)}, {"doubt": sure}, "model error")["doubt"]
         count, every, catenary = matched(tree.get("model_of", older), older, "model error").values()
         if min(count, every) < 1 or catenary.shape not in ((0,), every_of(shape[0], every).shape):
             raise ValueError("a model error of no run")

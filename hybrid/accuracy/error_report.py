@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid.accuracy.error_control import ErrorController
-from hybrid.accuracy.error_order import Errors, bounded, summary
+from hybrid.accuracy.error_order import Errors, summary
 from hybrid.accuracy.extreme_errors import figures as extreme_figures
 from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.refinement import END_FORCE, asked_quantities, asked_text, figures, not_asked_text, sizes_of
@@ -67,10 +67,6 @@ def write_errors(
         name: _of_line(case, control, name, cpu, lambda name=name: lost().get(name, {}))  # type: ignore[misc]
         for name in control.standing
     }
-    if case.flat:
-        (report,) = found.values()
-        amend(target, [report.part("", control.notes)], before)
-        return
 
     def of_all(_: Happened) -> tuple[Attributes, list[tuple[str, str]]]:
         known = [x.attributes for x in found.values()]
@@ -81,8 +77,11 @@ def write_errors(
         events = [(kind, f"line {name}: {text}") for name, x in found.items() for kind, text in x.events]
         return largest, [*control.notes, *events]
 
-    parts = [x.part(f"{GROUP}/{name}", ()) for name, x in found.items()]
-    amend(target, [*parts, Part("", (), (), of_all)], before)
+    parts = list[Part]()
+    for name, x in found.items():
+        called = case.names[name]  # a line without a name is the result itself
+        parts.append(x.part(f"{GROUP}/{called}", ()) if called else x.part("", control.notes))
+    amend(target, parts if "" in case.names.values() else [*parts, Part("", (), (), of_all)], before)
 
 
 @dataclass
@@ -191,8 +190,7 @@ def known(
 
 
 def error_fields(result: RunSample, errors: Errors) -> list[Field]:
-    """Errors by cause and quantity; those by neglected bending only where the run's own do not count as written."""
-    written = bool(result.model_error) and bounded(result)[0] is None
+    """Errors by cause and quantity."""
     return [
         Field(
             f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {_words(name)}, estimated",
@@ -200,7 +198,6 @@ def error_fields(result: RunSample, errors: Errors) -> list[Field]:
             ("right/s" if name.startswith("right_") else "s",) if len(shape) == 2 else (),
         )
         for cause, quantities in errors.fields.items()
-        if not (cause == "model" and written)
         for name, shape in quantities.items()
     ]  # fmt: skip
 

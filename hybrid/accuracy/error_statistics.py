@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from hybrid.accuracy.error_estimate import Estimate
-from hybrid.accuracy.error_order import MOST_ORDER, ORDER, Errors, Falls, bounded, scaled
+from hybrid.accuracy.error_order import MOST_ORDER, ORDER, Errors, Falls
 from hybrid.accuracy.snap_scatter import snap_times, steps_in_rise
 from hybrid.model.resolution import RequestedAccuracy
 from hybrid.scene.schema import LineScene
@@ -254,12 +254,12 @@ def _begins(t: np.ndarray, windows: int) -> np.ndarray:
 
 def _model_errors(run: RunSample, values: Mapping[str, np.ndarray], every: int, windows: int) -> dict[str, np.ndarray]:
     """What errors of neglected bending (nt, ...) make of STATISTICS, to first order: (4, 1, ...)."""
-    out, (factors, _) = {}, bounded(run)
+    out = {}
     named = {END_FORCES.get(name, name): x for name, x in values.items()}
     for name, field in run.model_error.items():
         if not len(field):
             continue
-        error, value = _thinned(scaled(np.asarray(field), factors), every // run.every), named.get(name)
+        error, value = _thinned(np.asarray(field), every // run.every), named.get(name)
         level = np.sqrt(np.mean(error * error, axis=0))
         if value is None or value.shape != error.shape:  # of vectors: no extreme of a component
             out[name] = np.stack([np.max(error, axis=0), level, level, level])[:, None]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.accuracy.error_estimate import NOTHING, Estimate
-from hybrid.accuracy.error_order import COARSER, Errors, doubtful
+from hybrid.accuracy.error_order import COARSER, Errors
 from hybrid.accuracy.error_statistics import (
     LARGEST,
     STATISTICS,
@@ -36,7 +36,6 @@ from hybrid.accuracy.refinement import (
     missed,
     not_converged,
     refined,
-    sizes_of,
 )
 from hybrid.accuracy.snap_scatter import errors_between, finer_between, snap_excess
 from hybrid.errors import ComputationError, Outcome
@@ -135,9 +134,6 @@ class LineErrors:
         found = self.estimate
         own = [*self.choice.notes, *self._notes, *self._irregular_note()]
         own += not_converged(self.diverging, self.asked)
-        if found is not None:
-            asked = None if self.asked is None else sizes_of(self.asked, found.run)
-            own += doubtful(found.errors, found.doubt, asked)
         return (*own, *((*found.several_equilibria, *found.run.notes, *found.notes) if found is not None else ()))
 
     @property

@@ -1,128 +1,115 @@
-"""What leaving bending out changes in a run.
+"""What leaving bending out changes in a run: the same with rods in place of catenaries is computed, and compared.
 
-Of a cable it is followed along a run to compare with.  Lines that are joined move each other: they are computed once
-more, as rods, and compared.  As of one cable the figure is that of a run to compare with, whose cells and steps are
-longer.  The rods have the cells of that run, and where zones have moved those of its rods, so that both have the same
-error by the mesh.
+Lines that are joined move each other: all get the error that one of them has.  The rods have the cells and steps of the
+run, and where zones have moved those of its rods, so that both have the same error by the mesh.  Beside point loads and
+clamps that catenaries bend at they have shorter cells, within which bending fades.  A run to compare with, whose cells
+and steps are longer, shows it of catenaries from end to end that move; else the result does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.accuracy.error_order import COARSER, magnitude
+from hybrid.accuracy.error_order import magnitude
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model
+from hybrid.model.mesh import GROWTH
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.model.sections import OutputPoints
 from hybrid.scene.analysis import CatenaryZone, Mesh, RodModel, RodZone, ZonesModel
 from hybrid.scene.network import JoinedLine
 from hybrid.scene.network_scene import Network
 from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample, Samples
 
 Stretches = Collection[tuple[float, float]]  # m, of s
+CELLS = 4.0  # of rods to a length sqrt(EI/T) beside point loads and clamps: the curvature there is 1 % off
 
 
 class Comparable(Protocol):
     """What of a case is asked here."""
 
+    scene: Any
     moves: bool
-    flat: bool
+    points: dict[str, OutputPoints]
 
+    @property
+    def names(self) -> Mapping[str, str]: ...
     @property
     def network(self) -> Network: ...
     def instead(self, scene: Any) -> AbstractContextManager[None]: ...
-    def sample(self, resolution: NetworkResolution, *, model: bool = False) -> Samples: ...
+    def sample(self, resolution: NetworkResolution) -> Samples: ...
 
 
 def with_model_errors(case: Comparable, runs: Samples, costs: list[float]) -> Samples:
-    """A run with what leaving bending out changes in it, where none could follow that.
+    """A run with what leaving bending out changes in it.
 
-    costs: s of processor time, to which that of the rods is added.
+    costs: s of processor time, to which that of the rods is added.  All lines get the error, because what one of them
+    leaves out moves the others.
     """
-    if case.flat:
-        return runs
-    finely = NetworkResolution({name: x.resolution for name, x in runs.items()})
-    rods, finely, names = as_rods(case.network, finely, {name: x.rods for name, x in runs.items()})
-    found, failed = None, ""
-    try:
-        if names:
-            with case.instead(rods):
-                found = case.sample(finely)
-            costs.append(next(iter(found.values())).cpu)
-    except (ComputationError, SceneError) as error:
-        failed = str(error).splitlines()[0]
-    return against_rods(runs, found, names, failed)
-
-
-def model_errors_of(case: Comparable, result: Samples, costs: list[float]) -> Samples:
-    """A run with what leaving bending out changes in a result: on its cells in longer steps, or beside rods.
-
-    costs: as of `with_model_errors`.  ComputationError.
-    """
-    if not case.flat:
-        return with_model_errors(case, result, costs)
-    finely = NetworkResolution({name: x.resolution for name, x in result.items()})
-    found = case.sample(finely.coarser(1.0, COARSER if case.moves else 1.0), model=True)
-    costs.append(next(iter(found.values())).cpu)
-    return found
-
-
-def leaves_bending_out(line: JoinedLine) -> bool:
-    """Whether a line that can bend has catenaries."""
-    return any(x.weakest_bending for x in line.sections) and not isinstance(line.chosen_model, RodModel)
-
-
-def as_rods(
-    system: Network, resolution: NetworkResolution, rods: Mapping[str, Stretches]
-) -> tuple[Network, NetworkResolution, list[str]]:
-    """The same with rods in place of catenaries, how finely, and the names of the lines that this changes.
-
-    resolution: of a run of the system; rods: stretches of its lines that were rod at some time in it.
-    """
-    names = [
-        name
-        for name, line in system.lines.items()
-        if leaves_bending_out(line) and sum(b - a for a, b in _joined(rods[name])) < line.cable.length * (1 - 1e-9)
-    ]
-    if not names:
-        return system, resolution, []
-    model, lines, finely = build_system(system, resolution=resolution), dict(system.lines), dict(resolution.lines)
-    for name in names:
-        nodes = _nodes(_model_of(model, name), rods[name])
-        update = {"model": _rods(system.lines[name]), "mesh": Mesh(nodes=tuple(nodes.tolist()))}
-        lines[name] = system.lines[name].model_copy(update=update)
-        finely[name] = replace(resolution.lines[name], fineness=1.0, grading=None)
-    return system.model_copy(update={"lines": lines}), NetworkResolution(finely), names
-
-
-def against_rods(
-    runs: Mapping[str, RunSample], rods: Mapping[str, RunSample] | None, names: Collection[str], failed: str = ""
-) -> Samples:
-    """Samples of a run with what leaving bending out changes in them.
-
-    rods: samples of the same lines as rods; None: there are none, because that run failed; names: of the lines that
-    leave bending out.  All lines get the error, because what one of them leaves out moves the others.
-    """
+    network = case.network
+    names = [name for name, x in runs.items() if leaves_bending_out(network.lines[name], x)]
     if not names:
         return dict(runs)
-    if rods is None:
-        text = f"what bending would change in its catenaries is not known: with rods in place of them: {failed}"
-        note = ((NOT_ESTIMATED, f"{text}; `model: rod`, or a finer mesh, tells why"),)
+    finely = NetworkResolution({name: x.resolution for name, x in runs.items()})
+    changes, finely = as_rods(network, finely, {name: runs[name] for name in names}, case.points)
+    try:
+        with case.instead(case.scene.with_lines({case.names[name]: x for name, x in changes.items()})):
+            rods = case.sample(finely)
+    except (ComputationError, SceneError) as error:
+        text = f"with rods in place of them: {str(error).splitlines()[0]}; `model: rod`, or a finer mesh, tells why"
+        note = ((NOT_ESTIMATED, f"what bending would change in its catenaries is not known: {text}"),)
         return {name: replace(x, notes=(*x.notes, *note)) if name in names else x for name, x in runs.items()}
+    costs.append(next(iter(rods.values())).cpu)
     return {name: replace(x, model_error=_difference(x, rods[name])) for name, x in runs.items()}
 
 
+def goes_by_cells(case: Comparable, runs: Samples) -> bool:
+    """Whether longer cells do not show what leaving bending out changes, or hardly cost less.
+
+    They do not beside joints of rods and catenaries; an equilibrium costs little on any cells.
+    """
+    lines = case.network.lines
+    return not case.moves or any(x.rods and leaves_bending_out(lines[name], x) for name, x in runs.items())
+
+
+def leaves_bending_out(line: JoinedLine, run: RunSample) -> bool:
+    """Whether a line that can bend was catenary anywhere, at any time of a run."""
+    if not any(x.weakest_bending for x in line.sections) or isinstance(line.chosen_model, RodModel):
+        return False
+    if run.catenary.size:  # zones have moved
+        return bool(run.catenary.any())
+    return sum(b - a for a, b in _joined(run.rods)) < line.cable.length * (1 - 1e-9)
+
+
+def as_rods(
+    network: Network, resolution: NetworkResolution, runs: Samples, points: Mapping[str, OutputPoints]
+) -> tuple[dict[str, dict[str, Any]], NetworkResolution]:
+    """Tables of lines with rods in place of catenaries, by name, and how finely they are computed.
+
+    resolution: of a run of the network; runs: of the lines that change in it; points: where outputs of lines are.
+    """
+    model, tables, finely = build_system(network, resolution=resolution), {}, dict(resolution.lines)
+    for name, run in runs.items():
+        line, s = _model_of(model, name), points[name].s
+        tension = np.asarray(run.values["tension"]).max(axis=0)
+        nodes = _nodes(line, run.rods)
+        for at, short in _kinks(line, s[run.places] if run.places.size else s, tension):
+            nodes = _with_layer(nodes, at, short, run.rods)
+        tables[name] = {"model": _rods(network.lines[name]), "mesh": Mesh(nodes=tuple(nodes.tolist()))}
+        finely[name] = replace(resolution.lines[name], fineness=1.0, grading=None, parts=1)
+    return tables, NetworkResolution(finely)
+
+
 def _difference(run: RunSample, rods: RunSample) -> dict[str, np.ndarray]:
-    called = END_FORCES | RIGHT
-    both = [name for name in run.values if name in rods.values]
+    """By quantity; of moments, which a catenary has none of, all of them."""
+    called, there = END_FORCES | RIGHT, {name: np.asarray(x) for name, x in run.values.items()}
     return {
-        called.get(name, name): magnitude(np.asarray(rods.values[name]) - np.asarray(run.values[name]), name)
-        for name in both
+        called.get(name, name): magnitude(np.asarray(x) - there.get(name, 0.0), name) for name, x in rods.values.items()
     }
 
 
@@ -152,6 +139,42 @@ def _nodes(model: Model, rods: Stretches) -> np.ndarray:
     for a, b in rods:
         kept |= (s >= a - near) & (s <= b + near)
     return s[kept]
+
+
+def _kinks(model: Model, s: np.ndarray, tension: np.ndarray) -> Iterator[tuple[float, float]]:
+    """Point loads and clamps (m), and how long cells of rods are there; tension: N, the largest at s (m).
+
+    None of a line that is paid out, whose winch makes its cells.
+    """
+    cable, ends = model.cable, (0.0, model.length)
+    for at in (
+        ()
+        if model.payout is not None
+        else {*model.attached, *(x for x, held in zip(ends, cable.held_tangent, strict=True) if held)}
+    ):
+        EI, T = float(cable.mean_bending[cable.piece(np.array([at]))[0]]), float(np.interp(at, s, tension))
+        if EI > 0.0 < T:
+            yield at, float(np.sqrt(EI / T)) / CELLS
+
+
+def _with_layer(nodes: np.ndarray, at: float, short: float, rods: Stretches) -> np.ndarray:
+    """Nodes (m) with others beside a place: cells of a length there, which grow away from it, in place of longer ones.
+
+    rods: stretches that keep their cells.
+    """
+    more = list[float]()
+    for way, end in ((-1.0, nodes[0]), (1.0, nodes[-1])):
+        far = step = short
+        while far < way * (end - at):
+            x = at + way * far
+            k = min(max(int(np.searchsorted(nodes, x)), 1), nodes.size - 1)
+            if any(a <= x <= b for a, b in rods) or nodes[k] - nodes[k - 1] < step:
+                break
+            if min(nodes[k] - x, x - nodes[k - 1]) > 0.5 * step:
+                more.append(x)
+            step = short + GROWTH * far
+            far += step
+    return np.union1d(nodes, more)
 
 
 def _rods(line: JoinedLine) -> RodModel | ZonesModel:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import time as clock
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from hybrid.accuracy.model_choice import chosen_and_surveyed
 from hybrid.accuracy.refinement import WORTH_WRITING, Free, times_the_cost
 from hybrid.accuracy.run_forecast import Budget
 from hybrid.errors import ComputationError
-from hybrid.model.build import zone_plans
 from hybrid.model.model_costs import NAMED, ModelChoice
 from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import output_times
@@ -36,7 +34,7 @@ from hybrid.model.resolution import (
     wants_survey,
     zones_are_free,
 )
-from hybrid.scene.schema import AdaptiveModel, LineScene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import CELLS, STEPS
@@ -108,7 +106,7 @@ class Passes:
         else:
             resolution = self._surveyed(resolution) if remaining is None else resolution
             control = self._controls(compute)
-            first = _followed(resolution, case)
+            first = resolution
 
             def go_on() -> None:
                 control.start(first)
@@ -226,14 +224,6 @@ class Passes:
         return found
 
 
-def _followed(resolution: NetworkResolution, case: Case) -> NetworkResolution:
-    """The resolution of a first result, which may follow itself what its model leaves out."""
-    if not (case.flat and case.moves):
-        return resolution
-    follow = _has_joints(case.scene)
-    return NetworkResolution({name: replace(x, follow=follow) for name, x in resolution.lines.items()})
-
-
 def free_in(scene: LineScene) -> Free:
     """What the scene leaves to the program."""
     time = scene.time
@@ -241,16 +231,6 @@ def free_in(scene: LineScene) -> Free:
     # where cells follow the curvature its share decides kinds, and the tolerance cells as well: both stay
     follows = follows_curvature(scene)
     return Free(mesh_is_free(scene), steps, zones_are_free(scene) and not follows, follows)
-
-
-def _has_joints(scene: LineScene) -> bool:
-    """Whether rods and catenaries may meet on the cells of a result, which then follows itself what that leaves out.
-
-    What a joint does beside it is of the cells there: a coarser run, whose outputs are fewer too, does not show it.
-    """
-    if isinstance(scene.model, AdaptiveModel):
-        return not follows_curvature(scene)
-    return len({zone.kind for zone in zone_plans(scene)}) > 1
 
 
 def emptied(target: Target, error: ComputationError | None = None) -> None:

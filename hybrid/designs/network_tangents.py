@@ -357,7 +357,7 @@ class NetworkOthers:
         more = {}
         for l in base:
             books, cells, held = self._books[p][l], self._model.models[l].line.h.size, self._run.lines[l].held
-            rest, _ = batch_of_rows(books.samples[: int(books.counts.samples)], cells, held, False, 0, 0)
+            rest = batch_of_rows(books.samples[: int(books.counts.samples)], cells, held, False, 0, 0)
             more[l] = joined([self._first[p][l], rest])
         scene, other = self._scenes[p]
         seen = self._looked_at(scene, self._others[p].model, more, names)

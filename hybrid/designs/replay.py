@@ -90,7 +90,7 @@ def course_of(scene: Any) -> Course:
     if any(x.local is not None for x in found.values()):
         longest = float(np.diff([0.0, *ends]).max())
         found = {k: replace(x, local=None, later=0.0, step=longest, ends=ends) for k, x in found.items()}
-    return _with_nodes(Course(computed, {k: replace(x, follow=False) for k, x in found.items()}))
+    return _with_nodes(Course(computed, found))
 
 
 def refuse_push(result: Result) -> None:

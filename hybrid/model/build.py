@@ -18,7 +18,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.mesh.cell_lengths import COMPRESSED_SHARE, FLANK, SHARP
 from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.model.catenary_guess import Hanging
-from hybrid.model.contents import Entry, contents_of, followed
+from hybrid.model.contents import Entry, contents_of
 from hybrid.model.ends import EndConditions
 from hybrid.model.initial_shape import (
     corners,
@@ -76,7 +76,6 @@ class Model:
     on_base: LineOnBase | None = None  # and what makes its lines
     plane: Floats | None = None  # (3, 3) rows p, q, normal: what the scene lies in, if it does
     kept_in: Floats | None = None  # (3,) normal of the plane that it must not leave, though it is computed in space
-    follows_error: bool = False  # whether the error of leaving bending out is followed
     payout: PayoutPlan | None = None  # of a line that is paid out or taken in
     held: Line | None = None  # the line as its ends held it before the first of them was let go
 
@@ -208,7 +207,6 @@ def build(
         for name, r in (spare_shapes(scene, s) if shape is not None else from_joint(scene, s))
         if spare and like is None
     ]
-    follows = resolution.follow and followed(scene, zones).on
     plane, flat = in_plane(scene, start, others, ends.values)
     kept: Floats | None = None
     if plane is not None and (scene.obstacles or scene.contact.self):  # which are computed in space
@@ -223,7 +221,7 @@ def build(
         inextensible=not line.ck.any(),
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
         on_base=LineOnBase(cable, layout.base) if layout is not None else None,
-        plane=plane, kept_in=kept, follows_error=follows,
+        plane=plane, kept_in=kept,
         payout=paid or payout_plan(scene, line, zones, to_compare=to_compare),
     )  # fmt: skip
 

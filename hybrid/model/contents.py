@@ -163,24 +163,16 @@ def _by_first_harmonic(scene: LineScene, end: End) -> bool:
     return finite and vessel is not None and vessel.rao is not None
 
 
-def followed(scene: LineScene, zones: Sequence[Zone]) -> Entry:
-    """Whether the error of leaving bending out is followed along the run."""
-    what, sections = "model error (bending left out), along the run", scene.cable.sections
+def model_error(scene: LineScene, zones: Sequence[Zone]) -> Entry:
+    """Whether what leaving bending out changes is estimated."""
+    what = "model error (bending left out)"
     if not wants_errors(scene):
         return Entry(what, False, "output.errors: true")
-    if not isinstance(scene.model, AdaptiveModel):
-        if all(z.kind == "rod" for z in zones):
-            return Entry(what, False, "rod everywhere: nothing is left out")
-        if not any(x.weakest_bending for x in sections):
-            return Entry(what, False, "no bending stiffness: there is nothing to leave out")
-        if any(x.anisotropic for x in sections):
-            return Entry(what, False, "bends differently in two directions: a catenary does not know which way it lies")
-    bed = scene.environment.seabed
-    if bed is not None and bed.soil is not None:
-        return Entry(what, False, "soil remembers (seabed.soil): how it answers to a shift depends on the way there")
-    if any(x.intrinsic_curvature and any(x.intrinsic_curvature[:2]) for x in sections):
-        return Entry(what, False, "curved without stress: a catenary does not know which way it lies")
-    return Entry(what, True, "error figure; in a coarser run")
+    if not isinstance(scene.model, AdaptiveModel) and all(z.kind == "rod" for z in zones):
+        return Entry(what, False, "rod everywhere: nothing is left out")
+    if not any(x.weakest_bending for x in scene.cable.sections):
+        return Entry(what, False, "no bending stiffness: there is nothing to leave out")
+    return Entry(what, True, "error figure; by a coarser run with rods in place of catenaries")
 
 
 def _force(scene: LineScene, line: Line, name: str, bit: int, needs: str) -> Entry:
@@ -288,7 +280,7 @@ def contents_of(scene: LineScene, line: Line, zones: Sequence[Zone], flat: Entry
                 )
             )
     entries += [Entry(x.what, True, x.why, "implausible", x.s) for x in implausible(scene)]
-    entries.append(followed(scene, zones))
+    entries.append(model_error(scene, zones))
     if isinstance(scene.model, AdaptiveModel):
         entries += _watched(scene)
         entries.append(Entry("criteria as fields", scene.output.criteria, "output.criteria"))

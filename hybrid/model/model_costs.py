@@ -23,9 +23,9 @@ from hybrid.scene.schema import AdaptiveModel, CatenaryModel, LineScene, RodMode
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
 # Another model must cost less than this part of rods, which need no criterion and leave nothing out.
 CLEARLY = {"catenary": 0.9, "adaptive": 0.8}
-# Part of the steps of all runs of an accuracy at which the error of leaving bending out is followed: in the results of
-# zones that move, and in one of the runs that catenaries are compared with, of longer cells and steps.
-FOLLOWED = {"catenary": 0.25, "adaptive": 0.6}
+# Part of the price of what leaving bending out changes (COST_AS_RODS): of zones that move the result is computed
+# once more as rods, of catenaries one of the runs that they are compared with, of longer cells and steps.
+AS_RODS = {"catenary": 0.25, "adaptive": 0.6}
 # Catenaries are a choice where criteria that count errors of position stay below 1, and that of slack below this: a
 # pre-run sees outputs alone.  What zones that move would hold as rods is above it in any of them.
 CALM = 0.25
@@ -194,11 +194,11 @@ def costs(
     rods, catenaries: cells; of_zones: what zones would make rod; why_not: why catenaries are no choice; more_steps: of
     zones, for one of rods.
     """
-    share, part = of_zones.share * rods, FOLLOWED["adaptive"]
-    moving = step_time(scene, model, share, rods - share, moves=True, followed=part)
+    share = of_zones.share * rods
+    moving = step_time(scene, model, share, rods - share, moves=True, as_rods=AS_RODS["adaptive"])
     return (
         Cost("rod", rods, step_time(scene, model, rods, 0)),
-        Cost("catenary", catenaries, step_time(scene, model, 0, catenaries, followed=FOLLOWED["catenary"]), why_not),
+        Cost("catenary", catenaries, step_time(scene, model, 0, catenaries, as_rods=AS_RODS["catenary"]), why_not),
         Cost("adaptive", rods, moving, rods=of_zones, steps=more_steps),
     )
 
@@ -242,7 +242,7 @@ COST_WAVE = 10e-9
 COST_RUN, COST_STEP, COST_OUTPUT = 0.02, 12e-6, 0.1e-3
 # s of a step of zones that move, and of each of their cells: criteria, and the joints of a rod.
 COST_MANAGER, COST_CRITERIA = 3e-6, 0.03e-6
-COST_CORRECTOR = 0.23e-6  # s per cell and step, where the error of leaving bending out is followed
+COST_AS_RODS = 0.23e-6  # s per cell and step, of rods beside catenaries: by what choices of 1.0 were tried
 USUAL_ITERATIONS = 2.1
 # Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.
 ROD_SHARE = 0.38
@@ -280,12 +280,11 @@ def foretold_steps(scene: LineScene, model: Model, resolution: Resolution, least
 
 
 def step_time(
-    scene: LineScene, model: Model, rods: float, catenaries: float, moves: bool = False, followed: float = 0.0
+    scene: LineScene, model: Model, rods: float, catenaries: float, moves: bool = False, as_rods: float = 0.0
 ) -> float:
     """Processor time, s, of a step of a line of so many cells of either kind.
 
-    model: of the scene, with whatever cells; moves: zones move; followed: part of the steps at which the error of
-    leaving bending out is followed.
+    model: of the scene, with whatever cells; moves: zones move; as_rods: as of AS_RODS.
     """
     flat, total, bits = model.plane is not None, rods + catenaries, model.line.bits
     each = COST["rod"][flat] * rods + COST["catenary"][flat] * catenaries
@@ -295,7 +294,7 @@ def step_time(
     waves = scene.environment.waves
     if waves is not None:
         each += COST_WAVE * waves.waves_in_sum * total * _stirred(model)
-    each += COST_CORRECTOR * total * followed
+    each += COST_AS_RODS * total * as_rods
     return each + COST_STEP + (COST_MANAGER + COST_CRITERIA * total) * moves
 
 
@@ -313,7 +312,7 @@ def processor_time(scene: LineScene, model: Model, cells: Sequence[int], steps: 
         counts[zone.kind] += count
     if model.layout is not None:
         counts = {"rod": ROD_SHARE * model.cells, "catenary": (1.0 - ROD_SHARE) * model.layout.rod.size}
-    step = step_time(scene, model, counts["rod"], counts["catenary"], model.layout is not None, model.follows_error)
+    step = step_time(scene, model, counts["rod"], counts["catenary"], model.layout is not None)
     one = COST_RUN + steps * step + outputs * COST_OUTPUT
     if not wants_errors(scene):
         return one

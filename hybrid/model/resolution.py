@@ -201,7 +201,7 @@ class Resolution:
     fineness: number of cells, relative to the default mesh; grading: density of cells along the line, None: as the
     scene or the program places them; step: s, fixed, or the largest; local: m, error allowed per step, None: steps are
     fixed; zones: error that neglected bending may make, as a part of the length; every: outputs of the result to one
-    of such a run; follow: whether the error of neglected bending is followed along the run.  later: s, the largest step
+    of such a run; later: s, the largest step
     where no vibration is there that a ramp has set off along the line with more than `still` (N); 0: all are alike.
     bends: error of curvature that is asked, as a part of the largest that a pre-run has shown; infinite: none is.
     rods: stretches (from, to, m; the lack over what is allowed) of which a pre-run has shown that catenaries will lack
@@ -217,7 +217,6 @@ class Resolution:
     zones: float
     grading: Grading | None = None
     every: int = 1
-    follow: bool = False
     later: float = 0.0
     still: float = 0.0
     bends: float = inf

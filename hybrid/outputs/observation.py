@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -34,10 +33,9 @@ from hybrid.kernels.state.report import (
     STRETCH_ENERGY,
 )
 from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line, Sea
-from hybrid.outputs.observed_states import ObservedStates, across, cross, dot, size
-from hybrid.outputs.output_grid import ends_of, means_beside, means_on_line
+from hybrid.outputs.observed_states import ObservedStates, across, cross, size
+from hybrid.outputs.output_grid import means_beside, means_on_line
 from hybrid.outputs.strains import EndLayer, between_nodes, part_without_spring, strains
-from hybrid.solve.bending_corrector import Shift
 
 
 def links(batch: Batch, line: Line) -> Floats:
@@ -61,7 +59,7 @@ class Observation(ObservedStates):
             t = self.at_end(self.d, k)
             if len(self.d) > 1:
                 t = np.where(self._kink_beside(k), t, 1.5 * t - 0.5 * self.at_end(self.d, k, 1))
-            knows = self.has_element(k) | (self.shift is not None and self.shift.clamped[k])
+            knows = self.has_element(k)
             if np.any(knows):  # a clamp or guide knows the tangent
                 t = np.where(knows, self._held_tangent(k), t)
             if self.loaded(k):
@@ -69,8 +67,7 @@ class Observation(ObservedStates):
             else:
                 force = self.reaction(k) if k else -self.reaction(k)
                 ends.append((force * t).sum(axis=0) / np.sqrt((t * t).sum(axis=0)))
-        found = self.grid.held @ self.with_ends(self.T, ends)
-        return found if self.shift is None else found - self.grid.sides @ self._borne_by_bending(self.shift)
+        return self.grid.held @ self.with_ends(self.T, ends)
 
     def _held_tangent(self, k: int) -> Floats:
         """Tangent (3, nb) of the line at the clamp at end k, not normalized; as `watch.extremes.beyond_spring`."""
@@ -87,27 +84,6 @@ class Observation(ObservedStates):
             part = part_without_spring(self, k * n, k * (n - 1), np.stack([angle, 0.0 * angle]))
         between = np.sin(part * angle) * t + np.sin((1.0 - part) * angle) * d
         return np.where((part > RIGID) | (angle < 1e-6), t, between)
-
-    def _borne_by_bending(self, shift: Shift) -> Floats:
-        """Tension (n sides, nb), N, of a catenary that a rod in its place would bear by bending.
-
-        M^2/(2 EI) of an elastica, whose force is that of the catenary but across its tangent in part.  The ends'
-        tension has it already.
-        """
-        out = self._square_of_moment(self.node_moment) * 0.5
-        for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
-            if zone.kind == "rod":
-                out[o : o + b - a + 1] = 0.0
-        out[[0, -1]] = 0.0
-        EI = self._side_stiffness(shift)
-        return np.divide(out, EI, out=np.zeros_like(out), where=EI > 0.0)
-
-    def _side_stiffness(self, shift: Shift) -> Floats:
-        """Bending stiffness (n sides, 1) N m2: where a section ends, of either side its own, as at the node beside."""
-        EI, at = shift.stiffness[self.grid.side_nodes], ends_of(np.array(self.grid.spans).reshape(-1, 3))
-        changes = np.isin(at.node, self.changes)
-        EI[at.row[changes]] = shift.stiffness[at.inner[changes]]
-        return EI[:, None]
 
     @cached_property
     def tangent(self) -> Floats:
@@ -147,7 +123,7 @@ class Observation(ObservedStates):
         Found at the nodes, and interpolated: the tangent between nodes, off by the square of the cell length, would
         make a torque of the bending moment.
         """
-        torque = _node_torques(self._plain)[self.grid.side_nodes]
+        torque = _node_torques(self)[self.grid.side_nodes]
         return self.grid.sides @ (torque + _passed_torques(self) if self.batch.turn.size else torque)
 
     @cached_property
@@ -159,8 +135,7 @@ class Observation(ObservedStates):
     def shear(self) -> Floats:
         """(ns, nb) N."""
         V = cross(self.d, np.diff(self.node_moment, axis=0)) / self.length[:, None]
-        if self.shift is None:
-            V[self.line.spin == 0] = 0.0
+        V[self.line.spin == 0] = 0.0
         return size(self.grid.cells @ V)
 
     # ---- curvature and twist ------------------------------------------------------------------
@@ -168,23 +143,19 @@ class Observation(ObservedStates):
     @cached_property
     def curvature_twist(self) -> Floats:
         """(ns, 2, nb) 1/m."""
-        strains = self._plain._strains
-        if self.shift is not None:
-            strains = np.stack([self._curvature_of_moment(self.shift), strains[:, 1]], axis=1)
-            for layer, end in self._plain._taken_at_ends:  # moments have that of rods of these cells
-                strains[layer.rows, 0] += end * (layer.of_cells - layer.part)[layer.at]
-        bend = self._plain.bend_directions * strains[:, :1]
+        strains = self._strains
+        bend = self.bend_directions * strains[:, :1]
         found = self.grid.sides @ np.concatenate([bend, strains[:, 1:]], axis=1)
-        for layer, end in self._plain._taken_at_ends:  # which is no straight line in cells that are long for it
-            direction = self._plain.bend_directions[layer.rows[0]]
+        for layer, end in self._taken_at_ends:  # which is no straight line in cells that are long for it
+            direction = self.bend_directions[layer.rows[0]]
             for points, less in between_nodes(self, layer):
                 found[points, :-1] += (less * end)[:, None] * direction
         return np.stack([np.sqrt((found[:, :-1] ** 2).sum(axis=1)), found[:, -1]], axis=1)
 
     @property
     def curvature_on_sides(self) -> Floats:
-        """(n sides, nb) 1/m, of what was computed, at the nodes of the grid's stretches."""
-        return np.abs(self._plain._strains[:, 0])
+        """(n sides, nb) 1/m, at the nodes of the grid's stretches."""
+        return np.abs(self._strains[:, 0])
 
     @cached_property
     def _strains_and_taken(self) -> tuple[Floats, list[tuple[EndLayer, Floats]]]:
@@ -192,7 +163,7 @@ class Observation(ObservedStates):
 
     @property
     def _strains(self) -> Floats:
-        """Curvature and twist (n sides, 2, nb), 1/m, of what was computed."""
+        """Curvature and twist (n sides, 2, nb), 1/m."""
         return self._strains_and_taken[0]
 
     @property
@@ -200,22 +171,9 @@ class Observation(ObservedStates):
         """Layers that catenaries have not at their ends, and the curvature (nb,) 1/m of each without that."""
         return self._strains_and_taken[1]
 
-    def _curvature_of_moment(self, shift: Shift) -> Floats:
-        """Curvature (n sides, nb) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
-        bending = np.sqrt(self._square_of_moment(self.node_moment))
-        EI = self._side_stiffness(shift)
-        return np.divide(bending, EI, out=self._plain._strains[:, 0].copy(), where=EI > 0.0)
-
-    def _square_of_moment(self, moment: Floats) -> Floats:
-        """Of moments (N+1, 3, nb) N m the square of what bends (n sides, nb)."""
-        bending = across(moment, self.node_tangent)
-        return np.asarray((bending * bending).sum(axis=1)[self.grid.side_nodes])
-
     @cached_property
     def link(self) -> Floats:
-        """(4, nb): turns of twist, writhe and link, crossings; of what was computed."""
-        if self._corrects is not None:
-            return self._corrects.link
+        """(4, nb): turns of twist, writhe and link, crossings."""
         return links(self.batch, self.line)
 
     # ---- at the ends --------------------------------------------------------------------------
@@ -233,21 +191,9 @@ class Observation(ObservedStates):
         b = self.batch
         held = b.held[:, k] != 0
         force = -b.report[:, FORCE_A + 3 * k : FORCE_A + 3 * k + 3].T
-        if self.shift is not None and held.any():
-            force = force - np.where(held, self.shift.resultants[k], 0.0)
         if held.all() or self.loaded(k):
             return np.asarray(force)
         return np.where(held, force, b.force[:, k].T)
-
-    def line_force(self, k: int) -> Floats:
-        """(3, nb) N: the same, but that of an end with a body is from the tension and direction of the line.
-
-        What leaving bending out changes there follows from the line: the loads on the body are those of the run.
-        """
-        if not self.loaded(k):
-            return self.reaction(k)
-        pull = (2.0 * k - 1.0) * self._end_tension(k) * self.at_end(self.d, k)
-        return np.asarray(np.where(self.batch.held[:, k] != 0, self.reaction(k), pull))
 
     def loaded(self, k: int) -> bool:
         """Whether there is a point load at end k."""
@@ -276,19 +222,19 @@ class Observation(ObservedStates):
     @cached_property
     def depth(self) -> Floats:
         """(N+1, nb) m, below where contact begins."""
-        return penetration(self.sea, self._plain.r)
+        return penetration(self.sea, self.r)
 
     @cached_property
     def touchdown(self) -> Touchdown:
         s = self._varied["s"].T if "s" in self._varied else self.line.s[:, None]
-        return touchdown(s, self.depth, self._plain.r)
+        return touchdown(s, self.depth, self.r)
 
     @property
     def contact(self) -> Floats:
         """(ns, nb) N/m."""
         if self.line.bits & SOIL:
             return np.asarray(self.grid.chords @ np.ascontiguousarray(self.batch.soil[:, :, PRESSES].T))
-        q = contact_pressure(self.sea, self.depth, sinking(self.sea, self._plain.r, self._plain.v))
+        q = contact_pressure(self.sea, self.depth, sinking(self.sea, self.r, self.v))
         return np.asarray(self.grid.chords @ carried(self.cell_lengths, q))
 
     @property
@@ -355,30 +301,6 @@ def _passed_torques(view: ObservedStates) -> Floats:
             if low <= high:
                 out[o + low - a : o + high - a + 1] = view.batch.turn[:, z, TORQUE]
     return out
-
-
-def bends_by_load(plain: Observation, corrected: Observation) -> Floats:
-    """Change of curvature (ns, nb) 1/m from a line as computed to the turns of its chords where bending shifts it to.
-
-    A joint takes the moment of the rod, so that beside it the line goes on about EI/T times the curvature away from
-    where the rod lies.  A bed of stiffness k, or what else depends on the place, answers with another load across, and
-    curvature is load over tension.  The moment that is left out knows nothing of that; the chords of the shifted line
-    do, as they turn from cell to cell.
-    None at ends, at point loads, where a kink is no curvature, and in layers of pins, which lie within a cell.
-    """
-    d, nodes = corrected.d, plain.grid.side_nodes
-    bends = np.zeros((len(d) + 1, plain.columns))
-    turns = 2.0 * size(cross(d[:-1], d[1:])) / (1.0 + dot(d[:-1], d[1:]))
-    bends[1:-1] = turns / plain.of_line("hn", np.arange(1, len(d)))
-    change = np.abs(bends[nodes] - plain.curvature_on_sides)
-    change[np.isin(nodes, plain.end_nodes)] = 0.0
-    parts, spans = plain.grid.parts, plain.grid.spans
-    for (one, (first, last, row)), (two, (_, _, after)) in pairwise(zip(parts, spans, strict=True)):
-        if one.kind == two.kind:
-            change[[row + last - first, after]] = 0.0
-    for layer, _ in plain._taken_at_ends:  # of each output up to where it has faded in that
-        change[layer.rows] = np.where(layer.at[:, None] <= (layer.part > 0.0).sum(axis=0), 0.0, change[layer.rows])
-    return np.asarray(plain.grid.sides @ change)
 
 
 @dataclass(frozen=True)

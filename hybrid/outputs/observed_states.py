@@ -19,7 +19,6 @@ from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.kernels.watch.observed_outputs import observed
 from hybrid.outputs.output_grid import Grid, ends_of
-from hybrid.solve.bending_corrector import Shift
 
 
 def last(x: Floats) -> Floats:
@@ -28,23 +27,13 @@ def last(x: Floats) -> Floats:
 
 
 class ObservedStates:
-    """A batch of states on nodes and cells, as computed or (`corrected`) with what leaving bending out shifts it by."""
+    """A batch of states on nodes and cells, as computed."""
 
     def __init__(
         self, line: Line, sea: Sea, grid: Grid, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})
     ) -> None:
         """varied: arrays (nb, ...) of the line by name, where it is another one in every output."""
         self.line, self.sea, self.grid, self.batch, self._varied = line, sea, grid, batch, varied
-        self.shift: Shift | None = None
-        self._corrects: Self | None = None  # the observation that this one corrects
-
-    def corrected(self, shift: Shift) -> Self:
-        """The same states with position, tension, curvature and moment corrected; energies and contact stay."""
-        other = self.on(self.grid)
-        for name in ("r", "v", "e", "T", "length", "d"):
-            other.__dict__.pop(name, None)
-        other.shift, other._corrects = shift, self
-        return other
 
     def on(self, grid: Grid) -> Self:
         """The same on other points of the same stretches."""
@@ -53,14 +42,6 @@ class ObservedStates:
         for name in ("tension", "tangent", "moment", "torque", "bending_moment", "curvature_twist"):
             other.__dict__.pop(name, None)
         return other
-
-    @property
-    def _plain(self) -> Self:
-        """The states as computed, without corrections.
-
-        An attribute that refers to itself would keep a batch until garbage is collected.
-        """
-        return self._corrects or self
 
     def of_line(self, name: str, at: int | slice | NDArray[np.int64]) -> Floats:
         """Values of the line at nodes or cells, (..., nb), or (..., 1) where they are the same in all outputs."""
@@ -135,26 +116,22 @@ class ObservedStates:
     @cached_property
     def r(self) -> Floats:
         """(N+1, 3, nb) m."""
-        r = last(self.batch.r)
-        return r if self.shift is None else r + self.shift.position
+        return last(self.batch.r)
 
     @cached_property
     def v(self) -> Floats:
         """(N+1, 3, nb) m/s."""
-        v = last(self.batch.v)
-        return v if self.shift is None else v + self.shift.velocity
+        return last(self.batch.v)
 
     @cached_property
     def e(self) -> Floats:
         """(N, 3, nb) m, chords."""
-        e = last(self.batch.e)
-        return e if self.shift is None else e + np.diff(self.shift.position, axis=0)
+        return last(self.batch.e)
 
     @cached_property
     def T(self) -> Floats:
         """(N, nb) N."""
-        T = last(self.batch.T)
-        return T if self.shift is None else T + self.shift.tension
+        return last(self.batch.T)
 
     @cached_property
     def length(self) -> Floats:
@@ -168,12 +145,7 @@ class ObservedStates:
 
     @cached_property
     def _observed(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Moments, strains, energies and bends of the states as computed.
-
-        (N+1, 3, nb) N m, (N+1, 3, nb) rad, (5, nb) J, and (N+1, nb) 1/m.
-        """
-        if self._corrects is not None:
-            return self._corrects._observed
+        """Moments (N+1, 3, nb) N m, strains (N+1, 3, nb) rad, energies (5, nb) J and bends (N+1, nb) 1/m."""
         M, strain, energy, bend = observed(self.line, self.batch, self._varied)
         if len(M) < self.batch.t.size:  # a catenary has neither
             M = strain = np.broadcast_to(np.zeros(1), (self.batch.t.size, *M.shape[1:]))
@@ -186,7 +158,7 @@ class ObservedStates:
 
     @property
     def bends(self) -> Floats:
-        """(N+1, nb) 1/m, from cell to cell, of what was computed, as of kernels.watch.observed_outputs."""
+        """(N+1, nb) 1/m, from cell to cell, as of kernels.watch.observed_outputs."""
         return self._observed[3]
 
     # ---- moments, and which way the line bends ------------------------------------------------
@@ -194,13 +166,11 @@ class ObservedStates:
     @property
     def node_moment(self) -> Floats:
         """(N+1, 3, nb) N m, inertial."""
-        return self._observed[0] if self.shift is None else self._observed[0] + self.shift.moment
+        return self._observed[0]
 
     @cached_property
     def node_tangent(self) -> Floats:
-        """(N+1, 3, nb) of what was computed: halfway between the cells, at an end that of its holder or cell."""
-        if self._corrects is not None:
-            return self._corrects.node_tangent
+        """(N+1, 3, nb): halfway between the cells, at an end that of its holder or cell."""
         d = self.d
         t = np.concatenate([d[:1], d[1:] + d[:-1], d[-1:]])
         for k in (0, 1):

@@ -18,8 +18,7 @@ from hybrid.model.mesh import Zone
 from hybrid.model.sections import NEAR, OutputPoints
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
-from hybrid.outputs.observation import Observation, Probe, bends_by_load
-from hybrid.outputs.observed_states import size
+from hybrid.outputs.observation import Observation, Probe
 from hybrid.outputs.obstacle_forces import (
     obstacle_fields,
     obstacle_force_fields,
@@ -28,7 +27,6 @@ from hybrid.outputs.obstacle_forces import (
 )
 from hybrid.outputs.output_grid import NO_HINGES, Grid, VaryingGrid
 from hybrid.outputs.quantities import Quantities
-from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.stepper import POWERS
 from hybrid.store.format import Field
 from hybrid.store.records import THERE, node_bits
@@ -131,38 +129,8 @@ SIDED = (
     "tension", "theta", "phi", "curvature", "twist", "bending_moment", "torque", "shear", "wall_tension", "von_mises",
     "capacity_used", "code_used",
 )  # fmt: skip
-# What leaving bending out makes of each quantity, by name: unit, description, dimensions.
-MODEL_ERRORS = {
-    "position": ("m", "distance", _S),
-    "tension": ("N", "change of tension", _S),
-    "curvature": ("1/m", "change of curvature", _S),
-    "bending_moment": ("N m", "change of the bending moment", _S),
-    "end_force_start": ("N", "change of the force that holds the start", ()),
-    "end_force_end": ("N", "change of the force that holds the end", ()),
-}
-# Those of them that may jump, and of which errors are known on both sides: of the right one under right_<name>.
-SIDED_ERRORS = tuple(name for name in MODEL_ERRORS if name in SIDED)
-
-
-def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats]:
-    """MODEL_ERRORS on the output grid: how far what is corrected for bending is from what is not.
-
-    The curvature of a catenary, w/T, changes with its tension too, and with what its place makes of the load
-    (`bends_by_load`); of both the moment that is left out knows nothing.
-    """
-    change, bends = np.abs(corrected.tension - plain.tension), plain.curvature_twist[:, 0]
-    taut = (plain.tension > change) & plain.grid.in_catenary[:, None]
-    by_tension = bends * np.divide(change, plain.tension, out=np.zeros(change.shape), where=taut)
-    by_moment = np.abs(corrected.curvature_twist[:, 0] - bends) + by_tension
-    out = {
-        "position": size(plain.grid.nodes @ (corrected.r - plain.r)),
-        "tension": change,
-        "curvature": np.maximum(by_moment, bends_by_load(plain, corrected)),
-        "bending_moment": np.abs(corrected.bending_moment - plain.bending_moment),
-    }
-    for k, name in enumerate(("end_force_start", "end_force_end")):
-        out[name] = size((corrected.line_force(k) - plain.line_force(k))[None])[0]
-    return out
+# Those of them of which errors are known on both sides: of the right one under right_<name>.
+SIDED_ERRORS = ("tension", "curvature", "bending_moment")
 
 
 def elevation_field(places: Floats) -> Field:
@@ -182,8 +150,7 @@ class Recorded(NamedTuple):
     """What of a line is recorded.
 
     work: whether works are; only: names of probes, None: all; criteria: name and description of those that are written
-    as well; errors: whether what leaving bending out makes of the results is written.  `values_of` gets the criteria,
-    and for the latter the shift.  edges: whether what cells miss beside edges of contact is written
+    as well, which `values_of` gets; edges: whether what cells miss beside edges of contact is written
     (outputs.edge_errors); gauges: places (x, y), m, where the elevation of the sea is; quantities: what the scene asks
     for beside the usual.
     """
@@ -191,7 +158,6 @@ class Recorded(NamedTuple):
     work: bool
     only: Sequence[str] | None = None
     criteria: Sequence[tuple[str, str]] = ()
-    errors: bool = False
     edges: bool = False
     gauges: Sequence[tuple[float, float]] = ()
     quantities: Quantities | None = None
@@ -256,7 +222,7 @@ class Observer:
         self._place(line, sea, zones, s)
         self._touched = tuple(features.obstacles)
         self._obstacles = self._touched if line.moved.size else ()
-        self._with_work, self._errors, self.quantities = recorded.work, recorded.errors, recorded.quantities
+        self._with_work, self.quantities = recorded.work, recorded.quantities
         self.first_energy: float | None = None  # J, at the first output
         self.gauges = np.array(recorded.gauges, float).reshape(-1, 2)
         self._probes = _probes_of(_parts_of(line, zones, features, recorded), recorded)
@@ -272,7 +238,7 @@ class Observer:
             Field(name, "", f"largest since the last output: {text}", (s.size,), _S)
             for name, (_, text) in zip(self._criteria, recorded.criteria, strict=True)
         ]
-        self.fields = (*fields, *self._fields_of_errors(), *self._fields_beside_the_line())
+        self.fields = (*fields, *self._fields_beside_the_line())
 
     def _fields_of_probes(self) -> list[Field]:
         sizes = {"s": self.s.size, "xyz": 3, "edge": 2}
@@ -291,20 +257,11 @@ class Observer:
             for f, text in zip(found, words, strict=True)
         ]
 
-    def _fields_of_errors(self) -> list[Field]:
-        fields = [
-            Field(f"errors/model/{x}", unit, f"{text} by bending that is left out", (self.s.size,) * len(dims), dims)
-            for x, (unit, text, dims) in MODEL_ERRORS.items()
-            if self._errors
-        ]
-        sided = SIDED_ERRORS if self.jumps.size else ()
-        fields += self._after_jumps(fields, {f"errors/model/{x}": f"errors/model/right_{x}" for x in sided})
-        words = {x: f"error of {x.replace('_', ' ')} by cells beside edges of contact" for x in self._edges}
-        return fields + [Field(EDGE_ERRORS + x, PROBES[x].unit, words[x], (self.s.size,), _S) for x in self._edges]
-
     def _fields_beside_the_line(self) -> list[Field]:
-        """Waves at gauges, obstacles and their forces, and which nodes there are."""
-        fields = [elevation_field(self.gauges)] if len(self.gauges) else []
+        """Errors beside edges of contact, waves at gauges, obstacles and their forces, and which nodes there are."""
+        words = {x: f"error of {x.replace('_', ' ')} by cells beside edges of contact" for x in self._edges}
+        fields = [Field(EDGE_ERRORS + x, PROBES[x].unit, words[x], (self.s.size,), _S) for x in self._edges]
+        fields += [elevation_field(self.gauges)] if len(self.gauges) else []
         fields += obstacle_fields(self._obstacles) + obstacle_force_fields(self._touched)
         if self._finest is not None:
             text = "which of the nodes mesh/s there are: bit k % 64 of word k // 64"
@@ -350,7 +307,7 @@ class Observer:
         """The same of these probes alone."""
         other = copy(self)
         other._probes = {name: self._probes[name] for name in self._probes if name in names}
-        other._right, other._errors, other._edges, other._finest = [], False, (), None
+        other._right, other._edges, other._finest = [], (), None
         other._obstacles = other._touched = ()
         other.gauges = np.zeros((0, 2))
         return other
@@ -401,25 +358,16 @@ class Observer:
         """Outputs as computed, for `values_of`; varied: arrays (nb, ...) of the line, where it is another in each."""
         return Observation(self.line, self.sea, self.grid, batch, varied)
 
-    def values_of(
-        self, plain: Observation, ratios: Floats | None = None, shift: Shift | None = None
-    ) -> dict[str, Floats]:
+    def values_of(self, plain: Observation, ratios: Floats | None = None) -> dict[str, Floats]:
         """All fields of nb outputs, (nb, ...) in the units of the fields, as new arrays.
 
-        plain: as of `look`; ratios: (nb, criteria, ns), if they are written: the largest since the output before;
-        shift: of these outputs, what bending that is left out would change, if its error is written.
+        plain: as of `look`; ratios: (nb, criteria, ns), if they are written: the largest since the output before.
         """
         batch = plain.batch
-        corrected = plain.corrected(shift) if shift is not None else plain
         found = {name: p.value(plain) for name, p in self._probes.items()}
         if self._right:
             right = plain.on(self._after)
             found |= {f"right/{name}": self._probes[name].value(right) for name in self._right}
-        if self._errors:
-            found |= {f"errors/model/{name}": x for name, x in model_errors(plain, corrected).items()}
-            if self.jumps.size:
-                after = model_errors(plain.on(self._after), corrected.on(self._after))
-                found |= {f"errors/model/right_{name}": after[name] for name in SIDED_ERRORS}
         if self._edges:
             missed = edge_errors(plain)
             found |= {EDGE_ERRORS + name: missed[name] for name in self._edges}

@@ -312,7 +312,6 @@ class EndLayer(NamedTuple):
     EI: float
     deep: Floats  # (m-1, nb) depth of each cell
     part: Floats  # (m, nb)
-    of_cells: Floats  # (m, nb) what rods of these cells have of it (kernels.laws.hinge_layer.fade)
 
 
 def end_layers(view: ObservedStates) -> list[EndLayer]:
@@ -355,8 +354,6 @@ def _end_layer(
     slope = np.where(T > 0.0, np.sqrt(np.maximum(T, 0.0) / EI), np.inf)  # none is left without tension
     deep = slope * h
     depth = np.concatenate([np.zeros((1, T.shape[1])), np.cumsum(deep, axis=0)])
-    half = 1.0 + 0.5 * np.minimum(deep, 1e6) ** 2
-    of_cells = np.cumprod(np.concatenate([np.ones((1, T.shape[1])), 1.0 / (half + np.sqrt(half * half - 1.0))]), axis=0)
     at_nodes = np.concatenate([T[:1], 0.5 * (T[1:] + T[:-1]), T[-1:]])
     with np.errstate(invalid="ignore"):
         part = np.maximum(at_nodes / np.where(T[0] > 0.0, T[0], 1.0), 0.0) ** 0.25 * np.exp(-depth)
@@ -364,12 +361,10 @@ def _end_layer(
     part[0] = 1.0
     gone = part <= FADED
     part[np.logical_or.accumulate(gone, axis=0)] = 0.0  # of each output by itself: none depends on those beside it
-    lasts = (part > 0.0).sum(axis=0)
-    of_cells = np.where(np.arange(len(nodes))[:, None] <= lasts, of_cells, 0.0)
-    kept = min(1 + int(lasts.max()), len(nodes))
+    kept = min(1 + int((part > 0.0).sum(axis=0).max()), len(nodes))
     at = np.abs(all_nodes - nodes[0])
     use = at < kept
-    return EndLayer(nodes[:kept], way, rows[use], at[use], EI, deep[: kept - 1], part[:kept], of_cells[:kept])
+    return EndLayer(nodes[:kept], way, rows[use], at[use], EI, deep[: kept - 1], part[:kept])
 
 
 def between_nodes(view: ObservedStates, layer: EndLayer) -> Iterator[tuple[Integers, Floats]]:

@@ -21,7 +21,6 @@ from hybrid.errors import ComputationError, ResultError
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.material import NO_DOUBT
 from hybrid.model.model_costs import with_models
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.payout import longest_out, winch_side
@@ -54,8 +53,6 @@ from hybrid.simulation.run_file import AnyRecorder, Asked
 from hybrid.simulation.run_sample import (
     ALL,
     COMPARED,
-    MODEL_ERRORS,
-    NOT_ESTIMATED,
     Notes,
     RunSample,
     Samples,
@@ -66,7 +63,6 @@ from hybrid.simulation.run_sample import (
     most_at_places,
     rods_of,
     rows_key,
-    split_outputs,
     usual_cells,
 )
 from hybrid.simulation.run_zones import Start
@@ -124,9 +120,6 @@ class Case:
         points: of the result that is continued, by the names that lines have in the scene; None: those of the scene.
         """
         self.scene: Any = scene  # what is computed, as the user wrote it
-        # Whether its line has no name: what leaving bending out does is followed along its run, which moves no ends.
-        # Lines that are joined move each other, and are compared with rods.
-        self.flat = "" in scene.lines
         self.criterion = with_names(criterion, self.names)
         self.changes: tuple[LoadChange[Any], ...] = tuple(changes)
         lines, kept = self.lines, points or {}
@@ -316,8 +309,7 @@ class Case:
         """
         name, model, scene = line.name, line.model, self.lines[line.name]
         own, resolution = data[group] if group else data, run.resolution.lines[line.name]
-        errors = [*(MODEL_ERRORS + x for x in own.get(MODEL_ERRORS, ())), *(x for x in own if MODEL_ERRORS in x)]
-        stored = {x: own[x] for x in (*COMPARED, *errors) if x in own}
+        stored = {x: own[x] for x in COMPARED if x in own}
         # they stay in the file, if they are many, and no finer result may replace it
         finer = any(requested_accuracy(x) is not None for x in self.lines.values())
         stays = stay if not finer and sum(x.size for x in stored.values()) > MOST_IN_MEMORY else None
@@ -337,19 +329,17 @@ class Case:
             held = {x: own[x][()] for x in _datasets(own, ENVELOPE, EXTREMES)}
             asked = (x for x, q in self.network.output.quantities.items() if q.line == name)
             held |= {full: data[full][()] for x in asked if (full := f"{EXTREMES}/{x}") in data}
-        values, model_error = split_outputs(found)
         moves, notes, forces = line.manager is not None, Notes(), np.zeros((0, 3))
         if self.moves:
             forces = np.column_stack([own[f"steps/{x}"][()] for x in FORCES])
         if resolution.local is not None:
             notes = damped_vibrations(result)
         return RunSample(
-            resolution, values, cells, max(run.steps, 1), cpu, 1, b"unresolved bend" in kinds, model_error,
-            resolution.zones * model.length if moves and self.flat else 0.0, notes,
+            resolution, found, cells, max(run.steps, 1), cpu, 1, b"unresolved bend" in kinds, notes=notes,
             forces=forces, catenary=np.array([catenary_share(x) for x in result.zones]) if moves else np.zeros(0),
-            doubt=doubt_of_line(line), touches=b"line touches itself" in kinds, places=places,
+            touches=b"line touches itself" in kinds, places=places,
             at_edges=missed, extremes=extremes_about(held, self.points[name].s),
-            rods=() if self.flat else rods_of(result.zones),
+            rods=rods_of(result.zones),
         )  # fmt: skip
 
     def _judges(self, name: str) -> bool:
@@ -358,9 +348,9 @@ class Case:
         return self.moves and self.wants_errors and (asked or has_limits(self.lines[name]))
 
     def _places_of(self, name: str, line: str) -> np.ndarray | None:
-        """Of an output, or an error of one, the numbers of the points where runs are compared; None: all."""
+        """Of an output the numbers of the points where runs are compared; None: all."""
         places = self.places[line]
-        return places if places.size and is_along(name.removeprefix(MODEL_ERRORS)) else None
+        return places if places.size and is_along(name) else None
 
     def _at_places(self, name: str, values: Any, line: str) -> np.ndarray:
         """The values (nt, ...) of a dataset where runs are compared."""
@@ -382,16 +372,13 @@ class Case:
         return beside(samples, threads, self.progress.look, self._unwanted.set)
 
     def sample(
-        self, resolution: NetworkResolution, points: Mapping[str, Floats] | None = None, until: float | None = None,
-        *, model: bool = False,
-    ) -> Samples:  # fmt: skip
+        self, resolution: NetworkResolution, points: Mapping[str, Floats] | None = None, until: float | None = None
+    ) -> Samples:
         """Compute for comparison only; points: places, m, instead of those of the result; until: s, None: to the end.
 
-        model: what leaving bending out changes is followed along it, of a cable.  A resolution with longer steps has as
-        many times fewer outputs, to save time, and so that outputs do not shorten its steps where these end at outputs.
+        A resolution with longer steps has as many times fewer outputs, to save time, and so that outputs do not shorten
+        its steps where these end at outputs.
         """
-        if model and self.flat:
-            resolution = NetworkResolution({name: replace(x, follow=True) for name, x in resolution.lines.items()})
         begin = clock.thread_time()
         if self.moves:
             self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution.one)
@@ -423,10 +410,8 @@ class Case:
         """What is compared of a line in a run for comparison; judged: extremes, too."""
         name, resolution, found = line.name, run.resolution.lines[line.name], line.recorder
         assert isinstance(found, ComparisonRecorder)
-        values, errors = split_outputs({x: found[x] for x in found.names})
+        values = {x: found[x] for x in found.names}
         moves, follows = line.manager is not None, follows_curvature(self.lines[name])
-        unknown = [f"in a run to compare with, {text}" for kind, text in found.events if kind == NOT_ESTIMATED]
-        notes = tuple((NOT_ESTIMATED, text) for text in unknown[:1])
         rows = found.reference() if isinstance(found, RowsRecorder) else {}
         held: dict[str, Any] = {}
         if judged and self._judges(name):
@@ -434,9 +419,9 @@ class Case:
             held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t) | run.quantities.ranges_of(name)
         return RunSample(
             resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
-            resolution.every, False, errors, resolution.zones * line.model.length if moves and self.flat else 0.0,
-            notes, rows, found.steps, found.catenary if moves else np.zeros(0), doubt_of_line(line),
-            run.contact.lets_touch or bool(self.network.lines[name].contact.self), self.places[name],
+            resolution.every, rows=rows, forces=found.steps,
+            catenary=found.catenary if moves else np.zeros(0),
+            touches=run.contact.lets_touch or bool(self.network.lines[name].contact.self), places=self.places[name],
             extremes=extremes_about(held, self.points[name].s), rods=tuple(sorted(found.rods)),
         )  # fmt: skip
 
@@ -483,7 +468,7 @@ class Case:
     def _network_run(self, resolution: NetworkResolution, target: Target | None, recording: Recording) -> NetworkRun:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
         network, changes = self.network, [replace(x, scene=network_of(x.scene)) for x in self.changes]
-        recording = recording._replace(planes=True, error=self.flat, asked=Asked(self.scene, self.changes))
+        recording = recording._replace(planes=True, asked=Asked(self.scene, self.changes))
         if recording.points is None:
             recording = recording._replace(points=self.points)
         with self._said():
@@ -533,11 +518,6 @@ def _datasets(data: Mapping[str, Any], *groups: str) -> list[str]:
     return [x for x in names if x.count("/") == 1 and hasattr(data[x], "shape")]
 
 
-def doubt_of_line(line: LineResult) -> Floats:
-    """`RunSample.doubt` of a complete run; of zones that move criteria of zones bound what bending does."""
-    return line.correction.doubt if line.correction is not None and line.manager is None else np.array(NO_DOUBT)
-
-
 class CaseAtRest(Case):
     """The equilibrium of one scene at t = 0, under loads that have grown to their full size."""
 
@@ -572,11 +552,10 @@ class CaseAtRest(Case):
 
 def _sample(line: LineResult, run: NetworkRun, cpu: float) -> RunSample:
     """What is compared of a line in an equilibrium that has been recorded; cpu: s, that it took."""
-    k, model, correction = line.number, line.model, line.correction
+    k, model = line.number, line.model
     batch = line.state_now(0.0, run.solver.lines[k].ends, run.state.lines[k], run.solver.work[k])
     seen = line.observer.observation(batch)
-    shift = correction.shift(correction.corrector.sampled[:1], batch) if correction is not None else None
-    values = line.observer.values_of(seen, shift=shift)
+    values = line.observer.values_of(seen)
     missed = edge_errors(seen) if model.line.bits & SEABED else {}
     at_edges = {name: error[:, 0] for name, error in missed.items()}
     for name, error in layer_errors(seen, [int(np.argmin(np.abs(model.line.s - at))) for at in model.attached]).items():
@@ -584,9 +563,7 @@ def _sample(line: LineResult, run: NetworkRun, cpu: float) -> RunSample:
     return RunSample(
         run.resolution.lines[line.name], {name: np.array(values[name]) for name in COMPARED if name in values},
         compared_cells(model), 1, cpu, 1, False,
-        {k.removeprefix(MODEL_ERRORS): np.array(x) for k, x in values.items() if k.startswith(MODEL_ERRORS)},
         catenary=np.array([catenary_share(model.zones)]) if model.layout is not None else np.zeros(0),
-        doubt=np.array(NO_DOUBT) if correction is None else correction.doubt,
         at_edges={name: error[None] for name, error in at_edges.items()}, rods=rods_of([model.zones]),
     )  # fmt: skip
 

@@ -27,7 +27,6 @@ SOLVER = ("run.entry.in_plane", "run.entry.in_space")
 OUTPUTS = "watch.observed_outputs.observe_outputs"
 ZONES = "mesh.zone_step.follow_zones"
 CRITERIA = "mesh.zone_step.evaluate_criteria"
-MODEL_ERROR = "watch.bending_error.advance_error"
 STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
 # Steps, equilibria, lines that are joined or touch, those that are paid out.
 OF_JOINED = "run.network.solve_system"
@@ -61,9 +60,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     touch_themselves = any(x.contact.self for x in lines.values())
     if together or touch_themselves:
         found.append(OF_JOINED)
-    leave_out = {name for name, x in lines.items() if wants_errors(x) and x.model.kind != "rod"}
-    followed = {name for name in leave_out if not form.names[name]}  # others are compared with rods
-    rods = {name for name, x in lines.items() if _has_rods(x)} | (leave_out - followed)
+    rods = {name for name, x in lines.items() if _has_rods(x) or wants_errors(x)}  # others are compared with these
     if any(_is_judged(x, static) for name, x in planar.items() if name in rods):
         found.append(STABILITY)
     if scene.time is not None and scene.adaptive:
@@ -74,10 +71,6 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
         found += TOUCHING_LINES
     if touch_themselves:
         found.append(TOUCHING)
-    if followed:
-        found.append(MODEL_ERROR)
-    if static and scene.dimension is None and followed & {*planar} and SOLVER[1] not in found:
-        found.append(SOLVER[1])  # what leaving bending out does is followed in space
     return found
 
 
@@ -112,8 +105,6 @@ def compile_beside(scene: Scene, static: bool = False) -> None:
     one core.  static: for its equilibrium alone.
     """
     needed = [*kernels_of(scene, static)[1:], *([] if static else [REST_OF_LINES])]  # beside the solver
-    if MODEL_ERROR in needed and SOLVER[1] not in needed:  # a line in a plane needs both solvers
-        needed.insert(needed.index(OUTPUTS) + 1, SOLVER[1])
     missing = [name for name in needed if not is_ready(name)]
     frozen = getattr(sys, "frozen", False)  # an application made by PyInstaller would start itself again
     if missing and (os.cpu_count() or 1) > 1 and sys.executable and not frozen:
@@ -153,8 +144,6 @@ def compile_all(names: Sequence[str]) -> None:
         in_space.compile_unless_busy(table)
     if ZONES in names or CRITERIA in names:
         _compile_zones(scene, model, moves=ZONES in names)
-    if MODEL_ERROR in names:
-        _compile_model_error(model)
 
 
 def payout_kernels() -> tuple[Any, ...]:
@@ -206,9 +195,3 @@ def _compile_zones(scene: LineScene, model: Model, moves: bool) -> None:
     manager.review(0.0, model.start)
     if moves:
         follow_zones.compile_unless_busy(np.zeros(0, np.int64))
-
-
-def _compile_model_error(model: Model) -> None:
-    from hybrid.simulation.bending_correction import corrector_for
-
-    corrector_for(model).address()

@@ -15,7 +15,6 @@ from hybrid.kernels.state.state import Batch, Floats, State, Work
 from hybrid.kernels.step.newton import Limits
 from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel
-from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.envelope import Envelope
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.zone_switching import ZoneSwitching
@@ -43,8 +42,6 @@ class OfLine(Protocol):
     def marked(self) -> Sequence[tuple[float, int]]: ...
     @property
     def contact(self) -> SelfContact | None: ...
-    @property
-    def correction(self) -> Correction | None: ...
     @property
     def paying(self) -> PayingOut | None: ...
     @property
@@ -242,4 +239,4 @@ def by_itself(run: OfRun, number: int) -> bool:
     line, watch = run.lines[number], run.contact.watch
     watched = watch is not None and watch.is_needed
     alone = number in run.solver.lone and not run.solver.mixes and not watched
-    return alone and line.contact is None and line.correction is None
+    return alone and line.contact is None

@@ -25,7 +25,6 @@ from hybrid.kernels.state.books import (
     PARTS_ITSELF,
     STRAINS,
     STRETCHED,
-    UNKNOWN_ERROR,
     Books,
     Clock,
     Counts,
@@ -34,7 +33,6 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.report import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, sampled_size, slip_size
-from hybrid.kernels.watch.bending_error import sampled_size as error_size
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.plane import as_begun, planar
@@ -45,14 +43,13 @@ from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.deferred_recorder import DeferredRecorder, OutputsAside, may_be_joined
 from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.failure import FASTEST
 from hybrid.simulation.kind_changes import Around
-from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED
+from hybrid.simulation.run_sample import COMPARED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.slack_bends import note_laid
 from hybrid.solve.flaws import slack_cell
@@ -103,8 +100,6 @@ class Wanted(NamedTuple):
 
     record: NewRecorder | None = None  # makes what the line is recorded by; None: it is only to be compared with
     points: OutputPoints | None = None  # None: those of the scene
-    error: bool = False  # whether that of leaving bending out is followed
-    torque: Callable[[], float] | None = None  # N m, of zones that move; None: it follows from the turn of the ends
 
 
 WANTED = Wanted()
@@ -126,7 +121,7 @@ def observer_of(
         () if only else model.sea.names,
     )  # fmt: skip
     recorded = Recorded(
-        moves and only is None, only, criteria, wanted.error,
+        moves and only is None, only, criteria,
         edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
         gauges=() if only else scene.output.elevation or (), quantities=None if only else quantities_of(scene),
     )  # fmt: skip
@@ -151,7 +146,6 @@ class Waiting(NamedTuple):
     """What waits to be recorded of a line."""
 
     outputs: Sequence[Batch]
-    errors: Sequence[Floats]  # of leaving bending out, of these
     ratios: Sequence[Floats]  # of criteria, of these
     aside: Sequence[tuple[Model, Output]]  # outputs of other cells
     log: Sequence[Floats]  # rows of steps
@@ -179,9 +173,6 @@ class LineResult:
         self.held = np.ones(2, np.int8)  # (2,) ends that count as held in outputs: all but free ones, by their points
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
-        self.correction: Correction | None = None  # of the error of leaving bending out
-        if wanted.error:
-            self.correction = Correction(model, wanted.torque)
         self.observer = observer_of(scene, model, self._moves, COMPARED if wanted.record is None else None, wanted)
         self.envelope = Envelope(scene, model, self._moves, found is not None and found.settled)
         self.marked = marked_places(scene, model)
@@ -200,10 +191,7 @@ class LineResult:
         self.manager: DomainManager | None = None  # of zones that move
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
-        self._errors: list[Floats] = []  # of leaving bending out, as sampled with these
         self._ratios: list[Floats] = []  # of criteria, where they are written
-        self._sampled_errors: Floats = np.zeros((0, 0))
-        self._unknown_until = -np.inf  # s, that nothing is to be said of an unknown error
         self._aside = OutputsAside()  # of other cells
         self.shown: Callable[[Batch], None] | None = None  # what looks at outputs beside the recorder
         self._log: list[Floats] = []
@@ -230,7 +218,6 @@ class LineResult:
             hinges=self.model.hinges, placed=begin[base], borne=1.0 + borne_strain(self.model),
             extremes=no_extremes(nodes + marked.size),
             touch=self._blank_touch(),
-            model_error=self.correction.corrector.sampled if self.correction is not None else np.zeros((2, 0)),
         )  # fmt: skip
 
     @property
@@ -241,7 +228,7 @@ class LineResult:
         cells = line.h.size if layout is None else int(layout.starts[-1])
         if layout is None and self.paying is not None:
             cells = max(cells, self.paying.most_cells)
-        return sample_size(cells, layout is not None, *more) + (error_size(cells) if self.correction else 0)
+        return sample_size(cells, layout is not None, *more)
 
     def make_room(self, rows: int) -> None:
         """Room for so many samples of the line as it is; what is there is gone."""
@@ -332,7 +319,7 @@ class LineResult:
     def outputs_join(self) -> bool:
         """Whether outputs wait though the cells that they are of change, by the curvature or at a winch."""
         change = follows_curvature(self.scene) if self.paying is None else self.model.layout is None
-        change = change and self._moves and not self.touches and self.shown is None and self.correction is None
+        change = change and self._moves and not self.touches and self.shown is None
         return change and may_be_joined(self.observer, self.model.line)
 
     def follow(self, model: Model, other_cells: bool = False) -> None:
@@ -345,8 +332,6 @@ class LineResult:
         if not (other_cells and self.outputs_join):
             self.write_down()
         self.model, first = model, self.observer.first_energy
-        if self.correction is not None:
-            self.correction.switch(model)
         self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
         self.observer.first_energy = first
         self.books.hinges[:] = model.hinges
@@ -354,8 +339,6 @@ class LineResult:
         self._itself = LineWatch(self.envelope.itself, model)
         if self.touches != bool(self.books.touch.size):
             self.books = self.books._replace(touch=self._blank_touch())
-        if self.correction is not None:
-            self.books = self.books._replace(model_error=self.correction.corrector.sampled)
 
     def take_cells(self, model: Model, extremes: bool = True) -> None:
         """Go on with other cells; extremes: whether those of now count."""
@@ -399,11 +382,6 @@ class LineResult:
     def attach(self, solver: NetworkSolver, states: tuple[State, State], clock: Clock, counts: Counts) -> None:
         """Steps of a solver go on with the line, between two states in turn; clock, counts: of the run."""
         solver.bind_line(self.number, **self._itself.attach(states, clock, counts))
-        if self.correction is not None:
-            x, work, own = solver.lines[self.number], solver.work[self.number], self.books
-            corrector = self.correction.corrector
-            job = corrector.bind(x.line, x.sea, x.ends, states, own.clock, own.counts, work)
-            solver.bind_line(self.number, following=job, follower=corrector.address())
 
     def log(self, rows: Floats) -> None:
         """Log steps (n, len(LOG) + 1), the last column the time of the processor, s."""
@@ -435,10 +413,6 @@ class LineResult:
             flags &= ~(STRETCHED | JUMPED)
         if flags & (STRETCHED | JUMPED):
             self.write_down()  # what stopped the run before comes first
-        if flags & UNKNOWN_ERROR and self.correction is not None and step.t > self._unknown_until:
-            s_a, s_b, text = self.correction.unknown(self.model.zones)
-            self.events.event(step.t, s_a, s_b, NOT_ESTIMATED, text)
-            self._unknown_until = step.t + self.model.time_scale  # that it takes the whole line to move
         self._stop_if(self.diagnostics.look(step, flags), step.t, step.state)
 
     def _stop_if(self, stop: Stop, t: float | None, state: State | None = None) -> None:
@@ -468,9 +442,7 @@ class LineResult:
         """Rows (n, size) of samples of the line on so many cells, as views."""
         line, varies = self.model.line, self.model.layout is not None
         sizes = cells, self.held, varies, len(line.torsion), self.books.touch.shape[1], line.moved.size
-        batch, left = batch_of_rows(rows, *sizes, slip_size(line), bool(line.bits & REMEMBERS))
-        self._sampled_errors = left[:, : self.books.model_error.shape[1]]
-        return batch
+        return batch_of_rows(rows, *sizes, slip_size(line), bool(line.bits & REMEMBERS))
 
     def state_now(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
         """The state at t (s), now, as an output that is made of it."""
@@ -494,7 +466,6 @@ class LineResult:
             self._aside.put(self.model, own)
         else:
             self._waiting.append(batch)
-            self._errors.append(self._sampled_errors)
             if self.observer.writes_criteria and self.manager is not None:
                 now = self.manager.largest_ratios(self.observer.grid.s)
                 self._ratios.append(np.repeat(now[None], len(batch.t), axis=0))
@@ -516,15 +487,14 @@ class LineResult:
             self._stop_if(stop, t)
         if not self._waiting:
             return
-        (waiting, self._waiting), (errors, self._errors) = (self._waiting, []), (self._errors, [])
+        waiting, self._waiting = self._waiting, []
         known, self._ratios = self._ratios, []
         batch = waiting[0]
         if len(waiting) > 1:
             batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
-        shift = self.correction.shift(np.concatenate(errors), batch) if self.correction is not None else None
         there, seen, more = self.look(batch)
         ratios = np.concatenate(known) if known else None
-        values = there.values_of(seen, ratios, shift)
+        values = there.values_of(seen, ratios)
         self.observer.first_energy = there.first_energy
         if not self._moves:
             self._judge_rest(seen, values)
@@ -571,12 +541,12 @@ class LineResult:
     def waiting(self) -> Waiting:
         """Outputs and steps that wait, to come back to."""
         aside, log = [*self._aside.waiting], [*self._log]
-        return Waiting([*self._waiting], [*self._errors], [*self._ratios], aside, log, self.observer.first_energy)
+        return Waiting([*self._waiting], [*self._ratios], aside, log, self.observer.first_energy)
 
     def wait_again(self, kept: Waiting) -> None:
         """Let that wait which `waiting` has returned, and nothing else."""
         self._waiting, self._aside, self._log = [*kept.outputs], OutputsAside(kept.aside), [*kept.log]
-        self._errors, self._ratios = [*kept.errors], [*kept.ratios]
+        self._ratios = [*kept.ratios]
         self.observer.first_energy = kept.first_energy
 
     def impose_now(self) -> None:
@@ -623,7 +593,7 @@ class LineResult:
             "ends": self.model.ends.checkpoint(), "first_energy": self.observer.first_energy or 0.0,
             **({"torsion": {name: x.copy() for name, x in answers.items()}} if answers else {}),
             **({} if self.contact is None else {"self_contact": self.contact.checkpoint(t)}),
-            **({} if self.correction is None else {"correction": self.correction.checkpoint()}), **self.references(),
+            **self.references(),
         }  # fmt: skip
 
     def references(self) -> dict[str, Floats]:
@@ -654,8 +624,6 @@ class LineResult:
             quantities.turns[:] = saved.get("first_turns", quantities.turns)
         if self.contact is not None:
             self.contact.restore(saved["self_contact"], t)
-        if self.correction is not None:
-            self.correction.restore(saved["correction"])
         ends = saved["ends"] | {"released": model.ends.released}  # as what broke says: files of 1.0 have none released
         model.ends.restore(ends, t)
         apart = np.abs(saved["ends"]["position"] - model.ends.values.position).max(axis=1)

@@ -299,7 +299,7 @@ class LonePlanes(Part):
         changes = {}
         for k, x in self._lines.items():
             model, may = self._run.model.models[k], self._may(k)
-            stays = model.layout is None and model.payout is None and self._run.lines[k].correction is None
+            stays = model.layout is None and model.payout is None
             x.monitor.comes_back = may and stays
             if x.plane is not None and not may:
                 self._note(k, 0, "out of plane", f"the line comes near itself or another one: {IN_SPACE}, {TOUCHES}")

@@ -155,9 +155,6 @@ class NetworkRun(RecordedRun):
             self.contact.look_for_overlaps()
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
                 line.note_equilibrium(x, state, None, self.found, self.turned)
-                if line.correction is not None:
-                    rubs = line.number in self.found.with_friction
-                    line.correction.begin(x.ends, state, at_rest=True, with_friction=rubs)
             self.renew_other()
             self.loop.attach(solver, self.state, self.other)
             self._output()
@@ -213,8 +210,6 @@ class NetworkRun(RecordedRun):
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         for line, x in zip(self.lines, lines, strict=True):
             line.held = np.minimum(x.ends.held, 1)
-        follows = [line.correction is not None for line in self.lines]
-        lines = [x._replace(serves=x.serves or y) for x, y in zip(lines, follows, strict=True)]
         self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared, self.resolution.tolerance)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
@@ -288,9 +283,6 @@ class NetworkRun(RecordedRun):
                 line.note_start(x, state, 0.0)
             line.diagnostics.scheme(time.rho_inf)
             line.diagnostics.watch(line.books.clock)
-            if line.correction is not None:
-                rubs = self.found is not None and line.number in self.found.with_friction
-                line.correction.begin(line.model.ends.at(0.0), state, self.found is not None, rubs)
         self.renew_other()
         self._attach()
         self._output()
@@ -439,8 +431,6 @@ class NetworkRun(RecordedRun):
             attach(loop)
         for line in self.lines:
             line.lets_touch = self.contact.lets_touch
-            if line.correction is not None:
-                line.correction.set_torque()
         moves = [model.ends.moves() for model in self.model.models]
         if len(moves) != len(self._moved) or any(x is not y for x, y in zip(moves, self._moved, strict=True)):
             self._moved = moves

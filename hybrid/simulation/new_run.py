@@ -11,7 +11,6 @@ from weakref import proxy
 
 import numpy as np
 
-from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.kernels.state.state import state_for
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
@@ -54,8 +53,8 @@ class Recording(NamedTuple):
     called behind the first output; planes: whether lines that are joined to nothing are computed in the planes in
     which they lie; start: the first state, if it is known; points: of outputs of lines by name, None: those of
     their scenes; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself
-    where lines come near themselves, else that is only noticed; error: whether that of leaving bending out is followed,
-    of lines whose resolution says so; asked: what the network was made of, by whose names it gets its file.
+    where lines come near themselves, else that is only noticed; asked: what the network was made of, by whose names it
+    gets its file.
     """
 
     mode: WriteMode = AT_ONCE
@@ -68,7 +67,6 @@ class Recording(NamedTuple):
     points: Mapping[str, OutputPoints] | None = None
     until: float | None = None
     touches: bool = True
-    error: bool = False
     asked: Asked | None = None
 
 
@@ -183,9 +181,9 @@ def _add_lines(run: NetworkRun, first: First, recording: Recording) -> None:
     run.lines = []
     every = zip(run.model.names, first.scenes, run.model.models, run.state.lines, strict=True)
     for k, (name, scene, model, state) in enumerate(every):
-        manager, error = first.managers.get(k), recording.error and model.follows_error
+        manager = first.managers.get(k)
         record = partial(run.file.line_recorder, manager=manager) if run.target is not None else None
-        wanted = Wanted(record, points.get(name), error, _torque_of(manager))
+        wanted = Wanted(record, points.get(name))
         shown, outputs = run.file.scene_of(scene), len(run.times)
         line = LineResult(k, name, shown, model, run.found, state, outputs, wanted, reels.get(k))
         run.lines.append(line)
@@ -209,11 +207,6 @@ def start_of(system: Network, model: NetworkModel, moves: bool, criterion: UserC
         return Start(model, None, managers)
     with at_once():
         return start_at_rest(system, scenes, model, moves, criterion)
-
-
-def _torque_of(manager: DomainManager | None) -> Callable[[], float] | None:
-    """What gives the torque of a line as far as its rods do not carry it, N m; None: its zones stay."""
-    return None if manager is None else lambda: float(manager.torque)
 
 
 def run_system(

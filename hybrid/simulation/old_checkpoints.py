@@ -26,8 +26,8 @@ OF_LINE |= {"_stored": "stored", "watch": "noted", "first_places": "first_places
 OF_RUN = {x: x for x in ("t", "steps", "changes", "cpu", "rho", "leg")} | {"dt": "last", "last": "interval"}
 # What becomes something else, and what follows from the scene, or is of the last step alone.
 TURNED_INTO_OTHERS = {"report", "tension", "twist", "control", "vibration", "lengths", "_turned", "_slackened", "mesh"}
-TURNED_INTO_OTHERS |= {"self_contact", "zoning", "payout", "plane", "push", "home", "correction"}
-LEFT_OUT = {"iterations", "floor", "_beyond"}
+TURNED_INTO_OTHERS |= {"self_contact", "zoning", "payout", "plane", "push", "home"}
+LEFT_OUT = {"iterations", "floor", "_beyond", "correction"}
 
 
 def is_of_cable(saved: Any) -> bool:
@@ -52,14 +52,10 @@ def as_of_line(saved: Mapping[str, Any], name: str, model: Model, weaknesses: Se
     contact = saved.get("self_contact")
     if contact is not None:
         line["self_contact"] = contact
-    if saved.get("correction") is not None:
-        line["correction"] = saved["correction"]
     if "report" in saved:  # not in a file of 0.6
         line["report"] = saved["report"][0]
         line["before"] = {"report": saved["report"][1], "tension": saved["tension"], "twist": saved["twist"]}
         line["before"]["touch"] = np.zeros((1, 0)) if contact is None else contact["touch"][None]
-    if saved.get("correction") is not None:
-        line["correction"] = saved["correction"]
     found = _of_run(saved) | {"lines": {name: line}, "quantities": {}, "dry": [], "overlaps": [], "under": {}}
     found["broken"] = _broken(line["ends"]["released"], weaknesses)
     found["vibrations"] = {name: saved["vibration"]} if "vibration" in saved else {}

@@ -115,6 +115,7 @@ def resolution_from(tree: Any, scene: LineScene) -> Resolution:
         "places": np.zeros(0),
         "ends": np.zeros(0),
     }  # all cells of before had one part
+    tree = {name: x for name, x in tree.items() if name != "follow"}  # of checkpoints of 1.0
     saved = matched(later | tree, resolution_tree(first) | {"grading": None}, "resolution")
     for name in ("fineness", "step", "local", "zones", "later", "still"):
         asked, is_ = getattr(first, name), saved[name]

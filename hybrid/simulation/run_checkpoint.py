@@ -128,7 +128,8 @@ def lines_of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:
     if not (isinstance(lines, dict) and all(isinstance(x, dict) for x in lines.values())):
         return lines
     found = {}
-    for name, line in lines.items():
+    for name, saved in lines.items():
+        line = {key: x for key, x in saved.items() if key != "correction"}  # of what leaving bending out did, in 1.0
         mine, state, report = template.get(name), line.get("state"), line.get("report")
         if mine is not None and isinstance(state, dict):
             empty = {x: mine["state"][x] for x in OPTIONAL_STATE if x in mine["state"] and not mine["state"][x].size}
@@ -140,8 +141,6 @@ def lines_of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:
             line = line | {"report": np.pad(report, (0, REPORT_SIZE - report.size))}
         if mine is not None and "torsion" in mine:
             line = {"torsion": mine["torsion"]} | line
-        if mine is not None and "correction" in mine and isinstance(line.get("correction", {}), dict):
-            line = line | {"correction": mine["correction"] | line.get("correction", {})}
         if mine is not None:
             before = line.get("before", {})
             older = {"rho": rho, "report": mine["report"]} | {x: mine[x] for x in REFERENCES if x in mine}

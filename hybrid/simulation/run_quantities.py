@@ -11,7 +11,7 @@ from hybrid.kernels.state.state import Batch, Floats
 from hybrid.kernels.watch.named_quantities import PATH_ROW
 from hybrid.model.model_costs import with_models
 from hybrid.model.network import NetworkModel, build_system
-from hybrid.model.resolution import model_is_free, wants_errors
+from hybrid.model.resolution import model_is_free
 from hybrid.outputs.observation import Probe
 from hybrid.outputs.obstacle_forces import KEYS, Lines, pair_fields, pair_forces
 from hybrid.outputs.quantities import Quantities
@@ -23,7 +23,7 @@ from hybrid.scene.quantities import KINDS, Quantity
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import network_of
-from hybrid.simulation.line_result import LineResult, Wanted, observer_of
+from hybrid.simulation.line_result import LineResult, observer_of
 from hybrid.simulation.parts import Part
 from hybrid.simulation.result_file import STEP_FIELDS, limits_of
 from hybrid.simulation.run_points import fields_of
@@ -288,8 +288,7 @@ def listed_outputs(scene: SceneLike) -> list[Listed]:
     if "" not in scenes:  # which would record the quantities itself, and has no points beside it
         found = _over_time([*fields_of(system), *fields_of_pairs(model), *RunQuantities(system, scenes).fields])
     for (name, each), built in zip(scenes.items(), model.models, strict=True):
-        wanted = Wanted(error=built.follows_error and wants_errors(each))
-        fields = observer_of(each, built, moves, wanted=wanted).fields
+        fields = observer_of(each, built, moves).fields
         found += _over_time(fields, steps=moves, begin=group_of(name))
     return _with_ranges(found, asked.output.quantities) if moves else found
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from hybrid.model.build import Model
-from hybrid.model.material import NO_DOUBT
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import Reach, Resolution, first_resolution
 from hybrid.model.sections import OutputPoints
@@ -21,7 +20,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched, pack
 from hybrid.store.records import Zone as ZoneRow
-from hybrid.store.stored_rows import StoredArray, StoredRows, rows_from, rows_path
+from hybrid.store.stored_rows import MissingRows, StoredArray, StoredRows, rows_from, rows_path
 
 # Outputs by which runs are compared; those that a run does not have are skipped.
 RIGHT = {f"right/{name}": f"right_{name}" for name in SIDED_ERRORS}  # and under which names their errors are reported
@@ -29,8 +28,8 @@ COMPARED = ("position", "tension", "curvature", "bending_moment", "reaction_star
 # Of reactions, the magnitude is reported, under these names.
 END_FORCES = {"reaction_start": "end_force_start", "reaction_end": "end_force_end"}
 
-# What datasets of errors of neglected bending begin with, and the kind of events that say they are not known.
-MODEL_ERRORS, NOT_ESTIMATED = "errors/model/", "model error not estimated"
+# Kind of the events that say that errors of neglected bending are not known.
+NOT_ESTIMATED = "model error not estimated"
 
 # Output points at which runs are compared: more take time in every run, and hardly show more.  Of these, so many on
 # either side of ends and jumps, where errors change most from one point to the next.
@@ -58,13 +57,11 @@ class RunSample:
     cpu: float  # s
     every: int = 1  # outputs of the result to one of these; the last is there always
     unresolved: bool = False  # whether a bend was sharper than its cells can show
-    model_error: Mapping[str, Outputs] = field(default_factory=dict)
-    bound: float = 0.0  # m, that the criteria of zones that move let pass; 0 where there are none
+    model_error: Mapping[str, Outputs] = field(default_factory=dict)  # what leaving bending out changes
     notes: Notes = ()  # that the result should carry
     rows: Tree = field(default_factory=dict)  # what store.stored_rows keeps of the outputs; {}: they are in memory
     forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of all steps: s; N, at start and end
     catenary: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) part of the line, of zones that move
-    doubt: np.ndarray = field(default_factory=lambda: np.array(NO_DOUBT))  # of the model error
     touches: bool = False  # of a result: whether the line touched itself; of others: whether contact was computed
     # Numbers of the output points at which its values along the line are (`compared_places`); in no checkpoint.
     places: np.ndarray = field(default_factory=lambda: ALL)
@@ -105,7 +102,8 @@ class RunSample:
         kept_fields = [x.name for x in fields(self) if x.name not in ("places", "rods")]
         out = {name: getattr(self, name) for name in kept_fields} | {"resolution": resolution_tree(self.resolution)}
         kept = {} if self.rows else {"values": self.values, "model_error": self.model_error}
-        blank: Tree = {"values": {}, "model_error": {}}
+        lost = {name: np.zeros(0) for name in self.model_error}  # they are in no file: the runs are computed again
+        blank: Tree = {"values": {}, "model_error": lost}
         return out | blank | {x: {name: np.asarray(y) for name, y in found.items()} for x, found in kept.items()}
 
 
@@ -214,8 +212,9 @@ def restored_sample(
     """
     blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
     free = dict.fromkeys(("resolution", "values", "model_error", "at_edges", "extremes", "notes", "rows"))
-    older = {"rows": {}, "catenary": np.zeros(0), "doubt": np.array(NO_DOUBT), "touches": False}  # not in 0.6
+    older = {"rows": {}, "catenary": np.zeros(0), "touches": False}  # not in 0.6
     older |= {"at_edges": {}, "extremes": {}}  # not in 1.0
+    tree = {name: x for name, x in tree.items() if name not in ("bound", "doubt")}  # of 1.0
     saved = matched(older | tree, blank | free, "run")
     if saved["forces"].ndim != 2 or saved["forces"].shape[1] != 3 or not np.isfinite(saved["forces"]).all():
         raise ValueError("forces of steps that no run has")
@@ -224,10 +223,11 @@ def restored_sample(
     resolution = resolution_from(saved["resolution"], scene)
     if not all(isinstance(x, np.ndarray) and x.ndim == 1 and np.isfinite(x).all() for x in saved["extremes"].values()):
         raise ValueError("extremes that no run has")
+    if saved["rows"] and saved["model_error"]:
+        raise MissingRows("what leaving bending out changes")
     if saved["rows"] and result is not None:
-        found = rows_from(saved["rows"], rows_path(result, rows_key(resolution, name)))
-        saved["values"], saved["model_error"] = split_outputs(found)
-    if min(saved["cells"], saved["steps"], saved["every"]) < 1 or saved["bound"] < 0.0:
+        saved["values"] = rows_from(saved["rows"], rows_path(result, rows_key(resolution, name)))
+    if min(saved["cells"], saved["steps"], saved["every"]) < 1:
         raise ValueError("a run without cells, steps or outputs")
     shape = (every_of(shape[0], saved["every"]).size, *shape[1:])
     return RunSample(
@@ -238,12 +238,6 @@ def restored_sample(
             "at_edges": restored_outputs(saved["at_edges"], shape),
         }
     )  # fmt: skip
-
-
-def split_outputs(found: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Of all that a run to compare with has written: outputs, and errors of neglected bending."""
-    values = {name: found[name] for name in COMPARED if name in found}
-    return values, {x.removeprefix(MODEL_ERRORS): y for x, y in found.items() if x.startswith(MODEL_ERRORS)}
 
 
 def restored_notes(tree: Any) -> Notes:

@@ -585,7 +585,7 @@ class RunKinds:
         """Whether zones of these lines can change so between two steps of a run whose solver is attached."""
         attached = run.solver.turns is not None and run.solver.turns is run.loop.turns
         alone = run.payout is None and run.contact.shared is None and not run.solver.meets
-        alone &= all(line.contact is None and line.correction is None for line in run.lines)
+        alone &= all(line.contact is None for line in run.lines)
         if not (attached and alone):
             return False
         return all(carries_all(x.model, x) and not x.zones.clock.share > 0.0 for x in switched)

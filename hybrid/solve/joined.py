@@ -41,7 +41,6 @@ class JoinedLine(NamedTuple):
     borne: Floats = np.zeros(0)  # (N,) strain that cells bear, of a line that may lie on obstacles; empty: of no other
     keeps_pace: bool = False  # whether its zones or its length follow the steps with the spectral radius of all lines
     winds: bool = False  # whether its winch holds a tension, which takes factors of its equations that serve again
-    serves: bool = False  # whether these serve again for what leaving bending out does
 
 
 class NetworkState(NamedTuple):

@@ -168,7 +168,7 @@ class NetworkSolver:
         """Whether all factors of a line may serve again: for contact, bodies, sheaves and winches."""
         beside = bool(self._rides.size or self._sheaves or self._winches)
         mixes = beside and (self._mixes[number] or self._near[number] < 0)
-        return x.winds or x.serves or mixes or number in self._touching_lines
+        return x.winds or mixes or number in self._touching_lines
 
     def _make_rooms(self) -> Rooms:
         """What jobs of the lines work in."""

@@ -52,8 +52,8 @@ def batch_of_rows(
     obstacles: int = 0,
     layers: int = 0,
     soil: bool = False,
-) -> tuple[Batch, Floats]:
-    """Samples (n, size) of a line as views (kernels.state.books.sample_size), and the columns behind them.
+) -> Batch:
+    """Samples (n, size) of a line as views (kernels.state.books.sample_size).
 
     held: (2,) as `Ends` has it; varies: whether they have lengths and stiffness; zones: that a torque passes through;
     touching: N+1, or 0 where the line does not touch itself; obstacles: of which one moves; layers: numbers of a node;
@@ -75,11 +75,10 @@ def batch_of_rows(
     slipped = take(cells + 1, layers) if layers else NO_LAYERS_SEEN
     remembered = take(cells + 1, NO_SOIL.shape[1]) if soil else NO_SOIL_SEEN
     ends = np.repeat(held[None], count, axis=0)
-    batch = Batch(
+    return Batch(
         t, r, v, vd, e, T, a1, w, ends, position, frame, spin, force, moment, report, work, sea, h, kb, turn, touch,
         seen, slipped, remembered,
     )  # fmt: skip
-    return batch, rows[:, at:]
 
 
 def no_extremes(columns: int) -> Floats:

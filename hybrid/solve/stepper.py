@@ -106,14 +106,11 @@ OK, OUTCOMES = int(Outcome.OK), {int(x): x for x in Outcome}
 class Stepper:
     """Takes steps of one line; owns the work arrays, not the state."""
 
-    def __init__(
-        self, line: Line, length: float, tension_scale: float, slack_floor: float = -np.inf, keep: bool = False
-    ) -> None:
-        """keep: whether the factors of the last matrix stay for another right-hand side (solve.bending_corrector)."""
+    def __init__(self, line: Line, length: float, tension_scale: float, slack_floor: float = -np.inf) -> None:
         self.line = line
         self.limits = Limits(REACH * length, tension_scale, MOST_ITERATIONS)
         self.floor = slack_floor  # N; a catenary cell not above it refuses the step
-        self.work = workspace_of(line, keep)
+        self.work = workspace_of(line)
         self.told: list[float] = self.work.report.tolist()  # the report of the last step or start, as plain numbers
 
     def step(

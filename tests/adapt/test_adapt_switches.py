@@ -7,7 +7,6 @@ to them is its own doing.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,11 +15,8 @@ from problems import Scene, pinned, scene
 
 import hybrid
 from hybrid.kernels.mesh.cell_errors import CURVATURE
-from hybrid.model.build import build
 from hybrid.simulation import initial_zones
-from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.run_zones import RunKinds
-from hybrid.simulation.zone_switching import on_layout
 from hybrid.store.reader import Result
 
 BUSY = ["deep", "bend", "point", "edge"]
@@ -225,25 +221,3 @@ def test_error_goes_on_across_changes_of_zones(name: str) -> None:
     ratio = result["errors/model/position"].max(axis=1)[clear] / true[clear]
     assert np.median(ratio) == pytest.approx(1.0, abs=0.15)
     assert np.percentile(ratio, 5) > 0.6 and np.percentile(ratio, 95) < 1.8
-
-
-def test_switching_carries_the_error_over() -> None:
-    """Between base nodes it is interpolated; at them it is what it was, to the last bit; spins begin at none."""
-    scene: Any = bending()
-    model = build(scene)
-    assert model.layout is not None
-    n = model.layout.rod.size
-    few = on_layout(model, model.layout._replace(rod=np.arange(n) < n // 2))
-    more = on_layout(model, model.layout._replace(rod=np.arange(n) < n // 2 + 4))
-    correction = Correction(few)
-    c = correction.corrector
-    c.error[:] = np.random.default_rng(4).normal(size=c.error.shape)
-    c.error[:, :-1, 3] *= few.line.spin
-    before = c.error.copy()
-    correction.switch(more)
-    after = correction.corrector.error
-    assert few.layout is not None and more.layout is not None
-    np.testing.assert_array_equal(after[:, more.layout.first, :3], before[:, few.layout.first, :3])
-    assert not after[:, :-1, 3][:, more.line.spin == 0].any()
-    correction.switch(few)
-    np.testing.assert_array_equal(correction.corrector.error[:, :, :3], before[:, :, :3])

@@ -42,7 +42,7 @@ print(json.dumps(found))
 """
 
 # A line in a plane with a zone of each kind; in space; its equilibrium; zones that move over a seabed with friction;
-# the effect of bending followed along.
+# a catenary and the rods that it is compared with.
 SCRIPT = """
 import hybrid
 

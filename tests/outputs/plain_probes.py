@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +17,6 @@ from hybrid.model.mesh import Zone
 from hybrid.outputs.observation import Touchdown
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.probes import Observer
-from hybrid.solve.bending_corrector import Shift
 
 cross = np.cross
 
@@ -70,24 +68,9 @@ class Plain:
         self.line, self.sea, self.zones, self.ends = line, sea, zones, ends
         self.computed, self.grid, self.report = state, grid, report
         self.state = state
-        self.shift: Shift | None = None
-        self._plain: Plain | None = None  # the view that this one corrects
-        self.of_cells: list[tuple[int, float]] = []  # what rods have more of it at sides of nodes
         self.between: list[
             tuple[Any, ...]
         ] = []  # layers of pins in cells: ends, parts there, depth, curvature at the pin
-
-    def corrected(self, shift: Shift) -> Plain:
-        """The same state with position, tension, curvature and moment corrected; energies and contact stay."""
-        other, state = copy(self), self.computed
-        for name in ("d", "tension", "tangent", "moment", "torque", "curvature_twist", "shear"):
-            other.__dict__.pop(name, None)
-        other.shift, other._plain = shift, self
-        other.state = state._replace(
-            r=state.r + shift.position, v=state.v + shift.velocity, T=state.T + shift.tension,
-            e=state.e + np.diff(shift.position, axis=0),
-        )  # fmt: skip
-        return other
 
     @cached_property
     def touchdown(self) -> Touchdown:
@@ -112,9 +95,7 @@ class Plain:
         ends = []
         for k, first, second in ((0, 0, 1), (1, -1, -2)):
             t = 1.5 * d[first] - 0.5 * d[second] if len(d) > 1 else d[first]
-            if self.line.element[first] or (
-                self.shift is not None and self.shift.clamped[k]
-            ):  # a clamp or guide knows the tangent
+            if self.line.element[first]:  # a clamp or guide knows the tangent
                 t = self.ends.frame[k].reshape(3, 3)[:, 2]
             force = self.reaction(k) if k else -self.reaction(k)
             at_end = self.line.s[first]
@@ -122,22 +103,7 @@ class Plain:
                 ends.append(self._end_tension(k))
             else:
                 ends.append(float(force @ t) / float(np.linalg.norm(t)))
-        found = np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))
-        return found if self.shift is None else found - self.grid.sides @ self._borne_by_bending(self.shift)
-
-    def _borne_by_bending(self, shift: Shift) -> Floats:
-        """Tension (n sides,), N, M^2/(2 EI), that a rod has less than the catenary in its place."""
-        out = []
-        moment = self._bending(self.node_moment)
-        for zone, (a, b, _) in zip(self.grid.parts, self.grid.spans, strict=True):
-            for i in range(a, b + 1):
-                known = zone.kind == "rod" or i in (0, len(moment) - 1) or shift.stiffness[i] <= 0.0
-                out.append(0.0 if known else moment[i] ** 2 / (2.0 * shift.stiffness[i]))
-        return np.array(out)
-
-    def _bending(self, moment: Floats) -> Floats:
-        """Size (N+1,) of what of moments (N+1, 3) N m bends."""
-        return np.asarray(np.linalg.norm(self._across(moment), axis=1))
+        return np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))
 
     def _across(self, moment: Floats) -> Floats:
         t = self._node_tangent()
@@ -165,8 +131,6 @@ class Plain:
 
     @cached_property
     def _observed(self) -> tuple[Floats, Floats, Floats]:
-        if self._plain is not None:
-            return self._plain._observed
         n, st = self.line.h.size, self.computed
         M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
         observe(self.line, self.ends, st.e, st.v, st.a1, st.w, st.T, st.turn, Observed(M, strain, energy))
@@ -175,7 +139,7 @@ class Plain:
     @property
     def node_moment(self) -> Floats:
         """(N+1, 3) N m, inertial."""
-        return self._observed[0] if self.shift is None else self._observed[0] + self.shift.moment
+        return self._observed[0]
 
     @property
     def energy(self) -> Floats:
@@ -197,8 +161,6 @@ class Plain:
     @cached_property
     def _strains(self) -> Floats:
         """Curvature and twist (n sides, 2), 1/m."""
-        if self._plain is not None:
-            return self._plain._strains
         line, out = self.line, np.zeros((len(self.grid.side_nodes), 2))
         d = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None]
         cosine = np.einsum("ij,ij->i", d[:-1], d[1:])
@@ -241,7 +203,7 @@ class Plain:
         if last - first < 2:
             return
         line, T, end, direction = self.line, self.state.T, out[row, 0], self._directions[row]
-        out[row, 0], depth, before, of_cells = 0.0, 0.0, 1.0, 1.0
+        out[row, 0], depth, before = 0.0, 0.0, 1.0
         for i in range(node + way, (0 if k else line.h.size), way):
             c, beyond = min(i, i - way), min(i, i + way)
             deep = line.h[c] * np.sqrt(T[c] / EI)
@@ -252,10 +214,7 @@ class Plain:
             if part == 0.0:
                 return
             before = part
-            b = 2.0 + line.h[c] ** 2 * T[c] / EI
-            of_cells *= 0.5 * (b - np.sqrt(b * b - 4.0)) if b < 1e6 else 1.0 / b
             for row in np.flatnonzero(self.grid.side_nodes == i):
-                self.of_cells.append((row, end * (of_cells - part)))
                 mine = self._directions[row]
                 whole = out[row, 0] * mine - end * part * direction
                 out[row, 0] = np.copysign(np.linalg.norm(whole), whole @ mine)
@@ -312,13 +271,8 @@ class Plain:
     @cached_property
     def curvature_twist(self) -> Floats:
         strains = self._strains
-        if self.shift is not None:
-            strains = np.column_stack([self._curvature_of_moment(self.shift), strains[:, 1]])
-            assert self._plain is not None
-            for row, more in self._plain.of_cells:
-                strains[row, 0] += more
         bend = self.grid.sides @ (self._directions * strains[:, :1])
-        for a, b, one, two, deep, vector in (self._plain or self).between:
+        for a, b, one, two, deep, vector in self.between:
             for i in np.flatnonzero((self.grid.s - a) * (self.grid.s - b) < 0.0) if deep > 0.1 else ():
                 u = (self.grid.s[i] - a) / (b - a)
                 here = one * (two / one) ** u if two > 0.0 else one * (np.exp(-u * deep) - u * np.exp(-deep))
@@ -328,8 +282,6 @@ class Plain:
     @cached_property
     def _directions(self) -> Floats:
         """Of the curvature vector (n sides, 3), across the chords beside a node, at ends of the line of the moment."""
-        if self._plain is not None:
-            return self._plain._directions
         line, d, moment = self.line, self.d, self._across(self.node_moment)
         last = line.h.size
 
@@ -350,19 +302,11 @@ class Plain:
                     out[-1] = between(i + inward)
         return np.array(out)
 
-    def _curvature_of_moment(self, shift: Shift) -> Floats:
-        """Curvature (n sides,) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
-        bending = self._bending(self.node_moment)
-        side = self.grid.side_nodes
-        EI = shift.stiffness[side]
-        return np.divide(bending[side], EI, out=self._strains[:, 0].copy(), where=EI > 0.0)
-
     @cached_property
     def shear(self) -> Floats:
         Q = np.diff(self.node_moment, axis=0)
         V = cross(self.d, Q) / np.linalg.norm(self.state.e, axis=1)[:, None]
-        if self.shift is None:
-            V[self.line.spin == 0] = 0.0
+        V[self.line.spin == 0] = 0.0
         return np.asarray(np.linalg.norm(self.grid.cells @ V, axis=1))
 
     def bending_moment(self) -> Floats:
@@ -373,18 +317,11 @@ class Plain:
         """Force of the support, or of an end body, on the cable at end k; else the force applied there."""
         force = -self.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]
         if self.ends.held[k]:
-            return force if self.shift is None else force - self.shift.resultants[k]
+            return np.asarray(force)
         first = 0 if k == 0 else -1
         if not any(abs(x - self.line.s[first]) < 1e-9 * self.line.s[-1] for x in self.grid.loads):
             return self.ends.force[k].copy()
         return np.asarray(force)
-
-    def line_force(self, k: int) -> Floats:
-        """The same, but of an end with a body the pull of the line there, by its tension and the last cell's chord."""
-        if self.ends.held[k] or not any(abs(x - self.line.s[-k]) < 1e-9 * self.line.s[-1] for x in self.grid.loads):
-            return self.reaction(k)
-        chord = self.state.e[-k]
-        return np.asarray((2.0 * k - 1.0) * self._end_tension(k) * chord / np.linalg.norm(chord))
 
     def _end_tension(self, k: int) -> float:
         """Tension of the cable at end k, extrapolated from its last cells."""
@@ -393,13 +330,12 @@ class Plain:
         return float(T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0])
 
 
-def plain_values(observer: Observer, batch: Batch, i: int, shift: Shift | None, grid: Grid) -> dict[str, object]:
+def plain_values(observer: Observer, batch: Batch, i: int, grid: Grid) -> dict[str, object]:
     """What `observer.values_of` should have at output i, but for work and criteria."""
     x = batch
     state = blank_state(x.T.shape[1])._replace(r=x.r[i], v=x.v[i], e=x.e[i], T=x.T[i], a1=x.a1[i], w=x.w[i])
     ends = Ends(x.held[i], x.position[i], x.frame[i], x.spin[i], x.force[i], x.moment[i])
     computed = Plain(x.line(i, observer.line), observer.sea, observer.zones, ends, state, grid, x.report[i])
-    shifted = computed.corrected(shift) if shift is not None else computed
     v = computed
     t = v.tangent
     out = {
@@ -417,8 +353,4 @@ def plain_values(observer: Observer, batch: Batch, i: int, shift: Shift | None, 
         down = v.touchdown
         out |= {"contact": v.contact, "energy/contact": v.stored, "grounded_length": down.grounded}
         out |= {"touchdown": down.edges, "touchdown_position": down.places}
-    if shift is not None:
-        out["errors/model/tension"] = np.abs(shifted.tension - computed.tension)
-        out["errors/model/bending_moment"] = np.abs(shifted.bending_moment() - computed.bending_moment())
-        out["errors/model/end_force_end"] = np.linalg.norm(shifted.line_force(1) - computed.line_force(1))
     return out

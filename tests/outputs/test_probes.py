@@ -13,7 +13,6 @@ import hybrid
 from hybrid.kernels.state.state import Batch, Floats
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
-from hybrid.solve.bending_corrector import Shift
 
 # Round-off of sums in another order, as a part of the largest value of a field in the run.
 SAME = 1e-13
@@ -81,8 +80,7 @@ SCENES = {
 
 # Fields that are a small difference of larger ones, and the field whose size their round-off has.
 SIZED_BY = {
-    "torque": "bending_moment", "errors/model/tension": "tension", "errors/model/bending_moment": "bending_moment",
-    "errors/model/end_force_end": "reaction_end", "work/scheme": "energy/potential",
+    "torque": "bending_moment", "work/scheme": "energy/potential",
 }  # fmt: skip
 
 
@@ -96,34 +94,23 @@ def compare(found: dict[str, Floats], expected: dict[str, Floats]) -> None:
         np.testing.assert_allclose(x, y, rtol=0.0, atol=SAME * float(np.abs(size).max()), err_msg=name)
 
 
-# Fields of a `Shift` that have a value for each output.
-OF_OUTPUTS = ("position", "velocity", "tension", "moment", "resultants")
-
-
-def shift_at(shift: Shift | None, i: int) -> Shift | None:
-    """What bending makes of output i."""
-    return shift and shift._replace(**{x: getattr(shift, x)[..., i] for x in OF_OUTPUTS})
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     values_of, checked = Observer.values_of, set()
-    past: dict[Observer, list[tuple[Batch, Any, Any, dict[str, Floats]]]] = {}
+    past: dict[Observer, list[tuple[Batch, Any, dict[str, Floats]]]] = {}
 
-    def watched(
-        self: Observer, seen: Observation, ratios: Floats | None = None, shift: Shift | None = None
-    ) -> dict[str, Floats]:
-        found, batch = values_of(self, seen, ratios, shift), seen.batch
+    def watched(self: Observer, seen: Observation, ratios: Floats | None = None) -> dict[str, Floats]:
+        found, batch = values_of(self, seen, ratios), seen.batch
         expected: dict[str, Floats] = {}
         for prefix, grid in (("", self.grid), ("right/", self._after)) if self.jumps.size else (("", self.grid),):
             each = range(batch.t.size)
-            rows = [plain_values(self, batch, i, shift_at(shift, i), grid) for i in each]
+            rows = [plain_values(self, batch, i, grid) for i in each]
             expected |= {prefix + field: np.array([row[field] for row in rows], float) for field in rows[0]}
         compare(found, expected)
         checked.update(found.keys() & expected.keys())
         copied = Batch(*(np.array(x) for x in batch))  # the next steps overwrite it
-        past.setdefault(self, []).append((copied, ratios, shift and Shift(*(np.array(x) for x in shift)), found))
+        past.setdefault(self, []).append((copied, ratios, found))
         return found
 
     monkeypatch.setattr(Observer, "values_of", watched)
@@ -131,17 +118,10 @@ def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytes
     unchecked = {field for field in result.names if "t" in result.dims(field)[:1]} - checked
     assert all(x.split("/")[0] in ("t", "work", "criteria", "errors") for x in unchecked), unchecked
     observer, taken = max(past.items(), key=lambda item: (len(item[0].fields), len(item[1])))
-    batches, ratios, shifts, found = zip(*taken, strict=True)
+    batches, ratios, found = zip(*taken, strict=True)
     batch = Batch(*(np.concatenate(parts) for parts in zip(*batches, strict=True)))
     wide = Batch(*(np.repeat(x, 3, axis=0).reshape(len(x), 3, *x.shape[1:])[:, 1] for x in batch))  # views
-    many = None
-    if shifts[0] is not None:
-        parts = zip(*shifts, strict=True)
-        joined = {
-            x: np.concatenate(part, axis=-1) for x, part in zip(Shift._fields, parts, strict=True) if x in OF_OUTPUTS
-        }
-        many = shifts[0]._replace(**joined)
-    again = values_of(observer, observer.observation(wide), None if ratios[0] is None else np.concatenate(ratios), many)
+    again = values_of(observer, observer.observation(wide), None if ratios[0] is None else np.concatenate(ratios))
     compare(again, {field: np.concatenate([part[field] for part in found]) for field in again})
     computed = [x for field, x in again.items() if not field.startswith("criteria/")]
     assert all(x.flags.c_contiguous and not np.shares_memory(x, wide.work) for x in computed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 from hybrid.accuracy.error_control import ErrorController
@@ -22,8 +22,9 @@ Made = Callable[[Resolution], RunSample]
 class OneLine:
     """A control of a line in motion, and the case that it computes; sample, result: make its runs up."""
 
-    moves = flat = True
+    moves = True
     names: ClassVar[dict[str, str]] = {LINE: ""}
+    network = SimpleNamespace(lines={LINE: SimpleNamespace(sections=())})  # which cannot bend
 
     def __init__(
         self, asked: RequestedAccuracy | None, free: Free, sample: Made, result: Made,
@@ -39,9 +40,9 @@ class OneLine:
     def _result(self, resolution: NetworkResolution) -> Samples:
         return {LINE: self.result(resolution.one)}
 
-    def sample(self, resolution: NetworkResolution, *, model: bool = False) -> Samples:
+    def sample(self, resolution: NetworkResolution) -> Samples:
         """A run to compare with."""
-        return {LINE: self.made(replace(resolution.one, follow=True) if model else resolution.one)}
+        return {LINE: self.made(resolution.one)}
 
     def beside(self, samples: Sequence[Any]) -> AbstractContextManager[Sequence[Any]]:
         """One after the other."""

@@ -68,7 +68,7 @@ def test_the_gallery_in_its_plane_and_in_space(name: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name, model", [("touchdown", "catenary"), ("irregular_sea", None), ("rov_tether", None)])
 def test_the_model_error_in_its_plane_and_in_space(name: str, model: str | None) -> None:
-    """What leaving bending out does, followed with the factors of either march; 1e-9 in tensions makes 1e-7 in forces."""
+    """What leaving bending out does, by rods that either march solves; 1e-9 in tensions makes 1e-7 in forces."""
     what = example(name, 100).model_dump(exclude_none=True)
     what["output"]["errors"] = True
     if model is not None:

@@ -359,7 +359,7 @@ def test_a_change_that_is_stopped_has_the_errors_of_the_change(more, tmp_path, m
 
 
 @pytest.mark.long
-def test_a_run_that_is_stopped_while_its_model_error_is_followed_again(tmp_path, monkeypatch):
+def test_a_run_that_is_stopped_while_its_model_error_is_computed_again(tmp_path, monkeypatch):
     """After the result, where no accuracy is asked for: the result stands, and goes on to its error figure."""
     monkeypatch.setattr(Estimate, "lacks_model_errors", lambda self: True)
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=true", "time.duration=5"])

@@ -55,7 +55,6 @@ from hybrid.kernels.state.books import (
 from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import note_cuts, settle, watch_push
-from hybrid.kernels.step.generalized_alpha import before_fixed
 from hybrid.kernels.step.job import call_follower, call_itself, call_solver, read
 from hybrid.kernels.step.newton import ADDRESS, CUT_SHORT, GAIN, OK, SLACK, STEP, TURNED_TOO_FAR, ask_contact
 from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, passes, take_past
@@ -417,20 +416,12 @@ def accept(steps, system):
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
         report, row = job.work.report, steps.log[counts.rows, l]
-        if job.follower != 0:
-            own = job.books.clock  # by which the error is followed
-            own.last_dt, own.step_before, own.rho_before = dt, system.asked.before, own.last_rho
-            if not counts.controlled:
-                own.step_before, own.rho_before = before_fixed(dt, own.step_before, own.rho_before, clock.rho)
         job.books.clock.last_rho = report[USED_RHO]
         if l == first:
             clock.last_rho = report[USED_RHO]
         row[0], row[1], row[2], row[3] = clock.now, dt, counts.tries + counts.wasted, clock.correction
         row[4], row[5], row[6] = residual, counts.repeats, report[LOCAL_ERROR]
         row[7], row[8] = pull(report, 0), pull(report, 1)
-        if job.follower != 0:
-            job.books.counts.parity = counts.parity
-            job.books.counts.notices |= call_follower(job.follower, job.following)
         steps.seen[l] = watch_itself(job, job.new)
         flags |= job.books.counts.notices | steps.seen[l]
     if steps.watcher != 0:  # the parity is that of the next step

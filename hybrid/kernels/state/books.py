@@ -115,7 +115,6 @@ ASK_BEFORE, ASK_TRIES, ASK_STEPS = 1, 2, 4
 AT_STOP, PAUSED, TRYING, TRIED, STEPPED, FAILED = range(6)
 # Bits of Counts.notices.
 STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SLACK = 1, 2, 4, 8, 16, 32, 64, 128
-UNKNOWN_ERROR = 256
 IS_BENT, MEETS_ITSELF = 512, 1024
 LETS_GO = 2048
 ITERATIONS_CUT = 4096
@@ -171,8 +170,7 @@ class Books(NamedTuple):
     borne: Floats  # (N,) length over unstretched length that each cell bears
     worst: Floats  # (WORST, 4)
     log: Floats  # (rows, len(LOG))
-    samples: Floats  # (rows, sample_size(N) + K)
-    model_error: Floats  # (2, K) what samples take of the model error now and before the last step; K = 0: not followed
+    samples: Floats  # (rows, sample_size(N))
     # (N+1, STRAINS) of elements: curvature (1/m), bending moment (N m), torque (N m), curvature as results have it, and
     # what kernels.watch.soft_rods finds that by; empty: not wanted
     strains: Floats
@@ -193,8 +191,7 @@ class Books(NamedTuple):
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
 # work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); turns (K, 3)
 # of zones that a torque passes through; of a line that touches itself, the force of that (N+1); of obstacles of which one
-# moves, SEEN of each (kernels.state.obstacle_rows); how far layers have slipped (N+1, 2 L); what nodes remember of soil (N+1, 6); of the model error, where it
-# is followed, K numbers.
+# moves, SEEN of each (kernels.state.obstacle_rows); how far layers have slipped (N+1, 2 L); what nodes remember of soil (N+1, 6).
 SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
     1,
     5,
@@ -214,8 +211,6 @@ def sample_size(
     """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness; zones: with turns; touches:
 
     with the force of contact with itself; obstacles: of which one moves; layers: numbers of a node of what slips, and soil.
-
-    What is sampled of the model error comes behind them.
     """
     return (
         HEAD
@@ -236,7 +231,7 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
         clock=Clock(), counts=Counts(), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
         report=z((3, REPORT_SIZE)), tension=z((2, cells)), twist=z((2, 2)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), hinges=z((3, 3)), base=z(0, np.int64), placed=z((0, 3)),
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
-        samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, STRAINS)), start=z((nodes, 3)), marks=z(nodes, np.int8),
+        samples=z((rows, sample_size(cells))), strains=z((0, STRAINS)), start=z((nodes, 3)), marks=z(nodes, np.int8),
         right=np.arange(nodes),
         extremes=z((4, 0, nodes)), touch=z((3, 0)), asked=z((0, 0)), reached=z((0, 0)), path=z((0, 0)), radii=z((0, 2)), walls=z((0, 0)),
     )  # fmt: skip

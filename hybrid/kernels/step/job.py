@@ -41,7 +41,6 @@ class Job(NamedTuple):
     now: Floats  # (N+1, 4) and after it
     work: Work
     books: Books
-    following: NDArray[np.int64]  # of a run: table of what follows the model error (kernels.watch.bending_error)
     itself_table: NDArray[
         np.int64
     ]  # of a kernels.contact.self_distance.ItselfJob, of a line that could come near itself
@@ -54,7 +53,6 @@ class Job(NamedTuple):
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
     reel: int = 0  # address of kernels.reel.payout.pay_out, of a line of several stand_among; 0: its length stays
     iterated: int = 0  # of a run: address of kernels.reel.payout.iterate; 0: iterations need nothing of it
-    follower: int = 0  # and of what is called with `following` after every step; 0: nothing
     quantities: int = 0  # address of kernels.watch.named_quantities.note_quantities; 0: none are asked for
 
 
@@ -65,7 +63,7 @@ def blank_job() -> Job:
     task = Task(0, limits=limits)
     return Job(
         task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books(),
-        np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(3, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64),
+        np.zeros(0, np.int64), np.zeros(3, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64),
     )  # fmt: skip
 
 

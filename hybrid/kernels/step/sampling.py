@@ -277,15 +277,6 @@ def sample_head(sea, books, x, dt, k, t, row):
 
 
 @inner
-def sample_model_error(model_error, x, row, at):
-    """The error of neglected bending, which changes evenly in a step."""
-    for j in range(model_error.shape[1]):
-        row[at + j] = model_error[0, j]
-        if x < 1.0:
-            row[at + j] = x * model_error[0, j] + (1.0 - x) * model_error[1, j]
-
-
-@inner
 def sample_state(line, sea, old, new, books, where, row):
     """The state at a time within the last step as a row; where: that time (s), the part of the step before it, the
 
@@ -318,7 +309,6 @@ def sample_state(line, sea, old, new, books, where, row):
         for j in range(new.soil.shape[1]):
             row[at + j] = x * new.soil[i, j] + (1.0 - x) * old.soil[i, j]
         at += new.soil.shape[1]
-    sample_model_error(books.model_error, x, row, at)
 
 
 @inner
