@@ -321,6 +321,7 @@ def free_to_turn(cells=None):
     } | ({"model": "rod", "mesh": {"cells": cells}} if cells else {})  # fmt: skip
 
 
+@pytest.mark.long
 def test_equilibria_that_depend_on_the_mesh_are_noticed():
     """Meshes of 60 and 120 cells find other solutions, 6 cm apart; one of three is reported as met, once."""
     shapes = [hybrid.static(free_to_turn(cells)).position[0] for cells in (60, 120)]

@@ -75,6 +75,7 @@ def test_a_mesh_that_shows_all_bends_stays() -> None:
         assert np.array_equal(usual["curvature"], equal["curvature"])
 
 
+@pytest.mark.long
 @both_ways
 def test_runs_resumed_and_stepped_from_outside_have_the_same_cells(network: bool, tmp_path: Path) -> None:
     heave = {"motion": {"heave": {"amplitude": 0.5, "period": 4}, "ramp": 4}}

@@ -217,6 +217,7 @@ def three(**more: Any) -> Tables:
     return tables
 
 
+@pytest.mark.long
 def test_a_third_line_joins_two_that_touch_already() -> None:
     """What is known of the contact of two lines goes on in that of three.
 

@@ -120,6 +120,7 @@ def test_what_topples_leaves_its_plane_and_stays_where_two_dimensions_are_asked(
         assert len(planes(result)) == 1 and (across > farthest if farthest else across == 0.0)
 
 
+@pytest.mark.long
 def test_other_loads_may_take_a_line_out_of_its_plane(flat: list[list[int]], tmp_path: Path) -> None:
     """A current across it from 2 s on: the same motion, but for the push by which it leaves, as computed in space."""
     across = ["environment.fluid.current=[0.4, -0.3, 0]"]

@@ -212,6 +212,7 @@ def test_what_does_not_go_with_obstacles_is_refused(change: dict[str, Any], wher
     assert any(x.where == where and says in str(refused.value) for x in refused.value.complaints), refused.value
 
 
+@pytest.mark.long
 def test_derivatives_of_a_line_on_a_sheave_lead_to_the_length_that_is_sought() -> None:
     """Against a difference of equilibria; what is found, put into the scene, has the tension that was asked for."""
     tables = over_pipe()

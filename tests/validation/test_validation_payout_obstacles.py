@@ -200,6 +200,7 @@ def test_slow_payout_over_a_pipe_is_the_equilibrium_of_that_length(model: str, r
     assert abs(result["work/scheme"][-1]) < 1e-4 * abs(result["work/end"][-1])
 
 
+@pytest.mark.long
 def test_zones_that_move_over_a_pipe_are_rods() -> None:
     """Nodes enter as rods, and what lies on the pipe is one."""
     rods = hybrid.run(slow(12.0, "rod", 0.1))

@@ -150,6 +150,7 @@ def rolled() -> Any:
     return hybrid.run(two_ropes())
 
 
+@pytest.mark.long
 def test_two_ropes_turn_one_sheave_by_what_both_are_pulled(rolled: Any) -> None:
     """a = (sum of differences of pulls)/(all masses + I/rho^2), of both: the sheave passes on what one gives."""
     length = sum(x.s[-1] for x in rolled.lines.values())
