@@ -137,6 +137,7 @@ def resume(
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
         _check(left.scene, criterion)
         case = Case(left.scene, criterion, left.changes, left.points)
+        case.unasked = left.unasked
         with _supervised(case, progress):
             Passes(case, target, path, left).compute()
     return written_result(target, case.late_file)

@@ -46,7 +46,7 @@ from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.new_run import Recording, new_run, start_of
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter, at_once
-from hybrid.simulation.restart import LoadChange, changes_text
+from hybrid.simulation.restart import LoadChange, changes_text, with_own_contact
 from hybrid.simulation.restore import is_cut_off, kept_resolution
 from hybrid.simulation.result_checks import damped_vibrations
 from hybrid.simulation.run_file import AnyRecorder, Asked
@@ -102,6 +102,7 @@ class Case:
     late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
     late_finer: LateFile | None = None  # of a finer one, which may take its place
     _results = 0  # that were begun
+    unasked: Sequence[str] = ()  # lines that nobody asked to go on without contact with themselves: the file says none
     _told: tuple[object, str] | None = None  # a scene, and what it is as a text
     _start: tuple[Network, NetworkResolution, Start] | None = None  # that was looked at last
     # Whether contact of lines with themselves that nobody asks for is computed in runs to compare with: where one has
@@ -191,7 +192,7 @@ class Case:
     def _texts(self) -> tuple[str, str]:
         """What the file says of the scene, and of what changes."""
         if self._told is None or self._told[0] is not self.scene:
-            self._told = self.scene, scene_text(self.scene)
+            self._told = self.scene, scene_text(with_own_contact(self.scene, self.unasked, None))
         return self._told[1], changes_text(self.changes)
 
     # --- results --------------------------------------------------------------------------------

@@ -61,7 +61,8 @@ class Remaining(Generic[S]):
 
     before: what was found before the run, of what it is part of; {}: nothing, it begins with `resolution`.  anew: from
     t = 0, not from the checkpoint; reached: s, where it begins; points: of the lines of the result by their names in
-    the scene, None if it is computed anew.
+    the scene, None if it is computed anew; unasked: lines of the scene that nobody asked to go on without contact with
+    themselves, as they do.
     """
 
     scene: S
@@ -71,6 +72,7 @@ class Remaining(Generic[S]):
     anew: bool
     reached: float
     points: Mapping[str, OutputPoints] | None
+    unasked: Sequence[str] = ()
 
 
 def remaining(
@@ -115,13 +117,15 @@ def _found(path: Path) -> tuple[Remaining[Any], bool]:
             meets, reached = "let_pass" in state, max(point.t, float(state["t"]))
         with open_result(path) as result:
             lines = dict(result.each_line())
-            scene = _as_often(as_begun(read_text(result.scene_text)[0], lines, meets), result)
+            scene_of_file = read_text(result.scene_text)[0]
+            scene = _as_often(as_begun(scene_of_file, lines, meets), result)
             told = [(t, as_begun(read_text(text)[0], lines, meets)) for t, text in _told(path, result)]
             with refused(path):
                 points = {name: _points_of(part, scene.scene_of(name)) for name, part in lines.items()}
             done = result.done and not before
     changes, resolution = tuple(LoadChange(*x) for x in told), kept_resolution(network_of(scene), path)
-    return Remaining(scene, changes, resolution, before, False, reached, points), done
+    unasked = _touching_unasked(scene_of_file, lines)
+    return Remaining(scene, changes, resolution, before, False, reached, points, unasked), done
 
 
 def _points_of(result: Result, scene: LineScene) -> OutputPoints:
@@ -186,9 +190,19 @@ def as_begun(scene: Scene, lines: Mapping[str, Result], meets: bool) -> Scene:
 
     lines: of the result; meets: whether it computed that between lines.
     """
-    alone = [name for name, x in lines.items() if "self_contact" not in x and self_reach(scene.scene_of(name)).may]
-    contact = {name: {"contact": scene.lines[name].contact.model_copy(update={"self": False})} for name in alone}
-    return (scene if meets else passing_each_other(scene)).with_lines(contact)
+    contact = with_own_contact(scene, _touching_unasked(scene, lines), False)
+    return contact if meets else passing_each_other(contact)
+
+
+def _touching_unasked(scene: Scene, lines: Mapping[str, Result]) -> list[str]:
+    """Lines whose contact with themselves would be computed unasked, and has not been."""
+    return [name for name, x in lines.items() if "self_contact" not in x and self_reach(scene.scene_of(name)).may]
+
+
+def with_own_contact(scene: Scene, names: Sequence[str], asked: bool | None) -> Scene:
+    """The same with contact of these lines with themselves, without (False), or where nobody asks (None)."""
+    contact = {name: {"contact": scene.lines[name].contact.model_copy(update={"self": asked})} for name in names}
+    return scene.with_lines(contact) if names else scene
 
 
 def changes_text(changes: Sequence[LoadChange[Any]]) -> str:
