@@ -32,7 +32,7 @@ from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Se
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout, LineOnBase, on_other_parts
 from hybrid.model.mesh import Zone
-from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, length_at, lengths_at, payout_of, winch_at
+from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, length_at, lengths_at, payout_of
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
@@ -514,20 +514,17 @@ class PayingOut:
         lengthen(self.table.numbers)
 
 
-def length_asked(
-    scene: LineScene, paying: PayingOut | None, length: Any, rate: Any, where: str = ""
-) -> tuple[float | None, float]:
+def length_asked(scene: LineScene, paying: PayingOut, length: Any, rate: Any, where: str) -> tuple[float | None, float]:
     """Length (m; None: what the rate leads to) and rate (m/s) that are asked of a line; ValueError: they cannot be.
 
-    where: of a line of several its `payout` stands; empty: of one cable.
+    where: its `payout` stands in the scene.
     """
     payout = payout_of(scene)
-    if payout is None or paying is None:
-        raise ValueError("the scene has no ends.end.payout (nor ends.start.payout): the length of its line stays")
+    assert payout is not None
     if paying.ended:
         raise ValueError("the end at the winch has been let go: no line comes any more")
     if not payout.from_outside:
-        raise ValueError(f"{where or winch_at(scene)} gives the length: leave {', '.join(SOURCES)} out to set it")
+        raise ValueError(f"{where} gives the length: leave {', '.join(SOURCES)} out to set it")
     for name, x in (("rate", rate), ("length", 0.0 if length is None else length)):
         if isinstance(x, bool) or not isinstance(x, int | float | np.integer | np.floating) or not np.isfinite(x):
             raise ValueError(f"{name}: expected a finite number, found {x!r:.60}")
@@ -536,7 +533,7 @@ def length_asked(
     plan = paying.plan
     if not plan.shortest <= length <= plan.longest * (1.0 + ROUND_OFF):
         between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
-        raise ValueError(f"length = {length:.9g} m, expected between {between} ({where or winch_at(scene)}.longest)")
+        raise ValueError(f"length = {length:.9g} m, expected between {between} ({where}.longest)")
     return float(length), float(rate)
 
 

@@ -102,7 +102,7 @@ def bring_back(run: NetworkRun, saved: Saved) -> None:
     if run.model is not saved.model or moving:
         run.model = saved.model
         for k, (line, model, rows) in enumerate(zip(run.lines, saved.model.models, saved.waiting, strict=True)):
-            line.wait_again(rows._replace(outputs=(), errors=(), ratios=(), aside=(), log=()))
+            line.wait_again(rows._replace(outputs=(), ratios=(), aside=(), log=()))
             if k not in moving:
                 line.follow(model)
         for part in reversed(run.parts):

@@ -315,8 +315,9 @@ class SteppedPoints(SettableObstacles):
         k, run = self._line(name), self._run
         reels = {} if run.payout is None else run.payout.lines
         if k not in reels:
+            key = dotted(self._form.place(("lines", name, "connections", "end", "payout")))
             where = self._form.text(f"line {name}")
-            raise ValueError(f"{where} has no `payout` at an end: its length stays")
+            raise ValueError(f"{where} has no `payout`: there is no {key}, nor one at its start; its length stays")
         from hybrid.simulation.payout import length_asked
 
         side = ENDS[reels[k].plan.side]
