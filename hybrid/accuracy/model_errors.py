@@ -8,10 +8,10 @@ and steps are longer, shows it of catenaries from end to end that move; else the
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -28,6 +28,17 @@ from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSa
 
 Stretches = Collection[tuple[float, float]]  # m, of s
 CELLS = 4.0  # of rods to a length sqrt(EI/T) beside point loads and clamps: the curvature there is 1 % off
+
+
+class _EndCell(NamedTuple):
+    """Outputs within a cell at an end: a rod and a catenary are drawn there each in its own way.
+
+    How far each is off is an error of cells (outputs.edge_errors).
+    """
+
+    within: np.ndarray  # their numbers
+    nodes: tuple[int, int]  # of the output at the end, and the first beyond the cell
+    parts: np.ndarray  # (2, n) of the values at these two, in the values within
 
 
 class Comparable(Protocol):
@@ -56,7 +67,7 @@ def with_model_errors(case: Comparable, runs: Samples, costs: list[float]) -> Sa
     if not names:
         return dict(runs)
     finely = NetworkResolution({name: x.resolution for name, x in runs.items()})
-    changes, finely = as_rods(network, finely, {name: runs[name] for name in names}, case.points)
+    changes, finely, ends = as_rods(network, finely, {name: runs[name] for name in names}, case.points)
     try:
         with case.instead(case.scene.with_lines({case.names[name]: x for name, x in changes.items()})):
             rods = case.sample(finely)
@@ -65,7 +76,7 @@ def with_model_errors(case: Comparable, runs: Samples, costs: list[float]) -> Sa
         note = ((NOT_ESTIMATED, f"what bending would change in its catenaries is not known: {text}"),)
         return {name: replace(x, notes=(*x.notes, *note)) if name in names else x for name, x in runs.items()}
     costs.append(next(iter(rods.values())).cpu)
-    return {name: replace(x, model_error=_difference(x, rods[name])) for name, x in runs.items()}
+    return {name: replace(x, model_error=_difference(x, rods[name], ends.get(name, ()))) for name, x in runs.items()}
 
 
 def goes_by_cells(case: Comparable, runs: Samples) -> bool:
@@ -88,29 +99,37 @@ def leaves_bending_out(line: JoinedLine, run: RunSample) -> bool:
 
 def as_rods(
     network: Network, resolution: NetworkResolution, runs: Samples, points: Mapping[str, OutputPoints]
-) -> tuple[dict[str, dict[str, Any]], NetworkResolution]:
-    """Tables of lines with rods in place of catenaries, by name, and how finely they are computed.
+) -> tuple[dict[str, dict[str, Any]], NetworkResolution, dict[str, list[_EndCell]]]:
+    """Tables of lines with rods in place of catenaries, by name, how finely they are computed, and their end cells.
 
     resolution: of a run of the network; runs: of the lines that change in it; points: where outputs of lines are.
     """
     model, tables, finely = build_system(network, resolution=resolution), {}, dict(resolution.lines)
+    ends: dict[str, list[_EndCell]] = {}
     for name, run in runs.items():
         line, s = _model_of(model, name), points[name].s
         tension = np.asarray(run.values["tension"]).max(axis=0)
-        nodes = _nodes(line, run.rods)
-        for at, short in _kinks(line, s[run.places] if run.places.size else s, tension):
+        nodes, s = _nodes(line, run.rods), s[run.places] if run.places.size else s
+        ends[name] = list(_end_cells(line, nodes, s))
+        for at, short in _kinks(line, s, tension):
             nodes = _with_layer(nodes, at, short, run.rods)
         tables[name] = {"model": _rods(network.lines[name]), "mesh": Mesh(nodes=tuple(nodes.tolist()))}
         finely[name] = replace(resolution.lines[name], fineness=1.0, grading=None, parts=1)
-    return tables, NetworkResolution(finely)
+    return tables, NetworkResolution(finely), ends
 
 
-def _difference(run: RunSample, rods: RunSample) -> dict[str, np.ndarray]:
-    """By quantity; of moments, which a catenary has none of, all of them."""
+def _difference(run: RunSample, rods: RunSample, ends: Iterable[_EndCell]) -> dict[str, np.ndarray]:
+    """By quantity; of moments, which a catenary has none of, all of them.
+
+    ends: cells within which curvature differs as it does from node to node.
+    """
     called, there = END_FORCES | RIGHT, {name: np.asarray(x) for name, x in run.values.items()}
-    return {
+    found = {
         called.get(name, name): magnitude(np.asarray(x) - there.get(name, 0.0), name) for name, x in rods.values.items()
     }
+    for x in ends if "curvature" in found else ():
+        found["curvature"][:, x.within] = found["curvature"][:, list(x.nodes)] @ x.parts
+    return found
 
 
 def _model_of(model: NetworkModel, name: str) -> Model:
@@ -139,6 +158,18 @@ def _nodes(model: Model, rods: Stretches) -> np.ndarray:
     for a, b in rods:
         kept |= (s >= a - near) & (s <= b + near)
     return s[kept]
+
+
+def _end_cells(model: Model, nodes: np.ndarray, s: np.ndarray) -> Iterator[_EndCell]:
+    """The cells at ends that turn freely, of nodes and outputs at these s (m), where there is one at the end."""
+    ends, cells = (0, s.size - 1), (nodes[1] - nodes[0], nodes[-1] - nodes[-2])
+    for end, place, cell, held in zip(ends, (nodes[0], nodes[-1]), cells, model.cable.held_tangent, strict=True):
+        away = np.abs(s - place)
+        within, beyond = np.flatnonzero((away > 0.0) & (away < cell)), np.flatnonzero(away >= cell)
+        if not held and away[end] == 0.0 and within.size and beyond.size:
+            other = int(beyond[np.argmin(away[beyond])])
+            part = away[within] / away[other]
+            yield _EndCell(within, (end, other), np.array([1.0 - part, part]))
 
 
 def _kinks(model: Model, s: np.ndarray, tension: np.ndarray) -> Iterator[tuple[float, float]]:
