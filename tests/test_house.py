@@ -243,7 +243,7 @@ def test_files_are_as_long_as_a_subject() -> None:
 # Rules of writing, and in how many places each is broken: only less.
 BROKEN = {
     "docstring whose first line is no whole sentence": 25,
-    "name from the list of banned words": 120,
+    "name from the list of banned words": 104,
     "more than two constants in a line": 16,
     "constructor above 40 lines": 5,
     "function above 60 lines": 17,

@@ -68,7 +68,7 @@ class BodiesAtRest:
         numbers = model.body_numbers(np.inf)
         if numbers.shape != self._numbers.shape or not np.array_equal(numbers[:, PIECES], self._numbers[:, PIECES]):
             raise ValueError("other pieces of members")
-        model.stir(np.inf, self._states.bodies, 0.0, numbers)
+        model.update_water(np.inf, self._states.bodies, 0.0, numbers)
         self._solver.bodies[:] = numbers
         try:
             self._solver.evaluate_forces(self._states, 0.0)

@@ -326,7 +326,7 @@ class NetworkOthers:
         )
         numbers = self._tables.job.numbers
         flat = bool(self._model.models[0].line.bits & PLANAR)
-        loop.take_tangents(numbers, (follow_in_plane if flat else follow_system).address(numbers))
+        loop.bind_tangents(numbers, (follow_in_plane if flat else follow_system).address(numbers))
 
     def _ends(self, x: JoinedLine, state: State) -> Any:
         """What ends of a line impose, as outputs have it: they are where its nodes are."""

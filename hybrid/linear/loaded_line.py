@@ -283,7 +283,7 @@ class LoadedMembers:
         """state: (STATE,) of the body at rest; omegas: (F,) 1/s."""
         self.name, self.omegas, self.phases, R = name, omegas, phases_of(omegas), state[FRAME:V].reshape(3, 3)
         rows = members.pieces.copy()
-        members.stir(np.inf, state, 0.0, rows)
+        members.update_water(np.inf, state, 0.0, rows)
         arms, self.d = rows[:, MIDDLE:ALONG] @ R.T, rows[:, ALONG:CN] @ R.T
         self.axes, self.current, self.wet = axes_across(self.d), rows[:, WATER:PUSH].copy(), rows[:, WET].copy()
         self.cn, self.ct, self.length = self.wet * rows[:, CN], self.wet * rows[:, CT], members.lengths
@@ -380,7 +380,7 @@ def stiffness_by_water(solver: NetworkSolver, states: NetworkState, b: int, memb
                 moved.bodies[b, FRAME:V] = (rotation(sign * step[k] * np.eye(3)[k - 3]) @ frame).ravel()
             solver.evaluate_forces(moved, 0.0)
             before = solver.body_work[b, OWN : OWN + 6].copy()
-            members.stir(np.inf, moved.bodies[b], 0.0, solver.bodies[b, pieces].reshape(-1, PIECE))
+            members.update_water(np.inf, moved.bodies[b], 0.0, solver.bodies[b, pieces].reshape(-1, PIECE))
             solver.evaluate_forces(moved, 0.0)
             K[:, k] -= sign * (solver.body_work[b, OWN : OWN + 6] - before) / (2.0 * step[k])
             solver.bodies[:] = numbers

@@ -394,7 +394,7 @@ def rest_of(scene: Any, resolution: NetworkResolution) -> Rest:
     found = run.found.solver  # which knows neither waves nor friction
     lines = [x._replace(line=model.line) for x, model in zip(found.lines, run.model.models, strict=True)]
     for body, state, row in zip(run.model.bodies, run.state.bodies, found.bodies, strict=False):
-        body.take_added_mass(state)  # as it is wet at rest
+        body.set_added_mass(state)  # as it is wet at rest
         row[MASS : MASS + 36] = body.numbers[MASS : MASS + 36]
     solver, model = NetworkSolver(lines, len(found.net), found.bodies), run.model
     touching = TouchingLines(found, friction_between(model)) if run.found.settled else None

@@ -92,14 +92,14 @@ class Members:
     def added_mass(self, row: Floats) -> Floats:
         """(6, 6) about the origin in axes of the body, of the pieces as far as they are wet in a row of a state."""
         M, out = np.zeros((6, 6)), self.pieces.copy()
-        self.stir(np.inf, row, 0.0, out)
+        self.update_water(np.inf, row, 0.0, out)
         for x, mass in zip(out, out[:, WET] * self._sizes[:, 0], strict=True):
             p, d = x[MIDDLE:ALONG], x[ALONG:CN]
             G = np.hstack([np.eye(3), -np.cross(np.eye(3), p).T])
             M += G.T @ (mass * (np.eye(3) - np.outer(d, d))) @ G
         return M
 
-    def stir(self, t: float, row: Floats, dt: float, out: Floats) -> None:
+    def update_water(self, t: float, row: Floats, dt: float, out: Floats) -> None:
         """Write wetness and water at t (s; infinity: without waves) into `out` (n, PIECE).
 
         row: of a state, that the body has dt (s) before.
@@ -157,7 +157,7 @@ class BodyModel:
                 at = FORCE if x.what == "force" else MOMENT
                 out[at : at + 3] += x.grown(t)
 
-    def take_added_mass(self, row: Floats) -> None:
+    def set_added_mass(self, row: Floats) -> None:
         """Have the added mass of its members as they are wet in a row (STATE,) of a state."""
         if self.members is not None:
             assert self.own_mass is not None
@@ -193,7 +193,7 @@ def body_model(
     numbers[PIECES] = len(members.pieces)
     own_mass = numbers[MASS : MASS + 36].copy()
     made = BodyModel(name, np.append(numbers, members.pieces), start, loads, members, own_mass)
-    made.take_added_mass(start)
+    made.set_added_mass(start)
     return made
 
 

@@ -171,14 +171,14 @@ class NetworkModel:
         for k in self.unheld:
             out[len(self.bodies) + k, MASS + 21 : MASS + 36 : 7] = 1.0
         self.load_bodies(t, out)
-        self.stir(t, self.body_places, 0.0, out)
+        self.update_water(t, self.body_places, 0.0, out)
         return out
 
-    def stir(self, t: float, bodies: Floats, dt: float, out: Floats) -> None:
+    def update_water(self, t: float, bodies: Floats, dt: float, out: Floats) -> None:
         """Write the water around members of bodies (B, STATE) at t (s), dt (s) later, into their numbers `out`."""
         for body, state, row in zip(self.bodies, bodies, out, strict=False):
             if body.members is not None:
-                body.members.stir(t, state, dt, row[NUMBERS : body.numbers.size].reshape(-1, PIECE))
+                body.members.update_water(t, state, dt, row[NUMBERS : body.numbers.size].reshape(-1, PIECE))
 
     def members_of(self, out: Floats) -> dict[int, Table]:
         """Of bodies that have members, by their numbers: what tells the water around these into their numbers `out`."""

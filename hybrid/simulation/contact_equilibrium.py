@@ -111,7 +111,7 @@ def contact_of(model: Model) -> SelfContact:
 def nearness(model: Model, t: float, state: State) -> Floats:
     """How near nodes (N+1,) of a line at rest are to other parts of it: above 1, nearer than two diameters."""
     contact = contact_of(model)
-    near = contact.look_ahead(1.0)
+    near = contact.watch_nearness(1.0)
     contact.energy_of(model.line, model.ends.at(t), state)
     return near
 
@@ -221,7 +221,7 @@ def nearness_in(model: NetworkModel, lines: Sequence[JoinedLine], found: LinesAt
         bodies = found.bodies
         solver = touching_solver(lines, len(model.free), bodies, lambda: ([], shared_of(model)))
         assert solver.shared is not None
-        near |= solver.shared.look_ahead(1.0)
+        near |= solver.shared.watch_nearness(1.0)
         solver.contact_energy(found.state)
     return near
 

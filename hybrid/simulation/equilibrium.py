@@ -204,7 +204,7 @@ def _in_its_water(asked: _Asked) -> LinesAtRest:
     part, before = 1.0, None
     for _ in range(MOST_ROUNDS):
         there = numbers.copy()
-        model.stir(t, found.state.bodies, 0.0, there)
+        model.update_water(t, found.state.bodies, 0.0, there)
         if _same_water(there, numbers):
             return found
         change = there - numbers

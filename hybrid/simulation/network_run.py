@@ -199,7 +199,7 @@ class NetworkRun(RecordedRun):
         """Take the added mass of members of bodies that were at rest (B, STATE) when the motion began."""
         self.rest = bodies.copy()
         for body, row in zip(self.model.bodies, bodies, strict=False):
-            body.take_added_mass(row)
+            body.set_added_mass(row)
 
     def make_solver(self) -> None:
         """A solver for the model as it is."""
@@ -217,7 +217,7 @@ class NetworkRun(RecordedRun):
             use_solver(self.model, self.solver)
         if self.loop.controlled:
             self.solver.allowed[:] = self.resolution.allowed
-        self.loop.stir(self.model.members_of(self.solver.bodies))
+        self.loop.bind_members(self.model.members_of(self.solver.bodies))
         self._moved, self._loaded = [], np.nan
 
     def _make_room(self, solver: NetworkSolver) -> None:
@@ -448,7 +448,7 @@ class NetworkRun(RecordedRun):
             model.sea.at(t)
             line.books.velocity[:] = model.ends.velocity
         self.model.load_bodies(t, self.solver.bodies, self.loaded)
-        self.model.stir(t, self.state.bodies, t - self.t, self.solver.bodies)
+        self.model.update_water(t, self.state.bodies, t - self.t, self.solver.bodies)
 
     def _judge(self) -> None:
         """After a try: it may have to be made again, with other lines."""
@@ -564,7 +564,7 @@ class NetworkRun(RecordedRun):
             model.sea.at(self.t)
             line.books.velocity[:] = model.ends.velocity
         self.model.load_bodies(self.t, solver.bodies, self.loaded)
-        self.model.stir(self.t, self.state.bodies, 0.0, solver.bodies)
+        self.model.update_water(self.t, self.state.bodies, 0.0, solver.bodies)
         lengthening: dict[int, Floats] = {}
         with ExitStack() as stack:
             for forces_on in self.parts.forces_on:

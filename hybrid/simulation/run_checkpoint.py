@@ -156,7 +156,7 @@ def set_state(run: KeptRun, found: Mapping[str, Any]) -> None:
     run.stand_at(found["t"], found["steps"], found["last"], found["rho"], found["interval"])
     run.loaded, run.leg, run.cpu = found["loaded"], (found["leg"][0], found["leg"][1]), found["cpu"]
     longest = max(max(x.step, x.later) for x in run.resolution.lines.values())
-    run.loop.take_control(found["control"], longest)
+    run.loop.restore_control(found["control"], longest)
     run.loop.restore_cuts(found["cuts"])
     run.state.bodies[:], run.solver.body_work[:, :SPRING] = found["bodies"], found["body_work"]
     run.loop.worked[0], run.loop.worked[1, :, :SPRING] = run.solver.body_work, found["worked"]

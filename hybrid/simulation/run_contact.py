@@ -126,7 +126,7 @@ class RunContact(Part):
         if shared is not None and self.shared is not None and shared.lines == self.shared.lines:
             shared.restore(self.shared.checkpoint(run.t), run.t, remeshed=remeshed)
         elif shared is not None and (own or self.shared is not None):
-            shared.take(self.shared, own, run.t)
+            shared.copy_from(self.shared, own, run.t)
         self.shared = shared
         return contacts, shared
 

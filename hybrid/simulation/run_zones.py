@@ -288,11 +288,11 @@ class RunZones(Part):
         run = self._run
         loop.clock.allowed = self.longest
         if not self._compiled:
-            loop.follow([])
+            loop.bind_zones([])
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
             return
         loop.hold_zones([x.switching.table for x in self.lines])
-        loop.follow([x.bind(run, loop) for x in self.lines])
+        loop.bind_zones([x.bind(run, loop) for x in self.lines])
         mine = [run.lines[x.number] for x in self.lines]
         if run.contact.shared is not None or any(x.contact is not None for x in mine):
             loop.counts.asks |= b.ASK_STEPS
@@ -323,11 +323,11 @@ class RunZones(Part):
         run = self._run
         horizons = {x.number: LOOKAHEAD * x.switching.manager.pace for x in self.lines}
         shared = run.contact.shared
-        near = {} if shared is None else shared.look_ahead(max(horizons.values()))
+        near = {} if shared is None else shared.watch_nearness(max(horizons.values()))
         for x in self.lines:
             contact = run.lines[x.number].contact
             if contact is not None:
-                near[x.number] = contact.look_ahead(horizons[x.number])
+                near[x.number] = contact.watch_nearness(horizons[x.number])
             x.switching.manager.near = near.get(x.number, np.zeros(0))
 
     def _note_contact(self) -> None:

@@ -137,7 +137,7 @@ def lines_at_rest(
             roads = [islice(roads[0], 1)]
         elif rough and rubs:
             roads.append(_lazily(lambda: stuck(group.solver(rough), rough, begun[0][1], name, tally)))
-        return _found(*first_sound(chain(*roads), tally, refused), tally)
+        return _solution(*first_sound(chain(*roads), tally, refused), tally)
 
     return _in_plane_first(group, first, search, quick)
 
@@ -163,7 +163,7 @@ def settled_with_friction(
         if not lays or (set(ways.values()) != {"usual"} and not quick):
             tried.append(stuck(solver, ways, group.begun(first[1]), first[0], tally))
         before = found.path[:-1] if found is not None else ()
-        laid = _found(*first_sound(chain(*tried), tally, before=before), tally)
+        laid = _solution(*first_sound(chain(*tried), tally, before=before), tally)
         if found is None or not found.pushed or not laid.pulled:
             return laid
         return replace(laid, path=(*laid.path[:-1], f"{laid.path[-1]}, {PUSHED}"))
@@ -202,7 +202,7 @@ def _in_plane_first(
     return search(group, quick)
 
 
-def _found(path: tuple[str, ...], tried: Attempt, tally: Tally) -> LinesAtRest:
+def _solution(path: tuple[str, ...], tried: Attempt, tally: Tally) -> LinesAtRest:
     solver, states = tried.solver, tried.states
     rough = frozenset(k for k, x in enumerate(solver.lines) if x.line.bits & FRICTION)
     residual = solver.proof(states)

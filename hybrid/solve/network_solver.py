@@ -432,7 +432,7 @@ class NetworkSolver:
         for parity, (a, b) in enumerate((self.turns, self.turns[::-1])):
             self._bind_states(parity, a, b)
         for k, contact in self._contacts.items():
-            contact.follow(old.lines[k], new.lines[k])
+            contact.set_states(old.lines[k], new.lines[k])
         for k, table in self._lone_tables.items():
             table.bind(**self._by_itself(k, {"old": old.lines[k], "new": new.lines[k]}))
             self._bind_pushes(k)
@@ -478,7 +478,7 @@ class NetworkSolver:
         self.turns = None
         self._bind_states(0, old, new)
         for k, contact in self._contacts.items():
-            contact.follow(old.lines[k], new.lines[k])
+            contact.set_states(old.lines[k], new.lines[k])
             self.books[k].counts.parity = 0
         limits = task.limits
         self._asked[:] = (
@@ -617,7 +617,7 @@ class NetworkSolver:
         for contact, _ in found:
             contact.samples[:] *= finer
         for k, own in self._contacts.items():
-            own.follow(states.lines[k], states.lines[k])
+            own.set_states(states.lines[k], states.lines[k])
             own.force(states.lines[k])
         if self.shared is not None:
             self._push(states)
@@ -743,30 +743,30 @@ class NetworkSolver:
                 lie_in_soil(x.line, x.sea, state.r, state.soil)
         taken = self._march(ASSEMBLY, ca, states, t)
         if taken.outcome == Outcome.OK:
-            self._settle_contact(states)
+            self._count_contact_energy(states)
         return taken
 
     def forces_in_motion(self, states: NetworkState, t: float) -> NetworkTaken:
         """The same of states between two steps, at t (s): mean tensions of ropes stay what they are."""
         return self.evaluate_forces(states, HEAVY, t)
 
-    def _settle_contact(self, states: NetworkState) -> None:
+    def _count_contact_energy(self, states: NetworkState) -> None:
         """Put what contact does to held ends into the reports and powers of states that have just been evaluated."""
         for k, contact in self._contacts.items():
             x, books, report = self.lines[k], self.books[k], self.work[k].report
             before = report[NET_A : NET_A + 6].copy()
-            contact.settle(states.lines[k], x.ends, report)
+            contact.count_energy(states.lines[k], x.ends, report)
             added = (report[NET_A : NET_A + 6] - before).reshape(2, 3)
             books.power[0, :2] -= np.einsum("ij,ij->i", added, books.velocity)
             books.report[0] = report
         if self.shared is not None:
-            self._settle_shared()
+            self._count_shared_energy()
 
-    def _settle_shared(self) -> None:
+    def _count_shared_energy(self) -> None:
         """The same of lines that may touch each other."""
         assert self.shared is not None
         before = {k: self.work[k].report[NET_A : NET_A + 6].copy() for k in self.shared.lines}
-        self.shared.settle_lines(self.work, [x.ends for x in self.lines])
+        self.shared.count_energies(self.work, [x.ends for x in self.lines])
         for k, net in before.items():
             books, report = self.books[k], self.work[k].report
             added = (report[NET_A : NET_A + 6] - net).reshape(2, 3)

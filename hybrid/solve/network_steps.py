@@ -132,7 +132,7 @@ class NetworkSteps:
         """Bodies are loaded so from now on: as Moves.loads and history, of rows of bodies."""
         self._job.bind(loads=loads, history=history)
 
-    def stir(self, members: Mapping[int, Table]) -> None:
+    def bind_members(self, members: Mapping[int, Table]) -> None:
         """Bodies of these numbers have members, whose water is told by these tables."""
         if not members:
             self._job.bind(stirrer=0)
@@ -155,7 +155,7 @@ class NetworkSteps:
         for row, table in zip(self._followed, zones, strict=True):
             table.move(row)
 
-    def follow(self, zones: Sequence[Table]) -> None:
+    def bind_zones(self, zones: Sequence[Table]) -> None:
         """These tables of kernels.mesh.zone_step follow zones of lines from now on; none: Python does."""
         self.change_cells([])
         if not zones:
@@ -198,7 +198,7 @@ class NetworkSteps:
             self._job.bind(runner=run_system.address(self._job.numbers))
         self._job.bind(node_asker=asker if known else 0, reeler=reeler if known else 0)
 
-    def take_tangents(self, job: np.ndarray, follower: int) -> None:
+    def bind_tangents(self, job: np.ndarray, follower: int) -> None:
         """After every step this kernel takes tangents along it, with a table of kernels.run.network_tangents."""
         self._job.bind(beside=job, tangents=follower)
 
@@ -338,7 +338,7 @@ class NetworkSteps:
             return []
         return [float(self.clock.next_dt), float(self.clock.error_ratio), float(self.counts.wary)]
 
-    def take_control(self, saved: Any, largest: float) -> None:
+    def restore_control(self, saved: Any, largest: float) -> None:
         """Go on as `control` has told; largest: s, that a step may ever be.  ValueError: that cannot be."""
         if not self.controlled:
             return

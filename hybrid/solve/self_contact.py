@@ -236,7 +236,7 @@ class SelfContact(ContactBooks):
         self.attach(line, ends, (state, state.copy()), workspace_of(line, keep=True), books)
         return self.energy()
 
-    def settle(self, state: State, ends: Ends, report: Floats) -> float:
+    def count_energy(self, state: State, ends: Ends, report: Floats) -> float:
         """Energy, J, of contact of the state of a run, on other cells now: what travels store counts from here.
 
         It goes into the report of the state, and what contact does to ends that are held into their forces.
@@ -266,7 +266,7 @@ class SelfContact(ContactBooks):
         self.energy()
         return forces_on_nodes(self.contact)
 
-    def look_ahead(self, horizon: float) -> Floats:
+    def watch_nearness(self, horizon: float) -> Floats:
         """From now on steps find how near nodes are to other parts of the line, or will be within `horizon`, s.
 
         Returns where (N+1,): above 1, nearer than two diameters.
@@ -274,7 +274,7 @@ class SelfContact(ContactBooks):
         self.contact.numbers.horizon = horizon
         return self.contact.near
 
-    def follow(self, old: State, new: State) -> None:
+    def set_states(self, old: State, new: State) -> None:
         """The states from which and to which the next step leads, where they do not take turns."""
         self._job.bind(old=old, new=new)
 

@@ -107,7 +107,7 @@ class SharedContact(ContactBooks):
         each = zip(self.lines, self.begins.tolist(), self._nodes, strict=True)
         return {k: slice(begin, begin + count) for k, begin, count in each}
 
-    def look_ahead(self, horizon: float) -> dict[int, Floats]:
+    def watch_nearness(self, horizon: float) -> dict[int, Floats]:
         """From now on steps find how near nodes are to what they may touch, or will be within `horizon`, s.
 
         Returns where (N+1,), by number of a line: above 1, nearer than two diameters.
@@ -134,8 +134,8 @@ class SharedContact(ContactBooks):
         found = forces_on_nodes(self.contact)
         return {k: found[nodes] for k, nodes in self.slices().items()}
 
-    def settle_lines(self, works: Sequence[Work], ends: Sequence[Ends]) -> None:
-        """As SelfContact.settle, of all lines that may touch: reports get what contact has and does to held ends."""
+    def count_energies(self, works: Sequence[Work], ends: Sequence[Ends]) -> None:
+        """As SelfContact.count_energy, of all lines that may touch, into the reports of the lines."""
         self.rest_energy(works)
         numbers, shares = self.contact.numbers, self.contact.shares
         numbers.stored = numbers.tried
@@ -194,7 +194,7 @@ class SharedContact(ContactBooks):
         super().restore(saved, t, remeshed)
         self._times[:] = np.nan if remeshed else t, np.nan
 
-    def take(self, before: SharedContact | None, own: Mapping[int, SelfContact], t: float) -> None:
+    def copy_from(self, before: SharedContact | None, own: Mapping[int, SelfContact], t: float) -> None:
         """Go on at t, s, from contact of other lines with each other, and of lines with themselves, by number.
 
         What is known of lines that are here no longer is forgotten.

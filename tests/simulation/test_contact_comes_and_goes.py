@@ -157,7 +157,7 @@ def travels(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
     Points that had nothing near them before are not counted: they come into contact by the change.
     """
     found: list[tuple[int, int]] = []
-    settle, begin = SelfContact.settle, SelfContact.__init__
+    settle, begin = SelfContact.count_energy, SelfContact.__init__
 
     def beginning(contact: SelfContact, line: Line, *args: object) -> None:
         begin(contact, line, *args)
@@ -175,7 +175,7 @@ def travels(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
         found.append((kept.size, lost))
         return energy
 
-    monkeypatch.setattr(SelfContact, "settle", noting)
+    monkeypatch.setattr(SelfContact, "count_energy", noting)
     monkeypatch.setattr(SelfContact, "__init__", beginning)
     return found
 
