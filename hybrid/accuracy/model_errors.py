@@ -88,9 +88,14 @@ def goes_by_cells(case: Comparable, runs: Samples) -> bool:
     return not case.moves or any(x.rods and leaves_bending_out(lines[name], x) for name, x in runs.items())
 
 
+def can_leave_bending_out(line: JoinedLine) -> bool:
+    """Whether a line that can bend may be catenary somewhere."""
+    return any(x.weakest_bending for x in line.sections) and not isinstance(line.chosen_model, RodModel)
+
+
 def leaves_bending_out(line: JoinedLine, run: RunSample) -> bool:
     """Whether a line that can bend was catenary anywhere, at any time of a run."""
-    if not any(x.weakest_bending for x in line.sections) or isinstance(line.chosen_model, RodModel):
+    if not can_leave_bending_out(line):
         return False
     if run.catenary.size:  # zones have moved
         return bool(run.catenary.any())

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import time as clock
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from hybrid.accuracy.error_report import write_errors
 from hybrid.accuracy.finer_result import FinerResult
 from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.model_choice import chosen_and_surveyed
+from hybrid.accuracy.model_errors import can_leave_bending_out
 from hybrid.accuracy.refinement import WORTH_WRITING, Free, times_the_cost
 from hybrid.accuracy.run_forecast import Budget
 from hybrid.errors import ComputationError
@@ -216,7 +218,11 @@ class Passes:
             passes = [(PRE_RUN, resolution.coarser(CELLS, STEPS).one)] if surveyed else []
             passes += [(RESULT, resolution.one)]
             if case.wants_errors:
-                passes += [(ESTIMATION, x.one) for x in comparison_resolutions(resolution, moves=True)]
+                finely = comparison_resolutions(resolution, moves=True)
+                passes += [(ESTIMATION, x.one) for x in finely]
+                named = (x for x in case.network.lines.values() if x.model is not None)
+                rods = replace(finely[0].one, fineness=1.0)  # on nodes that are given
+                passes += [(ESTIMATION, rods)] * any(can_leave_bending_out(x) for x in named)
             case.progress.expect(passes, resolution.one)
         self._choices, found = chosen_and_surveyed(case, resolution)
         if case.scene is not asked and case.moves:
