@@ -1,9 +1,10 @@
 """What leaving bending out changes in a run: the same with rods in place of catenaries is computed, and compared.
 
-Lines that are joined move each other: all get the error that one of them has.  The rods have the cells and steps of the
-run, and where zones have moved those of its rods, so that both have the same error by the mesh.  Beside point loads and
-clamps that catenaries bend at they have shorter cells, within which bending fades.  A run to compare with, whose cells
-and steps are longer, shows it of catenaries from end to end that move; else the result does.
+Lines that are joined move each other: all get the error that one of them has.  The rods have the cells and the very
+steps of the run, and where zones have moved those of its rods, so that both have the same error by the mesh and by the
+step.  Beside point loads and clamps that catenaries bend at they have shorter cells, within which bending fades.  A run
+to compare with, whose cells and steps are longer, shows it of catenaries from end to end that move; else the result
+does.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model
 from hybrid.model.mesh import GROWTH
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.model.resolution import Resolution
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.analysis import CatenaryZone, Mesh, RodModel, RodZone, ZonesModel
 from hybrid.scene.network import JoinedLine
@@ -66,7 +68,7 @@ def with_model_errors(case: Comparable, runs: Samples, costs: list[float]) -> Sa
     names = [name for name, x in runs.items() if leaves_bending_out(network.lines[name], x)]
     if not names:
         return dict(runs)
-    finely = NetworkResolution({name: x.resolution for name, x in runs.items()})
+    finely = NetworkResolution({name: _in_steps_of(x) for name, x in runs.items()})
     changes, finely, ends = as_rods(network, finely, {name: runs[name] for name in names}, case.points)
     try:
         with case.instead(case.scene.with_lines({case.names[name]: x for name, x in changes.items()})):
@@ -77,6 +79,13 @@ def with_model_errors(case: Comparable, runs: Samples, costs: list[float]) -> Sa
         return {name: replace(x, notes=(*x.notes, *note)) if name in names else x for name, x in runs.items()}
     costs.append(next(iter(rods.values())).cpu)
     return {name: replace(x, model_error=_difference(x, rods[name], ends.get(name, ()))) for name, x in runs.items()}
+
+
+def _in_steps_of(run: RunSample) -> Resolution:
+    """The resolution of a run in the very steps that it took: of others, the difference would be of steps."""
+    if run.resolution.local is None or not len(run.forces):
+        return run.resolution
+    return replace(run.resolution, local=None, ends=tuple(run.forces[:, 0].tolist()))
 
 
 def goes_by_cells(case: Comparable, runs: Samples) -> bool:

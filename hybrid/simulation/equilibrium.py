@@ -247,8 +247,26 @@ def _without_contact(asked: _Asked, group: Group) -> LinesAtRest:
     if not touch and ways and {*ways.values()} == {"start"}:
         found = settled_with_friction(group, ways, _first_shapes(model))
     else:
-        found = (None if touch or "start" in ways.values() else _by_coarser(asked, group)) or _on_its_side(asked, group)
+        found = _on_many_cells(asked, group, touch or "start" in ways.values())
     return found if touch else _keep_turns(model, asked.t, found)
+
+
+def _on_many_cells(asked: _Asked, group: Group, held: bool) -> LinesAtRest:
+    """Find the equilibrium on fewer cells where that helps; not of lines that contact or friction hold from the start.
+
+    Of several lines only where no other way leads to one: they have more equilibria, and that beside the first places
+    is meant.
+    """
+    if held:
+        return _on_its_side(asked, group)
+    if len(group.lines) == 1:
+        return _by_coarser(asked, group) or _on_its_side(asked, group)
+    try:
+        return _on_its_side(asked, group)
+    except LineFailed:
+        if (found := _by_coarser(asked, group)) is None:
+            raise
+        return found
 
 
 def _first_shapes(model: NetworkModel) -> Start:

@@ -74,6 +74,7 @@ def shorten(path: Path) -> None:
 
 ASKED = ["accuracy={tension: 0.3%}", "time={duration: 7}", "mesh=null"]
 CASES = {"rods": [*ASKED, "model=rod"], "model left open": ASKED}
+FILES = {"rods": 3, "model left open": 5}  # runs to compare with, and such with rods in place of catenaries
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +90,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
                 other.setattr(cases, "MOST_IN_MEMORY", 10**9)
                 hybrid.run(scene(*CASES[name]), folder / "whole.h5").close()
             patched.setattr(cases, "MOST_IN_MEMORY", 0)
-            assert len(interrupted(scene(*CASES[name]), folder / "run.h5", stopping)) == 3
+            assert len(interrupted(scene(*CASES[name]), folder / "run.h5", stopping)) == FILES[name]
         return folder
 
     return make
@@ -106,7 +107,10 @@ def test_a_stopped_run_goes_on_bit_for_bit(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the files, and without one of them: then all runs to compare with are computed again."""
+    """With the files, and without one of them: then all runs to compare with are computed again.
+
+    So they are where lines leave bending out, because what that changes is in no file.
+    """
     Stopping(monkeypatch)
     for file in made(name).iterdir():
         shutil.copy(file, tmp_path)
@@ -117,7 +121,7 @@ def test_a_stopped_run_goes_on_bit_for_bit(
         harm(rows(tmp_path)[1])
     hybrid.resume(tmp_path / "run.h5").close()
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
-    assert (len(computed) >= 3) == (harm is not None)
+    assert (len(computed) >= 3) == (harm is not None or name != "rods")
     assert {x.name for x in tmp_path.iterdir()} == {"whole.h5", "run.h5"}
 
 
