@@ -230,7 +230,7 @@ def test_one_line_is_no_other_case_than_several() -> None:
 
 
 # Files, those below 100 lines, and those above 700: only less.  What is small joins its subject.
-MOST_FILES, SMALL_FILES, LONG_FILES = 476, 23, 2
+MOST_FILES, SMALL_FILES, LONG_FILES = 472, 23, 2
 
 
 def test_files_are_as_long_as_a_subject() -> None:
@@ -242,12 +242,12 @@ def test_files_are_as_long_as_a_subject() -> None:
 
 # Rules of writing, and in how many places each is broken: only less.
 BROKEN = {
-    "docstring whose first line is no whole sentence": 25,
-    "name from the list of banned words": 104,
+    "docstring whose first line is no whole sentence": 20,
+    "name from the list of banned words": 103,
     "more than two constants in a line": 16,
-    "constructor above 40 lines": 5,
+    "constructor above 40 lines": 4,
     "function above 60 lines": 17,
-    "fmt: skip": 447,
+    "fmt: skip": 438,
 }
 # Words that do not say what a thing is or does; the second ones only where they are the whole name.
 BANNED = {"calm", "follow", "found", "haste", "its", "look", "looks", "loudest", "pace", "patience", "said",
