@@ -3,7 +3,7 @@
 Lines that are joined move each other: all get the error that one of them has.  The rods have the cells and the very
 steps of the run, and where zones have moved those of its rods, so that both have the same error by the mesh and by the
 step.  Beside point loads and clamps that catenaries bend at they have shorter cells, within which bending fades.  A run
-to compare with, whose cells and steps are longer, shows it of catenaries from end to end that move; else the result
+to compare with, whose cells and steps are longer, shows it of catenaries that move and touch nothing; else the result
 does.
 """
 
@@ -91,10 +91,17 @@ def _in_steps_of(run: RunSample) -> Resolution:
 def goes_by_cells(case: Comparable, runs: Samples) -> bool:
     """Whether longer cells do not show what leaving bending out changes, or hardly cost less.
 
-    They do not beside joints of rods and catenaries; an equilibrium costs little on any cells.
+    They do not beside joints of rods and catenaries, and where a line touches down: bending fades within a cell there.
+    An equilibrium costs little on any cells.
     """
-    lines = case.network.lines
-    return not case.moves or any(x.rods and leaves_bending_out(lines[name], x) for name, x in runs.items())
+    network = case.network
+    left_out = [x for name, x in runs.items() if leaves_bending_out(network.lines[name], x)]
+    return not case.moves or any(x.rods or may_touch(network) for x in left_out)
+
+
+def may_touch(network: Network) -> bool:
+    """Whether there is a bed or an obstacle."""
+    return network.environment.seabed is not None or bool(network.surfaces)
 
 
 def can_leave_bending_out(line: JoinedLine) -> bool:

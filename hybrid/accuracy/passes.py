@@ -19,7 +19,7 @@ from hybrid.accuracy.error_report import write_errors
 from hybrid.accuracy.finer_result import FinerResult
 from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.model_choice import chosen_and_surveyed
-from hybrid.accuracy.model_errors import can_leave_bending_out
+from hybrid.accuracy.model_errors import can_leave_bending_out, may_touch
 from hybrid.accuracy.refinement import WORTH_WRITING, Free, times_the_cost
 from hybrid.accuracy.run_forecast import Budget
 from hybrid.errors import ComputationError
@@ -221,7 +221,8 @@ class Passes:
                 finely = comparison_resolutions(resolution, moves=True)
                 passes += [(ESTIMATION, x.one) for x in finely]
                 named = (x for x in case.network.lines.values() if x.model is not None)
-                rods = replace(finely[0].one, fineness=1.0)  # on nodes that are given
+                own = may_touch(case.network)
+                rods = replace((resolution if own else finely[0]).one, fineness=1.0)  # on nodes that are given
                 passes += [(ESTIMATION, rods)] * any(can_leave_bending_out(x) for x in named)
             case.progress.expect(passes, resolution.one)
         self._choices, found = chosen_and_surveyed(case, resolution)

@@ -80,7 +80,8 @@ def test_the_figure_of_a_swayed_line_with_a_clump_is_not_too_small():
     """A line of zones that move, clamped at its swayed end, in a current that veers: 0.10 was estimated, once.
 
     Where outputs are far below the largest error, the figure may be larger than three times the truth.  Just after
-    zones have changed at the clamp the tension is off by more than it says.
+    zones have changed at the clamp the linear estimate of 1.0 said 0.32 of what the tension is off, and that it was not
+    known; rods in its place say all of it.
     """
     scene = {
         "environment": {"fluid": {"density": 1025, "current": {
@@ -112,11 +113,9 @@ def test_the_figure_of_a_swayed_line_with_a_clump_is_not_too_small():
         scene | {"model": {"kind": "adaptive", "always_move": True}, "accuracy": {"position": "1%", "tension": "1%"}}
     )
     assert SHARP[0] <= effectivity(result, truth) <= SHARP[1]
-    changes = np.array([event.t for event in result.events if event.kind in ("grow", "split")])
-    since = result.times[:, None] - changes
-    calm = ~((since >= 0.0) & (since < 0.2)).any(axis=1)
-    for name, there in (("position", slice(None)), ("tension", calm)):
-        found = at_outputs(result, truth, name)[there]
+    assert {"grow", "split"} & {event.kind for event in result.events}
+    for name in ("position", "tension"):
+        found = at_outputs(result, truth, name)
         assert found.size > 15 and found.min() >= SHARP[0], (name, found)
 
 
