@@ -1,4 +1,4 @@
-"""Equilibria of networks are sought of joined lines together, and of others one by one.
+"""Equilibria of networks are sought of joined lines together, and of each other line by itself.
 
 One search for either (solve.lines_at_rest): on the side of obstacles where lines begin, with the turns of their ends,
 on fewer cells first, with contact where that keeps them apart, then with friction that has settled as the scene says.
@@ -85,11 +85,12 @@ def equilibrium_of(system: Network, model: NetworkModel, t: float, friction: boo
     """
     if floating := [Complaint(dotted(x.at), str(x.given), x.expected, x.fix) for x in floating_groups(system)]:
         raise SceneError(floating)
-    numbers = model.body_numbers(t)
+
+    def search(_: Sequence[int], own: NetworkModel) -> LinesAtRest:
+        return _in_its_water(_Asked(_network_of(system, own.names), own, t, own.body_numbers(t), friction))
+
     try:
-        if _are_alone(model):
-            return _one_by_one(model, t, lambda k, x: _at_rest(_Asked(system, x, t, numbers, friction)))
-        return _in_its_water(_Asked(system, model, t, numbers, friction))
+        return _by_parts(model, t, _parts_of(model), search)
     except LineFailed as failed:
         raise named(_with_reasons(failed, model), model, _nearer(system)) from None
 
@@ -101,8 +102,13 @@ def solve_from(
 
     It is found as that was: with contact, or with friction that has settled likewise.
     """
-    if found.alone:
-        return _one_by_one(model, t, lambda k, x: solve_from(found.alone[k], x, t, bodies, _only(start, k), name))
+    if found.parts:
+
+        def again_of(part: tuple[int, ...], own: NetworkModel) -> LinesAtRest:
+            states = NetworkState([start.lines[k] for k in part], start.bodies[: len(own.body_places)])
+            return solve_from(found.parts[part], own, t, bodies[: len(own.body_places)], states, name)
+
+        return _by_parts(model, t, [*found.parts], again_of)
     group = group_of(model, t, bodies)
     if found.settled:
         model, group = letting_touch(model, group)
@@ -141,36 +147,85 @@ def group_of(model: NetworkModel, t: float, bodies: Floats) -> Group:
     return Group(joined_lines(model, t), len(model.free), bodies, first.plane, first.cable.held_tangent)
 
 
-def _are_alone(model: NetworkModel) -> bool:
-    """Whether each line is joined to nothing that moves and asks for no contact: what it finds, no other line knows."""
-    joined = bool(model.free or len(model.body_places)) or model.touching is not None
-    return not (joined or any(x.line.bits & SELF_CONTACT for x in model.models))
+def _is_alone(model: NetworkModel, number: int) -> bool:
+    """Whether a line is joined to nothing that moves and asks for no contact: what it finds, no other line knows."""
+    asks = model.touching is not None or model.rides.size or any(x.line.bits & SELF_CONTACT for x in model.models)
+    return not asks and max(model.joints[number]) < 0
 
 
-def _one_by_one(model: NetworkModel, t: float, search: Callable[[int, NetworkModel], LinesAtRest]) -> LinesAtRest:
-    """Return the equilibria that a search finds of each line by itself as one."""
-    found = list[LinesAtRest]()
-    for k, x in enumerate(model.models):
-        of = slice(k, k + 1)
-        own = replace(
-            model, names=model.names[of], models=(replace(x, line=as_kept(x.line, x.plane, x.kept_in)),),
-            joints=model.joints[of], fairleads=model.fairleads[of], seats=model.seats[of], turns=model.turns[of],
-        )  # fmt: skip
+def _parts_of(model: NetworkModel) -> list[tuple[int, ...]]:
+    """Numbers of the lines that are sought together: each that is alone, and all others."""
+    lines = tuple(range(len(model.models)))
+    others = tuple(k for k in lines if not _is_alone(model, k))
+    if not others and (model.free or len(model.body_places)):  # which no line holds
+        return [lines]
+    return [*((k,) for k in lines if k not in others), *([others] if others else [])]
+
+
+def _network_of(system: Network, names: Sequence[str]) -> Network:
+    """A network of some of the lines of another, with their points."""
+    if len(names) == len(system.lines):
+        return system
+    lines = {name: system.lines[name] for name in names}
+    at = {point for line in lines.values() for point in (line.start, line.end)}
+    points = {name: x for name, x in system.points.items() if name in at}
+    return system.model_copy(update={"lines": lines, "points": points})
+
+
+def _model_of(model: NetworkModel, part: Sequence[int]) -> NetworkModel:
+    """The model of some of its lines: of one that is alone, without what is free, and in its plane."""
+    of = [*part]
+    own = replace(
+        model,
+        names=tuple(model.names[k] for k in part),
+        models=tuple(model.models[k] for k in part),
+        joints=tuple(model.joints[k] for k in part),
+        fairleads=model.fairleads[of],
+        seats=model.seats[of],
+        turns=tuple(model.turns[k] for k in part),
+    )
+    if not _is_alone(model, part[0]):
+        return own
+    (x,) = own.models
+    return replace(
+        own,
+        models=(replace(x, line=as_kept(x.line, x.plane, x.kept_in)),),
+        free=(),
+        rigid=(),
+        moments=(),
+        bodies=(),
+        places=model.places[:0],
+        body_places=model.body_places[:0],
+    )
+
+
+def _by_parts(
+    model: NetworkModel,
+    t: float,
+    parts: Sequence[tuple[int, ...]],
+    search: Callable[[tuple[int, ...], NetworkModel], LinesAtRest],
+) -> LinesAtRest:
+    """Return the equilibria that a search finds of each part, by numbers of its lines, as one."""
+    if len(parts) == 1 and (len(parts[0]) > 1 or not _is_alone(model, 0)):
+        return search(parts[0], model)
+    found = dict[tuple[int, ...], LinesAtRest]()
+    for part in parts:
         try:
-            found.append(search(k, own))
+            found[part] = search(part, _model_of(model, part))
         except LineFailed as failed:
-            raise LineFailed(k, failed.outcome, None, failed.s, failed.detail, first=failed.first) from None
+            number = part[failed.line] if failed.line >= 0 else -1
+            raise LineFailed(number, failed.outcome, None, failed.s, failed.detail, first=failed.first) from None
     return _together(model, t, found)
 
 
-def _only(states: NetworkState, k: int) -> NetworkState:
-    return NetworkState([states.lines[k]], states.bodies)
-
-
-def _together(model: NetworkModel, t: float, found: Sequence[LinesAtRest]) -> LinesAtRest:
-    """Equilibria of all lines as one."""
-    rubs = frozenset(k for k, x in enumerate(found) if x.with_friction)
-    states = NetworkState([x.state.lines[0] for x in found], model.body_places)
+def _together(model: NetworkModel, t: float, found: Mapping[tuple[int, ...], LinesAtRest]) -> LinesAtRest:
+    """Equilibria of the parts of a network as one."""
+    of_line = {k: (x, j) for part, x in found.items() for j, k in enumerate(part)}
+    each = [of_line[k] for k in range(len(model.models))]
+    rubs = frozenset(k for k, (x, j) in enumerate(each) if j in x.with_friction)
+    joined = next((x for part, x in found.items() if not _is_alone(model, part[0])), None)
+    bodies = model.body_places if joined is None else joined.state.bodies
+    states = NetworkState([x.state.lines[j] for x, j in each], bodies)
 
     def solver() -> NetworkSolver:
         lines = []
@@ -179,17 +234,24 @@ def _together(model: NetworkModel, t: float, found: Sequence[LinesAtRest]) -> Li
             if own.plane is not None and not leaves_plane(own.plane, one, own.length):
                 line = planar(line, own.plane)  # in which it was found, so that nothing is compiled for space
             lines.append(x._replace(line=line))
-        made = NetworkSolver(lines, 0, model.body_numbers(t))
+        made = NetworkSolver(lines, len(model.free), model.body_numbers(t) if joined is None else joined.bodies)
         made.evaluate_forces(states, made.anchor)
         return made
 
-    path = max(found, key=lambda x: len(x.path)).path  # of the line that took most ways
+    path = max(found.values(), key=lambda x: len(x.path)).path  # of the part that took most ways
     return LinesAtRest(
-        states, path, sum(x.iterations for x in found), max(x.residual for x in found), solver,
-        any(x.settled for x in found), next((x.unjudged for x in found if x.unjudged), ""), rubs,
-        frozenset(k for k, x in enumerate(found) if x.blurred), tuple(found),
-        {k: x.not_settled.get(0, "") for k, x in enumerate(found)},
-    )  # fmt: skip
+        states,
+        path,
+        sum(x.iterations for x in found.values()),
+        max(x.residual for x in found.values()),
+        solver,
+        any(x.settled for x in found.values()),
+        next((x.unjudged for x in found.values() if x.unjudged), ""),
+        rubs,
+        frozenset(k for k, (x, j) in enumerate(each) if j in x.blurred),
+        found,
+        {k: x.not_settled.get(j, "") for k, (x, j) in enumerate(each)},
+    )
 
 
 # --- one search -----------------------------------------------------------------------------------------

@@ -42,7 +42,8 @@ class LinesAtRest:
     unjudged: str = ""  # where settled: why it is not known that it would stay
     with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction took part
     blurred: frozenset[int] = frozenset()  # and of those of which round-off hides whether they buckle
-    alone: tuple[LinesAtRest, ...] = ()  # of each line where all are joined to nothing that moves: found one by one
+    # Of lines that were sought apart from others, by their numbers; empty: all were sought together.
+    parts: Mapping[tuple[int, ...], LinesAtRest] = field(default_factory=dict)
     # By number of those that leave friction to the program, why it did not.
     not_settled: Mapping[int, str] = field(default_factory=dict)
 
@@ -62,7 +63,7 @@ class LinesAtRest:
     @property
     def presses_bodies(self) -> bool:
         """Whether lines touch a body that is free."""
-        return not self.alone and self.solver.presses_bodies
+        return not self.parts and self.solver.presses_bodies
 
     @property
     def pushed(self) -> bool:

@@ -73,6 +73,31 @@ def scene(*parts: Tables, duration: float = 1.0, step: float = 0.02, **more: Any
     return merged | more
 
 
+# Two lines from a body that hangs between them, beside a line of rods that many cells and slack make hard to find.
+JOINED: Tables = {
+    "bodies": {"weight": {"initial_guess": [0, 0, -3], "mass": 40.0, "inertia": [1.0] * 3}},
+    "points": {"left": {"position": [-4, 0, 0]}, "right": {"position": [4, 0, 0]},
+               "eye": {"body": "weight", "place": [0, 0, 0.5]}},
+    "lines": {"first": line("left", "eye", 5.0), "last": line("eye", "right", 5.5)},
+}  # fmt: skip
+BESIDE: Tables = {
+    "points": {"c": {"position": [0, 20, 0]}, "d": {"position": [60, 20, 5]}},
+    "lines": {"bent": line("c", "d", 150.0, 1100) | {"model": "rod"}},
+}
+BESIDE["lines"]["bent"]["sections"] = [ROPE | {"length": 150.0, "bending_stiffness": 5.0}]
+
+
+def test_a_lone_line_comes_to_rest_as_by_itself() -> None:
+    names = JOINED["lines"] | BESIDE["lines"]
+    lines = {name: names[name] for name in ("first", "bent", "last")}
+    together = JOINED | {"points": JOINED["points"] | BESIDE["points"], "lines": lines}
+    found = dict(hybrid.static(together).each_line())
+    for apart in (JOINED, BESIDE):
+        for name, own in hybrid.static(apart).each_line():
+            assert np.array_equal(found[name]["position"], own["position"])
+            assert np.allclose(found[name]["tension"], own["tension"], rtol=1e-13)
+
+
 @pytest.fixture
 def groups(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
     """Numbers of the lines that one Newton solves, whenever other ones are."""
