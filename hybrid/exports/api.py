@@ -71,13 +71,15 @@ def export(
     kind, names = format_of(path, format), [names] if isinstance(names, str) else names
     if path is None and result.file is None:
         raise ResultError(f"a result in memory has no name of its own\n    try:      path='run{SUFFIXES[kind]}'")
-    if result.lines and (kind in ("vtkhdf", "fatigue") or (kind == "csv" and names is None)):
-        name = next(iter(result.lines))
-        raise ResultError(
-            f"{kind} is of one line, and the result is of several: {', '.join(result.lines)}\n    try:      export("
-            f"result.lines['{name}'], 'run.{name}{SUFFIXES[kind]}'); the command `hybrid export` makes a file of each"
-        )
     file = Path(path).expanduser() if path is not None else (result.file or Path()).with_suffix(SUFFIXES[kind])
+    if result.lines and (kind in ("vtkhdf", "fatigue") or (kind == "csv" and names is None)):
+        (name, line), *others = result.lines.items()
+        if others:
+            raise ResultError(
+                f"{kind} is of one line, and the result is of several: {', '.join(result.lines)}\n    try:      export("
+                f"result.lines['{name}'], 'run.{name}{SUFFIXES[kind]}'); the command `hybrid export` makes a file of each"
+            )
+        result = line
     if kind == "csv":
         names, at = ["tension"] if names is None else names, _usual_places(result) if at is None else at
     if kind == "fatigue" and names is not None:

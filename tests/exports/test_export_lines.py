@@ -165,6 +165,14 @@ def test_a_format_of_one_line_says_to_take_one(folder: Path, name: str) -> None:
             hybrid.export(whole.lines["west"], "vtkhdf")
 
 
+def test_the_only_line_is_what_a_format_of_one_line_is_of(folder: Path) -> None:
+    scene = SCENE | {"points": {"a": {"position": [-40, 0, 0]}, "b": {"position": [10, 0, 0]}}, "bodies": {}}
+    with hybrid.run(scene | {"lines": {"west": SCENE["lines"]["west"] | {"start": "a", "end": "b"}}}) as one:
+        made = hybrid.export(one, folder / "one.csv").files[0]
+        same = hybrid.export(one.lines["west"], folder / "west.csv").files[0]
+    assert made.read_text() == same.read_text()
+
+
 @pytest.mark.needs("pythonfmu3")
 def test_a_scene_of_several_lines_becomes_a_unit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The command makes of a file what `hybrid.export_fmu` makes of it; a wrong ending names the format."""
