@@ -76,8 +76,9 @@ def export(
         (name, line), *others = result.lines.items()
         if others:
             raise ResultError(
-                f"{kind} is of one line, and the result is of several: {', '.join(result.lines)}\n    try:      export("
-                f"result.lines['{name}'], 'run.{name}{SUFFIXES[kind]}'); the command `hybrid export` makes a file of each"
+                f"{kind} is of one line, and the result is of several: {', '.join(result.lines)}\n"
+                f"    try:      export(result.lines['{name}'], 'run.{name}{SUFFIXES[kind]}'); the command `hybrid "
+                "export` makes a file of each"
             )
         result = line
     if kind == "csv":
