@@ -27,7 +27,7 @@ from random_scenes import random_scene
 import hybrid
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.mesh import Zone
-from hybrid.simulation import zone_switching as zoning
+from hybrid.zones import change as zoning
 
 pytestmark = pytest.mark.bench
 EXAMPLES = Path(__file__).parents[1] / "examples"

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from test_bench_cells import CASES, TOUCHDOWN, from_file, scene_of
 
 import hybrid
-from hybrid.adapt.manager import transfer_to
 from hybrid.kernels.mesh.zone_step import Zones
-from hybrid.simulation import zone_switching
 from hybrid.simulation.cell_changes import CellChanges
+from hybrid.zones import change as zone_change
+from hybrid.zones.change import transfer_to
 from tests.inside import OnlyLine
 
 pytestmark = pytest.mark.bench
@@ -132,7 +132,7 @@ def fast_edge() -> dict[str, Any]:
 def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
     """Of all changes from now on what momentum changes by, over the mass of the line, and the largest speed, m/s."""
     found: list[tuple[float, float]] = []
-    change, transfer = CellChanges.change, zone_switching.begin_switch
+    change, transfer = CellChanges.change, zone_change.begin_switch
 
     def note(line: Any, state: Any, target: Any, out: Any) -> None:
         off = np.linalg.norm(target.mass @ out.v - line.mass @ state.v) / line.mass.sum()
@@ -159,8 +159,8 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
     jobs: list[Any] = []
     monkeypatch.setattr(CellChanges, "change", compiled)
     monkeypatch.setattr(CellChanges, "alone", False)
-    monkeypatch.setattr(zone_switching, "transfer_to", in_python)
-    monkeypatch.setattr(zone_switching, "begin_switch", begin)
+    monkeypatch.setattr(zone_change, "transfer_to", in_python)
+    monkeypatch.setattr(zone_change, "begin_switch", begin)
     return found
 
 

@@ -17,13 +17,13 @@ import pytest
 from test_bench_zones import MESHES, SHARE, Text, per_step, riser, run, touchdown
 
 import hybrid
-from hybrid.adapt.manager import DomainManager
 from hybrid.errors import ZONE_EVENTS
 from hybrid.kernels.mesh.cell_errors import CURVATURE
-from hybrid.simulation import initial_zones
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.run_zones import RunZones
+from hybrid.zones import at_start
+from hybrid.zones.manager import DomainManager
 
 pytestmark = pytest.mark.bench
 ROUNDS = 3
@@ -95,7 +95,7 @@ def four_lines() -> Text:
 
 def test_switch_of_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each line that changes, what follows for all of them included; the outputs that it has to write before apart."""
-    monkeypatch.setattr(initial_zones, "shares_asked", lambda *_: {CURVATURE: SHARE})
+    monkeypatch.setattr(at_start, "shares_asked", lambda *_: {CURVATURE: SHARE})
     written, changing, attaching, change = list[float](), list[float](), list[float](), RunZones.after_step
 
     def without_outputs(zones: RunZones) -> None:

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hybrid.accuracy.api import resume, run, static
     from hybrid.accuracy.run_forecast import plan
-    from hybrid.adapt.zone_rules import NodeState
     from hybrid.couple.fmu_export import export_fmu
     from hybrid.designs.design import design, openmdao_component
     from hybrid.designs.nearest import seek
@@ -49,11 +48,12 @@ if TYPE_CHECKING:
     from hybrid.view.quantities import plot_summary as plot
     from hybrid.view.report import write_report as report
     from hybrid.view.space import plot_space
+    from hybrid.zones.criteria import NodeState
 
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
     "HybridError": ("hybrid.errors", "HybridError"),
-    "NodeState": ("hybrid.adapt.zone_rules", "NodeState"),
+    "NodeState": ("hybrid.zones.criteria", "NodeState"),
     "Outcome": ("hybrid.errors", "Outcome"),
     "Result": ("hybrid.store.reader", "Result"),
     "ResultError": ("hybrid.errors", "ResultError"),

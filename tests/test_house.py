@@ -18,7 +18,7 @@ PACKAGE = Path(hybrid.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 # One rule for each room: which other rooms it may import.  docs/architecture.md draws them.
-COMPUTING = ("errors", "kernels", "scene", "statistics", "store", "model", "solve", "adapt", "outputs")
+COMPUTING = ("errors", "kernels", "scene", "statistics", "store", "model", "solve", "zones", "outputs")
 ALLOWED: dict[str, tuple[str, ...]] = {
     "errors": (),
     "kernels": (),
@@ -27,7 +27,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "store": ("errors", "statistics"),
     "model": ("errors", "kernels", "scene"),
     "solve": ("errors", "kernels", "model"),
-    "adapt": ("errors", "kernels", "model"),
+    "zones": ("errors", "kernels", "scene", "model", "solve", "store"),
     "outputs": ("errors", "kernels", "model", "solve", "store"),
     "simulation": COMPUTING,
     "linear": (*COMPUTING, "simulation"),
@@ -72,7 +72,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 
 # Packages from outside that only these rooms may import.
 ONLY = {
-    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "linear", "accuracy", "modal", "designs", "view", "exports", "studies"),
+    "scipy": ("scene", "statistics", "store", "model", "solve", "zones", "outputs", "simulation", "linear", "accuracy", "modal", "designs", "view", "exports", "studies"),
     "numba": ("kernels",),
     "h5py": ("store", "exports"),
     "matplotlib": ("view",),

@@ -29,8 +29,8 @@ FLOORS = (
         "view": (3.2, "plots, report, films"),
         "exports": (4.1, "netCDF, CSV, VTK"),
     },
-    {"outputs": (0.05, "values on the output grid")},
-    {"solve": (0.05, "statics, stepping in time"), "adapt": (0.95, "domain manager, zones")},
+    {"outputs": (0.05, "values on the output grid"), "zones": (0.95, "domain manager")},
+    {"solve": (0.05, "statics, stepping in time")},
     {"model": (0.5, "the scene as arrays")},
     {
         "kernels": (0.05, "compiled numerics"),

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 from hybrid.accuracy.finer_result import beside
 from hybrid.accuracy.model_choice import CHOSEN, chosen_and_surveyed, rods_instead_of_slack
 from hybrid.accuracy.passes import Passes, emptied
-from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import ComputationError, ResultError, SceneError
 from hybrid.model.model_costs import with_models
 from hybrid.model.network import NetworkResolution
@@ -31,6 +30,7 @@ from hybrid.simulation.restart import remaining
 from hybrid.store.array_contents import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target, locked
 from hybrid.store.reader import Result, open_result, written_result
+from hybrid.zones.criteria import UserCriterion
 
 if TYPE_CHECKING:
     pass

@@ -36,10 +36,10 @@ from hybrid.scene.root import Scene
 from hybrid.scene.schema import AdaptiveModel, Environment, LineScene
 from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.case import Case
-from hybrid.simulation.initial_zones import HOLD
 from hybrid.simulation.layer_mesh import layered, shown
 from hybrid.simulation.mesh_survey import CELLS, STEPS, Survey, lack_along, with_survey
-from hybrid.simulation.zone_switching import LONGEST_IN_PACE, READY
+from hybrid.zones.at_start import HOLD
+from hybrid.zones.change import LONGEST_IN_PACE, READY
 
 # Why a line may be no catenary that has come near itself in a pre-run.
 NEAR = "it comes near itself, and contact of catenaries alone is not asked for"

@@ -16,6 +16,7 @@ from hybrid.model.line import NO_INERTIA, WITH_SECTIONS, line_on
 from hybrid.model.plane import planar
 
 FEWER = 4  # cells that become one
+MANY = 1000  # cells of a line from which on the equilibrium of a coarser mesh is sought first
 FEWEST = 80  # cells below which a line is coarse enough
 FOLDED = -1.0 + 1e-6  # cosine of the turn of a chord that is turned right back
 

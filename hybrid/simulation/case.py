@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from hybrid.adapt.zone_rules import UserCriterion, with_names
 from hybrid.errors import ComputationError, ResultError
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, State
@@ -65,7 +64,7 @@ from hybrid.simulation.run_sample import (
     rows_key,
     usual_cells,
 )
-from hybrid.simulation.run_zones import Start
+from hybrid.simulation.zones_at_rest import Start
 from hybrid.store.array_contents import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.copying import group_of
 from hybrid.store.envelope import GROUP as ENVELOPE
@@ -77,6 +76,7 @@ from hybrid.store.records import ERROR_ESTIMATE, THERE
 from hybrid.store.stored_rows import ComparisonRecorder, RowsRecorder, StoredArray, rows_path
 from hybrid.store.whole_file import LateFile
 from hybrid.store.writer import Recorder, WriteMode
+from hybrid.zones.criteria import UserCriterion, with_names
 
 if TYPE_CHECKING:
     from hybrid.scene.network_scene import Network

@@ -23,7 +23,7 @@ from hybrid.kernels.mesh.zone_criteria import twist_of_rods
 from hybrid.kernels.state.report import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.coarsen import coarser, refined
+from hybrid.model.coarsen import MANY, coarser, refined
 from hybrid.model.initial_shape import GIVEN, HUNG, reasons_against
 from hybrid.model.network import NetworkModel, balanced_places, starts_between
 from hybrid.model.plane import as_kept, leaves_plane, planar
@@ -43,8 +43,6 @@ from hybrid.solve.search import PUSHED, Start
 
 # Turns that close the frames of the initial shape, at most, and round-off; the twist of a cell, rad, that is resolved.
 CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
-# Cells of a line from which on the equilibrium of a coarser mesh is sought first.
-MANY = 1000
 # Equilibria until the water around members is that of the place found, and what of the largest wetted part, velocity
 # and acceleration there counts as the same.
 MOST_ROUNDS, SAME_WATER = 40, 1e-8

@@ -187,7 +187,7 @@ def _compile_outputs(model: Model) -> None:
 
 def _compile_zones(scene: LineScene, model: Model, moves: bool) -> None:
     from hybrid.kernels.mesh.zone_step import follow_zones
-    from hybrid.simulation.initial_zones import manager_for
+    from hybrid.zones.at_start import manager_for
 
     manager = manager_for(scene, model, first_resolution(scene), None)
     manager.evaluate_criteria(model.line, model.sea.values, model.ends.values, model.start, 0.0)

@@ -17,11 +17,11 @@ from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.envelope import Envelope
 from hybrid.simulation.lines_contact import LinesWatch
-from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
+from hybrid.zones.change import ZoneSwitching
 
 if TYPE_CHECKING:  # a line that is not paid out does without
     from hybrid.simulation.payout import PayingOut
@@ -137,6 +137,20 @@ class Marching(NamedTuple):
 
     work: Work
     limits: Limits
+
+
+class Around(NamedTuple):
+    """What a run knows of a line beside its states.
+
+    envelope: extremes of all meshes, None: none are kept; marked: as of `marks_on`; nearest: (2,) the pair of cells
+    that was nearest.
+    """
+
+    work: Work
+    books: Books
+    envelope: Envelope | None
+    marked: Sequence[tuple[float, int]]
+    nearest: np.ndarray
 
 
 class OneOfMany:

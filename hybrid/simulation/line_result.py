@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.adapt.manager import DomainManager
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
 from hybrid.kernels.junctions.carried_frames import TURNS
@@ -48,7 +47,7 @@ from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stret
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.failure import FASTEST
-from hybrid.simulation.kind_changes import Around
+from hybrid.simulation.line_of_run import Around
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.slack_bends import note_laid
@@ -61,6 +60,7 @@ from hybrid.solve.self_contact import SelfContact
 from hybrid.store.array_contents import ArrayRecorder
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
+from hybrid.zones.manager import DomainManager
 
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table

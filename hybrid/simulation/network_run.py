@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.adapt.manager import DomainManager
-from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats, Moves, Work
@@ -53,6 +51,8 @@ from hybrid.store.array_contents import Target
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.writer import Recorder
+from hybrid.zones.criteria import UserCriterion
+from hybrid.zones.manager import DomainManager
 
 if TYPE_CHECKING:
     from hybrid.simulation.run_payout import RunPayout
@@ -101,7 +101,7 @@ class NetworkRun(RecordedRun):
         """As yet without lines, parts and a file.
 
         loop: its steps, with outputs to its end; target: None: it is only to be compared with; criterion: one more for
-        zones that move (adapt.zone_rules); kept: whether it writes checkpoints.
+        zones that move (zones.criteria); kept: whether it writes checkpoints.
         """
         self.system, self.model, self.state, self.found = first.system, first.model, first.state, first.found
         self.scenes, self.resolution, self.changed = first.scenes, first.model.resolution, first.changed

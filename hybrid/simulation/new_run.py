@@ -11,7 +11,6 @@ from weakref import proxy
 
 import numpy as np
 
-from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.kernels.state.state import state_for
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.plan import output_times
@@ -33,13 +32,15 @@ from hybrid.simulation.run_failures import Failures
 from hybrid.simulation.run_file import Asked, file_of
 from hybrid.simulation.run_of_lines import WatchedLines, loaded_as, with_loads_of
 from hybrid.simulation.run_quantities import Rotations, RunQuantities
-from hybrid.simulation.run_zones import RunZones, Start, managers_for, start_at_rest, zones_as_placed
+from hybrid.simulation.run_zones import RunZones
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
+from hybrid.simulation.zones_at_rest import Start, managers_for, start_at_rest, zones_as_placed
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.store.array_contents import Target
 from hybrid.store.format import Text
 from hybrid.store.writer import AT_ONCE, WriteMode
+from hybrid.zones.criteria import UserCriterion
 
 if TYPE_CHECKING:  # what a run without winches does not load
     pass
@@ -82,7 +83,7 @@ def new_run(
 
     target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether its
     motion is wanted, else its equilibrium under full loads; resolution: how finely, None: as the scene asks for, or the
-    checkpoint says; criterion: one more for zones that move (adapt.zone_rules); changes: loads and motions of these
+    checkpoint says; criterion: one more for zones that move (zones.criteria); changes: loads and motions of these
     systems hold from some time on.
     """
     end = (recording.until or system.require_time().duration) if moves else 0.0

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.adapt.manager import states
 from hybrid.kernels.contact.self_distance import blank_itself, blank_itself_job, boxes_of
 from hybrid.kernels.machine.binding import Packed, Room, Table
 from hybrid.kernels.mesh.cell_changes import after_forces, before_forces
@@ -49,10 +48,11 @@ from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.line import lines
 from hybrid.outputs.joined_lines import Output
-from hybrid.simulation.cell_views import REST_OF_SEA, Kept, Shaped, blank_kept, copy_fields, seas
+from hybrid.simulation.cell_changes import REST_OF_SEA, Kept, Shaped, blank_kept, copy_fields, seas
 from hybrid.simulation.envelope import marks_on
 from hybrid.simulation.line_of_run import OfRun, OneOfMany, by_itself, ends_alone
 from hybrid.solve.stepper import HEAVY
+from hybrid.zones.change import states
 
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")

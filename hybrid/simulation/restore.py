@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.machine.cache import compiler_hash
 from hybrid.model.mesh import MOST_CELLS, Grading
@@ -31,13 +30,14 @@ from hybrid.store.checkpoint import Checkpoint, read_checkpoint
 from hybrid.store.hdf5_file import is_result, opened
 from hybrid.store.named_arrays import Tree, matched, pack
 from hybrid.store.reader import Result, open_result
+from hybrid.zones.criteria import UserCriterion
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.model.network import NetworkResolution
     from hybrid.scene.network_scene import Network
 
 # Rooms that have a part in the numbers of a file.
-COMPUTES = ("accuracy", "adapt", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store")
+COMPUTES = ("accuracy", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store", "zones")
 # Times as fine or as coarse as the scene asks for that a run may be: far beyond what error control chooses.
 FARTHEST = 1e4
 

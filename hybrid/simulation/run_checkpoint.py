@@ -8,7 +8,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
@@ -23,6 +22,7 @@ from hybrid.solve.run import no_extremes
 from hybrid.store.checkpoint import digest_of, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import matched
+from hybrid.zones.criteria import UserCriterion
 
 REFERENCES = "first_places", "first_turns"  # of outputs of a line
 

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from hybrid.adapt.manager import DomainManager
 from hybrid.errors import ComputationError
 from hybrid.kernels.machine.cache import cache_folder
 from hybrid.scene.points import Fairlead
@@ -24,7 +23,6 @@ from hybrid.scene.schema import LineScene
 from hybrid.scene.short_form import short_form
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
-from hybrid.simulation.initial_zones import reasons_at_start
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.result_file import STEP_FIELDS, mesh_fields, places_of_elevation, result_recorder
@@ -39,6 +37,8 @@ from hybrid.store.format import Field, Header, Text, made
 from hybrid.store.records import PENDING, RODS_AT_START
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
+from hybrid.zones.at_start import reasons_at_start
+from hybrid.zones.manager import DomainManager
 
 AnyRecorder = Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
 

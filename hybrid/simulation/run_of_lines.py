@@ -11,7 +11,6 @@ from typing import Protocol
 
 import numpy as np
 
-from hybrid.adapt.manager import Change
 from hybrid.kernels.junctions.bodies import DONE, SPRING
 from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Line, Work
@@ -26,7 +25,6 @@ from hybrid.simulation.events import Sink
 from hybrid.simulation.line_of_run import HasContact, HasPlanes
 from hybrid.simulation.line_result import LineResult, LineStep
 from hybrid.simulation.parts import Part
-from hybrid.simulation.zone_switching import on_layout
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
@@ -34,6 +32,8 @@ from hybrid.solve.network_steps import NetworkSteps
 from hybrid.store.array_contents import ArrayRecorder
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
+from hybrid.zones.change import on_layout
+from hybrid.zones.plan import Change
 
 
 class MovingZones(Protocol):

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.adapt.manager import Change, DomainManager, Reason, change_base
 from hybrid.errors import Outcome
 from hybrid.kernels.mesh.stiffness_ramp import soften
 from hybrid.kernels.reel.payout import iterate, iterate_with_others, pay_out, stand_among
@@ -22,41 +21,30 @@ from hybrid.kernels.run.payout_run import ask_node, change_node
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Floats, State, state_for
-from hybrid.model.build import Model, given_zones
+from hybrid.model.build import Model
 from hybrid.model.layout import Layout
 from hybrid.model.network import NetworkModel
-from hybrid.model.payout import FEWEST_CELLS, PayoutPlan
+from hybrid.model.payout import FEWEST_CELLS
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.failure import winch_text
 from hybrid.simulation.parts import Part
 from hybrid.simulation.payout import Before, PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.joined import LineFailed, NetworkState
+from hybrid.zones.at_start import rods_at_winch
+from hybrid.zones.change import ZoneSwitching, change_base
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Change, Reason
 
 if TYPE_CHECKING:
     from hybrid.solve.network_solver import NetworkSolver
     from hybrid.solve.network_steps import NetworkSteps
 
 
-# Ramp times of bending stiffness within which a cell that is taken in must have become rod.
-AHEAD = 2.0
 # Nodes by which cells are merged before the one leaves at which they must be whole: merged then, where the reel still
 # brings lengths to their true ones, they kicked the pull by 0.14 % of its mean, a node before by 0.09 %.
 MERGED_AHEAD = 2
-
-
-def rods_at_winch(scene: LineScene, plan: PayoutPlan, model: Model, count: int, pace: float, rate: float) -> np.ndarray:
-    """(N,) of base cells: 1 rod, -1 catenary, 0 adaptive, where the winch may reach them soon.
-
-    count: material nodes that are out; pace: s; rate: m/s.
-    """
-    assert model.layout is not None
-    given = given_zones(scene, model.layout)
-    near = plan.at_winch(count, AHEAD * pace * abs(rate))
-    given[near & (given == 0)] = 1
-    return given
 
 
 class PaidZones:

@@ -13,40 +13,43 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.adapt.manager import Change, DomainManager
-from hybrid.adapt.zone_rules import UserCriterion, of_line
-from hybrid.errors import ComputationError, Outcome
+from hybrid.errors import KINK_COUNTS, Outcome
 from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh.cell_changes import blank_renew_job, clear_state, renew
+from hybrid.kernels.mesh.zone_line import blank_line_job, fill_line
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, follow_zones
+from hybrid.kernels.mesh.zone_switch import (
+    AFTER,
+    BEFORE,
+    NUMBERS,
+    RELAXES,
+    TIME,
+    begin_switch,
+    blank_switch_job,
+    end_switch,
+)
+from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
+from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Counts
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
-from hybrid.kernels.state.state import Ends, Line, State, state_for
+from hybrid.kernels.state.state import FIELDS, ROD, Ends, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
 from hybrid.model.network import NetworkModel
-from hybrid.scene.network_scene import Network
-from hybrid.scene.schema import AdaptiveModel, LineScene
-from hybrid.simulation.cell_changes import CellChanges
-from hybrid.simulation.contact_equilibrium import nearness_in
-from hybrid.simulation.equilibrium import joined_lines, solve_from
-from hybrid.simulation.initial_zones import (
-    MOST_ROUNDS,
-    STRICTER,
-    manager_for,
-    on_fewer,
-    zones_without_equilibrium,
-)
-from hybrid.simulation.kind_changes import LineKinds, carries_all, copy_into
+from hybrid.simulation.cell_changes import CellChanges, carries_all
+from hybrid.simulation.envelope import marks_on
+from hybrid.simulation.events import EventLog
+from hybrid.simulation.line_of_run import Around
 from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.simulation.parts import Part
-from hybrid.simulation.run_cells import equilibrium_on_cells, following
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
-from hybrid.solve.joined import NetworkState
-from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.run import Tried
 from hybrid.store.named_arrays import matched
+from hybrid.zones.change import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, on_layout
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Change
 
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
@@ -64,100 +67,24 @@ HELD = (
 AFTER_CHANGE = "after a change of zones"
 
 
-class Start(NamedTuple):
-    """Zones of a system at rest."""
-
-    model: NetworkModel
-    found: LinesAtRest | None  # None: a motion begins as the scene says
-    managers: Mapping[int, DomainManager]  # by the number of the line
-
-
-def managers_for(
-    scenes: Mapping[str, LineScene], model: NetworkModel, criterion: UserCriterion | None
-) -> dict[int, DomainManager]:
-    """The domain managers of lines that are rod wherever they may be; at a clamp to what is free they stay rod."""
-    managers = {
-        k: manager_for(scenes[name], x, model.resolution.lines[name], of_line(criterion, name))
-        for k, (name, x) in enumerate(zip(model.names, model.models, strict=True))
-        if isinstance(scenes[name].model, AdaptiveModel)
-    }
-    for k, manager in managers.items():
-        manager.given[[0, -1]] = np.where(model.seats[k, :, TURNS] != 0.0, 1, manager.given[[0, -1]])
-    return managers
-
-
-def start_at_rest(
-    system: Network, scenes: Mapping[str, LineScene], model: NetworkModel, moves: bool, criterion: UserCriterion | None
-) -> Start:
-    """Equilibrium with its zones and cells; moves: whether a motion begins there, else it has loads of full size."""
-    t, managers = (0.0 if moves else np.inf), managers_for(scenes, model, criterion)
-    follow = following(model, managers) if moves else {}
-    rest = equilibrium_on_cells(system, model, follow, t)
-    return Start(*_zones_at_rest(*rest, {k: x for k, x in managers.items() if k not in follow}, t), managers)
-
-
-def _zones_at_rest(
-    model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
-) -> tuple[NetworkModel, LinesAtRest]:
-    """Zones for the equilibrium of a system whose lines with managers are all rod: rod only where it is needed.
-
-    As of one cable (simulation.initial_zones): where the two equilibria are further apart than the tolerance of a line
-    criteria become stricter, and where that does not help zones stay rod.
-    """
-    allowed = {k: manager.tolerance for k, manager in managers.items()}
-    most, rest = _most_rod(model, found, managers, t)
-    try:
-        for part in STRICTER:
-            for k, manager in managers.items():
-                _take_rods(manager, model.models[k])
-                manager.tolerance = part * allowed[k]
-            answer = _within(model, found, managers, t)
-            if answer is None:
-                break
-            if all(_apart(k, most, rest, *answer) <= allowed[k] for k in managers):
-                return answer
-        held = answer is not None
-    except ComputationError:
-        held = True
-    for k, manager in managers.items():
-        manager.held |= held
-        manager.tolerance = allowed[k] if held else manager.tolerance
-        _take_rods(manager, most.models[k])
-    return most, rest
-
-
-def _most_rod(
-    model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
-) -> tuple[NetworkModel, LinesAtRest]:
-    """The most rod that scenes let lines have, and its equilibrium, from that of lines that are all rod."""
-    free = {k: manager.given >= 0 for k, manager in managers.items()}
-    if all(x.all() for x in free.values()):
-        return model, found
-    return _with_rods(model, found, free, t)
-
-
-def _with_rods(
-    model: NetworkModel, found: LinesAtRest, rods: Mapping[int, np.ndarray], t: float
-) -> tuple[NetworkModel, LinesAtRest]:
-    """Lines of which these base cells are rod, by their numbers, at rest, from lines that are all rod."""
-    models, states = [*model.models], [*found.state.lines]
-    for k, rod in rods.items():
-        full = model.models[k]
-        assert full.layout is not None
-        models[k] = on_layout(full, full.layout._replace(rod=rod))
-        states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at(t))
-    other, start = replace(model, models=tuple(models)), NetworkState(states, found.state.bodies)
-    return other, solve_from(found, other, t, found.bodies, start, "the equilibrium of rods")
-
-
-def zones_as_placed(
-    scenes: Mapping[str, LineScene], model: NetworkModel, criterion: UserCriterion | None
-) -> tuple[NetworkModel, dict[int, DomainManager]]:
-    """Zones of a start that is no equilibrium, as of one cable: rod, but for what a line wants to be catenary."""
-    managers, models = managers_for(scenes, model, criterion), [*model.models]
-    for k, manager in managers.items():
-        models[k] = zones_without_equilibrium(models[k], manager)
-    return replace(model, models=tuple(models)), managers
+def note_change(events: EventLog, manager: DomainManager, t: float, change: Change, booked: float) -> None:
+    """Events of a change of zones at t (s) that the manager has adopted; booked: J, that it puts in."""
+    base = manager.layout.base
+    for k, why in enumerate(change.reasons):
+        events.event(
+            t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
+            criterion=why.criterion, value=why.value, threshold=why.threshold,
+            energy=booked if k == 0 else 0.0,  # of all that change now
+        )  # fmt: skip
+    cause = "" if manager.kinked else manager.cable.kinks_count
+    if cause and (at := manager.joint_passed(change)) is not None:
+        manager.kinked = True
+        text = (
+            f"at s = {at:.4g} m a rod has grown past its joint: while its stiffness comes in, the kink of the joint "
+            f"{KINK_COUNTS} there, and of every joint that is passed from now on, because the line has {cause}; the "
+            f"smallest bend radius may be a third of the true one; model: rod, or model.force_rod where the line bends"
+        )
+        events.event(t, float(base[0]), float(base[-1]), "kink at joint", text)
 
 
 def _saved_layout(layout: Layout, saved: Mapping[str, Any]) -> Layout:
@@ -166,50 +93,6 @@ def _saved_layout(layout: Layout, saved: Mapping[str, Any]) -> Layout:
     if here is not None and not (here.dtype == bool and here.shape == (layout.parts.sum() + 1,)):
         raise ValueError("cells that no line has")
     return layout._replace(rod=saved["rod"], here=here)
-
-
-def _take_rods(manager: DomainManager, model: Model) -> None:
-    assert model.layout is not None
-    manager.set_layout(model.layout)
-
-
-def _within(
-    model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
-) -> tuple[NetworkModel, LinesAtRest] | None:
-    """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
-    rods = _asked(managers, model, found, t)
-    for _ in range(MOST_ROUNDS):
-        if all(rod[managers[k].given >= 0].all() for k, rod in rods.items()):
-            return None
-        other, answer = _with_rods(model, found, rods, t)
-        for k, manager in managers.items():
-            _take_rods(manager, other.models[k])
-        more = {k: rods[k] | asked for k, asked in _asked(managers, other, answer, t).items()}
-        if all((more[k] == rods[k]).all() for k in managers):
-            return other, answer
-        rods = more
-    return None
-
-
-def _asked(
-    managers: Mapping[int, DomainManager], system: NetworkModel, found: LinesAtRest, t: float
-) -> dict[int, np.ndarray]:
-    """Base cells that the criteria want to be rod in an equilibrium, by number of the line."""
-    near, rods = nearness_in(system, joined_lines(system, t), found, t), {}
-    for k, manager in managers.items():
-        model, state = system.models[k], found.state.lines[k]
-        manager.near = near.get(k, np.zeros(0))
-        manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), state, 0.0)
-        rods[k] = manager.initial_rods(state)
-    return rods
-
-
-def _apart(k: int, model: NetworkModel, found: LinesAtRest, other: NetworkModel, answer: LinesAtRest) -> float:
-    """Largest distance (m) of base nodes of a line between two equilibria, the first of them all rod."""
-    full, few = model.models[k].layout, other.models[k].layout
-    assert full is not None and few is not None
-    r, there = found.state.lines[k].r[full.first], answer.state.lines[k].r[few.first]
-    return float(np.linalg.norm(r - there, axis=1).max())
 
 
 class _LineZones:
@@ -570,7 +453,92 @@ class RunZones(Part):
             line.books.work[0, b.ZONES] += more
 
 
-# Kinds of cells that change in several lines in the arrays of the run: no solver is made and nothing is bound anew.
+# Kinds of cells that change between two steps of a run whose cells stay, in the arrays of the run: no solver is made,
+# nothing is bound anew but by the first change; what line and state were is kept beside for as long as a change takes.
+
+# What of a line differs with the kinds of its cells, and lengths that are on their way.
+OF_KINDS = ("h", "spin", "element", "kb", "k0", *(name for name, field in FIELDS.items() if field.rule == ROD))
+
+
+class LineKinds:
+    """Changes of kinds of a line in its arrays: from the second of two states, which are alike, to the first."""
+
+    def __init__(
+        self, model: Model, switching: ZoneSwitching, states: tuple[State, State], around: Around, ends: Ends
+    ) -> None:
+        """From now on the model has a line of its own, which changes; ends: conditions in the arrays of the run."""
+        assert model.layout is not None and model.on_base is not None
+        self._switching, self._numbers, self._ends = switching, np.zeros(NUMBERS), ends
+        line, layout, sea, zones = _copied(model.line), model.layout, model.sea.values, switching.zones
+        self.model = replace(model, line=line)
+        own: dict[str, Any] = {name: getattr(line, name).copy() for name in OF_KINDS}
+        self._before = line._replace(**own)
+        self._rods, self._rods_before = (layout.rod_cells.copy() for _ in range(2))
+        self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
+        self._fill, self._switch, self._renew = Table(blank_line_job), Table(blank_switch_job), Table(blank_renew_job)
+        self._fill.bind(
+            cable=model.on_base.cable, nodes=line.s, base_of_cell=layout.base_of_cell, rod=self._rods, line=line
+        )
+        (first, second), base = states, np.zeros(layout.rod.size)
+        transfer = Transfer(
+            self._before, line, second, first, layout.places, layout.places, layout.base_of_cell, layout.first,
+            switching.kinks, base, self._clamps, self._held, np.ones(1, bool), blank_match(model.cells, model.cells),
+        )  # fmt: skip
+        self._keeps = zones.keeps.copy()  # of the kinds before
+        self._switch.bind(
+            transfer=transfer, ends=ends, sea=sea, target_sea=sea, zones=zones._replace(keeps=self._keeps),
+            target_zones=zones,
+            numbers=self._numbers, guided=switching.guided,
+        )  # fmt: skip
+        work, books, envelope, marked, nearest = around
+        nodes, piece = line.s.size, model.cable.piece(0.5 * (line.s[1:] + line.s[:-1]))
+        bounds, places, start = np.zeros((4, b.EXTREMES, 1)), np.zeros(1), np.zeros((nodes, 3))
+        if envelope is not None:
+            bounds, places, start = envelope.bounds, envelope.s, envelope.start
+        self._renew.bind(
+            s=line.s, rods=self._rods_before, to_s=line.s, to_rods=self._rods, line=line, place=layout.places,
+            of=layout.base_of_cell, first=layout.first, start=start, marked=marks_on(line.s, marked),
+            borne=1.0 + model.cable.max_strain[piece], state=first, twin=second, sea=sea, work=work, zones=zones,
+            before=books, books=books, push=NO_PUSH, new_push=NO_PUSH, next_push=NO_PUSH, envelope_s=places,
+            bounds=bounds, stays=np.zeros(nodes, np.int64), spare=np.zeros(books.extremes.size), width=np.zeros(0),
+            nearest=nearest, widths=base, scale=model.tension_scale,
+        )  # fmt: skip
+
+    def change(self, change: Change, t: float) -> float:
+        """Other kinds of cells from t (s) on: nothing moves; the energy, J, that is to be booked."""
+        switching, model, numbers = self._switching, self.model, self._numbers
+        assert model.layout is not None
+        for name in OF_KINDS:
+            getattr(self._before, name)[:] = getattr(model.line, name)
+        self._keeps[:] = switching.zones.keeps
+        layout = model.layout._replace(rod=change.rod.copy())
+        self._rods_before[:], self._rods[:] = self._rods, layout.rod[model.layout.base_of_cell]
+        for k, clamp in enumerate(switching.clamps(self._ends)):
+            self._held[k] = clamp is not None
+            if clamp is not None:
+                self._clamps[k] = clamp
+        numbers[TIME], numbers[RELAXES] = t, switching.zones.counts.relaxing
+        fill_line(self._fill.numbers)
+        clear_state(self._renew.numbers)
+        begin_switch(self._switch.numbers)
+        switching.manager.adopt_rods(change.rod, change, t)
+        end_switch(self._switch.numbers)
+        renew(self._renew.numbers)
+        self.model = replace(model, layout=layout, zones=layout.zones)
+        switching.set_model(self.model, switching.zones)
+        return float(numbers[AFTER] - numbers[BEFORE])
+
+
+def _copied(line: Line) -> Line:
+    arrays: dict[str, Any] = {name: x.copy() for name, x in line._asdict().items() if isinstance(x, np.ndarray)}
+    return line._replace(**arrays)
+
+
+def copy_into(old: NamedTuple, new: NamedTuple) -> None:
+    """Copy the arrays of one to those of the other."""
+    for x, y in zip(old, new, strict=True):
+        if isinstance(y, np.ndarray) and y.size:
+            y[:] = x
 
 
 class RunKinds:

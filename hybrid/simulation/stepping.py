@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.ends import DrivenEnd, contradictions
@@ -36,6 +35,7 @@ from hybrid.solve.network_steps import ROWS_OUTSIDE
 from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.hdf5_file import check_target, locked
 from hybrid.store.reader import Result, open_result, written_result
+from hybrid.zones.criteria import UserCriterion
 
 # s of the wall, after which the time of the processor is read again: to read it may take as long as ten steps.
 READ_OUTSIDE = 1.0

@@ -32,7 +32,7 @@ import hybrid.kernels
 from hybrid.kernels.machine.compile import Entry, Inner
 
 found = {}
-rooms = [x.name for x in pkgutil.walk_packages(hybrid.kernels.__path__, "hybrid.kernels.")] + ["hybrid.adapt.zone_rules"]
+rooms = [x.name for x in pkgutil.walk_packages(hybrid.kernels.__path__, "hybrid.kernels.")]
 for room in rooms:
     for name, f in vars(importlib.import_module(room)).items():
         if isinstance(f, Entry | Inner) and f.__module__ == room:

@@ -21,7 +21,7 @@ from hybrid.cli.console import Console
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
-from hybrid.simulation import network_run, run_cells
+from hybrid.simulation import network_run, zones_at_rest
 from hybrid.simulation.case import Case, CaseAtRest
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
 from hybrid.store import whole_file, writer
@@ -272,7 +272,7 @@ def test_a_stop_is_heard_while_the_equilibrium_is_searched(
         os.kill(os.getpid(), signal.SIGINT)
         reached.append("the end of a long search")
 
-    monkeypatch.setattr(run_cells, "equilibrium_of", long)
+    monkeypatch.setattr(zones_at_rest, "equilibrium_of", long)
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(scene, tmp_path / "run.h5")
     assert not reached and not list(tmp_path.iterdir())

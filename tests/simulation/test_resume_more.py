@@ -16,12 +16,13 @@ import hybrid.simulation.run_record
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.short_form import network_of
-from hybrid.simulation import case, initial_zones, restore, run_zones
+from hybrid.simulation import case, restore, zones_at_rest
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, hdf5_file
 from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import pack, unpack
+from hybrid.zones import at_start
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -494,14 +495,14 @@ def test_zones_that_are_fixed_stay_so(tmp_path, monkeypatch):
 
     assert any(e.kind in ("shrink", "merge") for e in hybrid.run(lasting(20.0)).events)
     with monkeypatch.context() as patch:
-        found = initial_zones.manager_for
+        found = at_start.manager_for
 
         def held(*given):
             manager = found(*given)
             manager.held = True
             return manager
 
-        for module in (initial_zones, run_zones):
+        for module in (at_start, zones_at_rest):
             patch.setattr(module, "manager_for", held)
         whole = hybrid.run(lasting(30.0))
         hybrid.run(lasting(15.0), tmp_path / "short.h5").close()

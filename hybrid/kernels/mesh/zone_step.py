@@ -1,7 +1,7 @@
 """What zones that move ask of every step, compiled: lengths and stiffness before it, criteria and energy after it.
 
 A run calls `follow_zones` by its address (kernels.run.network_run), so that scenes whose zones stay compile none of it; Python calls
-the same functions where a criterion or joints of its own take part (simulation.zone_switching).
+the same functions where a criterion or joints of its own take part (zones.change).
 """
 
 from __future__ import annotations
@@ -181,8 +181,8 @@ class ZoneJob(NamedTuple):
     near: (
         Floats  # (N+1,) how near the line is to itself (kernels.contact.self_contact_pairs.look_ahead); empty: unknown
     )
-    review_table: NDArray[np.int64]  # of an adapt.zone_rules.ReviewJob
-    review: int = 0  # address of adapt.zone_rules.quiet_review; 0: Python reviews
+    review_table: NDArray[np.int64]  # of an kernels.mesh.zone_plan.ReviewJob
+    review: int = 0  # address of kernels.mesh.zone_plan.quiet_review; 0: Python reviews
 
 
 def blank_zone_job() -> ZoneJob:

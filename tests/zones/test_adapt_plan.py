@@ -13,9 +13,10 @@ from adapt_cases import cable, layout, on
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from hybrid.adapt.zone_rules import OFF, Rules, planned, spread, wanted, widen
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA
+from hybrid.kernels.mesh.zone_plan import OFF, widen
 from hybrid.model.layout import edges
+from hybrid.zones.plan import Rules, planned, spread, wanted
 
 K = len(CRITERIA)
 ALL = range(K)

@@ -15,9 +15,9 @@ from problems import Scene, pinned, scene
 
 import hybrid
 from hybrid.kernels.mesh.cell_errors import CURVATURE
-from hybrid.simulation import initial_zones
 from hybrid.simulation.run_zones import RunKinds
 from hybrid.store.reader import Result
+from hybrid.zones import at_start
 
 BUSY = ["deep", "bend", "point", "edge"]
 PULLS = ("end_force_start", "end_force_end")
@@ -176,7 +176,7 @@ def test_compiled_reviews_and_switches_are_those_of_python(
     share: of curvature that is asked, for which results treat pins, and zones must not.
     """
     if share is not None:
-        monkeypatch.setattr(initial_zones, "shares_asked", lambda *_: {CURVATURE: share})
+        monkeypatch.setattr(at_start, "shares_asked", lambda *_: {CURVATURE: share})
     found = []
     for applies in (RunKinds.apply, lambda *_: False):
         monkeypatch.setattr(RunKinds, "apply", applies)

@@ -46,9 +46,9 @@ from adapt_scenes import (
 from problems import Scene
 
 import hybrid
-from hybrid.adapt.manager import BUFFER
-from hybrid.adapt.zone_rules import spread
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD
+from hybrid.zones.manager import BUFFER
+from hybrid.zones.plan import spread
 
 Floats = np.ndarray
 DT = 0.02

@@ -10,7 +10,6 @@ from adapt_cases import along, cable, layout, on, state_on, still
 from test_cell_errors import pinned, scene
 
 import hybrid
-from hybrid.adapt.manager import Allowed, DomainManager, Times
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.mesh import cell_errors as e
@@ -19,6 +18,8 @@ from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, read, watc
 from hybrid.kernels.state.state import no_sea
 from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.store.named_arrays import Tree
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Allowed, Times
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHARE = 0.05

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from adapt_cases import along, cable, even, on, state_on, still
 
-from hybrid.adapt.manager import Allowed, Change, DomainManager, Times
-from hybrid.adapt.zone_rules import blank_review_job, quiet_review
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, TORSION
+from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.state.state import no_sea
 from hybrid.model.layout import Layout
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Allowed, Change, Times
 
 HOLD = 2.0  # s
 

@@ -26,12 +26,13 @@ from adapt_scenes import (
 from problems import Scene, clamped, pinned, scene
 
 import hybrid
-from hybrid.adapt.manager import Allowed, DomainManager, Times
-from hybrid.adapt.zone_rules import NodeState, cell_ratios, of_line
 from hybrid.kernels.mesh.stiffness_ramp import advance
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO
 from hybrid.kernels.state.state import no_sea
+from hybrid.zones.criteria import NodeState, cell_ratios, of_line
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Allowed, Times
 
 STEP = 0.02
 EXAMPLES = Path(__file__).parents[2] / "examples"

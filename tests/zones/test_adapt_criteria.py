@@ -17,8 +17,6 @@ import pytest
 from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygon, state_on, still, untwisted, weighed
 from problems import pinned
 
-from hybrid.adapt.manager import Allowed, DomainManager, Times
-from hybrid.adapt.zone_rules import wanted
 from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.kernels.mesh.zone_criteria import (
     BEND,
@@ -34,6 +32,8 @@ from hybrid.kernels.mesh.zone_step import LONGEST_LOOKAHEAD, LOOKAHEAD, REJECT_R
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import no_sea
 from hybrid.model.material import TENSION_FLOOR, Material
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Allowed, Times, wanted
 
 EI, GJ, W = 2.0, 1.5, 1.0 * GRAVITY  # of `cable()`
 FLOORED = TENSION_FLOOR * (EI * W**2) ** (1 / 3)  # N

@@ -12,7 +12,6 @@ from adapt_cases import along, bight, cable, hanging, helix, layout, on, state_o
 from problems import order
 
 import hybrid
-from hybrid.adapt.manager import Allowed, Change, DomainManager, Times
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.machine import binding
 from hybrid.kernels.machine.binding import Table
@@ -20,12 +19,14 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, take_arcs
 from hybrid.kernels.state.state import no_sea
 from hybrid.outputs.probes import Observer
-from hybrid.simulation import run_cells
+from hybrid.simulation import zones_at_rest
 from hybrid.simulation.cell_changes import CellChanges
-from hybrid.simulation.initial_zones import shares_asked
 from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.network_steps import NetworkSteps
+from hybrid.zones.criteria import shares_asked
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Allowed, Change, Times
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # A line that touches down, its upper end heaving; the layer at the touchdown is 0.4 m long and goes to and fro over 20 m.
@@ -317,7 +318,7 @@ def test_cells_that_become_one_in_a_layer_do_not_kick_the_end_force(monkeypatch:
     def nowhere(*_: object) -> NoReturn:
         raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "no equilibrium on longer cells")
 
-    monkeypatch.setattr(run_cells, "_on_planned_cells", nowhere)
+    monkeypatch.setattr(zones_at_rest, "_on_planned_cells", nowhere)
     result = hybrid.run(
         bight()
         | {

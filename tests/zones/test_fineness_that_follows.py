@@ -12,7 +12,6 @@ from adapt_cases import Z, cable, hanging, layout, on, state_on, still
 
 import hybrid
 from hybrid.accuracy.passes import free_in
-from hybrid.adapt.manager import Allowed, DomainManager, Times, transfer_to
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_criteria import EDGE
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes
@@ -23,6 +22,9 @@ from hybrid.model.resolution import wants_survey
 from hybrid.simulation.run_sample import compared_cells, usual_cells
 from hybrid.store.records import MeshHistory, ZoneHistory, node_bits
 from hybrid.store.records import Zone as ZoneRow
+from hybrid.zones.change import transfer_to
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Allowed, Times
 
 
 def planned(shape, fineness=1.0, share=0.02, leaving=(), every=1) -> Floats:

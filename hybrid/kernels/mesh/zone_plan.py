@@ -1,15 +1,12 @@
 """From what the criteria say to zones: a pure function, so that the same past gives the same plan.
 
-Compiled, because it is asked for a plan several times in a dwell time, mostly without any change.
+Compiled, because it is asked for a plan several times in a hold time, mostly without any change.
 """
 
 from __future__ import annotations
 
-import inspect
 import math
-from collections.abc import Callable, Mapping
-from functools import partial, update_wrapper
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,69 +17,10 @@ from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.zone_criteria import CRITERIA, GIVEN, TORSION
 from hybrid.kernels.state.state import Floats
 
-
-class Rules(NamedTuple):
-    """How zones are made of what is asked.
-
-    buffer: (n,) m, rod on either side of what asks for it; shortest: least cells of a zone; dwell: s, how long a rod
-    must have been calm before it goes.
-    """
-
-    buffer: Floats
-    shortest: int
-    dwell: float
-
-
 OFF = np.array([x.off for x in CRITERIA])
-ROUND_BUFFER, ROUND_TIME = 1e-9, 1e-9  # of a length; of the pace of zones
+ROUND_BUFFER = 1e-9  # of a length
+ROUND_TIME = 1e-9  # of the ramp time of zones
 BACK = 0.5  # ratio above which a rod that is on its way out comes back
-
-
-def wanted(ratios: Floats, rod: np.ndarray) -> np.ndarray:
-    """Base cells (n,) that ask to be, or to stay, a rod: hysteresis between 1 and the criterion's `off`."""
-    out = np.empty(rod.size, bool)
-    _wanted(ratios, OFF, rod, out)
-    return out
-
-
-def spread(asks: np.ndarray, base: Floats, buffer: Floats) -> np.ndarray:
-    """Base cells within the buffer of those that ask."""
-    out = np.empty(asks.size, bool)
-    _spread(asks, base, buffer, out)
-    return out
-
-
-def tidied(flags: np.ndarray, rod: np.ndarray, shortest: int) -> np.ndarray:
-    """No rod and no gap between rods of less than `shortest` cells: rods widen, into what was rod first; gaps close."""
-    out = flags.copy()
-    _tidy(out, rod, shortest, np.empty_like(out))
-    return out
-
-
-def planned(
-    ratios: Floats,
-    rod: np.ndarray,
-    calm_since: Floats,
-    t: float,
-    base: Floats,
-    rules: Rules,
-    leaving: np.ndarray | None = None,
-    patience: Floats | None = None,
-) -> tuple[np.ndarray, Floats]:
-    """What the base cells should be, and since when (s) each rod has been calm (infinity: it is not).
-
-    rod: (n,) what they are; calm_since: (n,) from the last review; leaving: (n,) rods that are being blended out,
-    whose curvature rises for that reason alone: they are kept only above BACK; patience: (n,) dwell times that each
-    cell must be calm, 1 if not given.
-    """
-    n = rod.size
-    calm = calm_since.copy()
-    flags = np.zeros((4, n), bool)
-    if leaving is not None:
-        flags[0] = leaving
-    wait = np.full(n, float(rules.dwell)) if patience is None else rules.dwell * patience
-    _plan(ratios, OFF, rod, calm, float(t), base, rules.buffer, rules.shortest, wait, flags)
-    return flags[3], calm
 
 
 @inner
@@ -104,13 +42,13 @@ def _over(ratios, bound, j):
 
 
 @kernel
-def _wanted(ratios, off, rod, out):
+def mark_wanted(ratios, off, rod, out):
     for j in range(rod.size):
         out[j] = _asks(ratios, off, j) if rod[j] else _over(ratios, 1.0, j)
 
 
 @kernel
-def _spread(asks, base, buffer, out):
+def mark_spread(asks, base, buffer, out):
     n = asks.size
     out[:] = False
     for j in range(n):
@@ -164,7 +102,7 @@ def widen(buffer, H):
 
 
 @kernel
-def _tidy(flags, rod, shortest, before):
+def tidy(flags, rod, shortest, before):
     n = flags.size
     changed = True
     while changed:
@@ -199,7 +137,7 @@ def _tidy(flags, rod, shortest, before):
 
 
 @kernel
-def _plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
+def make_plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
     """wait: (n,) s that rods must be calm; flags: (4, n) leaving, two to work in, what the base cells should be."""
     leaving, asks, near, out = flags[0], flags[1], flags[2], flags[3]
     n = rod.size
@@ -208,14 +146,14 @@ def _plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
             asks[j] = _over(ratios, BACK, j)
         else:
             asks[j] = _asks(ratios, off, j) if rod[j] else _over(ratios, 1.0, j)
-    _spread(asks, base, buffer, near)
+    mark_spread(asks, base, buffer, near)
     for j in range(n):
         calm[j] = min(calm[j], t) if rod[j] and not near[j] else np.inf
         asks[j] = _over(ratios, 1.0, j)
-    _spread(asks, base, buffer, near)
+    mark_spread(asks, base, buffer, near)
     for j in range(n):
         out[j] = near[j] or (rod[j] and t - calm[j] < wait[j])
-    _tidy(out, rod, shortest, asks)
+    tidy(out, rod, shortest, asks)
 
 
 # --- reviews without consequence --------------------------------------------------------------------
@@ -320,7 +258,7 @@ def quiet_review(table):
     if z.asks_layers(zones):
         widen(job.buffer, zones.H)
     now = run.clock.now
-    _plan(ratios, job.off, zones.rod, job.calm, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
+    make_plan(ratios, job.off, zones.rod, job.calm, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
     for j in range(n):
         if not stays(job, zones, j):
             return 0
@@ -331,88 +269,3 @@ def quiet_review(table):
             job.seen[c, j], ratios[c, j] = max(job.seen[c, j], ratios[c, j]), 0.0
     clock.next_review = now + (max(wait, 0.0) - ROUND_TIME) * job.pace
     return 1
-
-
-# A criterion of the user: a Python function that says where the cable must be a rod.
-
-FORCED_RATIO = 2.0  # ratio of cells that the scene, or a mask of the user, forces to be rod
-
-
-class NodeState(NamedTuple):
-    """What a user criterion receives; the arrays are read-only.
-
-    t: s; s: (N+1,) m; position, velocity: (N+1, 3) m, m/s; tension: (N,) N, of cells; curvature: (N+1,) 1/m;
-    bending_stiffness: (N+1,) N m2; line: its name, empty in the short form of a scene.
-    """
-
-    t: float
-    s: Floats
-    position: Floats
-    velocity: Floats
-    tension: Floats
-    curvature: Floats
-    bending_stiffness: Floats
-    line: str = ""
-
-
-# (N+1,) above 1: rod around the node; below 0.5: catenary again.
-UserCriterion = Callable[[NodeState], Floats]
-
-
-def of_line(criterion: UserCriterion | None, name: str) -> UserCriterion | None:
-    """The criterion for a line, which sees its name."""
-    return with_names(criterion, {"": name})
-
-
-def with_names(criterion: UserCriterion | None, names: Mapping[str, str]) -> UserCriterion | None:
-    """The criterion, which sees other names of lines."""
-    if criterion is None:
-        return None
-    asked = criterion
-
-    def of_named(nodes: NodeState) -> Floats:
-        return asked(nodes._replace(line=names[nodes.line]))
-
-    return update_wrapper(of_named, asked) if callable(asked) else asked
-
-
-def cell_ratios(criterion: UserCriterion, nodes: NodeState) -> Floats:
-    """Ratios (N,) of cells, the larger of their nodes; ValueError: the criterion gave another shape, or no number."""
-    if not callable(criterion):
-        raise ValueError(f"criterion: expected a function of a hybrid.NodeState, found {criterion!r:.60}")
-    arrays = [x for x in nodes if isinstance(x, np.ndarray)]
-    for x in arrays:
-        x.flags.writeable = False
-    try:
-        given = criterion(nodes)
-    finally:
-        for x in arrays:
-            x.flags.writeable = True
-    try:
-        ratio = np.asarray(given, float)
-    except (TypeError, ValueError):
-        raise _refused(criterion, nodes, f"{given!r:.60} ({type(given).__name__})") from None
-    if ratio.shape != nodes.s.shape:
-        kind = f"an array of shape {ratio.shape}" if ratio.shape else f"{given!r:.60} ({type(given).__name__})"
-        raise _refused(criterion, nodes, kind)
-    if not np.isfinite(ratio).all():
-        i = int(np.flatnonzero(~np.isfinite(ratio))[0])
-        raise _refused(criterion, nodes, f"{ratio[i]} at s = {nodes.s[i]:.6g} m")
-    cells = np.maximum(ratio[:-1], ratio[1:])
-    cells[cells == 1.0] = FORCED_RATIO  # a mask
-    return cells
-
-
-def _refused(criterion: UserCriterion, nodes: NodeState, given: str) -> ValueError:
-    """What a criterion gave in place of ratios: where it is written, its name, and what is expected."""
-    written: Any = inspect.unwrap(criterion)
-    while isinstance(written, partial):
-        written = written.func
-    code = getattr(written, "__code__", None) or getattr(written.__call__, "__code__", None)
-    where = f"{code.co_filename}:{code.co_firstlineno}: " if code is not None else ""
-    name = getattr(written, "__qualname__", type(written).__qualname__)
-    return ValueError(
-        f"{where}the criterion {name} returned {given} at t = {nodes.t:.6g} s\n    expected: one number per node, an "
-        f"array of shape {nodes.s.shape}: 1 or more where the line must be a rod; or a mask\n"
-        "    try:      return such as nodes.position[:, 2] < -20.0"
-    )

@@ -13,13 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from problems import Scene, free, pinned, scene, straight
 
-from hybrid.adapt.manager import Allowed, DomainManager, Times, transfer_to
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_transfer import blank_transfer, transfer
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
+from hybrid.zones.change import transfer_to
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Allowed, Times
 
 Shape = Callable[[Floats], Floats]
 X, Y, Z = np.eye(3)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from hybrid.adapt.manager import Change, Clamp, DomainManager, transfer_to
-from hybrid.adapt.zone_rules import blank_review_job, quiet_review
-from hybrid.errors import KINK_COUNTS, Outcome
-from hybrid.kernels.machine.binding import Table
+from hybrid.errors import Outcome
+from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.march.torque_transfer import carry_torque
+from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.mesh.zone_step import (
     REJECT_RATIO,
     Zones,
     blank_zone_job,
+    blank_zones,
     follow_zones,
     plan_nodes,
     take_arcs,
@@ -31,15 +31,16 @@ from hybrid.kernels.mesh.zone_switch import (
     blank_switch_job,
     end_switch,
 )
-from hybrid.kernels.mesh.zone_transfer import Transfer
+from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import PLANAR
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.build import Model
-from hybrid.model.layout import Layout
-from hybrid.simulation.events import EventLog
+from hybrid.model.layout import Layout, LineOnBase, on_other_parts
 from hybrid.solve.run import Tried
 from hybrid.store.named_arrays import matched
+from hybrid.zones.manager import OF_BASE, DomainManager
+from hybrid.zones.plan import Change
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many paces.
 LETTING_GO = 1.0
@@ -59,24 +60,47 @@ def on_layout(model: Model, layout: Layout) -> Model:
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
-def note_change(events: EventLog, manager: DomainManager, t: float, change: Change, booked: float) -> None:
-    """Events of a change of zones at t (s) that the manager has adopted; booked: J, that it puts in."""
-    base = manager.layout.base
-    for k, why in enumerate(change.reasons):
-        events.event(
-            t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
-            criterion=why.criterion, value=why.value, threshold=why.threshold,
-            energy=booked if k == 0 else 0.0,  # of all that change now
-        )  # fmt: skip
-    cause = "" if manager.kinked else manager.cable.kinks_count
-    if cause and (at := manager.joint_passed(change)) is not None:
-        manager.kinked = True
-        text = (
-            f"at s = {at:.4g} m a rod has grown past its joint: while its stiffness comes in, the kink of the joint "
-            f"{KINK_COUNTS} there, and of every joint that is passed from now on, because the line has {cause}; the "
-            f"smallest bend radius may be a third of the true one; model: rod, or model.force_rod where the line bends"
-        )
-        events.event(t, float(base[0]), float(base[-1]), "kink at joint", text)
+# From the old zones to the new ones: the state on their nodes (kernels.mesh.zone_transfer).
+
+Clamp = tuple[Floats, Floats]  # first director and tangent
+states = Packed(blank_state, given=("turn", "slow", "wake", "peak", "grip", "sheave", "soil"))
+
+
+def transfer_to(
+    old: Layout,
+    new: Layout,
+    line: Line,
+    target: Line,
+    state: State,
+    kinks: np.ndarray,
+    twist: Floats,
+    clamps: Sequence[Clamp | None] = (None, None),
+    shifts: bool = True,
+) -> Transfer:
+    """What carries a state from one layout to another of the same base.
+
+    line, target: the old and the new line; kinks: (n+1,) bool, base nodes where tangent and tension may jump (point
+    loads); twist: (n,) 1/m, twist to give to the frames of base cells that become rod; clamps: first director and
+    tangent of what holds the twist of the two ends, None: nothing does; shifts: whether momentum is kept exactly.
+    """
+    held, frames = np.zeros(2, bool), np.zeros((2, 2, 3))
+    for k, clamp in enumerate(clamps):
+        if clamp is not None:
+            held[k], frames[k] = True, clamp
+    out = states(
+        target.h.size,
+        turn=np.zeros((len(target.torsion), 3)),
+        slow=np.zeros(len(target.law)),
+        wake=np.zeros((len(target.wake_law), NO_WAKE.shape[1])),
+        peak=np.zeros(state.peak.size and target.h.size),
+        grip=np.zeros((len(state.grip) and target.h.size + 1, state.grip.shape[1])),
+        sheave=np.zeros(state.sheave.shape),
+        soil=np.zeros((len(state.soil) and target.h.size + 1, state.soil.shape[1])),
+    )
+    return Transfer(
+        line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,
+        frames, held, np.array([shifts]), blank_match(line.h.size, target.h.size),
+    )  # fmt: skip
 
 
 class ZoneSwitching:
@@ -310,3 +334,43 @@ class ZoneSwitching:
         none = np.zeros(new.rod.size)
         shifts = not self.zones.clock.share > 0.0
         return transfer_to(old, new, line, target, state, self.kinks, none, self.clamps(ends), shifts)
+
+
+# The base cells of a line change while it is paid out: what the domain manager remembers of those that stay.
+
+# Arrays of `Zones` that have no base cells; of base cells; of cells.
+OF_LINE = ("clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits")
+CARRIED = ("leaving", "grown", "haste")
+OF_CELLS = ("past", "recent", "lack", "rate", "since", "keeps")
+
+
+def change_base(
+    manager: DomainManager, layout: Layout, source: np.ndarray, of_cell: np.ndarray, given: np.ndarray,
+    on_base: LineOnBase, anew: bool = False,
+) -> None:  # fmt: skip
+    """Let a manager go on with base cells of which some have come or gone, where they are one cell each.
+
+    source, of_cell: which of the old base cells (n,), and cells (N,), a new one is, or has come from; given: (n,) 1
+    rod, -1 catenary, 0 adaptive; anew: how long nodes have been calm is not known.
+    """
+    old, n, places = manager.zones, layout.rod.size, layout.starts[-1] + 1
+    calm = np.zeros(places, np.int64) if anew else on_other_parts(manager.layout, old.calm, source, layout.parts)
+    waves = np.zeros(places) if anew else on_other_parts(manager.layout, old.waves, source, layout.parts)
+    blank = blank_zones(1, n)._replace(here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=calm, waves=waves)
+    kept = {name: getattr(old, name) for name in OF_LINE} | {"ratios": old.ratios[:, source].copy()}
+    kept |= {name: getattr(old, name)[source] for name in CARRIED}
+    assert set(kept) <= set(OF_BASE)
+    cells = {name: getattr(old, name)[of_cell] for name in OF_CELLS}
+    known, relaxing = old.counts.known, old.counts.relaxing
+    age, recent_age = manager.age, manager.recent_age
+    manager.zones = blank._replace(**kept)
+    for name in ("calm_since", "patience", "released", "buffer"):
+        setattr(manager, name, getattr(manager, name)[source])
+    manager.calmed, manager.seen = manager.calmed[:, source].copy(), manager.seen[:, source].copy()
+    manager.given, manager.free, manager.on_base = given, (given >= 0).astype(np.int8), on_base
+    manager.measure(layout)
+    manager.set_layout(layout)
+    for name, x in cells.items():
+        getattr(manager.zones, name)[:] = x
+    manager.zones.counts.known, manager.zones.counts.relaxing = known, relaxing
+    manager.age, manager.recent_age = age, recent_age

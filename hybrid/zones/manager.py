@@ -7,41 +7,26 @@ thresholds, and earlier tensions.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.adapt.zone_rules import (
-    FORCED_RATIO,
-    OFF,
-    ROUND_TIME,
-    NodeState,
-    Rules,
-    UserCriterion,
-    cell_ratios,
-    planned,
-    reach,
-    spread,
-    tidied,
-    wanted,
-    widen,
-)
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_lengths import FADE
 from hybrid.kernels.mesh.stiffness_ramp import shares
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
+from hybrid.kernels.mesh.zone_plan import OFF, ROUND_TIME, reach, widen
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
-from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
-from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state
-from hybrid.model.layout import Layout, LineOnBase, edges, on_other_parts
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
+from hybrid.model.layout import Layout, LineOnBase, edges
 from hybrid.model.material import Material, tension_floor
+from hybrid.zones.criteria import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
+from hybrid.zones.plan import Allowed, Change, Reason, Rules, Times, planned, spread, tidied, wanted
 
 # Rod on either side of cells above a threshold, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension
 # it is weight that straightens a cable.
@@ -63,57 +48,6 @@ CHECKPOINTED = (
     "going", "next_review", "total_twist", "past", "recent", "age", "recent_age", "largest", "fastest",
     "kinked",
 )  # fmt: skip
-
-
-class Reason(NamedTuple):
-    """Why base cells a to b (exclusive) change: kind of event, criterion with its value and threshold, and words."""
-
-    a: int
-    b: int
-    kind: str
-    text: str
-    criterion: str = ""
-    value: float = math.nan
-    threshold: float = math.nan
-
-
-class Change(NamedTuple):
-    """A proposal, (n,) of base cells: what they should be, why, and which must be ramped up fast."""
-
-    rod: np.ndarray
-    reasons: tuple[Reason, ...]
-    urgent: np.ndarray
-    stiff: np.ndarray  # rods that get their full stiffness at once
-    same: bool = False  # whether cells change and nothing else
-
-
-class Allowed(NamedTuple):
-    """What leaving bending out, and lengths of cells, may make wrong.
-
-    tolerance: m, of position.  curvature_error: part of the largest curvature that the length of cells, which follow
-    it, may make it wrong by; None: they stay as they are.  asked: parts of the largest tension, curvature and moment
-    (numbers of mesh.cell_errors) that leaving bending out may make, where one is asked.  fineness: cells that follow
-    the curvature are so many times as short as that asks for.
-    """
-
-    tolerance: float
-    curvature_error: float | None = None
-    asked: Mapping[int, float] = MappingProxyType({})
-    fineness: float = 1.0
-
-
-class Times(NamedTuple):
-    """Times of zones, s.
-
-    hold: how long a rod must have been below its thresholds; ramp: of bending stiffness, None: hold.  edge: for which
-    the way of a contact edge is foreseen, None: ramp.  period: the longest of the motion, over some of which its
-    largest values count.
-    """
-
-    hold: float
-    ramp: float | None = None
-    edge: float | None = None
-    period: float = 0.0
 
 
 def _number(name: str, text: str) -> Any:
@@ -397,7 +331,7 @@ class DomainManager:
         return change
 
     def bind_review(self, table: Table, zone_table: NDArray[np.int64]) -> None:
-        """Bind what compiled reviews of zones (adapt.zone_rules.quiet_review) know; zone_table: of their ZoneJob."""
+        """Bind what compiled reviews of zones (quiet_review) know; zone_table: of their ZoneJob."""
         n = self.given.size
         if self._review_room[0].size != n:
             self._review_room = np.zeros(n), np.zeros(n), np.zeros((4, n), bool)
@@ -538,86 +472,3 @@ class DomainManager:
 
     def _update_ramping(self) -> None:
         self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())
-
-
-# The base cells of a line change while it is paid out: what the domain manager remembers of those that stay.
-
-# Arrays of `Zones` that have no base cells; of base cells; of cells.
-OF_LINE = ("clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits")
-CARRIED = ("leaving", "grown", "haste")
-OF_CELLS = ("past", "recent", "lack", "rate", "since", "keeps")
-
-
-def change_base(
-    manager: DomainManager, layout: Layout, source: np.ndarray, of_cell: np.ndarray, given: np.ndarray,
-    on_base: LineOnBase, anew: bool = False,
-) -> None:  # fmt: skip
-    """Let a manager go on with base cells of which some have come or gone, where they are one cell each.
-
-    source, of_cell: which of the old base cells (n,), and cells (N,), a new one is, or has come from; given: (n,) 1
-    rod, -1 catenary, 0 adaptive; anew: how long nodes have been calm is not known.
-    """
-    old, n, places = manager.zones, layout.rod.size, layout.starts[-1] + 1
-    calm = np.zeros(places, np.int64) if anew else on_other_parts(manager.layout, old.calm, source, layout.parts)
-    waves = np.zeros(places) if anew else on_other_parts(manager.layout, old.waves, source, layout.parts)
-    blank = blank_zones(1, n)._replace(here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=calm, waves=waves)
-    kept = {name: getattr(old, name) for name in OF_LINE} | {"ratios": old.ratios[:, source].copy()}
-    kept |= {name: getattr(old, name)[source] for name in CARRIED}
-    assert set(kept) <= set(OF_BASE)
-    cells = {name: getattr(old, name)[of_cell] for name in OF_CELLS}
-    known, relaxing = old.counts.known, old.counts.relaxing
-    age, recent_age = manager.age, manager.recent_age
-    manager.zones = blank._replace(**kept)
-    for name in ("calm_since", "patience", "released", "buffer"):
-        setattr(manager, name, getattr(manager, name)[source])
-    manager.calmed, manager.seen = manager.calmed[:, source].copy(), manager.seen[:, source].copy()
-    manager.given, manager.free, manager.on_base = given, (given >= 0).astype(np.int8), on_base
-    manager.measure(layout)
-    manager.set_layout(layout)
-    for name, x in cells.items():
-        getattr(manager.zones, name)[:] = x
-    manager.zones.counts.known, manager.zones.counts.relaxing = known, relaxing
-    manager.age, manager.recent_age = age, recent_age
-
-
-# From the old zones to the new ones: the state on their nodes (kernels.mesh.zone_transfer).
-
-Clamp = tuple[Floats, Floats]  # first director and tangent
-states = Packed(blank_state, given=("turn", "slow", "wake", "peak", "grip", "sheave", "soil"))
-
-
-def transfer_to(
-    old: Layout,
-    new: Layout,
-    line: Line,
-    target: Line,
-    state: State,
-    kinks: np.ndarray,
-    twist: Floats,
-    clamps: Sequence[Clamp | None] = (None, None),
-    shifts: bool = True,
-) -> Transfer:
-    """What carries a state from one layout to another of the same base.
-
-    line, target: the old and the new line; kinks: (n+1,) bool, base nodes where tangent and tension may jump (point
-    loads); twist: (n,) 1/m, twist to give to the frames of base cells that become rod; clamps: first director and
-    tangent of what holds the twist of the two ends, None: nothing does; shifts: whether momentum is kept exactly.
-    """
-    held, frames = np.zeros(2, bool), np.zeros((2, 2, 3))
-    for k, clamp in enumerate(clamps):
-        if clamp is not None:
-            held[k], frames[k] = True, clamp
-    out = states(
-        target.h.size,
-        turn=np.zeros((len(target.torsion), 3)),
-        slow=np.zeros(len(target.law)),
-        wake=np.zeros((len(target.wake_law), NO_WAKE.shape[1])),
-        peak=np.zeros(state.peak.size and target.h.size),
-        grip=np.zeros((len(state.grip) and target.h.size + 1, state.grip.shape[1])),
-        sheave=np.zeros(state.sheave.shape),
-        soil=np.zeros((len(state.soil) and target.h.size + 1, state.soil.shape[1])),
-    )
-    return Transfer(
-        line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,
-        frames, held, np.array([shifts]), blank_match(line.h.size, target.h.size),
-    )  # fmt: skip

@@ -9,25 +9,23 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybrid.adapt.manager import Allowed, DomainManager, Times
-from hybrid.adapt.zone_rules import UserCriterion
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.march.torque_transfer import carry_torque
-from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.cell_lengths import CALM_STEPS
 from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, Line, State
 from hybrid.model.build import Model, given_zones
-from hybrid.model.coarsen import FEWER, picked
+from hybrid.model.coarsen import FEWER, MANY, picked
 from hybrid.model.layout import edges
-from hybrid.model.payout import fastest
-from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
-from hybrid.scene.accuracy import ROUGHEST
+from hybrid.model.payout import PayoutPlan, fastest
+from hybrid.model.resolution import Resolution, follows_curvature
 from hybrid.scene.motion_checks import longest_period
 from hybrid.scene.schema import AdaptiveModel, LineScene
-from hybrid.simulation.equilibrium import MANY
-from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
+from hybrid.zones.change import ZoneSwitching, on_layout
+from hybrid.zones.criteria import UserCriterion, shares_asked
+from hybrid.zones.manager import DomainManager
+from hybrid.zones.plan import Allowed, Times
 
 # Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps;
 # and of a line that moves to and fro so many periods, lest what is let go comes back, up to so many ramp times.
@@ -37,13 +35,12 @@ PERIODS_HELD, MOST_HELD = 2.0, 10.0
 STRAIGHT = 0.25
 # Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
 SLOWEST, FASTEST = 2.0, 10
+# Ramp times of bending stiffness within which a cell that is taken in must have become rod.
+AHEAD = 2.0
 # Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
 STRICTER = (1.0, 0.5, 0.25)
 # Rounds of zones and equilibrium at the start: each only adds rod, so they end.
 MOST_ROUNDS = 10
-# Share of what is asked of tension, curvature or moment along the line that leaving bending out may make: as much as
-# finer zones are planned to make (accuracy.refinement), so that they are strict enough from the start.
-OF_ALONG = 0.25
 
 
 def reasons_at_start(manager: DomainManager | None) -> str:
@@ -119,30 +116,26 @@ def manager_for(
     return manager
 
 
+def rods_at_winch(scene: LineScene, plan: PayoutPlan, model: Model, count: int, pace: float, rate: float) -> np.ndarray:
+    """(N,) of base cells: 1 rod, -1 catenary, 0 adaptive, where the winch may reach them soon.
+
+    count: material nodes that are out; pace: s; rate: m/s.
+    """
+    assert model.layout is not None
+    given = given_zones(scene, model.layout)
+    near = plan.at_winch(count, AHEAD * pace * abs(rate))
+    given[near & (given == 0)] = 1
+    return given
+
+
 def _given(scene: LineScene, model: Model, pace: float) -> np.ndarray:
     """(n,) of base cells: 1 rod, -1 catenary, 0 adaptive; pace: s, ramp time of bending stiffness."""
     assert model.layout is not None
     if model.payout is None:
         return given_zones(scene, model.layout)
-    from hybrid.simulation.run_payout import rods_at_winch
 
     paid = model.payout
     return rods_at_winch(scene, paid, model, paid.count(paid.first), pace, fastest(paid.law))
-
-
-def shares_asked(scene: LineScene, curvature_error: float | None, bends: float = math.inf) -> dict[int, float]:
-    """Parts of the largest tension, curvature and moment along the line that leaving bending out may make.
-
-    bends: of `Resolution`: what limits of bending ask for as well.
-    """
-    wanted = requested_accuracy(scene)
-    parts = (wanted.of_tension, wanted.of_curvature, wanted.of_moment) if wanted is not None else (None,) * 3
-    asked = {k: OF_ALONG * part for k, part in zip((TENSION, CURVATURE, MOMENT), parts, strict=True) if part}
-    if bends <= ROUGHEST:
-        asked[CURVATURE] = min(OF_ALONG * bends, asked.get(CURVATURE, np.inf))
-    if curvature_error is not None:
-        asked[CURVATURE] = min(curvature_error, asked.get(CURVATURE, np.inf))
-    return asked
 
 
 def zones_without_equilibrium(model: Model, manager: DomainManager) -> Model:
