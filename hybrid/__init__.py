@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from hybrid.scene.root import Scene
     from hybrid.scene.root import Scene as System  # noqa: F401  # deprecated
     from hybrid.simulation.lines_stiffness import offsets, stiffness
+    from hybrid.simulation.own_parts import RunPart, RunView
     from hybrid.simulation.run_quantities import kinds_of_quantities, listed_outputs
     from hybrid.simulation.stepping import Simulation
     from hybrid.simulation.stepping import Simulation as SystemSimulation  # noqa: F401  # deprecated
@@ -55,6 +56,8 @@ _HOME = {
     "HybridError": ("hybrid.errors", "HybridError"),
     "NodeState": ("hybrid.zones.criteria", "NodeState"),
     "Outcome": ("hybrid.errors", "Outcome"),
+    "RunPart": ("hybrid.simulation.own_parts", "RunPart"),
+    "RunView": ("hybrid.simulation.own_parts", "RunView"),
     "Result": ("hybrid.store.reader", "Result"),
     "ResultError": ("hybrid.errors", "ResultError"),
     "Scene": ("hybrid.scene.root", "Scene"),
@@ -107,6 +110,8 @@ __all__ = [
     "Outcome",
     "Result",
     "ResultError",
+    "RunPart",
+    "RunView",
     "Scene",
     "SceneError",
     "Simulation",

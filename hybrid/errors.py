@@ -100,6 +100,7 @@ class Outcome(IntEnum):
     COLLAPSED = 15
     NOT_REACHED = 16
     LEFT_PLANE = 17
+    STOPPED = 18
 
     @property
     def cause(self) -> str:
@@ -239,6 +240,7 @@ _CAUSE = {
     Outcome.NOT_REACHED: "what is asked of the scene is not reached from where the search began",
     Outcome.LEFT_PLANE: "it leaves the plane in which it lies at first",
     Outcome.OVERSTRETCHED: "the cable is stretched, or compressed, beyond what a section bears",
+    Outcome.STOPPED: "a part of the user's own ends the run",
 }
 
 _REMEDY = {
@@ -257,6 +259,7 @@ _REMEDY = {
     Outcome.LEFT_PLANE: "write `dimension: 3`, or leave dimension out",
     Outcome.NOT_REACHED: "wider limits or bounds, more unknowns, or another start",
     Outcome.COLLAPSED: "what cuts the steps has to go: see what the message names, and where",
+    Outcome.STOPPED: "another scene, in which the part lets the run go on; or a run without the part",
     Outcome.OVERSTRETCHED: "check axial_stiffness (N), mass (kg/m), lengths (m), loads (N); max_strain is the limit",
     Outcome.FOLDED: "add cells where it bends (mesh), or begin nearer to the shape at rest (initial_guess)",
     Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",

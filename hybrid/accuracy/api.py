@@ -25,6 +25,7 @@ from hybrid.scene.schema import missing_time
 from hybrid.scene.short_form import network_of
 from hybrid.simulation.case import Case, CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
+from hybrid.simulation.own_parts import RunPart, checked_parts, require_parts
 from hybrid.simulation.progress import Listener, ProgressReporter, announce_compiling, interrupts, listener_of
 from hybrid.simulation.restart import remaining
 from hybrid.store.array_contents import MemoryTarget, Target
@@ -46,6 +47,7 @@ def run(
     progress: bool | Listener = False,
     overwrite: bool = True,
     criterion: UserCriterion | None = None,
+    parts: Sequence[RunPart] = (),
 ) -> Result:
     """Integrate a scene over its duration.
 
@@ -54,6 +56,7 @@ def run(
     `hybrid.simulation.progress.Progress` about ten times a second.  overwrite: replace an existing result (never
     another program's file).  criterion: for zones that move, one more: it gets a `hybrid.NodeState` at every step and
     gives a number (N+1,) per node, 1 or more where the cable must be a rod; of several lines each such one is asked.
+    parts: of the run, of one's own (`hybrid.RunPart`), such as one that stops a winch.
 
     Raises SceneError when the scene is refused, ResultError when the output cannot be written, and ComputationError
     when the computation stops; what was computed until then is in the file, and the last good state beside it.
@@ -63,6 +66,7 @@ def run(
         raise SceneError([missing_time()])
     _check(scene, criterion)
     case = Case(scene, criterion)
+    case.parts = checked_parts(parts)
     free = [name for name in scene.lines if criterion is None and model_is_free(scene.scene_of(name))]
     compile_beside(with_models(scene, dict.fromkeys(free, "rod")))  # most often chosen: they compile the least
     target = _target(output, overwrite, case.wants_errors)
@@ -110,13 +114,15 @@ def resume(
     start: float | None = None,
     progress: bool | Listener = False,
     criterion: UserCriterion | None = None,
+    parts: Sequence[RunPart] = (),
 ) -> Result:
     """Continue a run that was cut off, from the last checkpoint in its file; or beyond its end, or with other loads.
 
     What comes out is, to the last bit, what the run would have been had it not been stopped (but for processor
     times).  output: another file; None: the same.  until: s, a later end.  settings: changes such as
     ``environment.fluid.current=[0.5, 0, 0]`` (currents, waves, and what moves and loads the ends) from `start` (s) on;
-    None: from the checkpoint; before it the run is computed anew, into another file.  criterion: as `run` was given.
+    None: from the checkpoint; before it the run is computed anew, into another file.  criterion, parts: as `run` was
+    given.
 
     Raises ResultError when there is nothing to continue or the file is another program's, and else as `run`.
     """
@@ -131,13 +137,14 @@ def resume(
     if target != path:
         check_target(target, True)
     with locked(path), locked(target if target != path else None):
-        left = remaining(path, until, settings, start)
+        left, parts = remaining(path, until, settings, start), checked_parts(parts)
+        require_parts(parts, left.parts, path)
         if left.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
         _check(left.scene, criterion)
         case = Case(left.scene, criterion, left.changes, left.points)
-        case.unasked = left.unasked
+        case.unasked, case.parts = left.unasked, parts
         with _supervised(case, progress):
             Passes(case, target, path, left).compute()
     return written_result(target, case.late_file)

@@ -44,6 +44,7 @@ from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.new_run import Recording, new_run, start_of
+from hybrid.simulation.own_parts import RunPart
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter, at_once
 from hybrid.simulation.restart import LoadChange, changes_text, with_own_contact
 from hybrid.simulation.restore import is_cut_off, kept_resolution
@@ -102,6 +103,7 @@ class Case:
     late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
     late_finer: LateFile | None = None  # of a finer one, which may take its place
     _results = 0  # that were begun
+    parts: Sequence[RunPart] = ()  # of the user's own, which all runs have
     unasked: Sequence[str] = ()  # lines that nobody asked to go on without contact with themselves: the file says none
     _told: tuple[object, str] | None = None  # a scene, and what it is as a text
     _start: tuple[Network, NetworkResolution, Start] | None = None  # that was looked at last
@@ -365,10 +367,11 @@ class Case:
     ) -> AbstractContextManager[Sequence[Callable[[], Samples]]]:
         """Runs to compare with, in threads where that is worth it (`beside`).
 
-        A criterion of the user may not expect to be called by several threads.
+        A criterion or a part of the user may not expect to be called by several threads.
         """
         steps = self._duration / NetworkResolution.of(self.lines).one.step
-        threads = thread_count() if self.criterion is None and steps >= WORTH_THREADS else 1
+        own = self.criterion is not None or bool(self.parts)
+        threads = thread_count() if not own and steps >= WORTH_THREADS else 1
         self._unwanted.clear()
         return beside(samples, threads, self.progress.look, self._unwanted.set)
 
@@ -469,7 +472,7 @@ class Case:
     def _network_run(self, resolution: NetworkResolution, target: Target | None, recording: Recording) -> NetworkRun:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
         network, changes = self.network, [replace(x, scene=network_of(x.scene)) for x in self.changes]
-        recording = recording._replace(planes=True, asked=Asked(self.scene, self.changes))
+        recording = recording._replace(planes=True, asked=Asked(self.scene, self.changes), parts=self.parts)
         if recording.points is None:
             recording = recording._replace(points=self.points)
         with self._said():

@@ -36,8 +36,7 @@ from hybrid.simulation.run_checkpoint import (
 from hybrid.simulation.run_contact import (
     refuse_within_itself,
 )
-from hybrid.simulation.run_cuts import Cuts
-from hybrid.simulation.run_failures import Failures
+from hybrid.simulation.run_failures import Cuts, Failures
 from hybrid.simulation.run_of_lines import change_loads_of_lines
 from hybrid.simulation.run_record import RecordedRun
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, named

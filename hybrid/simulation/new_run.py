@@ -17,18 +17,19 @@ from hybrid.model.plan import output_times
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import LineScene
+from hybrid.scene.short_form import short_form
 from hybrid.simulation.floating_watch import FloatingWatch
 from hybrid.simulation.line_result import LineResult, Wanted
 from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.network_run import First, NetworkRun
+from hybrid.simulation.own_parts import OwnParts, RunPart
 from hybrid.simulation.parts import Part, Parts
 from hybrid.simulation.progress import RESULT, ProgressReporter, at_once
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import kept_resolution
 from hybrid.simulation.run_checkpoint import kept_changes
 from hybrid.simulation.run_contact import RunContact
-from hybrid.simulation.run_cuts import Cuts
-from hybrid.simulation.run_failures import Failures
+from hybrid.simulation.run_failures import Cuts, Failures
 from hybrid.simulation.run_file import Asked, file_of
 from hybrid.simulation.run_of_lines import WatchedLines, loaded_as, with_loads_of
 from hybrid.simulation.run_quantities import Rotations, RunQuantities
@@ -55,7 +56,7 @@ class Recording(NamedTuple):
     which they lie; start: the first state, if it is known; points: of outputs of lines by name, None: those of
     their scenes; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself
     where lines come near themselves, else that is only noticed; asked: what the network was made of, by whose names it
-    gets its file.
+    gets its file; parts: of the user's own, of which the run has copies.
     """
 
     mode: WriteMode = AT_ONCE
@@ -69,6 +70,7 @@ class Recording(NamedTuple):
     until: float | None = None
     touches: bool = True
     asked: Asked | None = None
+    parts: Sequence[RunPart] = ()
 
 
 ALONE = Recording()
@@ -172,6 +174,9 @@ def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording
     if first.managers and moves:
         run.zones = RunZones(me, first.managers, run.payout)
         parts.append(run.zones)
+    if recording.parts and moves:
+        called = {} if recording.asked is None else short_form(recording.asked.scene).names
+        parts.append(OwnParts(me, recording.parts, [called.get(name, name) for name in named], run.payout))
     parts += [WatchedLines(me), run.contact, run.cuts, run.failures, VibrationsOfLines(vibrations, run.loop.clock)]
     run.parts = Parts([*parts, run.quantities, run.rotations, FloatingWatch(me, moves)])
 

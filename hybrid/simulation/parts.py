@@ -25,6 +25,7 @@ ORDER = (
     "zones",  # before nodes, which enter and leave beside the cells that a line has
     "payout",  # before what breaks: a winch may come to its end in the step that breaks its line
     "failures",  # last of what changes lines: what comes loose does so from all of them as they are
+    "own",  # a user's own parts see a step with all that it has changed
     "vibrations",  # bounds the steps to come, whatever has changed
     "quantities",  # from here on parts only look
     "rotations",

@@ -76,6 +76,7 @@ class PayingOut:
         self.foreseen = fastest(self.law)
         self.layout: Layout | None = None  # of a line whose zones move
         self.ended = False  # whether the end at the winch has been let go
+        self.stopped = False  # whether its rate goes to zero for good
         self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), Clock()
         self._carrying = Table(blank_carry_job())
 
@@ -122,10 +123,37 @@ class PayingOut:
         self.winch.tension, self.ended = 0.0, True
         law = np.zeros((1, 8))
         law[0, 0], law[0, 7] = before.t, self.length
-        self.law, self.reel = law, self.reel._replace(law=law)
-        self.table.bind(reel=self.reel)
+        self._set_law(law)
         self.leave_unbalanced()
         return energy(line, ends, before.state) - old
+
+    def stop(self, t: float, over: float) -> None:
+        """From t (s) on the rate goes to zero over a time (s), for good, and so does a tension that is held.
+
+        It is cubic in time and begins as it is now, with its growth.  ValueError: longer or shorter than can be.
+        """
+        numbers = self.reel.numbers
+        of_winch = float(numbers.length), float(numbers.rate), float(numbers.acceleration)
+        L, c, a = of_winch if self.holds_tension else length_at(self.law, t)
+        law = np.zeros((2, 8))
+        law[:, 0] = t, t + over
+        law[0, 3:] = 0.5 * c / over**3 + 0.25 * a / over**2, -c / over**2 - 2.0 * a / (3.0 * over), 0.5 * a, c, L
+        law[1, 7] = self._checked(L + 0.5 * c * over + a * over**2 / 12.0)
+        self.winch.tension, self.stopped = 0.0, True
+        self._set_law(law)
+
+    def _checked(self, length: float) -> float:
+        """A length, m, to which line is to be paid out; ValueError: longer or shorter than can be."""
+        plan = self.plan
+        if not plan.shortest <= length <= plan.longest * (1.0 + ROUND_OFF):
+            between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
+            text = f"the length that is out would be {length:.6g} m, expected between {between} (payout.longest)"
+            raise ValueError(text)
+        return length
+
+    def _set_law(self, law: Floats) -> None:
+        self.law, self.reel = law, self.reel._replace(law=law)
+        self.table.bind(reel=self.reel)
 
     def asks(self, line: Line) -> bool:
         """Whether iterations of Newton's method need something of the reel: friction is on the material that passes."""
@@ -427,7 +455,7 @@ class PayingOut:
             cells["rod"] = self.layout.rod.copy()
             if self.plan.follows:
                 cells["here"] = self.layout.node_flags
-        ended = {"ended": True} if self.ended else {}
+        ended = {name: True for name in ("ended", "stopped") if getattr(self, name)}
         return {"count": self.count, "law": self.law.copy(), "foreseen": self.foreseen, **ended, **kept, **cells}
 
     def restore(self, tree: Any, model: Model) -> Model:
@@ -435,7 +463,8 @@ class PayingOut:
         template = {"count": 0, "law": np.zeros((0, 8))}
         given = dict(tree)
         cells = {name: given.pop(name) for name in ("rod", "here") if name in given}
-        foreseen, self.ended = given.pop("foreseen", None), bool(given.pop("ended", False))
+        foreseen = given.pop("foreseen", None)
+        self.ended, self.stopped = bool(given.pop("ended", False)), bool(given.pop("stopped", False))
         saved = matched({name: given.pop(name) for name in template}, template, "payout")
         count, law = saved["count"], saved["law"]
         if not (law.ndim == 2 and law.shape[1] == 8 and len(law) and (np.diff(law[:, 0]) >= 0.0).all()):
@@ -478,7 +507,7 @@ class PayingOut:
 
         ValueError: it cannot be so long, or so short.
         """
-        if self.plan.from_outside and not self.ended:
+        if self.plan.from_outside and not (self.ended or self.stopped):
             length, rate = asked or (None, length_at(self.law, begin)[1])
             self.drive(begin, end, length, rate)
 
@@ -488,11 +517,8 @@ class PayingOut:
         length: None: the one to which a rate that changes evenly leads.  ValueError: longer or shorter than can be.
         """
         L, c, _ = length_at(self.law, begin)
-        dt, plan = end - begin, self.plan
-        to = L + 0.5 * (c + rate) * dt if length is None else length
-        if not plan.shortest <= to <= plan.longest * (1.0 + ROUND_OFF):
-            between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
-            raise ValueError(f"the length that is out would be {to:.6g} m, expected between {between} (payout.longest)")
+        dt = end - begin
+        to = self._checked(L + 0.5 * (c + rate) * dt if length is None else length)
         mean = (to - L) / dt
         law = np.zeros((2, 8))
         law[:, 0] = begin, end
@@ -501,9 +527,7 @@ class PayingOut:
         if self.law.shape == law.shape:
             self.law[:] = law
         else:
-            self.law = law
-            self.reel = self.reel._replace(law=law)
-            self.table.bind(reel=self.reel)
+            self._set_law(law)
 
     def limit_step(self) -> None:
         """Of steps that follow the motion: the next one is no longer than the law of the length allows."""
@@ -523,6 +547,8 @@ def length_asked(scene: LineScene, paying: PayingOut, length: Any, rate: Any, wh
     assert payout is not None
     if paying.ended:
         raise ValueError("the end at the winch has been let go: no line comes any more")
+    if paying.stopped:
+        raise ValueError("the winch has been stopped by a part of the run: its length stays")
     if not payout.from_outside:
         raise ValueError(f"{where} gives the length: leave {', '.join(SOURCES)} out to set it")
     for name, x in (("rate", rate), ("length", 0.0 if length is None else length)):

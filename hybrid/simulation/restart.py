@@ -62,7 +62,7 @@ class Remaining(Generic[S]):
     before: what was found before the run, of what it is part of; {}: nothing, it begins with `resolution`.  anew: from
     t = 0, not from the checkpoint; reached: s, where it begins; points: of the lines of the result by their names in
     the scene, None if it is computed anew; unasked: lines of the scene that nobody asked to go on without contact with
-    themselves, as they do.
+    themselves, as they do; parts: names of the user's own parts that the result was computed with.
     """
 
     scene: S
@@ -73,6 +73,7 @@ class Remaining(Generic[S]):
     reached: float
     points: Mapping[str, OutputPoints] | None
     unasked: Sequence[str] = ()
+    parts: Sequence[str] = ()
 
 
 def remaining(
@@ -115,6 +116,7 @@ def _found(path: Path) -> tuple[Remaining[Any], bool]:
         with refused(path):
             state = point.state
             meets, reached = "let_pass" in state, max(point.t, float(state["t"]))
+            parts = [*state.get("parts", {})]
         with open_result(path) as result:
             lines = dict(result.each_line())
             scene_of_file = read_text(result.scene_text)[0]
@@ -125,7 +127,7 @@ def _found(path: Path) -> tuple[Remaining[Any], bool]:
             done = result.done and not before
     changes, resolution = tuple(LoadChange(*x) for x in told), kept_resolution(network_of(scene), path)
     unasked = _touching_unasked(scene_of_file, lines)
-    return Remaining(scene, changes, resolution, before, False, reached, points, unasked), done
+    return Remaining(scene, changes, resolution, before, False, reached, points, unasked, parts), done
 
 
 def _points_of(result: Result, scene: LineScene) -> OutputPoints:

@@ -279,14 +279,30 @@ class RunPayout(Part):
             elif x.due:
                 self._change(k, x)
                 changed.append(k)
-        if changed and run.zones is not None:
-            run.zones.go_on("where a node enters or leaves at a winch")
-        elif changed:
-            touching = () if run.contact.shared is None else run.contact.shared.lines
-            before = {k: float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in {*changed, *touching}}
-            run.renew_solver("where a node enters or leaves at a winch")
-            for k, energy in before.items():
-                run.lines[k].books.work[0, b.ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
+        if changed:
+            self._renew_solver(changed, "where a node enters or leaves at a winch")
+
+    def _renew_solver(self, changed: Collection[int], after: str) -> None:
+        """Another solver, as these lines have changed; after: what, for the text of a failure."""
+        run = self._run
+        if run.zones is not None:
+            run.zones.go_on(after)
+            return
+        touching = () if run.contact.shared is None else run.contact.shared.lines
+        before = {k: float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in {*changed, *touching}}
+        run.renew_solver(after)
+        for k, energy in before.items():
+            run.lines[k].books.work[0, b.ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
+
+    def stop(self, number: int, over: float) -> None:
+        """The winch of a line stops, over a time (s), between two steps; ValueError: it cannot."""
+        run, paying = self._run, self.lines[number]
+        run.output_due()
+        run.lines[number].write_down()  # with the law as it is
+        held = paying.holds_tension
+        paying.stop(run.t, over)
+        if held:  # iterations ask nothing of the winch any more
+            self._renew_solver([number], "where a winch is stopped")
 
     def _change(self, k: int, paying: PayingOut) -> None:
         """A node enters at the winch of a line, or leaves it."""

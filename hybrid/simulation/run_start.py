@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.model.network import NetworkModel
@@ -57,6 +57,8 @@ def named(failed: LineFailed, model: NetworkModel, first: str = "", left: Path |
     """The same with the name of the line in its detail; first: to try before the usual remedy; left: a snapshot."""
     where = f"line {model.names[failed.line]}" if failed.line >= 0 else "the points"
     detail = f"{where}; {failed.detail}" if failed.detail else where
+    if failed.outcome == Outcome.STOPPED:  # by what names itself
+        detail = failed.detail
     name = model.names[failed.line] if failed.line >= 0 else ""
     first = first or failed.first
     if not first and failed.line >= 0:

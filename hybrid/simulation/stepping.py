@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -26,6 +26,7 @@ from hybrid.simulation.layer_mesh import layered, rods_at_rest
 from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, with_survey
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.new_run import Recording, new_run, static_system
+from hybrid.simulation.own_parts import RunPart, checked_parts
 from hybrid.simulation.run_file import Asked
 from hybrid.simulation.saving import Saved, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.stepped import ONE_STEP, SLIVER, end_of_step, in_space, iterations_allowed, one_thread
@@ -66,20 +67,20 @@ class Simulation(SteppedPoints):
     """A scene in motion that is stepped from outside; a context manager.
 
     scene: as of `hybrid.run`; its time table gives the longest step and the duration, beyond which nothing is computed.
-    output: the HDF5 file to write; None keeps the result in memory.  criterion: as of `hybrid.run`.  Constructing it
-    finds the start that the scene asks for, an equilibrium perhaps, and nothing else: no run to estimate an error is
-    made.  A cable that says no `dimension` is computed in space, since an end may be set anywhere.  most_iterations:
-    Newton iterations that a step may take, for real time: one that has not converged by then is taken as it is, with an
-    event `iterations cut` and counted in `cut_short`; None: until it has.  One thread at a time: a method called while
-    another thread is in one raises ValueError.  Raises SceneError, ResultError and ComputationError as `hybrid.run`
-    does.
+    output: the HDF5 file to write; None keeps the result in memory.  criterion, parts: as of `hybrid.run`.
+    Constructing it finds the start that the scene asks for, an equilibrium perhaps, and nothing else: no run to
+    estimate an error is made.  A cable that says no `dimension` is computed in space, since an end may be set
+    anywhere.  most_iterations: Newton iterations that a step may take, for real time: one that has not converged by
+    then is taken as it is, with an event `iterations cut` and counted in `cut_short`; None: until it has.  One
+    thread at a time: a method called while another thread is in one raises ValueError.  Raises SceneError,
+    ResultError and ComputationError as `hybrid.run` does.
     """
 
     def __init__(
         self, scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True,
-        criterion: UserCriterion | None = None, most_iterations: int | None = None,
+        criterion: UserCriterion | None = None, most_iterations: int | None = None, parts: Sequence[RunPart] = (),
     ) -> None:  # fmt: skip
-        most = iterations_allowed(most_iterations)
+        most, parts = iterations_allowed(most_iterations), checked_parts(parts)
         self._read_scene(as_scene(scene))
         self.lock, self._stack, self._owner = threading.RLock(), ExitStack(), object()
         self._target: Path | io.BytesIO = io.BytesIO()
@@ -90,7 +91,7 @@ class Simulation(SteppedPoints):
         self._closed = False
         self._failed: tuple[LineFailed, ComputationError] | None = None  # of the last step, until `restore`
         try:
-            self._run = self._begun(most, criterion)
+            self._run = self._begun(most, criterion, parts)
         except BaseException:
             self._stack.close()
             raise
@@ -115,11 +116,11 @@ class Simulation(SteppedPoints):
         self.scene = in_space(scene.with_lines(contact))
         self._system, self._form = network_of(self.scene), short_form(self.scene)
 
-    def _begun(self, most: int, criterion: UserCriterion | None) -> NetworkRun:
+    def _begun(self, most: int, criterion: UserCriterion | None, parts: Sequence[RunPart]) -> NetworkRun:
         """The run at its start; most: iterations that a step may take.  ComputationError."""
         compile_beside(self.scene)
         # in space points may be set anywhere
-        recording = Recording(planes=self._system.dimension == 2, asked=Asked(self.scene))
+        recording = Recording(planes=self._system.dimension == 2, asked=Asked(self.scene), parts=parts)
         with self._form.said():
             cells, text = layers_at_rest(self._system), scene_text(self.scene)
             run = new_run(self._system, self._target, text, True, cells, recording, criterion)

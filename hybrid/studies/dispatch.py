@@ -11,7 +11,7 @@ import os
 import re
 import sys
 import time as clock
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -21,6 +21,7 @@ import numpy as np
 
 from hybrid.errors import ResultError, optional_package
 from hybrid.scene.study import Kept
+from hybrid.simulation.own_parts import RunPart
 from hybrid.store.study_file import FAILED, KILLED, OPEN, StudyFile, counts_of
 from hybrid.studies.cases import Cases
 from hybrid.studies.workers import Job, Outcome, compute_batch, has_something_new, write_outcomes
@@ -46,11 +47,11 @@ class StudyRunning:
 
 def compute_open_batches(
     file: StudyFile, cases: Cases, wanted: Mapping[str, Kept], workers: int | None, scheduler: str | None,
-    progress: Callable[[StudyRunning], None] | None, files: str = "",
+    progress: Callable[[StudyRunning], None] | None, files: str = "", parts: Sequence[RunPart] = (),
 ) -> None:  # fmt: skip
     """Compute the batches of a study that are not done; files: folder for whole results, "": they are not kept.
 
-    ResultError when the scheduler is gone.
+    parts: of all runs, of the user's own.  ResultError when the scheduler is gone.
     """
     begin = clock.perf_counter()
 
@@ -61,7 +62,7 @@ def compute_open_batches(
 
     def job_of(k: int) -> Job:
         where = file.slice_of(k)
-        return Job(cases.base, cases.keys, cases.rows[where], wanted, cases.static, where.start, files)
+        return Job(cases.base, cases.keys, cases.rows[where], wanted, cases.static, where.start, files, parts)
 
     with client_of(workers, scheduler) as client:
         dashboard = str(getattr(client, "dashboard_link", "") or "")

@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -28,7 +28,9 @@ from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.plan import plan
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.study import LIMIT_OF, Kept, Study, read_study, study_from
+from hybrid.simulation.own_parts import RunPart, checked_parts, require_parts
 from hybrid.store.hdf5_file import locked
+from hybrid.store.named_arrays import pack
 from hybrid.store.records import ALIASES
 from hybrid.store.study_file import OPEN, OWN, Column, StudyFile, open_study
 from hybrid.studies.cases import Cases, cases_of, digest_of, scene_of
@@ -53,6 +55,7 @@ def study(
     batch: int | None = None,
     overwrite: bool = False,
     progress: Callable[[StudyRunning], None] | None = None,
+    parts: Sequence[RunPart] = (),
     **more: Any,
 ) -> xarray.Dataset:
     """Compute a scene with other values of its keys, many times; returns what was kept of each run.
@@ -61,19 +64,23 @@ def study(
     sample, cases, only_if, derive, static): as the keys of a study file, docs/studies.md.  output: a Zarr folder, None:
     STUDY.zarr beside the study; one that is there goes on.  workers: processes, None: one for each core; scheduler:
     address of a dask scheduler instead; batch: cases in a batch, None: by the predicted time of a run; overwrite: begin
-    anew where there is a study; progress: called with a StudyRunning after every batch.
+    anew where there is a study; progress: called with a StudyRunning after every batch; parts: as of `hybrid.run`, with
+    classes that workers can import or that stand in the program that is started.
 
     SceneError when the study or its scene is refused, ResultError when the folder holds another study or the scheduler
     is gone; what was computed until then stays, and the same call goes on.
     """
     asked, target = _asked(source, vary, collect, more, output)
+    parts = checked_parts(parts)
+    if asked.static and parts:
+        raise ValueError("parts: expected none, because a study of equilibria has no motion")
     cases = cases_of(asked)
     wanted = asked.collect or usual(asked.static, cases.lines)
     _refuse_collisions(cases, wanted)
     _refuse_unknown_lines(cases, wanted)
     _refuse_several_values(wanted)
     _refuse_limits_not_there(cases, wanted)
-    identity = _identity(cases, wanted, asked.derive, asked.files)
+    identity = _identity(cases, wanted, asked.derive, asked.files, parts)
     whole = target.with_suffix(".files") if asked.files else None
     with locked(target):
         if target.exists():
@@ -89,11 +96,11 @@ def study(
         else:
             _refuse_cases(whole)
             count = workers or os.cpu_count() or 1
-            file = _created(target, asked, cases, wanted, identity, batch or _batch_of(cases, count))
+            file = _created(target, asked, cases, wanted, identity, batch or _batch_of(cases, count), parts)
         if file.open_batches():
             if whole is not None:
                 whole.mkdir(exist_ok=True)
-            compute_open_batches(file, cases, wanted, workers, scheduler, progress, str(whole or ""))
+            compute_open_batches(file, cases, wanted, workers, scheduler, progress, str(whole or ""), parts)
     return open_study(target)
 
 
@@ -120,18 +127,22 @@ def _refuse_cases(folder: Path | None) -> None:
         )
 
 
-def case_of(path: str | Path, case: int, output: str | Path | None = None) -> Any:
-    """Compute one case of a study again, with everything in its result; output: as of `hybrid.run`."""
+def case_of(path: str | Path, case: int, output: str | Path | None = None, *, parts: Sequence[RunPart] = ()) -> Any:
+    """Compute one case of a study again, with everything in its result.
+
+    output: as of `hybrid.run`; parts: as the study was given.
+    """
     if not Path(path).is_dir():
         raise ResultError(f"{path} is not the results of a study\n    expected: its folder, such as STUDY.zarr")
     attributes = StudyFile(path).attributes
     if changed := [file for file, digest in json.loads(attributes["files"]).items() if digest_of(file) != digest]:
         raise ResultError(f"{', '.join(changed)} has changed since {path} was computed: the case would be another one")
-    stored = json.loads(attributes["study"])
+    stored, parts = json.loads(attributes["study"]), checked_parts(parts)
+    require_parts(parts, stored.get("parts", ()), path)
     if not 0 <= case < len(stored["rows"]):
         raise ResultError(f"{path} has no case {case}\n    expected: 0 to {len(stored['rows']) - 1}")
     scene = scene_of(stored["base"], stored["keys"], stored["rows"][case])
-    return static(scene, output) if stored["static"] else run(scene, output)
+    return static(scene, output) if stored["static"] else run(scene, output, parts=parts)
 
 
 def _asked(
@@ -204,9 +215,12 @@ def _has(data: Any, key: str) -> bool:
     return isinstance(data, list | tuple) and any(_has(x, key) for x in data)
 
 
-def _identity(cases: Cases, wanted: Mapping[str, Kept], derived: Mapping[str, str], files: bool) -> str:
+def _identity(
+    cases: Cases, wanted: Mapping[str, Kept], derived: Mapping[str, str], files: bool, parts: Sequence[RunPart]
+) -> str:
     kept: dict[str, Any] = {name: each.model_dump(mode="json") for name, each in wanted.items()}
     kept |= {"whole files": True} if files else {}
+    kept |= {"parts": [[x.name, pack(x.checkpoint()).hex()] for x in parts]} if parts else {}
     kept |= {"derive": dict(derived), "release": version("hybrid-cable")}  # results of two releases are not mixed
     return hashlib.sha256((cases.identity + json.dumps(kept, sort_keys=True)).encode()).hexdigest()[:16]
 
@@ -220,7 +234,13 @@ def _refuse_other(file: StudyFile, identity: str) -> None:
 
 
 def _created(
-    target: Path, asked: Study, cases: Cases, wanted: Mapping[str, Kept], identity: str, batch: int
+    target: Path,
+    asked: Study,
+    cases: Cases,
+    wanted: Mapping[str, Kept],
+    identity: str,
+    batch: int,
+    parts: Sequence[RunPart],
 ) -> StudyFile:
     rows = cases.rows
     columns = {}
@@ -234,6 +254,7 @@ def _created(
     for name, values_of in cases.derived.items():
         columns[name] = Column("", asked.derive[name], (), np.asarray(values_of))
     stored = {"base": cases.base, "keys": cases.keys, "rows": rows, "static": cases.static}
+    stored |= {"parts": [x.name for x in parts]} if parts else {}
     attributes = {
         "identity": identity, "title": asked.title or Path(asked.scene).stem, "study": json.dumps(stored),
         "variables": json.dumps(list(columns)), "scene_file": Path(asked.scene).name,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.accuracy.api import run, static
 from hybrid.errors import EVENTS_BY_WEIGHT, HybridError, ResultError, SceneError
 from hybrid.scene.study import Kept
+from hybrid.simulation.own_parts import RunPart
 from hybrid.store.study_file import DONE, FAILED, NOT_WRITTEN, OWN, Column, StudyFile, accuracy_of_case
 from hybrid.studies.cases import scene_of
 from hybrid.studies.collect import Variable, collected
@@ -31,6 +32,7 @@ class Job(NamedTuple):
     static: bool
     first: int = 0  # number of the first case
     files: str = ""  # folder for whole results; "": they are not kept
+    parts: Sequence[RunPart] = ()  # of all runs, of the user's own
 
 
 class Outcome(NamedTuple):
@@ -62,7 +64,7 @@ def _computed(job: Job, row: dict[str, Any], case: int) -> Outcome:
     try:
         scene = scene_of(job.base, job.keys, row)
         target = Path(job.files) / f"case-{case:06d}.h5" if job.files else None
-        result = static(scene, target) if job.static else run(scene, target)
+        result = static(scene, target) if job.static else run(scene, target, parts=job.parts)
     except SceneError as error:
         first = error.complaints[0]
         reason = f"refused: {first.where}: given {first.value}, expected {first.expected}"
