@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.run import payout_run
+from hybrid.kernels.mesh import remesh
 from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_payout import RunPayout
 from hybrid.solve.network_steps import NetworkSteps
@@ -107,7 +107,7 @@ def test_cost_of_a_node(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(RunPayout, "_change", timed(RunPayout._change, taken))
     monkeypatch.setattr(RunPayout, "_change_by_itself", timed(RunPayout._change_by_itself, taken))
-    monkeypatch.setattr(payout_run, "change_node", timed(payout_run.change_node, compiled))
+    monkeypatch.setattr(remesh, "change_cells", timed(remesh.change_cells, compiled))
     for name, (model, section) in NODES.items():
         scene = sagging(True, 37.5).model_dump(mode="json", exclude_none=True)
         scene["model"] = model

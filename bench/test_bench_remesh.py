@@ -139,10 +139,10 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
         found.append((float(off), float(np.linalg.norm(state.v, axis=1).max())))
 
     def compiled(self: CellChanges, *given: Any) -> float:
-        k, n, parity, on = self.side, self.cells, int(self._owner.count.parity), self._on
+        k, n, parity = self.side, self.cells, int(self._owner.count.parity)
         booked = change(self, *given)
         to, m = self.side, self.cells
-        note(on.line(k, n), on.state(k, parity, n), on.line(to, m), on.state(to, 0, m))
+        note(self.line(k, n), self.state(k, parity, n), self.line(to, m), self.state(to, 0, m))
         return booked
 
     def in_python(*given: Any, **named: Any) -> Any:

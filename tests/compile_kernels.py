@@ -52,8 +52,8 @@ LINES = {
 BY_TABLE = {
     "plane": """run.entry.in_plane mesh.zone_step.follow_zones mesh.zone_switch.begin_switch
         mesh.zone_switch.end_switch mesh.zone_step.plan_nodes mesh.zone_step.take_arcs mesh.zone_transfer.transfer
-        mesh.cell_changes.lay_out mesh.cell_changes.clear_state mesh.cell_changes.renew run.following_run.put_cells
-        run.following_run.begin_cells run.following_run.end_cells""",
+        mesh.cell_changes.plan_cells mesh.cell_changes.clear_state mesh.cell_changes.renew mesh.remesh.put_cells
+        mesh.remesh.begin_cells mesh.remesh.end_cells""",
     "space": """run.entry.in_space contact.self_contact.contact_task
         contact.self_distance.watch_itself junctions.lines_contact.touch_system
         watch.named_quantities.note_quantities junctions.shared_contact.shared_task

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.machine.binding import Packed, Table
+from hybrid.kernels.mesh.fill_line import Cable, blank_kinds_job, blank_line_job, fill_kinds
 from hybrid.kernels.mesh.zone_criteria import HINGE, NodeKinds, blank_kinds
-from hybrid.kernels.mesh.zone_line import Cable, blank_kinds_job, blank_line_job, fill_kinds
 from hybrid.kernels.state.state import NO_MOVED, NO_PLANE, Floats, Line
 from hybrid.model.line import cable_on, inertia_of_zones, on_base, put_points
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR, Material
@@ -117,7 +117,7 @@ def edges(flags: np.ndarray) -> list[int]:
     return [0, *changes.tolist(), flags.size]
 
 
-# A material on base cells whose rods come and go: lines on any cells of them, compiled (kernels.mesh.zone_line).
+# A material on base cells whose rods come and go: lines on any cells of them, compiled (kernels.mesh.fill_line).
 
 kinds_of = Packed(lambda n: blank_kinds(n, 1), given=("free",))
 

@@ -23,8 +23,7 @@ from hybrid.kernels.laws.bending_slip import EACH, follow_slip
 from hybrid.kernels.laws.element import NO_SPRING
 from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
-from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
-from hybrid.kernels.mesh.zone_line import Cable, blank_line_job, fill_line
+from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH, Cable, blank_line_job, fill_line
 from hybrid.kernels.state.report import (
     AXIAL_LAW,
     BENDING_LAW,
@@ -89,7 +88,7 @@ def on_base(
 ) -> Line:  # fmt: skip
     """The line of a material with nodes s (N+1,) m; of_cell, rod: (N,) base cells of its cells, whether they are rod.
 
-    cable: that on the base cells; job: a table of kernels.mesh.zone_line.LineJob, None: a new one.
+    cable: that on the base cells; job: a table of kernels.mesh.fill_line.LineJob, None: a new one.
     """
     h, of = np.diff(s), material.piece(0.5 * (s[:-1] + s[1:]))
     torque, twist = material.torque_by_tension(h, of)

@@ -33,7 +33,7 @@ OF_JOINED = "run.network.solve_system"
 STEPS_OF_LINES, REST_OF_LINES = "run.network_run.run_system", "run.network_run.sample_system"
 BOOKS_OF_LINES, START_OF_LINES = "run.network.book_system_step", "run.network.begin_line"
 TOUCHING_LINES = "junctions.lines_contact.touch_system", "junctions.shared_contact.shared_task"
-PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "run.payout_run.change_node"  # this one: the rest
+PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "mesh.remesh.change_cells"  # this one: the rest
 
 # A cable for the second process to compile with; nothing is computed of it.
 SAMPLE = {
@@ -148,9 +148,8 @@ def compile_all(names: Sequence[str]) -> None:
 
 def payout_kernels() -> tuple[Any, ...]:
     """All that a line calls that is paid out, in the order in which a run asks for it; each takes one table."""
-    from hybrid.kernels.mesh import cell_changes
-    from hybrid.kernels.reel import payout, payout_nodes
-    from hybrid.kernels.run import payout_run
+    from hybrid.kernels.mesh import cell_changes, remesh
+    from hybrid.kernels.reel import node_changes, payout, payout_nodes
 
     first = (
         payout.pay_out,
@@ -164,17 +163,10 @@ def payout_kernels() -> tuple[Any, ...]:
         payout.take_forces_off,
         payout_nodes.carry_node,
     )
-    line = payout_run.change_line, payout_run.fit_changed, payout_run.book_change, payout_run.renew_run
+    line = node_changes.change_line, node_changes.fit_changed, node_changes.book_change, node_changes.renew_run
+    planner = node_changes.node_due, node_changes.plan_node, node_changes.keep_reel, node_changes.make_line
     forces = cell_changes.before_forces, cell_changes.after_forces
-    return (
-        *first,
-        *line,
-        *forces,
-        payout_run.put_paid,
-        payout_run.ask_node,
-        payout_run.change_node,
-        payout_run.make_line,
-    )
+    return *first, *line, *planner, *forces, remesh.put_cells, remesh.ask_cells, remesh.change_cells
 
 
 def _compile_outputs(model: Model) -> None:

@@ -13,6 +13,7 @@ from hybrid.kernels.laws.axial_law import SHIFT, stretch_energy
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.reel.node_changes import energy_of
 from hybrid.kernels.reel.payout import (
     end_payout,
     fit_line,
@@ -25,7 +26,6 @@ from hybrid.kernels.reel.payout import (
 from hybrid.kernels.reel.payout_layers import carry_layers
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
 from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job
-from hybrid.kernels.run.payout_run import energy_of
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FRICTION, LENGTH_OUT, PAYOUT_RATE, STIFFNESS_DAMPING, TOUCHES
 from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, slip_size, state_for

@@ -17,7 +17,6 @@ from hybrid.errors import Outcome
 from hybrid.kernels.mesh.stiffness_ramp import soften
 from hybrid.kernels.reel.payout import iterate, iterate_with_others, pay_out, stand_among
 from hybrid.kernels.reel.reel import MovingZones, ReelJob, zones_that_stay
-from hybrid.kernels.run.payout_run import ask_node, change_node
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Floats, State, state_for
@@ -234,9 +233,7 @@ class RunPayout(Part):
             x.table.bind(old=even.lines[k], new=odd.lines[k])
             self._change_by_itself(k)
         loop.pay(self._rows, pay_out.address(self._rows[0]))
-        jobs = [self._nodes[k].job if k in self._nodes else None for k in self.lines]
-        one = next((x for x in jobs if x is not None), None)
-        loop.change_nodes(jobs, *(() if one is None else (ask_node.address(one), change_node.address(one))))
+        loop.change_nodes([self._nodes[k].job if k in self._nodes else None for k in self.lines])
 
     def _change_by_itself(self, k: int) -> None:
         """Let nodes of line k enter and leave without Python from now on, where that can be."""

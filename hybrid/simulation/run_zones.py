@@ -17,14 +17,10 @@ from hybrid.errors import KINK_COUNTS, Outcome
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.cell_changes import blank_renew_job, clear_state, renew
-from hybrid.kernels.mesh.zone_line import blank_line_job, fill_line
+from hybrid.kernels.mesh.fill_line import blank_line_job, fill_line
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, follow_zones
 from hybrid.kernels.mesh.zone_switch import (
-    AFTER,
-    BEFORE,
-    NUMBERS,
-    RELAXES,
-    TIME,
     begin_switch,
     blank_switch_job,
     end_switch,
@@ -188,7 +184,7 @@ class RunZones(Part):
     def _change_by_itself(self, x: _LineZones, may: bool) -> None:
         """Let cells of a line change without Python from now on, where that can be."""
         run, line = self._run, self._run.lines[x.number]
-        if x.cells is None or not x.cells.fits(x.switching):
+        if x.cells is None or not x.cells.fits_zones(x.switching):
             x.cells = None
             if may and not run.loop.counts.samples and CellChanges.may_change(run, x.number, x.switching):
                 x.cells = CellChanges(run, x.number, x.switching)
@@ -348,7 +344,7 @@ class RunZones(Part):
         """Carry out changes of lines, in their arrays where that can be."""
         run = self._run
         for x, change in changes:
-            if x.cells is not None and not x.cells.fits(x.switching):  # another solver has the line now
+            if x.cells is not None and not x.cells.fits_zones(x.switching):  # another solver has the line now
                 x.cells = run.lines[x.number].cells = None
             if x.cells is not None:
                 booked = x.cells.change() if change.same else x.cells.change_zones(change)

@@ -12,8 +12,8 @@ from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import WORK
 from hybrid.kernels.junctions.members_water import stir_members
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh.remesh import ask_cells, change_cells
 from hybrid.kernels.mesh.zone_step import follow_zones
-from hybrid.kernels.run.following_run import ask_cells, change_cells
 from hybrid.kernels.run.network import book_system_step
 from hybrid.kernels.run.network_run import (
     CUT_LINE,
@@ -166,37 +166,32 @@ class NetworkSteps:
         self._job.bind(followed=self._followed, follower=follow_zones.address(self._followed[0]), due=due)
 
     def change_cells(self, lines: Sequence[NDArray[np.int64] | None]) -> None:
-        """These tables of kernels.run.following_run change cells of lines that `follow` has, where there is one."""
-        known = [x for x in lines if x is not None]
-        self._changes = bool(known)
-        if not known:
-            self._job.bind(changer=0)
-            return
-        tables = np.array([np.zeros_like(known[0]) if x is None else x for x in lines])
-        self._job.bind(
-            changed=tables,
-            changes=np.array([x is not None for x in lines], np.int64),
-            asker=ask_cells.address(known[0]),
-            changer=change_cells.address(known[0]),
-            runner=run_system.address(self._job.numbers),
-        )
+        """These tables of kernels.mesh.remesh change cells of lines that `follow` has, where there is one."""
+        tables, may, asker, changer = self._remeshed(lines)
+        self._changes = changer != 0
+        self._job.bind(changed=tables, changes=may, asker=asker, changer=changer)
 
     def pay(self, lines: np.ndarray, payer: int) -> None:
         """These tables (W, ..) of kernels.reel.reel change the lengths of lines from now on, by pay_out at `payer`."""
         self._job.bind(paid=lines, payer=payer, nodes_due=np.zeros(len(lines), np.int64))
 
-    def change_nodes(self, lines: Sequence[NDArray[np.int64] | None], asker: int = 0, reeler: int = 0) -> None:
-        """These tables of kernels.run.payout_run let nodes of lines that `pay` has enter and leave, where there is one.
+    def change_nodes(self, lines: Sequence[NDArray[np.int64] | None]) -> None:
+        """These tables of kernels.mesh.remesh let nodes of lines that `pay` has enter and leave, where there is one."""
+        tables, may, asker, changer = self._remeshed(lines)
+        self._winds = changer != 0
+        self._job.bind(reeled=tables, reels=may, node_asker=asker, reeler=changer)
 
-        asker, reeler: addresses of ask_node and change_node there.
-        """
+    def _remeshed(
+        self, lines: Sequence[NDArray[np.int64] | None]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], int, int]:
+        """Tables of lines, which of them have one, and the addresses of ask_cells and change_cells; 0: none has."""
         known = [x for x in lines if x is not None]
-        self._winds = bool(known)
-        if known:
-            tables = np.array([np.zeros_like(known[0]) if x is None else x for x in lines])
-            self._job.bind(reeled=tables, reels=np.array([x is not None for x in lines], np.int64))
-            self._job.bind(runner=run_system.address(self._job.numbers))
-        self._job.bind(node_asker=asker if known else 0, reeler=reeler if known else 0)
+        may = np.array([x is not None for x in lines], np.int64)
+        if not known:
+            return np.zeros((len(lines), 1), np.int64), may, 0, 0
+        tables = np.array([np.zeros_like(known[0]) if x is None else x for x in lines])
+        self._job.bind(runner=run_system.address(self._job.numbers))
+        return tables, may, ask_cells.address(known[0]), change_cells.address(known[0])
 
     def bind_tangents(self, job: np.ndarray, follower: int) -> None:
         """After every step this kernel takes tangents along it, with a table of kernels.run.network_tangents."""

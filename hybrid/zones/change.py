@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.march.torque_transfer import carry_torque
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME
 from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.mesh.zone_step import (
     REJECT_RATIO,
@@ -22,11 +23,6 @@ from hybrid.kernels.mesh.zone_step import (
     take_arcs,
 )
 from hybrid.kernels.mesh.zone_switch import (
-    AFTER,
-    BEFORE,
-    NUMBERS,
-    RELAXES,
-    TIME,
     begin_switch,
     blank_switch_job,
     end_switch,

@@ -12,8 +12,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.machine.kept_code import KeptCode
-from hybrid.kernels.reel import payout, payout_nodes
-from hybrid.kernels.run import payout_run
+from hybrid.kernels.reel import node_changes, payout, payout_nodes
 from hybrid.scene.read import as_scene
 from hybrid.simulation import first_use
 
@@ -48,10 +47,10 @@ def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: p
 def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
     """All entries that take a table, of which none is forgotten, but for what joined lines and a release ask for."""
     others = {"end_payout", "iterate_with_others"}
-    entry = type(payout_run.change_node)
+    entry = type(node_changes.plan_node)
     used = {
         x.__qualname__
-        for module in (payout, payout_nodes, payout_run)
+        for module in (payout, payout_nodes, node_changes)
         for x in vars(module).values()
         if isinstance(x, entry) and list(x.py_func.__code__.co_varnames[: x.py_func.__code__.co_argcount]) == ["table"]
     }

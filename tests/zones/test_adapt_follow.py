@@ -392,10 +392,10 @@ def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.Mo
 
     def measured(self: CellChanges, *given) -> float:
         k, n, parity = self.side, self.cells, int(self._owner.count.parity)
-        line, state = self._on.line(k, n), self._on.state(k, parity, n)
+        line, state = self.line(k, n), self.state(k, parity, n)
         size, before = line.mass.sum() * np.linalg.norm(state.v, axis=1).max(), line.mass @ state.v
         booked = change(self, *given)
-        line, state = self._on.line(self.side, self.cells), self._on.state(self.side, 0, self.cells)
+        line, state = self.line(self.side, self.cells), self.state(self.side, 0, self.cells)
         left.append(np.linalg.norm(line.mass @ state.v - before) / size)
         return booked
 

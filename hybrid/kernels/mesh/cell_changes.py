@@ -1,7 +1,8 @@
 """Other cells for a line in the middle of a run, on arrays that have room for the most that there can be.
 
-The steps of a change: `lay_out` places the nodes, kernels.mesh.zone_line makes the line, kernels.mesh.zone_switch carries the state
-and its lengths, `renew` what the run knows beside, `before_forces` and `after_forces` the report of the state.
+What a change of cells (kernels.mesh.remesh) calls: `plan_cells` places the nodes, kernels.mesh.fill_line makes the line,
+kernels.mesh.zone_switch carries the state and its lengths, `renew` what the run knows beside, `before_forces` and
+`after_forces` the report of the state.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from hybrid.kernels.laws.soil import lie_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.mesh.zone_step import Zones, blank_zones
+from hybrid.kernels.mesh.remesh import NUMBERS, RELAXES, TIME, RemeshPlaces
+from hybrid.kernels.mesh.zone_step import ZoneClock, ZoneFlags, Zones, blank_zones
 from hybrid.kernels.mesh.zone_transfer import carry_push
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, blank_books
+from hybrid.kernels.state.books import Books, Clock, blank_books
 from hybrid.kernels.state.report import FRICTION, SEABED_ENERGY, TOUCHES, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea, State, Work, blank_line, blank_state, no_sea, no_work
 from hybrid.kernels.step.job import read
@@ -29,8 +31,8 @@ from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.watch.carried_extremes import carry_extremes, fold_gone, match_nodes
 
 
-class LayoutJob(NamedTuple):
-    """Where nodes should be, and what that makes of the cells (written; with room for all).  K finest cells."""
+class CellPlanner(NamedTuple):
+    """Where nodes should be, what that makes of the cells of the other side (written), and when.  K finest cells."""
 
     plan: NDArray[np.bool_]  # (K+1,) of the finest mesh, nodes besides those of base cells
     rod: NDArray[np.bool_]  # (n,)
@@ -41,16 +43,26 @@ class LayoutJob(NamedTuple):
     of: NDArray[np.int64]  # (M,) base cells
     rods: NDArray[np.bool_]  # (M,) whether they are rod
     first: NDArray[np.int64]  # (n+1,) first node of base cells
+    here: NDArray[np.bool_]  # (K+1,) of the finest mesh: nodes now
+    at: RemeshPlaces
+    clock: Clock  # of the run
+    zone_clock: ZoneClock
+    zone_counts: ZoneFlags
+    numbers: Floats  # (NUMBERS,) of kernels.mesh.remesh
+    places: NDArray[np.int64]  # nodes of the lines whose outputs wait
 
 
-def blank_layout_job() -> LayoutJob:
-    """A job with the types that every one has."""
+def blank_cell_planner() -> CellPlanner:
+    """A planner with the types that every one has."""
     flags, whole = np.zeros(1, bool), np.zeros(1, np.int64)
-    return LayoutJob(flags, flags, whole, np.zeros(1), whole, np.zeros(1), whole, flags, whole)
+    return CellPlanner(
+        flags, flags, whole, np.zeros(1), whole, np.zeros(1), whole, flags, whole, flags, RemeshPlaces(), Clock(),
+        ZoneClock(), ZoneFlags(), np.zeros(NUMBERS), whole,
+    )  # fmt: skip
 
 
 class RenewJob(NamedTuple):
-    """What a run knows of a line beside its state: before a change, of N cells, and after it, of M, in the same memory."""
+    """What a run knows of a line beside its state: before a change, of N cells, and after it, of M."""
 
     s: Floats  # (N+1,) m, old nodes
     rods: NDArray[np.bool_]  # (N,) whether old cells are rod
@@ -93,13 +105,24 @@ def blank_renew_job() -> RenewJob:
     )  # fmt: skip
 
 
-read_layout, read_renew = reader(blank_layout_job()), reader(blank_renew_job())
+read_planner, read_renew = reader(blank_cell_planner()), reader(blank_renew_job())
 
 
 @kernel
-def lay_out(table):
+def cells_due(table):
+    """Whether nothing but the cells is to change, and they may without Python, as a number."""
+    job = read_planner(table)
+    zones = job.zone_clock
+    if job.at.alone == 0 or job.zone_counts.cells_due == 0:
+        return 0
+    return 0 if zones.loudest > 1.0 or job.clock.now >= zones.next_review else 1
+
+
+@kernel
+def plan_cells(table):
     """Cells where nodes are planned; how many there are."""
-    job = read_layout(table)
+    job = read_planner(table)
+    job.numbers[TIME], job.numbers[RELAXES] = job.clock.now, job.zone_counts.relaxing
     i, begin = 0, 0
     for j in range(job.parts.shape[0]):
         job.first[j] = i
@@ -113,12 +136,24 @@ def lay_out(table):
     return i
 
 
+@kernel
+def keep_places(table):
+    """Places of the nodes of now are kept for outputs that wait; how many there are."""
+    job = read_planner(table)
+    i = job.at.placed
+    for k in range(job.here.shape[0]):
+        if job.here[k]:
+            job.places[i] = k
+            i += 1
+    return i - job.at.placed
+
+
 # --- beside the state -----------------------------------------------------------------------------
 
 
 @inner
 def set_aside(job):
-    """Copy the extremes of the old nodes, which lie in the memory of those of the new ones."""
+    """Copy the extremes of the old nodes, which may lie in the memory of those of the new ones."""
     now, k = job.before.extremes, 0
     for bound in range(now.shape[0]):
         for row in range(now.shape[1]):
@@ -144,9 +179,10 @@ def fill_books(job):
             column += 1
     for c in range(m):
         books.borne[c] = job.borne[job.of[c]]
-    if job.s.shape[0] != m + 1:
-        for c in range(m):
-            books.tension[0, c], books.tension[1, c] = 0.0, 0.0
+    same = job.s.shape[0] == m + 1
+    for c in range(m):
+        for k in range(2):
+            books.tension[k, c] = job.before.tension[k, c] if same else 0.0
     for i in range(books.strains.shape[0]):
         for j in range(books.strains.shape[1]):
             books.strains[i, j] = 0.0
@@ -187,6 +223,29 @@ def clear(x):
             x[i, j] = 0.0
 
 
+@inner
+def begin_anew(job, state, s, line):
+    """What a change of cells or of nodes leaves of the run beside the line: nothing is known of the step before.
+
+    job: a RenewJob, or the NodeJob of kernels.reel.node_changes; state, line: new; s: old nodes.
+    """
+    copy_state(state, job.twin)
+    if job.push.shape[0] > 0:
+        carry_push(job.push, s, line.s, job.new_push)
+        for i in range(job.new_push.shape[0]):  # of a state of either parity, as the state
+            for k in range(job.new_push.shape[1]):
+                job.next_push[i, k] = job.new_push[i, k]
+    clear(job.sea.axis)
+    clear(job.sea.slip)
+    clear(job.sea.slid)
+    clear(job.sea.bed)
+    clear(job.sea.flow)
+    for j in range(job.work.report.shape[0]):
+        job.work.report[j] = 0.0
+    job.nearest[0], job.nearest[1] = -1, -1
+    job.books.clock.wave_step, job.books.counts.parity = wave_step(line, job.scale), 0
+
+
 @kernel
 def clear_state(table):
     """What a change does not carry to the cells of a catenary, and what forces have worked in."""
@@ -211,14 +270,7 @@ def renew(table):
     fill_books(job)
     if books.extremes.shape[1] > 0:
         carry_extremes(job.stays, cells, job.spare, columns, books.right, job.of.shape[0], books.extremes)
-    copy_state(job.state, job.twin)
-    clear(job.sea.axis)
-    clear(job.sea.slip)
-    clear(job.sea.slid)
-    clear(job.sea.bed)
-    clear(job.sea.flow)
-    for j in range(job.work.report.shape[0]):
-        job.work.report[j] = 0.0
+    begin_anew(job, job.state, job.s, job.line)
     for k in range(zones.here.shape[0]):
         zones.here[k] = False
     for i in range(job.place.shape[0]):
@@ -227,17 +279,11 @@ def renew(table):
     for k in range(zones.here.shape[0]):
         if not zones.here[k]:
             zones.waves[k] = 0.0
-    if job.push.shape[0] > 0:
-        carry_push(job.push, job.s, job.line.s, job.new_push)
-        for i in range(job.new_push.shape[0]):  # of a state of either parity, as the state
-            for k in range(job.new_push.shape[1]):
-                job.next_push[i, k] = job.new_push[i, k]
     for c in range(job.width.shape[0]):
         job.width[c] = job.widths[job.of[c]]
-    job.nearest[0], job.nearest[1] = -1, -1
     zones.clock.age, zones.clock.recent_age = 0.0, 0.0
     zones.counts.known, zones.counts.strained, zones.counts.relaxing = 0, 0, 1
-    clock.wave_step, clock.previous, books.counts.parity = wave_step(job.line, job.scale), clock.now, 0
+    clock.previous = clock.now
 
 
 # --- forces ---------------------------------------------------------------------------------------

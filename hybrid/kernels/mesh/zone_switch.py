@@ -17,15 +17,12 @@ from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.mesh.cell_lengths import arc_less_chord
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME
 from hybrid.kernels.mesh.stiffness_ramp import shares, soften
 from hybrid.kernels.mesh.zone_step import Zones, blank_zones
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_transfer, old_cell, put3, transfer_state
 from hybrid.kernels.state.report import AXIAL_LAW, PLANAR, TOUCHES
 from hybrid.kernels.state.state import Ends, Floats, Sea, no_ends, no_sea
-
-# Numbers of a switch: J, J, s, 1 where lengths were on their way.
-BEFORE, AFTER, TIME, RELAXES = range(4)
-NUMBERS = 4
 
 
 class SwitchJob(NamedTuple):

@@ -102,13 +102,11 @@ class StepsJob(NamedTuple):
     watched_odd: NDArray[np.int64]
     followed: NDArray[np.int64]  # (Z, ..) tables of kernels.mesh.zone_step.ZoneJob, with this clock and these counts
     due: NDArray[np.int64]  # (Z,) whether they ask for something after the last step
-    changed: NDArray[np.int64]  # (Z, ..) tables of kernels.run.following_run.FollowingJob, of lines whose cells follow
+    changed: NDArray[np.int64]  # (Z, ..) tables of kernels.mesh.remesh.RemeshJob, of lines whose cells follow
     changes: NDArray[np.int64]  # (Z,) 1 where there is one
     paid: NDArray[np.int64]  # (W, ..) likewise of kernels.reel.reel.ReelJob, of lines that are paid out
     nodes_due: NDArray[np.int64]  # (W,) whether a node is to enter or leave there after the last step
-    reeled: NDArray[
-        np.int64
-    ]  # (W, ..) tables of kernels.run.payout_run.PaidRunJob, of lines where that needs no Python
+    reeled: NDArray[np.int64]  # (W, ..) tables of kernels.mesh.remesh.RemeshJob, of lines where that needs no Python
     reels: NDArray[np.int64]  # (W,) 1 where there is one
     beside: NDArray[np.int64]  # of a kernels.run.network_tangents.NetworkTangents
     solver: int = 0  # address of kernels.run.network.solve_system
@@ -119,13 +117,11 @@ class StepsJob(NamedTuple):
     stirrer: int = 0  # of kernels.junctions.members_water.stir_members; 0: no body has members
     watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
     follower: int = 0  # of kernels.mesh.zone_step.follow_zones; 0: no zones move, or Python follows them
-    runner: int = (
-        0  # of run_system, and of kernels.run.following_run.ask_cells and change_cells; 0: Python changes cells
-    )
+    runner: int = 0  # of run_system, and of kernels.mesh.remesh.ask_cells and change_cells; 0: Python changes cells
     asker: int = 0
     changer: int = 0
     payer: int = 0  # of kernels.reel.payout.pay_out; 0: lines keep their lengths
-    node_asker: int = 0  # of kernels.run.payout_run.ask_node and change_node; 0: Python lets nodes enter and leave
+    node_asker: int = 0  # of kernels.mesh.remesh likewise; 0: Python lets nodes enter and leave
     reeler: int = 0
     tangents: int = 0  # of kernels.run.network_tangents.follow_system; 0: none are followed
 

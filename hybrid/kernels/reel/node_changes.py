@@ -1,8 +1,6 @@
-"""A run of a line that is paid out, compiled: steps, and nodes that enter and leave, without a return to Python.
+"""One node more or less at a winch: what a change of cells (kernels.mesh.remesh) calls of a line that is paid out.
 
-Two sets of arrays with room for the longest line take turns.  Steps and the parts of a change are kernels of their own
-and called by address, as in kernels.run.following_run, whose tables these are: fixed numbers plus numbers per old and new
-cell.  Places, nodes and cells count from the far end.
+Places, nodes and cells count from the far end.
 """
 
 from __future__ import annotations
@@ -12,22 +10,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.contact.self_distance import boxes_of
 from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.named_numbers import NamedNumbers
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
-from hybrid.kernels.mesh.cell_changes import clear, copy_state, wave_step
+from hybrid.kernels.mesh.cell_changes import begin_anew, clear
 from hybrid.kernels.mesh.fill_line import copy_cell, copy_node, move_line
-from hybrid.kernels.mesh.zone_transfer import carry_push
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RemeshPlaces
 from hybrid.kernels.reel.paid_length import cell, node, prepare
 from hybrid.kernels.reel.payout_nodes import CarryJob, blank_carry_job, move_row, place_reel
 from hybrid.kernels.reel.reel import Reel, blank_reel
 from hybrid.kernels.reel.winch import Winch, at_its_end
-from hybrid.kernels.run.following_run import call, call_solver, put, put_at
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, Clock, blank_books
+from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import TOUCHES
 from hybrid.kernels.state.state import (
     Ends,
@@ -42,9 +37,6 @@ from hybrid.kernels.state.state import (
     no_sea,
     no_work,
 )
-from hybrid.kernels.step.newton import ASSEMBLY, RUN
-
-Numbers = NDArray[np.int64]
 
 
 class NodeJob(NamedTuple):
@@ -70,6 +62,7 @@ class NodeJob(NamedTuple):
     moment: Floats  # (M+1, 3) this and the next: work arrays
     strain: Floats
     energy: Floats  # (5,)
+    numbers: Floats  # (NUMBERS,) of kernels.mesh.remesh
     scale: float  # N, tension scale
 
 
@@ -78,7 +71,8 @@ def blank_node_job() -> NodeJob:
     z, books, none = np.zeros, blank_books(), np.zeros((0, 4))
     return NodeJob(
         blank_carry_job(), blank_line(1), no_ends(), no_sea(1), no_work(), blank_state(1), books, books, none, none,
-        none, z(0), z(2, np.int64), z(1), z(1), z((2, 3)), z((4, b.EXTREMES, 2)), z((2, 3)), z((2, 3)), z(5), 1.0,
+        none, z(0), z(2, np.int64), z(1), z(1), z((2, 3)), z((4, b.EXTREMES, 2)), z((2, 3)), z((2, 3)), z(5), z(NUMBERS),
+        1.0,
     )  # fmt: skip
 
 
@@ -163,7 +157,6 @@ def renew_books(job, n, m, forward, cut):
         books.borne[c] = job.borne[piece]
         if job.width.shape[0] > 0:
             job.width[c] = job.widths[piece]
-    job.nearest[0], job.nearest[1] = -1, -1
     if not forward:
         for k in range(books.base.shape[0]):
             books.base[k] += m - n
@@ -211,16 +204,14 @@ def fit_changed(table):
 
 @kernel
 def book_change(table):
-    """The energy, J, that the new nodes put in."""
+    """Energy, J, before and after."""
     job = read_node(table)
-    more = 0.0
     for k in range(2):  # one call for both: it is compiled once
         line, state = (job.carry.target, job.carry.out) if k else (job.carry.line, job.carry.state)
         found = energy_of(line, job.ends, state, job.moment, job.strain, job.energy)
         if line.bits & TOUCHES:
             found += stored_in_contact(line, job.sea, state.r)
-        more = found - more
-    job.before.work[0, b.ZONES] += more
+        job.numbers[AFTER if k else BEFORE] = found
 
 
 @kernel
@@ -229,22 +220,9 @@ def renew_run(table):
     job = read_node(table)
     line, target, clock, forward = job.carry.line, job.carry.target, job.carry.clock, job.carry.new.numbers.side > 0.0
     n, m = line.h.shape[0], target.h.shape[0]
-    copy_state(job.carry.out, job.twin)
-    if job.push.shape[0] > 0:
-        carry_push(job.push, line.s, target.s, job.new_push)
-        for i in range(m + 1):  # of a state of either parity, as the state
-            for k in range(job.new_push.shape[1]):
-                job.next_push[i, k] = job.new_push[i, k]
+    begin_anew(job, job.carry.out, line.s, target)
     renew_books(job, n, m, forward, min(n, m) - job.carry.new.layer.shape[0] + 1)
-    clear(job.sea.axis)
-    clear(job.sea.slip)
-    clear(job.sea.slid)
-    clear(job.sea.bed)
-    clear(job.sea.flow)
-    for j in range(job.work.report.shape[0]):
-        job.work.report[j] = 0.0
-    job.books.clock.wave_step, clock.previous = wave_step(target, job.scale), clock.now
-    job.books.counts.parity = 0
+    clock.previous = clock.now
 
 
 class LineJob(NamedTuple):
@@ -272,171 +250,49 @@ def make_line(table):
     line_as(job.line, job.whole, job.out, job.reel)
 
 
-# --- steps and changes ----------------------------------------------------------------------------
+# --- the planner ----------------------------------------------------------------------------------
+
+OF_REEL = 4  # numbers of a cell that are kept for outputs that wait: lack, rate, since, span
 
 
-class PaidCalls(NamedNumbers, number=np.int64):
-    """Addresses of the kernels that are called."""
+class NodePlanner(NamedTuple):
+    """What says when a node enters or leaves, of one of the two sets of arrays."""
 
-    solver: int
-    change: int
-    carry: int
-    fit: int
-    book: int
-    renew: int
-    before_forces: int
-    stand_still: int
-    after_forces: int
-    books: int  # of kernels.run.network.begin_line
-
-
-class PaidPlaces(NamedNumbers, number=np.int64):
-    """Where things are: arrays, tables, memory for samples."""
-
-    on: int  # the arrays that are in use, and cells of the line now
-    cells: int
-    changes: int  # so far
-    task: int  # where the table of the run has its task, and address and rows of its samples
-    may_wait: int  # 1 where outputs may wait although the line that they are of changes
-    waiting: int  # lines whose outputs wait; numbers of their samples
-    used: int
-    placed: int  # numbers of its reels that wait with them, in the memory for samples
-    boxes_at: int  # where the table of kernels.contact.self_distance has the rows of its tree
-
-
-# Columns of `waiting`, and numbers per cell of a reel behind the samples: lack, rate, since, span.
-OFFSET, COUNT, OF_CELLS = range(3)
-OF_REEL = 4
-
-
-class PaidRunJob(NamedTuple):
-    """A run with all that nodes which enter and leave need.  Tables: (..., 3, size) fixed, per old cell, per new cell."""
-
-    calls: PaidCalls
-    at: PaidPlaces
-    clock: Clock  # of the run
-    own: Clock  # and of the line, which is another one where there are several
-    counts: b.Counts
+    at: RemeshPlaces
+    reel: Reel  # with all its room
     winch: Winch
-    first: Reel  # in the two sets of arrays, with all their room
-    second: Reel
-    run: Numbers  # table of the run
-    run_places: Numbers  # of those of its numbers that follow the cells
-    in_run: NDArray[np.int64]  # (2 sides, 3, run_places.size)
-    even: Numbers  # likewise its tables in steps from states of even parity, and of odd
-    odd: Numbers
-    in_odd: NDArray[np.int64]  # likewise of those
-    paid: Numbers  # likewise the table of kernels.reel.payout
-    paid_places: Numbers
-    in_paid: NDArray[np.int64]
-    itself: Numbers  # of kernels.contact.self_distance.watch_itself
-    itself_places: Numbers  # empty: nobody watches
-    in_itself: NDArray[np.int64]
-    node: Numbers  # table of a change
-    nodes: NDArray[np.int64]  # (2 old sides x 2 parities, 3, size)
-    waiting: NDArray[np.int64]  # (lines, 3)
     room: Floats  # for what cells of lines of before lacked
 
 
-def blank_paid_run_job() -> PaidRunJob:
-    """A job with the types that every one has."""
-    z, few, sides, reel = np.zeros, np.zeros(1, np.int64), np.zeros((2, 3, 1), np.int64), blank_reel(1)
-    return PaidRunJob(
-        PaidCalls(), PaidPlaces(), b.Clock(), b.Clock(), b.Counts(), Winch(), reel, reel, few, few, sides,
-        few, few, sides, few, few, sides, few, few, sides, few, sides, z((1, 3), np.int64), z(1),
-    )  # fmt: skip
+def blank_node_planner() -> NodePlanner:
+    """A planner with the types that every one has."""
+    return NodePlanner(RemeshPlaces(), blank_reel(1), Winch(), np.zeros(1))
 
 
-read = reader(blank_paid_run_job())
-boxes = inner(boxes_of)
+read_planner = reader(blank_node_planner())
 
 
-@inner
-def reel_of(job):
-    return job.second if job.at.on else job.first
+@kernel
+def node_due(table):
+    """Whether a node is to enter or leave, and may without Python, as a number."""
+    job = read_planner(table)
+    return 0 if job.reel.numbers.due == 0.0 or at_its_end(job.winch) else 1
 
 
-@inner
-def put_all(job):
-    """The run goes on with the line of now; samples of a single one come behind those that wait."""
-    at = job.at
-    k, m = at.on, at.cells
-    put_at(job.in_run[k], job.run_places, m, job.run)
-    put_at(job.in_paid[k], job.paid_places, m, job.paid)
-    if job.itself_places.shape[0] > 0:
-        put_at(job.in_itself[k], job.itself_places, m, job.itself)
-        job.itself[at.boxes_at] = boxes(m)
-    put_at(job.in_run[k], job.run_places, m, job.even)
-    put_at(job.in_odd[k], job.run_places, m, job.odd)
+@kernel
+def plan_node(table):
+    """How many cells there will be."""
+    job = read_planner(table)
+    reel, n = job.reel, job.at.cells
+    return n + 1 if reel.true[n - reel.layer.shape[0]] > reel.numbers.longest else n - 1
 
 
-@inner
-def change(job):
-    """A node enters or leaves, after the outputs of the line as it was."""
-    at, calls, counts, reel = job.at, job.calls, job.counts, reel_of(job)
-    k, n = at.on, at.cells
-    m = n + 1 if reel.true[n - reel.layer.shape[0]] > reel.numbers.longest else n - 1
-    put(job.nodes[2 * k + counts.parity], n, m, job.node)
-    call(calls.change, job.node)
-    call(calls.carry, job.node)
-    call(calls.fit, job.node)
-    call(calls.book, job.node)
-    call(calls.renew, job.node)
-    at.on, at.cells, at.changes = 1 - k, m, at.changes + 1
-    put_all(job)
-    job.own.now = job.clock.now
-    call(calls.before_forces, job.run)
-    job.run[at.task] = ASSEMBLY
-    call_solver(calls.solver, job.run)
-    job.run[at.task] = RUN
-    call(calls.stand_still, job.paid)
-    call(calls.after_forces, job.run)
-    call(calls.books, job.run)
-
-
-@inner
-def keep_reel(job, o):
-    """What cells of the line lack waits in the room from a number on; returns how many numbers that are."""
-    reel, n = reel_of(job), job.at.cells
+@kernel
+def keep_reel(table):
+    """What cells of the line lack is kept for outputs that wait; how many numbers that are."""
+    job = read_planner(table)
+    reel, n, o = job.reel, job.at.cells, job.at.placed
     for c in range(n):
         job.room[o + c], job.room[o + n + c] = reel.lack[c], reel.rate[c]
         job.room[o + 2 * n + c], job.room[o + 3 * n + c] = reel.since[c], reel.span[c]
     return OF_REEL * n
-
-
-@inner
-def keep_rows(job):
-    """The same of one of several lines, whose outputs wait where they are."""
-    at, some = job.at, job.counts.samples - job.at.used
-    if some > 0:
-        row = job.waiting[at.waiting]
-        row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, some, at.cells
-        at.placed += keep_reel(job, at.placed)
-        at.used += some
-        at.waiting += 1
-
-
-@kernel
-def ask_node(table):
-    """Whether a node of one of several lines is to enter or leave, and may without Python, as a number."""
-    job = read(table)
-    at = job.at
-    if reel_of(job).numbers.due == 0.0 or at_its_end(job.winch):
-        return 0
-    room = at.waiting < job.waiting.shape[0] and at.placed + OF_REEL * at.cells <= job.room.shape[0]
-    return 1 if job.counts.samples == at.used or (at.may_wait != 0 and room) else 0
-
-
-@kernel
-def change_node(table):
-    """A node of one of several lines enters or leaves, after outputs within the last step."""
-    job = read(table)
-    keep_rows(job)
-    change(job)
-    return 1
-
-
-@kernel
-def put_paid(table):
-    """`put_all`."""
-    put_all(read(table))

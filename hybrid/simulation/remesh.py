@@ -1,0 +1,443 @@
+"""Other cells for a line of a run without Python's help: on arrays with room for the most that there can be.
+
+Two sets of arrays, the sides, take turns: a change goes from one to the other (kernels.mesh.remesh), and the tables of
+the run get the numbers of the other one.  What Python has of the line is made anew when the run comes back (`sync`).
+A planner derives from `Remesh`: cells that follow with kinds of cells (simulation.cell_changes), and nodes at a winch
+(simulation.payout_nodes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybrid.kernels.contact.self_distance import Itself, blank_itself, blank_itself_job, boxes_of
+from hybrid.kernels.machine.binding import Packed, Room, Table
+from hybrid.kernels.mesh import remesh as f
+from hybrid.kernels.mesh.cell_changes import after_forces, before_forces
+from hybrid.kernels.run.entry import NO_PUSH, workspace
+from hybrid.kernels.run.network import begin_line
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books
+from hybrid.kernels.state.state import (
+    NO_GRIP,
+    NO_PEAK,
+    NO_SHEAVES,
+    NO_SLOW,
+    NO_SOIL,
+    NO_TENSION_TORQUE,
+    NO_TORSION,
+    NO_TURN,
+    NO_WAKE,
+    TENSION_TORQUE,
+    Batch,
+    Floats,
+    Line,
+    Sea,
+    State,
+    Work,
+    no_sea,
+)
+from hybrid.kernels.step.job import blank_job
+from hybrid.kernels.step.newton import RUN, Task
+from hybrid.model.build import Model
+from hybrid.model.line import lines
+from hybrid.outputs.joined_lines import Output
+from hybrid.simulation.line_of_run import OfRun, OneOfMany, ends_alone
+from hybrid.solve.stepper import HEAVY
+from hybrid.zones.change import states
+
+# What a line that changes so has not, of its fields and of those of its state: `Remesh` is not asked for one that has.
+NO_LAWS: dict[str, Floats] = {"torsion": NO_TORSION} | dict.fromkeys(TENSION_TORQUE, NO_TENSION_TORQUE)
+NO_MEMORY: dict[str, Floats] = {
+    "turn": NO_TURN, "slow": NO_SLOW, "wake": NO_WAKE, "peak": NO_PEAK, "grip": NO_GRIP, "sheave": NO_SHEAVES,
+    "soil": NO_SOIL,
+}  # fmt: skip
+# Of the tables of a run, what depends on the cells.
+IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
+IN_ITSELF = ("line", "old", "new", "itself")
+OF_SEA = ("flow", "axis", "slip", "slid", "bed")  # what it has of nodes
+REST_OF_SEA = tuple(name for name in Sea._fields if name not in OF_SEA)
+seas = Packed(no_sea, given=REST_OF_SEA)
+
+
+class Kept(NamedTuple):
+    """What of `Books` depends on the cells, but for the samples."""
+
+    tension: Floats
+    borne: Floats
+    strains: Floats
+    start: Floats
+    marks: np.ndarray
+    right: np.ndarray
+    extremes: Floats
+
+
+class Pushes(NamedTuple):
+    """A push out of the plane, and room for the next."""
+
+    push: Floats
+    next_push: Floats
+
+
+def blank_kept(n: int, extra: int, some: bool) -> Kept:
+    """Room for n cells; extra: marked nodes; some: whether extremes are kept."""
+    nodes, z = n + 1, np.zeros
+    return Kept(
+        z((2, n)), z(n), z((nodes if some else 0, b.STRAINS)), z((nodes, 3)), z(nodes, np.int8), z(nodes, np.int64),
+        z((4, b.EXTREMES, nodes + extra)) if some else z((4, 0, nodes)),
+    )  # fmt: skip
+
+
+class Part(NamedTuple):
+    """A part of a change: its kernel, and which of the tables it takes."""
+
+    kernel: Any
+    table: int
+
+
+class Shaped:
+    """A table whose numbers follow from the number of cells of the old and of the new line."""
+
+    def __init__(self, table: Table, values: Callable[[int, int], dict[str, Any]], like: Shaped | None = None) -> None:
+        """values: what is bound for so many old and new cells; like: a table of arrays of the same shapes."""
+        self.table, self._values = table, values
+        self._by_old: np.ndarray
+        self._by_new: np.ndarray
+        one = self._of(2, 2)
+        if like is not None:
+            self._by_old, self._by_new = like._by_old, like._by_new
+        else:
+            self._by_old, self._by_new = self._of(3, 2) - one, self._of(2, 3) - one
+        assert max(abs(self._by_old).max(), abs(self._by_new).max()) < 1000  # of shapes; addresses stay
+        self._fixed = one - 2 * (self._by_old + self._by_new)
+
+    def _of(self, old: int, new: int) -> np.ndarray:
+        self.table.bind(**self._values(old, new))
+        return self.table.numbers.copy()
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """(3, size) fixed, for each old and each new cell."""
+        return np.array([self._fixed, self._by_old, self._by_new])
+
+    def of(self, old: int, new: int) -> np.ndarray:
+        """(size,) for so many old and new cells."""
+        return np.asarray(self._fixed + old * self._by_old + new * self._by_new)
+
+    def places(self, names: Sequence[str]) -> np.ndarray:
+        """Where the numbers of some values are."""
+        parts = [self.table.part(name) for name in names]
+        return np.concatenate([np.arange(at.start, at.stop) for at in parts])
+
+
+def shaped(blank: Callable[[], Any], values: Callable[..., dict[str, Any]], *of: tuple[int, ...]) -> list[Shaped]:
+    """Tables of arrays of the same shapes, that differ by their addresses; of: what `values` gets before the cells."""
+    found: list[Shaped] = []
+    for which in of:
+        found.append(Shaped(Table(blank), partial(values, *which), *found[:1]))
+    return found
+
+
+BOTH, PAIRS = ((0,), (1,)), ((0, 0), (0, 1), (1, 0), (1, 1))  # sides; old sides and parities
+
+
+class Remesh:
+    """Changes of the cells of a line of a run, from one side of arrays to the other, with the solver of now."""
+
+    alone = True  # whether cells change without a return to Python
+    beside: tuple[str, ...] = ()  # of the table of what moves beside the run, what depends on the cells
+    most_waiting = 0  # lines whose outputs may wait
+    per_node = 0  # numbers of a node that are kept for them, at most
+
+    def __init__(self, run: OfRun, number: int, owner: OneOfMany, most: int, marked: int, twice: bool = False) -> None:
+        """Room for most cells; `adopt` before the first change.
+
+        marked: nodes beside which extremes are kept on both sides; twice: as of `workspace`.
+        """
+        self._of_run, self._of_line, self._solver = run, run.lines[number], run.solver
+        self._owner, self.most, self._fixed_to = owner, most, self._key(owner)
+        some = owner.envelope is not None
+        kept, pushes = Packed(lambda n: blank_kept(n, marked, some)), Packed(blank_pushes)
+        self._lines = Room(lines, most), Room(lines, most)
+        self._states = tuple((Room(states, most), Room(states, most)) for _ in range(2))
+        self._pushes, self._kept = (Room(pushes, most), Room(pushes, most)), (Room(kept, most), Room(kept, most))
+        self._sea = Room(seas, most)
+        self._work = Room(Packed(partial(workspace, keep=twice), given=("torsion",)), most)
+        self._base = np.zeros(owner.books.base.size, np.int64)
+        self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
+        self._itself: Itself = blank_itself(np.zeros(most))
+        self._calls, self._at, self._numbers = f.RemeshCalls(), f.RemeshPlaces(), np.zeros(f.NUMBERS)
+        self._waiting = np.zeros((self.most_waiting, 3), np.int64)
+        self._table = Table(f.blank_remesh_job)
+        self._views: dict[Any, Any] = {}  # while tables are bound
+        self.adopted, self._synced, self._bound, self._binding = False, -1, False, False
+
+    # --- what a planner says ------------------------------------------------------------------------
+
+    @staticmethod
+    def _key(owner: OneOfMany) -> tuple[Any, ...]:
+        """What the tables hold as it is."""
+        raise NotImplementedError
+
+    def _beside_table(self) -> tuple[Table, Callable[[], Any]]:
+        """The table of what moves beside the run, and what makes one."""
+        raise NotImplementedError
+
+    def _in_beside(self, k: int, _: int, m: int) -> dict[str, Any]:
+        """What depends on the cells there, with m of them in the arrays of side k."""
+        raise NotImplementedError
+
+    def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
+        """Tables of a change from each of PAIRS, its parts, and how many come before others hear of it."""
+        raise NotImplementedError
+
+    def _planner(self) -> tuple[tuple[Any, Any, Any], list[Table], int]:
+        """Kernels that say whether a change is due, plan it and keep outputs; their tables by side, and room."""
+        raise NotImplementedError
+
+    def _copy_beside(self, n: int) -> None:
+        """What moves beside a line of n cells goes on in the arrays of the first side."""
+        raise NotImplementedError
+
+    def _model_of(self, line: Line, sea: Sea) -> Model:
+        """The model of the line as it is now, on these arrays; what moves beside knows of it."""
+        raise NotImplementedError
+
+    def _outputs_of(self, batch: Batch, cells: int, begin: int) -> tuple[list[Output], int]:
+        """Outputs of a line of before, of so many cells, what is kept of which begins there; and where that ends."""
+        raise NotImplementedError
+
+    def _outputs_now(self, batch: Batch) -> list[Output]:
+        """Outputs of the line as it is."""
+        raise NotImplementedError
+
+    # --- state --------------------------------------------------------------------------------------
+
+    @property
+    def side(self) -> int:
+        """Which of the two sets of arrays is in use."""
+        return int(self._at.side)
+
+    @property
+    def cells(self) -> int:
+        """Cells of the line now."""
+        return int(self._at.cells)
+
+    @property
+    def waits(self) -> bool:
+        """Whether there are outputs of lines of before."""
+        return bool(self._at.waiting)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the line is solved by what the arrays were made for."""
+        watched = self._owner.itself.table if self._owner.itself is not None else None
+        same = self._solver is self._of_run.solver and self._of_line.watch_table is watched
+        return bool(same and self._fixed_to == self._key(self._owner))
+
+    @property
+    def job(self) -> np.ndarray:
+        """The table of kernels.mesh.remesh that the compiled steps get."""
+        self._at.alone, self._at.may_wait = self.alone, self._owner.outputs_may_wait
+        return self._table.numbers
+
+    # --- arrays -------------------------------------------------------------------------------------
+
+    @contextmanager
+    def _binds(self) -> Iterator[None]:
+        """While tables are bound a view is the same for the same number of cells."""
+        self._binding = True
+        try:
+            yield
+        finally:
+            self._binding = False
+            self._views.clear()
+
+    def _view(self, room: Room, cells: int, given: Mapping[str, Any] | None = None) -> Any:
+        """Of a room, for so many cells; while tables are bound, the same for the same."""
+        if not self._binding:
+            return room.view(cells, **(given or {}))
+        if (room, cells) not in self._views:
+            self._views[room, cells] = room.view(cells, **(given or {}))
+        return self._views[room, cells]
+
+    def line(self, k: int, cells: int) -> Line:
+        """The line of side k."""
+        line = self._owner.model.line
+        found: Line = self._view(self._lines[k], cells, {"bits": line.bits, "plane": line.plane, **NO_LAWS})
+        return found
+
+    def state(self, k: int, which: int, cells: int) -> State:
+        """The state of side k of even (which = 0) or odd parity (1)."""
+        found: State = self._view(self._states[k][which], cells, NO_MEMORY)
+        return found
+
+    def _push(self, k: int, which: int, cells: int) -> Floats:
+        """Of a run that carries one, else none."""
+        if not self._owner.push.size:
+            return NO_PUSH
+        found: Floats = self._view(self._pushes[k], cells)[which]
+        return found
+
+    def _sea_on(self, cells: int) -> Sea:
+        values = self._owner.model.sea.values
+        found: Sea = self._view(self._sea, cells, {x: getattr(values, x) for x in REST_OF_SEA})
+        return found
+
+    def _work_on(self, cells: int) -> Work:
+        found: Work = self._view(self._work, cells, {"torsion": self._owner.stepper.work.torsion})
+        return found
+
+    def _books(self, k: int, cells: int) -> Books:
+        if not self._binding:
+            return self._owner.books._replace(base=self._base, **self._kept[k].view(cells)._asdict())
+        if (Books, k, cells) not in self._views:
+            kept = self._view(self._kept[k], cells)._asdict()
+            self._views[Books, k, cells] = self._owner.books._replace(base=self._base, **kept)
+        found: Books = self._views[Books, k, cells]
+        return found
+
+    def _width(self, cells: int) -> Floats:
+        """Diameters of cells; none where nobody watches whether the line meets itself."""
+        return self._itself.width[: cells if self._watch is not None else 0]
+
+    # --- tables -------------------------------------------------------------------------------------
+
+    def _in_run(self, k: int, _: int, m: int) -> dict[str, Any]:
+        return {
+            "line": self.line(k, m), "sea": self._sea_on(m), "old": self.state(k, 0, m), "new": self.state(k, 1, m),
+            "was": self._push(k, 0, m), "now": self._push(k, 1, m), "work": self._work_on(m),
+            "books": self._books(k, m),
+        }  # fmt: skip
+
+    def _in_odd(self, k: int, _: int, m: int) -> dict[str, Any]:
+        found = self._in_run(k, _, m)
+        return found | {"old": found["new"], "new": found["old"]}
+
+    def _in_itself(self, k: int, _: int, m: int) -> dict[str, Any]:
+        itself = self._itself._replace(width=self._itself.width[:m])
+        return {"line": self.line(k, m), "old": self.state(k, 0, m), "new": self.state(k, 1, m), "itself": itself}
+
+    def _bind_all(self) -> None:
+        """Tables of changes from either side to the other, and of runs on either."""
+        owner, at, (beside, blank) = self._owner, self._at, self._beside_table()
+        of_run, of_odd = (shaped(blank_job, x, *BOTH) for x in (self._in_run, self._in_odd))
+        of_beside = shaped(blank, self._in_beside, *BOTH)
+        change, parts, at.begun = self._tables_of_change()
+        (due, plan, keep), planners, at.room = self._planner()
+        in_run, in_beside = of_run[0].places(IN_RUN), of_beside[0].places(self.beside)
+        numbers: dict[str, Any] = {
+            "itself": np.zeros(0, np.int64), "itself_places": np.zeros(0, np.int64),
+            "in_itself": np.zeros((2, 3, 0), np.int64),
+        }  # fmt: skip
+        of_itself: list[Shaped] = []
+        if self._watch is not None:
+            of_itself = shaped(blank_itself_job, self._in_itself, *BOTH)
+            places = of_itself[0].places(IN_ITSELF)
+            numbers["itself"], numbers["itself_places"] = self._watch.table.numbers, places
+            numbers["in_itself"] = np.array([x.numbers[:, places] for x in of_itself])
+            tree = self._itself.tree.__array_interface__["data"][0]
+            at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
+        ends = np.cumsum([0, *(len(x[0].table.numbers) for x in change)])
+        calls = [(p.kernel.address(change[p.table][0].table.numbers), *ends[p.table : p.table + 2]) for p in parts]
+        self._tables = of_run, of_odd, of_beside, of_itself, change, planners  # what is bound there stays alive
+        self._table.bind(
+            calls=self._calls, at=at, clock=owner.clock, own=owner.books.clock, counts=owner.count,
+            work=owner.books.work, numbers=self._numbers, planners=np.array([x.numbers for x in planners]),
+            parts=np.array(calls, np.int64), change=np.zeros(ends[-1], np.int64),
+            changed=np.array([np.concatenate([x[pair].numbers for x in change], axis=1) for pair in range(len(PAIRS))]),
+            run=owner.table.numbers, run_places=in_run, in_run=np.array([x.numbers[:, in_run] for x in of_run]),
+            even=owner.table.even.numbers, odd=owner.table.odd.numbers,
+            in_odd=np.array([x.numbers[:, in_run] for x in of_odd]), beside=beside.numbers, beside_places=in_beside,
+            in_beside=np.array([x.numbers[:, in_beside] for x in of_beside]), waiting=self._waiting, **numbers,
+        )  # fmt: skip
+        at.task, at.per_node = owner.table.part("task").start, self.per_node
+        for name, kernel in (("due", due), ("plan", plan), ("keep", keep)):
+            setattr(self._calls, name, kernel.address(planners[0].numbers))
+        for name, kernel in (("before_forces", before_forces), ("after_forces", after_forces), ("books", begin_line)):
+            setattr(self._calls, name, kernel.address(owner.table.numbers))
+
+    # --- steps --------------------------------------------------------------------------------------
+
+    def adopt(self) -> None:
+        """Go on with the line of the run as it is now, in these arrays."""
+        owner, model, n = self._owner, self._owner.model, self._owner.model.cells
+        if not self._bound:
+            with self._binds():
+                self._bind_all()
+            self._bound = True
+        self._at.side, self._at.cells = 0, n
+        parity = int(owner.count.parity)
+        for which in (0, 1):
+            copy_fields(owner.states[which], self.state(0, which, n), ("turn",))
+            if owner.push.size:
+                self._push(0, which, n)[:] = owner.pushes[which]
+        copy_fields(model.line, self.line(0, n), ("bits", "plane", *NO_LAWS))
+        copy_fields(model.sea.values, self._sea_on(n), REST_OF_SEA)
+        copy_fields(owner.stepper.work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
+        self._base[:] = owner.books.base
+        if self._watch is not None:
+            copy_fields(self._watch.itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
+        copy_fields(owner.books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
+        self._copy_beside(n)
+        owner.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
+        self._calls.solver = owner.solver_address()
+        f.put_cells(self._table.numbers)
+        self.adopted, self._synced = True, -1
+        owner.count.parity = parity
+        self.sync()
+
+    def sync(self) -> None:
+        """What Python has of the line is that of now."""
+        if self._at.changes == self._synced:
+            return
+        self._synced = int(self._at.changes)
+        owner, k, n = self._owner, self.side, self.cells
+        line, sea, work, books = self.line(k, n), self._sea_on(n), self._work_on(n), self._books(k, n)
+        now = sea.now.copy()
+        model = self._model_of(line, sea)
+        sea.now[:] = now
+        old, new = self.state(k, 0, n), self.state(k, 1, n)
+        owner.books, owner.states = books, (old, new)
+        owner.pushes = self._push(k, 0, n), self._push(k, 1, n)
+        owner.table.hold(
+            line=line, sea=sea, old=old, new=new, was=owner.pushes[0], now=owner.pushes[1], work=work, books=books,
+        )  # fmt: skip
+        self._beside_table()[0].hold(**self._in_beside(k, n, n))
+        if self._watch is not None:
+            itself = self._itself._replace(width=self._width(n), tree=self._itself.tree[: boxes_of(n)])
+            self._watch.itself = itself
+            self._watch.table.hold(line=line, old=old, new=new, itself=itself)
+        owner.take(model, work)
+
+    # --- outputs that wait --------------------------------------------------------------------------
+
+    def outputs(self, rows: Floats) -> tuple[list[Output], Batch]:
+        """All outputs that wait, in rows, copied, each with its line; and what they have at the ends."""
+        begin, found, batches = 0, list[Output](), list[Batch]()
+        for first, count, cells in self._waiting[: self._at.waiting].tolist():
+            batches.append(self._of_line.batch_of(rows[first : first + count], cells))
+            outputs, begin = self._outputs_of(batches[-1], cells, begin)
+            found += outputs
+        if len(rows) > self._at.used:
+            batches.append(self._of_line.batch_of(rows[self._at.used :], self._owner.model.cells))
+            found += self._outputs_now(batches[-1])
+        self._at.waiting = self._at.placed = self._at.used = 0
+        return found, ends_alone(batches)
+
+
+def blank_pushes(n: int) -> Pushes:
+    """Room for the pushes of n cells."""
+    return Pushes(np.zeros((n + 1, 4)), np.zeros((n + 1, 4)))
+
+
+def copy_fields(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
+    """Copy the arrays of a named tuple into those of another one, but for these."""
+    for name in old._fields:
+        if name not in but:
+            getattr(new, name)[:] = getattr(old, name)
