@@ -49,7 +49,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     if whole and getattr(config.option, "numprocesses", 0) and not hasattr(config, "workerinput"):
         folder = Path(tempfile.mkdtemp(prefix="hybrid-compiling-"))
         os.environ[COMPILING] = str(folder)
-        config.stash[STARTED] = [_compile(half, folder / half) for half in ("plane", "space")]
+        config.stash[STARTED] = [_compile(half, folder / half) for half in ("solvers", "rest")]
 
 
 def _compile(half: str, marker: Path) -> subprocess.Popen[bytes]:

@@ -55,7 +55,7 @@ def compile_for(level: cache.Level, few: bool, kept: Path) -> None:
     environment = os.environ | settings | {"HYBRID_CACHE_DIR": str(kept), "PYTHONPATH": str(ROOT)}
     if not few:
         script = str(ROOT / "tests" / "compile_kernels.py")
-        halves = [subprocess.Popen([sys.executable, script, half], env=environment) for half in ("plane", "space")]
+        halves = [subprocess.Popen([sys.executable, script, half], env=environment) for half in ("solvers", "rest")]
         if any([half.wait() for half in halves]):
             raise SystemExit("tests/compile_kernels.py failed")
     with TemporaryDirectory() as work:

@@ -1,11 +1,11 @@
-"""Compile the kernels that most tests call, one half of them: `python tests/compile_kernels.py plane`, or `space`.
+"""Compile the kernels that most tests call, one half of them: `python tests/compile_kernels.py solvers`, or `rest`.
 
 With `tests` behind it those, too, that few scenes call and many tests, among them what the features of scenes do: a
 wheel goes without (release/build_wheel.py).
 
-The first half is for lines in a plane, zones, cells and payout, the second for space, contact and several lines.
-Started together (conftest.py) they keep two cores busy, and each function that both need is read by numba twice, not by
-every process of the tests.
+The first half is what marches along lines, the second what is around: zones, cells, payout, contact, bodies, outputs.
+Started together (conftest.py) they keep two cores busy.  Kernels that share laws are in one half: what both need, a
+sixth of the code, is read by numba twice.
 """
 
 from __future__ import annotations
@@ -48,39 +48,37 @@ LINES = {
     "time": {"duration": 0.2, "step": 0.1},
 }  # fmt: skip
 
-# Those of the plane first where both halves need one: who comes second loads it, or waits.
+# The longest first: who comes second to a kernel loads it, or waits.
 BY_TABLE = {
-    "plane": """run.entry.in_plane mesh.zone_step.follow_zones mesh.zone_switch.begin_switch
-        mesh.zone_switch.end_switch mesh.zone_step.plan_nodes mesh.zone_step.take_arcs mesh.zone_transfer.transfer
-        mesh.cell_changes.plan_cells mesh.cell_changes.clear_state mesh.cell_changes.renew mesh.remesh.put_cells
-        mesh.remesh.begin_cells mesh.remesh.end_cells""",
-    "space": """run.entry.in_space contact.self_contact.contact_task
-        contact.self_distance.watch_itself junctions.lines_contact.touch_system
-        watch.named_quantities.note_quantities junctions.shared_contact.shared_task
-        junctions.joined_sheaves.spin_sheaves junctions.body_contact.meet_bodies""",
+    "solvers": """run.entry.in_space run.entry.in_plane run.network.solve_system run.network.begin_line
+        run.network_run.sample_system run.network.book_system_step""",
+    "rest": """mesh.zone_step.follow_zones mesh.zone_switch.begin_switch mesh.zone_switch.end_switch
+        mesh.zone_step.plan_nodes mesh.zone_step.take_arcs mesh.zone_transfer.transfer mesh.cell_changes.plan_cells
+        mesh.cell_changes.clear_state mesh.cell_changes.renew mesh.remesh.put_cells mesh.remesh.begin_cells
+        mesh.remesh.end_cells contact.self_contact.contact_task contact.self_distance.watch_itself
+        junctions.lines_contact.touch_system junctions.shared_contact.shared_task
+        junctions.joined_sheaves.spin_sheaves junctions.body_contact.meet_bodies
+        watch.named_quantities.note_quantities run.network_run.run_system""",
 }
 
-IN_TESTS = {
-    "plane": "run.network_tangents.follow_in_plane run.network_tangents.follow_system",
-    "space": "run.network_run.sample_system",
-}
+IN_TESTS = "run.network_tangents.follow_in_plane run.network_tangents.follow_system"  # solvers, too
 
 
 def main(half: str, for_tests: bool) -> None:
     gc.disable()  # numba leaves a hundred MB of garbage per large kernel: cheaper left than searched for
     os.cpu_count = lambda: 1  # or each run below would start a process that compiles beside it
     table = np.zeros(0, np.int64)
-    for name in [*BY_TABLE[half].split(), *(IN_TESTS[half].split() if for_tests else ())]:
+    for name in [*BY_TABLE[half].split(), *(IN_TESTS.split() if for_tests and half == "solvers" else ())]:
         file, function = name.rsplit(".", 1)
         getattr(import_module(f"hybrid.kernels.{file}"), function).compile_unless_busy(table)
-    if half == "plane":
-        hybrid.run({**SCENE, "dimension": 2}, progress=False)
+    if half == "rest":
         for kernel in payout_kernels():
             kernel.compile_unless_busy(table)
-    else:
         hybrid.run({**SCENE, "dimension": 3}, progress=False)
         hybrid.run(LINES, progress=False)
-    if for_tests and half == "plane":
+        return
+    hybrid.run({**SCENE, "dimension": 2}, progress=False)
+    if for_tests:
         sys.path.insert(0, str(Path(__file__).parents[1]))
         from tests.combinations.pairs import FEATURES, scene_of
 

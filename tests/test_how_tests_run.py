@@ -8,6 +8,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from compile_kernels import BY_TABLE
+
+from hybrid.kernels.machine.compile import entry
+from hybrid.kernels.machine.source_digest import Called, _of_function
 
 CONFTEST = runpy.run_path(str(Path(__file__).parents[1] / "conftest.py"))
 TESTS = CONFTEST["TESTS"]
@@ -46,3 +50,22 @@ def test_only_what_calls_many_kernels_waits_for_them(tmp_path: Path, monkeypatch
     assert not waits
     next(CONFTEST["pytest_runtest_protocol"](many))
     assert len(waits) == 1
+
+
+def code_of(kernels: str) -> dict[object, int]:
+    """Bytes of bytecode of each function that some kernels reach."""
+    found: Called = dict.fromkeys(entry(name).py_func for name in kernels.split())
+    todo = list(found)
+    while todo:
+        new = [x for x in _of_function(todo.pop())[1] if x not in found]
+        found.update(dict.fromkeys(new))
+        todo += new
+    return {x: len(x.__code__.co_code) for x in found}
+
+
+@pytest.mark.long  # imports all kernels
+def test_kernels_that_share_laws_are_compiled_in_one_process() -> None:
+    """Half of what kernels read was read in both processes when each had the kernels of one dimension."""
+    one, other = map(code_of, BY_TABLE.values())
+    both = sum(one[x] for x in one.keys() & other.keys())
+    assert 0 < both < 0.25 * sum((one | other).values())

@@ -27,6 +27,7 @@ SOLVER = ("run.entry.in_plane", "run.entry.in_space")
 OUTPUTS = "watch.observed_outputs.observe_outputs"
 ZONES = "mesh.zone_step.follow_zones"
 CRITERIA = "mesh.zone_step.evaluate_criteria"
+ZONE_CHANGES = "mesh.zone_switch.begin_switch", "mesh.zone_switch.end_switch", "mesh.cell_changes.renew"
 STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
 # Steps, equilibria, lines that are joined or touch, those that are paid out.
 OF_JOINED = "run.network.solve_system"
@@ -34,6 +35,8 @@ STEPS_OF_LINES, REST_OF_LINES = "run.network_run.run_system", "run.network_run.s
 BOOKS_OF_LINES, START_OF_LINES = "run.network.book_system_step", "run.network.begin_line"
 TOUCHING_LINES = "junctions.lines_contact.touch_system", "junctions.shared_contact.shared_task"
 PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "mesh.remesh.change_cells"  # this one: the rest
+
+NO_TABLE = np.zeros(0, np.int64)  # of which only the type counts
 
 # A cable for the second process to compile with; nothing is computed of it.
 SAMPLE = {
@@ -64,7 +67,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     if any(_is_judged(x, static) for name, x in planar.items() if name in rods):
         found.append(STABILITY)
     if scene.time is not None and scene.adaptive:
-        found.append(CRITERIA if static else ZONES)
+        found += [CRITERIA] if static else [*ZONE_CHANGES, ZONES]
     if not static and any(payout_of(x) is not None for x in lines.values()):
         found += PAYOUT_OF_LINES
     if network.touching_pairs or touch_themselves:
@@ -126,24 +129,30 @@ def command_to_compile(names: Sequence[str]) -> list[str]:
 
 
 def compile_all(names: Sequence[str]) -> None:
-    """Compile kernels in this process, but for what another one is compiling."""
-    from hybrid.kernels.run.entry import in_space
+    """Compile kernels in this process, but for what another one is compiling.
 
-    table = np.zeros(0, np.int64)  # of which only the type counts
-    for name in (OF_JOINED, START_OF_LINES, REST_OF_LINES, BOOKS_OF_LINES, STEPS_OF_LINES, *PAYOUT_OF_LINES[:2]):
-        if name in names:
-            entry(name).compile_unless_busy(table)
-    if PAYOUT_OF_LINES[2] in names:
-        for kernel in payout_kernels():
-            kernel.compile_unless_busy(table)
+    What shares its laws with a solver comes last: by then the process that compiles the solver may have it, too.
+    """
     scene = LineScene.model_validate(SAMPLE)
     model = build(scene)
+    _compile_by_table(names, OF_JOINED)
+    if ZONES in names or CRITERIA in names:
+        _compile_criteria(scene, model)
+    _compile_by_table(names, *ZONE_CHANGES, ZONES)
     if OUTPUTS in names:
         _compile_outputs(model)
-    if SOLVER[1] in names:
-        in_space.compile_unless_busy(table)
-    if ZONES in names or CRITERIA in names:
-        _compile_zones(scene, model, moves=ZONES in names)
+    if PAYOUT_OF_LINES[2] in names:
+        for kernel in payout_kernels():
+            kernel.compile_unless_busy(NO_TABLE)
+    _compile_by_table(names, TOUCHING, *TOUCHING_LINES, *PAYOUT_OF_LINES[:2])
+    _compile_by_table(names, STEPS_OF_LINES, BOOKS_OF_LINES, REST_OF_LINES, START_OF_LINES, SOLVER[1])
+
+
+def _compile_by_table(names: Sequence[str], *kernels: str) -> None:
+    """Those kernels, among those of these names, that take one table."""
+    for name in kernels:
+        if name in names:
+            entry(name).compile_unless_busy(NO_TABLE)
 
 
 def payout_kernels() -> tuple[Any, ...]:
@@ -177,13 +186,10 @@ def _compile_outputs(model: Model) -> None:
     stored_energy(model.line, model.sea.values, model.start.r)
 
 
-def _compile_zones(scene: LineScene, model: Model, moves: bool) -> None:
-    from hybrid.kernels.mesh.zone_step import follow_zones
+def _compile_criteria(scene: LineScene, model: Model) -> None:
     from hybrid.zones.at_start import manager_for
 
     manager = manager_for(scene, model, first_resolution(scene), None)
     manager.evaluate_criteria(model.line, model.sea.values, model.ends.values, model.start, 0.0)
     manager.initial_rods(model.start)
     manager.review(0.0, model.start)
-    if moves:
-        follow_zones.compile_unless_busy(np.zeros(0, np.int64))
