@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import Complaint, Outcome, SceneError
-from hybrid.kernels.junctions.bodies import NUMBERS
+from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
@@ -46,19 +47,24 @@ CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
 # Equilibria until the water around members is that of the place found, and what of the largest wetted part, velocity
 # and acceleration there counts as the same.
 MOST_ROUNDS, SAME_WATER = 40, 1e-8
+# Other places of what is free from which an equilibrium is sought where all else has failed: how many, and how far
+# from the first ones, as a part of the shortest line.
+OTHER_PLACES = 4
+ELSEWHERE = 1.0
 # Lengths of its line from a held point to the first place of another, beyond which that is named where no equilibrium
 # is found; nearer ones are found.
 FAR = 3.0
 
 
 class _Asked(NamedTuple):
-    """What an equilibrium is sought of, with the loads of t (s); rubs: whether friction acts."""
+    """What an equilibrium is sought of, with the loads of t (s); rubs: whether friction acts; begin: as of `starts`."""
 
     system: Network
     model: NetworkModel
     t: float
     bodies: Floats
     rubs: bool
+    begin: Start | None = None
 
     @property
     def ways(self) -> dict[int, str]:
@@ -66,14 +72,27 @@ class _Asked(NamedTuple):
         return ways_to_settle(self.model) if self.rubs else {}
 
     def starts(self) -> Iterator[Start]:
-        """Shapes from which the equilibrium is looked for."""
+        """Shapes from which the equilibrium is looked for: `begin` alone, where that is given."""
         model, system = self.model, self.system
+        if self.begin is not None:
+            yield self.begin
+            return
         yield _first_shapes(model)
         if len(model.places) + len(model.body_places):
             system = system.searched()
             places = balanced_places(system, model)
             if places is not None:
                 yield "lines hung between places that balance", NetworkState(*starts_between(system, *places, model))
+
+    def elsewhere(self) -> Iterator[Start]:
+        """Shapes between other places of what is free, the same at every call; none where nothing is."""
+        model, system = self.model, self.system.searched()
+        chance, reach = np.random.default_rng(0), ELSEWHERE * min(x.length for x in model.models)
+        for _ in range(OTHER_PLACES if len(model.places) + len(model.body_places) else 0):
+            places, bodies = model.places.copy(), model.body_places.copy()
+            for row in (*places, *bodies[:, PLACE:FRAME]):
+                row += reach * chance.uniform(-1.0, 1.0, 3)
+            yield "lines hung between other places", NetworkState(*starts_between(system, places, bodies, model))
 
 
 def equilibrium_of(system: Network, model: NetworkModel, t: float, friction: bool = True) -> LinesAtRest:
@@ -85,7 +104,14 @@ def equilibrium_of(system: Network, model: NetworkModel, t: float, friction: boo
         raise SceneError(floating)
 
     def search(_: Sequence[int], own: NetworkModel) -> LinesAtRest:
-        return _in_its_water(_Asked(_network_of(system, own.names), own, t, own.body_numbers(t), friction))
+        asked = _Asked(_network_of(system, own.names), own, t, own.body_numbers(t), friction)
+        try:
+            return _in_its_water(asked)
+        except LineFailed:
+            for begin in asked.elsewhere():
+                with suppress(LineFailed):
+                    return _in_its_water(asked._replace(begin=begin))
+            raise
 
     try:
         return _by_parts(model, t, _parts_of(model), search)

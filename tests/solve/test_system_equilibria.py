@@ -156,3 +156,12 @@ def test_a_leg_that_lies_slack_hangs_down_from_its_buoy() -> None:
     lies = (long.s > 2.5) & (long.s < 27.0)  # at the anchor the force on the support has a part along the line
     assert np.abs(long.tension[-1][lies]).max() < 1e-9 * long.tension.max()
     assert [x.s_b for x in long.events if x.kind == "slack"] == [30.0]
+
+
+@pytest.mark.long
+def test_lines_in_a_row_are_found_from_other_places_of_their_knots() -> None:
+    """No way from the first places of the knots, or from those that balance, leads to lines under tension."""
+    found = hybrid.static(tables_of("lines_in_a_row"))
+    assert "between other places" in found.attributes["static_path"]
+    tensions = [float(line.tension.min()) for line in found.lines.values()]
+    assert min(tensions) > 0.0 and float(found.attributes["static_residual"]) < 1e-6 * max(tensions)
