@@ -32,6 +32,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.state import state_for
 from hybrid.model.build import Model, build
+from hybrid.solve.borders import JointJobs
 
 BARE = {"length": 2.0, "mass": 0.1}
 BENDS = BARE | {"bending_stiffness": 1.0e-2}
@@ -320,3 +321,40 @@ def test_the_contents_name_every_optional_part() -> None:
     assert not moving["criteria as fields"].on
     asked = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "adaptive", output={"criteria": True})).contents}
     assert asked["criteria as fields"].on
+
+
+HANGING = {
+    "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [3, 0, 0]}, "middle": {"initial_guess": [1.5, 0, -1]}},
+    "lines": {
+        name: {"start": name, "end": "middle", "model": "catenary", "mesh": {"cells": 4},
+               "sections": [BARE | {"diameter": 0.01}], "contact": {"self": False}}
+        for name in "ab"
+    },
+}  # fmt: skip
+BALL = {"mass": 1.0, "inertia": [1, 1, 1], "initial_guess": [1.5, 0, -3], "shape": {"kind": "sphere", "radius": 0.1}}
+
+
+@pytest.mark.parametrize(
+    ("tables", "borders"),
+    [
+        (HANGING, ["join_lines"]),
+        (HANGING | {"bodies": {"ball": BALL}, "points": HANGING["points"] | {"middle": {"body": "ball", "place": [0, 0, 0.1]}}},
+         ["join_lines", "meet_bodies"]),
+    ],
+    ids=["points", "a body with a shape"],
+)  # fmt: skip
+def test_newton_has_no_border_that_the_network_does_not_have(
+    tables: dict[str, Any], borders: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No kernel, table or question for others; a line alone has none at all (tests/simulation/test_first_use.py)."""
+    listed = list[list[str]]()
+    march_by = JointJobs.march_by
+
+    def noted(jobs: JointJobs, marcher: int) -> None:
+        march_by(jobs, marcher)
+        assert jobs.jobs[0]._bound["borders"].size == len(jobs._borders)
+        listed.append([x.kernel.__name__ for x, _ in jobs._borders])
+
+    monkeypatch.setattr(JointJobs, "march_by", noted)
+    hybrid.static(tables)
+    assert listed and all(x == borders for x in listed)

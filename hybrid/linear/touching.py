@@ -32,7 +32,7 @@ from hybrid.kernels.contact.self_contact_law import (
 from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.junctions.bodies import MASS
 from hybrid.kernels.junctions.bodies import PLACE as ORIGIN
-from hybrid.kernels.junctions.body_forces import BY_BODY, BY_NODES, OF_LINE, OF_NODE, OF_SLOT, TOUCHED
+from hybrid.kernels.junctions.body_contact import BY_BODY, BY_NODES, OF_LINE, OF_NODE, OF_SLOT, TOUCHED
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.state.obstacle_rows import (

@@ -23,8 +23,9 @@ from hybrid.kernels.junctions.bodies import (
     STATE,
     STIFFNESS,
     V,
+    blank_members_job,
+    stir_members,
 )
-from hybrid.kernels.junctions.members_water import blank_members_job, stir_members
 from hybrid.kernels.laws.members import ALONG, CM, CN, CT, MIDDLE, PIECE, WET
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.state import Floats, Sea
@@ -109,7 +110,7 @@ class Members:
         stir_members(self.into(out).numbers)
 
     def into(self, out: Floats) -> Table:
-        """Arguments of kernels.junctions.members_water.stir_members, which writes into `out` (n, PIECE)."""
+        """Arguments of kernels.junctions.bodies.stir_members, which writes into `out` (n, PIECE)."""
         self._job.bind(out=out)
         return self._job
 

@@ -30,7 +30,7 @@ CRITERIA = "mesh.zone_step.evaluate_criteria"
 ZONE_CHANGES = "mesh.zone_switch.begin_switch", "mesh.zone_switch.end_switch", "mesh.cell_changes.renew"
 STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
 # Steps, equilibria, lines that are joined or touch, those that are paid out.
-OF_JOINED = "run.network.solve_system"
+OF_JOINED = "run.network.solve_system", "junctions.junctions.join_lines"
 STEPS_OF_LINES, REST_OF_LINES = "run.network_run.run_system", "run.network_run.sample_system"
 BOOKS_OF_LINES, START_OF_LINES = "run.network.book_system_step", "run.network.begin_line"
 TOUCHING_LINES = "junctions.lines_contact.touch_system", "junctions.shared_contact.shared_task"
@@ -62,7 +62,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     found += [START_OF_LINES, *([REST_OF_LINES] if static else [STEPS_OF_LINES, BOOKS_OF_LINES]), OUTPUTS]
     touch_themselves = any(x.contact.self for x in lines.values())
     if together or touch_themselves:
-        found.append(OF_JOINED)
+        found += OF_JOINED
     rods = {name for name, x in lines.items() if _has_rods(x) or wants_errors(x)}  # others are compared with these
     if any(_is_judged(x, static) for name, x in planar.items() if name in rods):
         found.append(STABILITY)
@@ -135,7 +135,7 @@ def compile_all(names: Sequence[str]) -> None:
     """
     scene = LineScene.model_validate(SAMPLE)
     model = build(scene)
-    _compile_by_table(names, OF_JOINED)
+    _compile_by_table(names, *OF_JOINED)
     if ZONES in names or CRITERIA in names:
         _compile_criteria(scene, model)
     _compile_by_table(names, *ZONE_CHANGES, ZONES)

@@ -10,32 +10,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
-from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH
-from hybrid.kernels.contact.self_contact import blank_contact_job
 from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
-from hybrid.kernels.junctions.body_contact import CARRY
-from hybrid.kernels.junctions.body_forces import EACH_BODY, TOUCHED
-from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT, TURNS
-from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
-from hybrid.kernels.junctions.junctions import HANDED
-from hybrid.kernels.junctions.lines_contact import room_for_products
-from hybrid.kernels.junctions.lone_lines import find_near, lead_lone
-from hybrid.kernels.junctions.network_job import NetworkTask
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
-from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.run.entry import NO_PUSH, in_plane, in_space
 from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_system_step, solve_system
-from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.obstacle_rows import FREE, MOVES
 from hybrid.kernels.state.report import (
     FRICTION,
     LOCAL_ERROR,
@@ -47,14 +32,13 @@ from hybrid.kernels.state.report import (
     USED_RHO,
     WAVES,
 )
-from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, State, Work, state_for
-from hybrid.kernels.step.job import blank_job
-from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, TOLERANCE, Limits, Task
+from hybrid.kernels.state.state import Floats, State, Work
+from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, TOLERANCE, Limits, Task
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.step.step_law import REFUSED
-from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
-from hybrid.solve.joined import JoinedLine, JointJobs, NetworkState, NetworkTaken, Rooms
+from hybrid.solve.joined import JoinedLine, NetworkState, NetworkTaken
+from hybrid.solve.line_jobs import LineJobs
 from hybrid.solve.line_solver import BALANCED, BALANCING, MOST_ITERATIONS
 from hybrid.solve.self_contact import SelfContact, left_over
 from hybrid.solve.shared_contact import SharedContact
@@ -72,26 +56,7 @@ CLOSER = 100.0
 NO_BODIES: Floats = np.zeros((0, NUMBERS))
 
 
-def _carries(x: JoinedLine) -> bool:
-    """Whether a line is solved for more right-hand sides: its start is joined, or an end turns."""
-    return x.joints[0] >= 0 or bool(x.seats[:, TURNS].any())
-
-
-def _room(x: JoinedLine, touches: bool = False) -> Work:
-    """Arrays for a line, with room for all its factors where they serve again, for the last where its end is joined.
-
-    touches: whether it touches itself.
-    """
-    cells, joints = x.line.h.size, x.joints
-    kept = (cells + 1) * KEPT if _carries(x) else KEPT if joints[1] >= 0 else 0
-    rows = np.zeros((1 if joints[0] >= 0 else 0, SIZE * WIDTH))
-    if touches or x.line.torsion.size:  # these take all factors, which are kept in every march where they serve again
-        kept = (cells + 1) * KEPT
-    work = workspace_of(x.line, keep=touches or _carries(x) or joints[1] >= 0)
-    return work._replace(X=np.zeros((cells + 1) * ROW + kept), rows=rows)
-
-
-class NetworkSolver:
+class NetworkSolver(LineJobs):
     """Solves for all lines of a system at once; owns the work arrays, not the states.
 
     It works in space, but for steps of lines that are joined to nothing and are marked as planar.
@@ -109,370 +74,14 @@ class NetworkSolver:
         contact of lines that may touch each other, which have none of their own; tolerance: of Newton's method in
         steps.  Each point and body must be at an end of some line.
         """
-        self.lines, self.bodies, self.tolerance = tuple(lines), bodies, tolerance
-        self.body_work = np.zeros((len(bodies), WORK))
-        self._fairleads = np.array([x.fairleads for x in lines], float).reshape(-1, 2, 3)
-        self._arms, self._gaps = np.zeros_like(self._fairleads), np.zeros_like(self._fairleads)
-        self._seats = np.array([x.seats for x in lines], float).reshape(-1, 2, SEAT)
-        self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
-        self._contacts, self.shared = {k: x for k, x in enumerate(contacts) if x is not None}, shared
-        self._rides = lines[0].rides  # obstacles are those of all lines
-        self._sheaves = int((lines[0].line.moved == FREE).sum())
-        # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.  Of
-        # each whether it always moves with others (-1), or else how near it is to a body or sheave that it may move.
-        self._near = np.array([-1 if max(x.joints) >= 0 else 0 for x in lines], np.int64)
-        together = [k for k in self._touching_lines if k not in self._contacts or lines[k].keeps_pace]
-        self._near[together] = -1
-        self._alone = np.zeros(len(lines), np.int64)
-        self._mixes = [bool(self._rides.size or self._sheaves) and near == 0 for near in self._near]
-        # Winches whose lengths may be unknowns of all lines; iterations of lines with winches that are by themselves.
-        each = zip(lines, self._near, self._mixes, strict=True)
-        self._winches = sum(x.winds and bool(near < 0 or mixes) for x, near, mixes in each)
-        self._wound: dict[int, int] = {}
-        self._reels: dict[int, NDArray[np.int64]] = {}  # tables of lines that are paid out
-        self.work = [_room(x, self._keeps(k, x)) for k, x in enumerate(lines)]
-        self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
-        self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
+        super().__init__(lines, bodies, contacts, shared)
+        self.tolerance, self.net, self.body_work = tolerance, np.zeros((points, 3)), np.zeros((len(bodies), WORK))
         self.blurred: set[int] = set()  # lines of the last equilibrium of which round-off hides whether they buckle
-        self.turns: tuple[NetworkState, NetworkState] | None = None  # states between which steps go back and forth
-        self.net = np.zeros((points, 3))
         mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
         self.scale = max(x.scale for x in lines)
         self.length = max(x.length for x in lines)
         self.anchor = ANCHOR * self.scale / (mass * self.length)  # 1/s2
-        self._pressing: NDArray[np.int64] = np.zeros(0, np.int64)
-        self._pressed: dict[str, Any] = {}
-        self._touched: tuple[Any, ...] = ()  # what jobs get where lines touch themselves or each other
-        self._phase, self._at_rest, self._asked = np.zeros(1, np.int64), np.zeros(1, np.int64), NetworkTask()
-        blank = Table(blank_job)
-        # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
-        self._numbers = np.zeros((2, len(lines), blank.numbers.size), np.int64)
-        self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in range(len(lines))]
-        self._rooms = self._make_rooms()
-        self._pushes: dict[int, list[Floats]] = {}  # out of planes, of states of even parity and of odd, by line
-        self._together = self._all = JointJobs(self._rooms, self._numbers, range(len(lines)))
-        self.lone: list[int] = []
-        self.joined = list(range(len(lines)))
-        self.lone_numbers = self._numbers[0, :0]
-        self._lone_tables: dict[int, Table] = {}
-        self._joined_tables = dict(enumerate(self._tables))
-        for k, (x, work, books) in enumerate(zip(lines, self.work, self.books, strict=True)):
-            limits = Limits(REACH * x.length, x.scale, 1)
-            self.bind_line(
-                k, task=Task(ASSEMBLY, limits=limits), line=x.line, sea=x.sea, ends=x.ends, work=work, books=books,
-                was=NO_PUSH, now=NO_PUSH,
-            )  # fmt: skip
-        self._group()
-
-    def _keeps(self, number: int, x: JoinedLine) -> bool:
-        """Whether all factors of a line may serve again: for contact, bodies, sheaves and winches."""
-        beside = bool(self._rides.size or self._sheaves or self._winches)
-        mixes = beside and (self._mixes[number] or self._near[number] < 0)
-        return x.winds or mixes or number in self._touching_lines
-
-    def _make_rooms(self) -> Rooms:
-        """What jobs of the lines work in."""
-        lines, points, bodies = self.lines, len(self.net), self.bodies
-        carried = [x.line.h.size + 1 if _carries(x) else 0 for x in lines]
-        columns = np.zeros((COLUMNS if self._seats[:, :, TURNS].any() else 3, max(sum(carried), 1), SIZE))
-        unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
-        self._matrix = np.zeros((unknowns + 5, unknowns + 1))
-        shared = {
-            "columns": columns, "functional": np.zeros(FUNCTIONAL), "parts": np.zeros_like(columns),
-            "answers": np.zeros((2, ANSWER)), "q": np.zeros(COLUMNS), "net": self.net, "bodies": bodies,
-            "work": self.body_work, "S": np.zeros((HANDED - 1, HANDED)), "G": np.zeros((2, 6, 6)),
-            "A": self._matrix,
-        }  # fmt: skip
-        of_lines = {
-            "joints": self.joints, "seats": self._seats, "arms": self._arms,
-            "first": np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64),
-        }  # fmt: skip
-        floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
-        own = {"fairleads": self._fairleads, "gaps": self._gaps, "floors": floors, "allowed": self.allowed}
-        apart = {"near": self._near, "alone": self._alone, "asked": self._asked}
-        begins = np.append(0, np.cumsum([x.line.s.size for x in lines])[:-1]).astype(np.int64)
-        rooms = Rooms(shared, of_lines, own, apart | {"rides": self._rides, "phase": self._phase}, begins, {}, {})
-        if self._rides.size:
-            rooms.meeting.update(self._room_to_meet())
-        if self._sheaves or self._winches:
-            rooms.spinning.update(self._room_to_spin())
-        return rooms
-
-    def bind_line(self, number: int, **values: Any) -> None:
-        """Put values in their places in the jobs of a line."""
-        for table in self._tables[number]:
-            table.bind(**values)
-        if number in self._lone_tables:
-            self._lone_tables[number].bind(**self._by_itself(number, values))
-        elif self._together is not self._all:
-            for table in self._joined_tables[number]:
-                table.bind(**values)
-
-    def wind(self, number: int, alone: int, **values: Any) -> None:
-        """Put values in the jobs of a line that is paid out; alone: what its iterations call where it is by itself."""
-        self._wound[number], self._reels[number] = alone, values["reel_table"]
-        self.bind_line(number, **values)
-
-    def _by_itself(self, number: int, values: dict[str, Any]) -> dict[str, Any]:
-        """The same for a line that is solved by itself: what is free moves as told, and no factors serve again."""
-        found = {**values}
-        if "iterated" in values:
-            found["iterated"] = self._wound.get(number, 0)
-        if not self._mixes[number]:
-            return found
-        if (line := values.get("line")) is not None:
-            moved = line.moved.copy()
-            moved[moved == FREE] = MOVES
-            found["line"] = line._replace(moved=moved)
-        serve = number in self._contacts or self.lines[number].winds
-        if (work := values.get("work")) is not None and not (serve or work.torsion.known.size):
-            found["work"] = work._replace(X=work.X[: self.lines[number].line.s.size * ROW])
-        for name in {"old", "new"} & {*values}:
-            found[name] = values[name]._replace(sheave=NO_SHEAVES)
-        return found
-
-    def _group(self) -> None:
-        """Which lines are solved by themselves from now on, and tables for these and for the others."""
-        some = not any(self._mixes) or bool((self._near != 0).any())  # else what is free moves with the first line
-        self._alone[:] = (self._near == 0) & (some | (np.arange(len(self.lines)) > 0))
-        self.lone, self.joined = (np.flatnonzero(self._alone == x).tolist() for x in (1, 0))
-        self.lone_numbers = np.zeros((len(self.lone), self._numbers.shape[2]), np.int64)
-        self._lone_tables = {}
-        for k, numbers in zip(self.lone, self.lone_numbers, strict=True):
-            table, own = self._tables[k][0].again(numbers), {"line": self.lines[k].line, "work": self.work[k]}
-            table.bind(task=self._task_of_run(k), **self._by_itself(k, own | {"iterated": 0}))
-            self._lone_tables[k] = table
-        self._together, self._joined_tables = self._all, dict(enumerate(self._tables))
-        if self.lone and not self.is_apart:
-            numbers = np.zeros((2, len(self.joined), self._numbers.shape[2]), np.int64)
-            self._joined_tables = {
-                k: tuple(mine.again(x[j]) for mine, x in zip(self._tables[k], numbers, strict=True))
-                for j, k in enumerate(self.joined)
-            }
-            self._together = JointJobs(self._rooms, numbers, self.joined)
-            if self._touched:
-                self._together.touch(*self._touched)
-
-    @property
-    def mixes(self) -> bool:
-        """Whether a line may come near what is free, with which it is then solved."""
-        return any(self._mixes)
-
-    def find_near(self, now: NetworkState, t: float) -> None:
-        """Find which lines are near what is free in the state of now, t (s), and solve these with it from now on."""
-        self._bind_states(0, now, now)
-        for x in self.lines:
-            carry_obstacles(t, t, x.sea)
-        shifts = self.body_work[:, U : U + 3].copy()
-        self.body_work[:, U : U + 3] = 0.0
-        self._all.ask_bodies(CARRY)
-        self.body_work[:, U : U + 3] = shifts
-        find_near(self._all.jobs[0].numbers)
-
-    def regroup(self) -> dict[str, Any]:
-        """Solve lines with what they have been found near, and others by themselves: as of `take_turns`."""
-        self._group()
-        return self._bind_turns()
-
-    def take_line(self, number: int, line: Line) -> None:
-        """A line is in other arrays from now on."""
-        self.lines = tuple(x._replace(line=line) if k == number else x for k, x in enumerate(self.lines))
-        self.bind_line(number, line=line)
-
-    def tables_by_itself(self, number: int) -> tuple[Table, Table, Table]:
-        """Jobs of a line that is solved by itself: of that, and of steps of even and of odd parity."""
-        even, odd = self._tables[number]
-        return self._lone_tables[number], even, odd
-
-    def _task_of_run(self, number: int) -> Task:
-        return Task(RUN, limits=self.limits_by_itself(number))
-
-    def limits_by_itself(self, number: int) -> Limits:
-        """What Newton's method works with in a line that is solved by itself."""
-        return Limits(REACH * self.lines[number].length, self.lines[number].scale, MOST_OF_STEP, self.tolerance)
-
-    def marcher_of(self, number: int) -> int:
-        """Address of the kernel that solves steps of a line that is solved by itself."""
-        return self._kernel_of(number).address(self._numbers[0, number])
-
-    def _kernel_of(self, number: int) -> Any:
-        return in_plane if self.lines[number].line.bits & PLANAR else in_space
-
-    @property
-    def is_apart(self) -> bool:
-        """Whether every line is solved by itself, whatever comes."""
-        return not (self.joined or len(self.net) or len(self.bodies) or any(self._mixes))
-
-    @property
-    def _marches_alone(self) -> bool:
-        """Whether forces of every line are found by itself, too: where it touches itself they are found with others."""
-        return self.is_apart and not self._contacts
-
-    def joint_solver(self) -> int:
-        """Address of the kernel that solves steps of lines that are joined; 0: none are, and it is not compiled."""
-        if self.is_apart:
-            return 0
-        self._let_march()
-        return solve_system.address(self._all.jobs[0].numbers)
-
-    def _let_march(self) -> None:
-        """Jobs of joined lines know the kernel that marches them, in space, which takes long to compile."""
-        self._rooms.job["solver"] = marcher = in_space.address(self._numbers[0, 0])
-        for table in (*self._all.jobs, *self._together.jobs):
-            table.bind(solver=marcher)
-
-    def adopt_cells(self, number: int, line: Line, sea: Sea, work: Work, books: Books) -> None:
-        """A line is in other arrays from now on, of which its jobs know."""
-        self.lines = tuple(x._replace(line=line, sea=sea) if k == number else x for k, x in enumerate(self.lines))
-        self.work[number], self.books[number] = work, books
-
-    def _room_to_meet(self) -> dict[str, Any]:
-        """Room of lines that touch the bodies that carry obstacles."""
-        bodies = sorted({int(b) for b in self._rides if b >= 0})
-        slots = np.full(len(self.bodies), -1, np.int64)
-        slots[bodies] = np.arange(len(bodies))
-        total, rows = sum(x.line.s.size for x in self.lines), EACH_BODY * len(bodies)
-        self._pressing = np.zeros(1 + len(bodies), np.int64)
-        self._pressed = {
-            "gaps": np.zeros_like(self._gaps), "rides": self._rides, "carriers": np.array(bodies, np.int64),
-            "slots": slots, "phase": self._phase,
-            "found": self._pressing, "touched": np.zeros((total * len(bodies), TOUCHED)),
-            "own": np.zeros((len(bodies), 36)), "wrench": np.zeros((len(bodies), 6)),
-            "marks": np.zeros(total, np.int64), "kept": np.zeros((total, SIZE)),
-            "moved": np.zeros((len(self.bodies), 6)), "responses": np.zeros((rows, total, SIZE)),
-            "turned": np.zeros((rows, len(self.bodies), 6)), "coupling": np.zeros((rows, rows + 1)),
-            "order": np.zeros(rows, np.int64),
-        }  # fmt: skip
-        return self._pressed
-
-    def _room_to_spin(self) -> dict[str, Any]:
-        """Room of sheaves that lines turn, and of winches that give of joined lines what keeps their tension."""
-        nodes, bodies = sum(x.line.s.size for x in self.lines), len(self.bodies)
-        return {
-            "gaps": np.zeros_like(self._gaps), "phase": self._phase, "asked": self._asked,
-            "marks": np.zeros(nodes, np.int64), "kept": np.zeros((nodes, SIZE)), "moved": np.zeros((bodies, 6)),
-            "turned": np.zeros((self._sheaves, bodies, 6)), "lengthened": np.zeros((self._winches, nodes, SIZE)),
-            "drawn": np.zeros((self._winches, bodies, 6)),
-        }  # fmt: skip
-
-    def _touch(self) -> None:
-        """Lines that touch themselves do so from now on, with the books as they are."""
-        states = [state_for(x.line) for x in self.lines]
-        tables = np.zeros((len(self.lines), Table(blank_contact_job).numbers.size), np.int64)
-        shared = np.array([[-1, 0]] * len(self.lines), np.int64)
-        for k, contact in self._contacts.items():
-            both = states[k], states[k]
-            numbers = contact.attach(self.lines[k].line, self.lines[k].ends, both, self.work[k], self.books[k])
-            self.bind_line(k, contact=contact.call, contact_table=numbers)
-            tables[k], shared[k] = numbers, (k, 0)
-        if self.shared is not None:
-            self._share(tables, shared)
-        nodes = sum(x.line.s.size for x in self.lines)
-        room = {
-            "gaps": np.zeros_like(self._gaps), "kept": np.zeros((nodes, SIZE)), "asked": self._at_rest,
-            "moved": np.zeros((len(self.bodies), 6)), "hessenberg": room_for_products(), "phase": self._phase,
-        }  # fmt: skip
-        self._touched = room, tables, shared
-        self._all.touch(*self._touched)
-        if self._together is not self._all:
-            self._together.touch(*self._touched)
-
-    @property
-    def line_tables(self) -> NDArray[np.int64]:
-        """(2, L, ..) jobs of all lines, of steps of even and of odd parity."""
-        return self._numbers
-
-    def look_at(self, states: NetworkState) -> None:
-        """Let the jobs of even parity lead from states to the same."""
-        self.turns = None
-        self._bind_states(0, states, states)
-
-    def _share(self, tables: NDArray[np.int64], shared: NDArray[np.int64]) -> None:
-        """Lines that may touch each other do so; the last of them is asked, and goes into the tables of all contact."""
-        found = self.shared
-        assert found is not None
-        one, both = found.attach(self._numbers, self.joints, self.books)
-        for k, begin in zip(found.lines, found.begins.tolist(), strict=True):
-            self.bind_line(k, contact=found.beside)
-            shared[k] = found.last, begin
-        for own in (self._tables, self._joined_tables):
-            for table, numbers in zip(own[found.last], both, strict=True):
-                table.bind(contact=found.call, contact_table=numbers)
-        tables[found.last] = one
-
-    def keep_books(self, books: Sequence[Books]) -> None:
-        """Keep powers, work and extremes of the lines in these books from now on."""
-        self.books = list(books)
-        for k, each in enumerate(books):
-            asks = each.asked.size or each.walls.size
-            self.bind_line(
-                k, books=each, quantities=note_quantities.address(self._numbers[0, 0]) if asks else 0
-            )  # fmt: skip
-        if self._contacts or self.shared is not None:
-            self._touch()
-
-    def take_turns(self, states: tuple[NetworkState, NetworkState]) -> dict[str, Any]:
-        """Steps lead from the first state to the second and back from now on: what run.network_run.StepsJob has."""
-        self.turns = states
-        return self._bind_turns()
-
-    def jobs_of_joined(self) -> tuple[Table, Table]:
-        """Jobs of both parities without lines that are solved by themselves: none is left where all are."""
-        if self.joined or self._together is not self._all:
-            return self._together.jobs
-        even, odd = (x.again(np.empty_like(x.numbers)) for x in self._together.jobs)
-        for x in (even, odd):
-            x.bind(tables=self.lone_numbers[:0], joints=np.zeros((0, 2), np.int64))
-        return even, odd
-
-    def _bind_turns(self) -> dict[str, Any]:
-        """Let all jobs lead from one of the states that take turns to the other."""
-        assert self.turns is not None
-        old, new = self.turns
-        for parity, (a, b) in enumerate((self.turns, self.turns[::-1])):
-            self._bind_states(parity, a, b)
-        for k, contact in self._contacts.items():
-            contact.set_states(old.lines[k], new.lines[k])
-        for k, table in self._lone_tables.items():
-            table.bind(**self._by_itself(k, {"old": old.lines[k], "new": new.lines[k]}))
-            self._bind_pushes(k)
-        numbers, mixes = self._all.jobs[0].numbers, any(self._mixes)
-        return {
-            "even": numbers, "odd": self._all.jobs[1].numbers,
-            "joined_even": self._together.jobs[0].numbers, "joined_odd": self._together.jobs[1].numbers,
-            "joined": np.array(self.joined, np.int64), "lone": self.lone_numbers,
-            "lone_lines": np.array(self.lone, np.int64), "marchers": np.array(self._marchers(), np.int64),
-            "leader": lead_lone.address(numbers) if mixes else 0, "finder": find_near.address(numbers) if mixes else 0,
-        }  # fmt: skip
-
-    def _marchers(self) -> list[int]:
-        """Addresses of the kernels that solve steps of the lines that are solved by themselves."""
-        return [self.marcher_of(k) for k in self.lone]
-
-    def carry(self, number: int, pushes: list[Floats]) -> None:
-        """Carry a push out of its plane along with a line: (N+1, 4) of states of even parity, and of odd."""
-        self._pushes[number] = pushes
-        self._bind_pushes(number)
-
-    def _bind_pushes(self, number: int) -> None:
-        if number in self._pushes and number in self._lone_tables:
-            was, now = self._pushes[number]
-            self._lone_tables[number].bind(was=was, now=now)
-
-    def exchange_pushes(self) -> None:
-        """What belongs to states of odd parity does so to those of even from now on."""
-        for number, pushes in self._pushes.items():
-            pushes.reverse()
-            self._bind_pushes(number)
-
-    def _bind_states(self, parity: int, old: NetworkState, new: NetworkState) -> None:
-        for tables, a, b in zip(self._tables, old.lines, new.lines, strict=True):
-            tables[parity].bind(old=a, new=b)
-        self._all.bind_bodies(parity, old.bodies, new.bodies)
-        if self._together is not self._all:
-            for k, tables in self._joined_tables.items():
-                tables[parity].bind(old=old.lines[k], new=new.lines[k])
-            self._together.bind_bodies(parity, old.bodies, new.bodies)
+        self._make_tables()
 
     def _solve(self, task: Task, old: NetworkState, new: NetworkState, t: float = 0.0) -> NetworkTaken:
         self.turns = None
@@ -483,7 +92,7 @@ class NetworkSolver:
         limits = task.limits
         self._asked[:] = (
             task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most,
-            task.rho_before, task.fixed, t, 1.0, task.cut, limits.tolerance,
+            task.rho_before, task.fixed, t, 1.0, task.cut, limits.tolerance, task.cv, task.ca,
         )  # fmt: skip
         self._let_march()
         outcome, iterations, left, line, where = solve_system(self._all.jobs[0].numbers)
@@ -551,7 +160,7 @@ class NetworkSolver:
     @property
     def presses_bodies(self) -> bool:
         """Whether a line touched a free body in the last march."""
-        return bool(self._pressing.any())
+        return bool(self._rides.size) and bool(self._pressed["found"].any())
 
     def pressed_bodies(self, states: NetworkState, cv: float = 0.0) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
         """What lines that touch bodies do to them in states at rest: rows (n, TOUCHED) of nodes, how that changes as
@@ -560,14 +169,9 @@ class NetworkSolver:
         self.evaluate_forces(states, 0.0)
         if cv:
             self._solve(Task(ASSEMBLY, cv=cv, limits=Limits(1.0, 1.0, 1)), states, states)
-        rows = self._pressed["touched"][: self._pressing[0]]
+        rows = self._pressed["touched"][: self._pressed["found"][0]]
         own, wrench = (self._pressed[x].copy() for x in ("own", "wrench"))
         return rows.copy(), own, wrench, self._pressed["carriers"]
-
-    @property
-    def _touching_lines(self) -> set[int]:
-        """Numbers of the lines that touch themselves, or may touch others."""
-        return {*self._contacts, *(self.shared.lines if self.shared is not None else ())}
 
     @property
     def narrowest(self) -> float:
@@ -822,15 +426,6 @@ class NetworkSolver:
         C = C * arm * arm[:, None]
         give = np.linalg.eigvalsh(0.5 * (C + C.T))
         return bool(give[0] > -1e-6 * NEUTRAL * give[-1])
-
-    def keep_factors(self) -> None:
-        """Keep all factors of all lines in every march from now on, for other right-hand sides."""
-        for k, (x, work) in enumerate(zip(self.lines, self.work, strict=True)):
-            self.work[k] = work._replace(X=np.zeros((x.line.h.size + 1) * (ROW + KEPT)))
-            self.bind_line(k, work=self.work[k])
-        if any(self._mixes):  # other right-hand sides have what lines may do to what is free
-            self._near[self._mixes], self._mixes = -1, [False] * len(self.lines)
-            self._group()
 
     def factor(self, states: NetworkState, ca: float) -> bool:
         """Leave the factors of states as they are where `keep_factors` keeps them; ca: as of `evaluate_forces`.

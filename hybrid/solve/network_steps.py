@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
-from hybrid.kernels.junctions.bodies import WORK
-from hybrid.kernels.junctions.members_water import stir_members
+from hybrid.kernels.junctions.bodies import WORK, stir_members
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.remesh import ask_cells, change_cells
 from hybrid.kernels.mesh.zone_step import follow_zones

@@ -16,129 +16,306 @@ Lines are eliminated (matrix A, all but P and Q) with bodies where they are, and
 y = Q x the rest is of rank 12 for every body that is touched: corrections are those without P and Q, less the responses
 to the columns of P times z and to unit forces on the bodies times y, and z and y solve a small dense system.  Its factors
 and the responses serve all corrections of an iteration: those that contact of lines makes of one are many.
-kernels.run.network and kernels.junctions.lines_contact call `meet_bodies` by its address, so that systems without such bodies
-compile none of it.
 """
 
 from __future__ import annotations
 
-from hybrid.kernels.algebra.block_elimination import ROW, SIZE, SPAN
-from hybrid.kernels.algebra.kept_factors import carry_given
-from hybrid.kernels.junctions.bodies import X
-from hybrid.kernels.junctions.body_forces import (
-    BY_BODY,
-    BY_NODES,
-    EACH_BODY,
-    OF_LINE,
-    OF_NODE,
-    OF_SLOT,
-    carry_shapes,
-    first_of_bodies,
-    hold_rolling,
-    press_bodies,
-    push_bodies,
-    read_meeting,
-    stiffen,
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.algebra.block_elimination import SIZE
+from hybrid.kernels.algebra.rotations import add, cross, get3, madd, mat_mat, mat_vec, mscale, msub, sub, vector
+from hybrid.kernels.junctions.bodies import (
+    FRAME,
+    LINES,
+    PLACE,
+    SOFTEST,
+    SPRING,
+    U,
+    V,
+    W,
+    X,
+    matrix,
 )
-from hybrid.kernels.junctions.joined_lines import last_block, substitute_dense
-from hybrid.kernels.junctions.junctions import END, START, correct_all, gather_right_sides
+from hybrid.kernels.junctions.borders import (
+    AGAIN,
+    BEFORE_MARCH,
+    BLOCK,
+    CARRY,
+    COUPLE,
+    FORCE,
+    HOLD,
+    add_corrections,
+    answer_right_sides,
+    clear_right_side,
+    eliminate_right_side,
+    keep_corrections,
+    push_node,
+    put_corrections,
+)
+from hybrid.kernels.junctions.junctions import count_tensions, first_unknown
+from hybrid.kernels.junctions.network_job import read_system
+from hybrid.kernels.laws.obstacle_motion import put_matrix, put_vector, row3, transposed
+from hybrid.kernels.laws.obstacles import force_of_obstacle
 from hybrid.kernels.machine.compile import called, inner, kernel
-from hybrid.kernels.march.assembly import JOINED
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.state.obstacle_rows import (
+    AXIS,
+    BEGAN,
+    ENDED,
+    OFFSET,
+    RADIUS,
+    SIDE,
+    SPEED,
+    STILL_AXIS,
+    STILL_SIDE,
+    SWEEP,
+    TURNED,
+    TURNING,
+)
+from hybrid.kernels.state.obstacle_rows import PLACE as CENTRE
+from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.job import read
+from hybrid.kernels.step.newton import CORRECTION
 
-# What is asked: shapes are brought to where their bodies are; forces of contact are found; these and R are put into the
-# equations of the bodies; corrections of lines and bodies are coupled; turns that contact does not hold get a spring; of other
-# corrections of the same iteration: R is put into the equations, and they are coupled.
-CARRY, PRESS, STIFFEN, COUPLE, HOLD, AGAIN = range(6)
-
-
-@inner
-def is_fixed(ends, i, n):
-    """Whether a node is an end that is held."""
-    end = 0 if i == 0 else 1
-    return (i == 0 or i == n) and ends.held[end] != 0 and ends.held[end] != JOINED
-
-
-@inner
-def clear_right_side(job, l):
-    """No right-hand side in the eliminated line l."""
-    line_job, n = read(job.tables[l]), read(job.tables[l]).line.h.shape[0]
-    X_, x, o = line_job.work.X, line_job.work.x, job.begins[l]
-    if job.joints[l, START] >= 0:
-        for a in range(3):
-            line_job.work.rows[0, (a + 1) * 24 + 23] = 0.0
-    for i in range(n + 1):
-        job.marks[o + i] = 0
-        for j in range(SIZE):
-            x[i, j] = 0.0
-            X_[i * ROW + j * SPAN + SPAN - 1] = 0.0
-    if job.joints[l, END] >= 0:
-        at = last_block(X_, n)
-        for j in range(SIZE):
-            X_[at + 64 + j] = 0.0
+# Columns of a node that touches a body.
+OF_LINE = 0
+OF_NODE = 1
+OF_SLOT = 2  # slot of the body
+BY_BODY = 3  # P (3 x 6)
+BY_NODES = 21  # Q (6 x 9)
+TOUCHED = 75
+# Responses of a body: to the columns of P, to unit forces on it.
+EACH_BODY = 12
+ORIGIN = (0.0, 0.0, 0.0)
 
 
-@inner
-def add_column(job, slot, c):
-    """Column c of P of a body into the right-hand sides of the lines."""
-    for t in range(job.found[0]):
-        row = job.touched[t]
-        if int(row[OF_SLOT]) != slot:
-            continue
-        l, i = int(row[OF_LINE]), int(row[OF_NODE])
-        line_job = read(job.tables[l])
-        if i == 0 and job.joints[l, START] >= 0:  # the march has replaced its balance by its place
-            for a in range(3):
-                line_job.work.rows[0, (a + 1) * 24 + 23] += row[BY_BODY + 6 * a + c]
-        elif not is_fixed(line_job.ends, i, line_job.line.h.shape[0]):
-            job.marks[job.begins[l] + i] = 1
-            for a in range(3):
-                line_job.work.x[i, 1 + a] += row[BY_BODY + 6 * a + c]
+class MeetingJob(NamedTuple):
+    """Arguments of the entry: S bodies with shapes, in slots; M obstacles; T nodes of all lines."""
+
+    system: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
+    carriers: NDArray[np.int64]  # (S,) the body of each slot
+    slots: NDArray[np.int64]  # (B,) the slot of each body; -1: it has no shape
+    found: NDArray[np.int64]  # (1 + S,) nodes that touch, and those that touch each body
+    touched: Floats  # (T M, TOUCHED)
+    own: Floats  # (S, 36) R
+    wrench: Floats  # (S, 6) W
+    kept: Floats  # (T, 5) corrections of lines without P and Q
+    moved: Floats  # (B, 6) and of bodies
+    responses: Floats  # (12 S, T, 5) of lines
+    turned: Floats  # (12 S, B, 6) of bodies
+    coupling: Floats  # (12 S, 12 S + 1)
+    order: NDArray[np.int64]  # (12 S,) exchanges of its rows
+    rank: int = 0
+
+
+def blank_meeting_job() -> MeetingJob:
+    """A job with the types that every one has."""
+    z, one = np.zeros, np.zeros(1, np.int64)
+    return MeetingJob(
+        one, one, one, one, z((1, TOUCHED)), z((1, 36)), z((1, 6)), z((2, SIZE)), z((1, 6)), z((EACH_BODY, 2, SIZE)),
+        z((EACH_BODY, 1, 6)), z((EACH_BODY, EACH_BODY + 1)), one,
+    )  # fmt: skip
+
+
+read_meeting = reader(blank_meeting_job())
 
 
 @inner
-def eliminate_right_side(job, l):
-    """Carry the right-hand side of line l through its kept factors."""
-    line_job, n = read(job.tables[l]), read(job.tables[l]).line.h.shape[0]
-    X_, x, o, joined = line_job.work.X, line_job.work.x, job.begins[l], job.joints[l, END] >= 0
-    begin = n + 1
-    for i in range(n, -1, -1):
-        if job.marks[o + i] != 0:
-            begin = i
-    if begin > n:
-        return
-    carry_given(X_, line_job.work.W, job.marks[o:], x, joined, begin)
-    for i in range(begin, n + 1):
-        for k in range(SIZE):
-            X_[i * ROW + k * SPAN + SPAN - 1] = x[i, k]
-    if joined:
-        at = last_block(X_, n)
-        for k in range(SIZE):
-            X_[at + 64 + k] = x[n, k]
+def carry_shape(sea, k, old, new, work):
+    """Bring obstacle k of a line to where its body is at the end of the step."""
+    c = add(vector(old, PLACE), vector(work, U))
+    before, R = matrix(old, FRAME), matrix(new, FRAME)
+    put_vector(sea.carried, k, BEGAN, vector(old, PLACE))
+    put_vector(sea.carried, k, ENDED, c)
+    put_matrix(sea.carried, k, SWEEP, mat_mat(R, transposed(before)))
+    put_vector(sea.carried, k, SPEED, vector(new, V))
+    put_vector(sea.carried, k, TURNING, mat_vec(R, vector(new, W)))
+    put_matrix(sea.carried, k, TURNED, R)
+    put_vector(sea.obstacles, k, CENTRE, add(c, mat_vec(R, row3(sea.carried, k, OFFSET))))
+    put_vector(sea.obstacles, k, AXIS, mat_vec(R, row3(sea.carried, k, STILL_AXIS)))
+    put_vector(sea.obstacles, k, SIDE, mat_vec(R, row3(sea.carried, k, STILL_SIDE)))
+
+
+@inner
+def carry_shapes(system):
+    """Bring all shapes to where their bodies are."""
+    for l in range(system.tables.shape[0]):
+        sea = read(system.tables[l]).sea
+        for k in range(system.rides.shape[0]):
+            b = system.rides[k]
+            if b >= 0:
+                carry_shape(sea, k, system.old[b], system.new[b], system.work[b])
+
+
+@inner
+def unit_of(c):
+    """Shift and turn of a unit of c."""
+    unit = (1.0 if c % 3 == 0 else 0.0, 1.0 if c % 3 == 1 else 0.0, 1.0 if c % 3 == 2 else 0.0)
+    if c < 3:
+        return unit, ORIGIN
+    return ORIGIN, unit
+
+
+@inner
+def put_by_body(row, own, force, rho, e, c):
+    """Column c of P into a row of `touched`, and of R into `own`; force: F, D, GL, GR; e: chords before, after."""
+    F, D, L, R = force
+    shift, turn = unit_of(c)
+    moved = mat_vec(D, add(shift, cross(turn, rho)))
+    moved = add(moved, add(mat_vec(L, cross(turn, e[0])), mat_vec(R, cross(turn, e[1]))))
+    dF = sub(cross(turn, F), moved)
+    dM = sub(cross(rho, dF), cross(shift, F))
+    for j in range(3):
+        row[BY_BODY + 6 * j + c] = dF[j]
+        own[6 * j + c] -= dF[j]
+        own[6 * (3 + j) + c] -= dM[j]
+
+
+@inner
+def put_by_nodes(row, force, rho):
+    """Q into a row of `touched`."""
+    F, D, L, R = force
+    here = msub(madd(D, L), R)
+    for n in range(3):
+        A = mscale(-1.0, L) if n == 0 else here if n == 1 else R
+        for j in range(3):
+            shift, _ = unit_of(j)
+            dF = mat_vec(A, shift)
+            dM = cross(rho, dF)
+            if n == 1:
+                dM = add(dM, cross(shift, F))
+            for i in range(3):
+                row[BY_NODES + 9 * i + 3 * n + j] = -dF[i]
+                row[BY_NODES + 9 * (3 + i) + 3 * n + j] = -dM[i]
 
 
 @called
-def respond(job, slot, c):
+def press_node(system, job, l, i, cv):
+    """Contact of node i of line l with bodies: its forces on them, and a row of `touched` for each that it touches."""
+    line_job = read(system.tables[l])
+    line, sea, e, n = line_job.line, line_job.sea, line_job.new.e, line_job.line.h.shape[0]
+    x = add(get3(line_job.old.r, i), get3(line_job.work.u, i))
+    for k in range(system.rides.shape[0]):
+        b = system.rides[k]
+        if b < 0:
+            continue
+        touches, F, D, L, R = force_of_obstacle(line, sea, k, i, x, line_job.work.u, line_job.new.v, e, cv)
+        if not touches:
+            continue
+        slot, row = job.slots[b], job.touched[job.found[0]]
+        job.found[0] += 1
+        job.found[1 + slot] += 1
+        row[OF_LINE], row[OF_NODE], row[OF_SLOT] = l, i, slot
+        rho = sub(x, row3(sea.carried, k, ENDED))
+        M = cross(rho, F)
+        for j in range(3):
+            job.wrench[slot, j] -= F[j]
+            job.wrench[slot, 3 + j] -= M[j]
+        before = get3(e, i - 1) if i > 0 else ORIGIN
+        after = get3(e, i) if i < n else ORIGIN
+        force = F, D, L, R
+        for c in range(6):
+            put_by_body(row, job.own[slot], force, rho, (before, after), c)
+        put_by_nodes(row, force, rho)
+
+
+@inner
+def press_bodies(system, job, cv):
+    """Forces of contact of all lines on bodies, with what they change by."""
+    for j in range(job.found.shape[0]):
+        job.found[j] = 0
+    for slot in range(job.own.shape[0]):
+        for j in range(36):
+            job.own[slot, j] = 0.0
+        for j in range(6):
+            job.wrench[slot, j] = 0.0
+    for l in range(system.tables.shape[0]):
+        for i in range(read(system.tables[l]).line.s.shape[0]):
+            press_node(system, job, l, i, cv)
+    for slot in range(job.own.shape[0]):
+        for j in range(6):
+            system.work[job.carriers[slot], LINES + j] += job.wrench[slot, j]
+
+
+@inner
+def first_of_bodies(system):
+    """Where the unknowns of the bodies begin."""
+    points = system.net.shape[0]
+    return first_unknown(points, count_tensions(system.joints), points)
+
+
+@inner
+def stiffen(system, job):
+    """R into the matrix of the bodies."""
+    first = first_of_bodies(system)
+    for slot in range(job.own.shape[0]):
+        at = first + 6 * job.carriers[slot]
+        for i in range(6):
+            for j in range(6):
+                system.A[at + i, at + j] += job.own[slot, 6 * i + j]
+
+
+@inner
+def hold_rolling(system):
+    """Springs against turns as weak as SOFTEST of what contact holds of shifts, at the radius of the shape."""
+    first, rows = first_of_bodies(system), read(system.tables[0]).sea.obstacles
+    for k in range(system.rides.shape[0]):
+        b = system.rides[k]
+        if b < 0:
+            continue
+        stiffest, at = 0.0, first + 6 * b
+        for j in range(3):
+            stiffest = max(stiffest, abs(system.A[at + j, at + j]))
+        spring = SOFTEST * stiffest * rows[k, RADIUS] ** 2
+        if spring > system.work[b, SPRING]:
+            for j in range(3):
+                system.A[at + 3 + j, at + 3 + j] -= spring - system.work[b, SPRING]
+            system.work[b, SPRING] = spring
+
+
+@inner
+def push_bodies(system, job):
+    """W into the right-hand side of the bodies."""
+    first, m = first_of_bodies(system), system.A.shape[1] - 1
+    for slot in range(job.own.shape[0]):
+        for j in range(6):
+            system.A[first + 6 * job.carriers[slot] + j, m] -= job.wrench[slot, j]
+
+
+@inner
+def add_column(system, job, slot, c):
+    """Column c of P of a body into the right-hand sides of the lines."""
+    for t in range(job.found[0]):
+        row, o = job.touched[t], BY_BODY + c
+        if int(row[OF_SLOT]) == slot:
+            push_node(system, int(row[OF_LINE]), int(row[OF_NODE]), (row[o], row[o + 6], row[o + 12]))
+
+
+@called
+def respond(system, job, slot, c):
     """Corrections of all lines and bodies to column c of P of a body, or from 6 on to a unit force or moment on it.
 
     False if they are not finite.
     """
-    m = job.A.shape[1] - 1
-    for l in range(job.tables.shape[0]):
-        clear_right_side(job, l)
+    for l in range(system.tables.shape[0]):
+        clear_right_side(system, l)
     if c < 6:
-        add_column(job, slot, c)
-        for l in range(job.tables.shape[0]):
-            eliminate_right_side(job, l)
-    gather_right_sides(job, m)
-    if c >= 6:
-        job.A[first_of_bodies(job) + 6 * job.carriers[slot] + c - 6, m] += 1.0
-    substitute_dense(job.A, m)
-    return correct_all(job, job.net.shape[0], m) < 0
+        add_column(system, job, slot, c)
+        for l in range(system.tables.shape[0]):
+            eliminate_right_side(system, l)
+        return answer_right_sides(system, job.rank)
+    at = 3 * system.net.shape[0] + 6 * job.carriers[slot] + c - 6
+    system.right[at] = 1.0
+    good = answer_right_sides(system, job.rank)
+    system.right[at] = 0.0
+    return good
 
 
 @inner
-def change_of_wrench(job, slot, out):
+def change_of_wrench(system, job, slot, out):
     """Q x of a body for the corrections of the lines, into out (6,)."""
     for j in range(6):
         out[j] = 0.0
@@ -146,7 +323,7 @@ def change_of_wrench(job, slot, out):
         row = job.touched[t]
         if int(row[OF_SLOT]) != slot:
             continue
-        line_job, i = read(job.tables[int(row[OF_LINE])]), int(row[OF_NODE])
+        line_job, i = read(system.tables[int(row[OF_LINE])]), int(row[OF_NODE])
         x, n = line_job.work.x, line_job.line.h.shape[0]
         for o in range(3):
             if 0 <= i - 1 + o <= n:
@@ -156,54 +333,15 @@ def change_of_wrench(job, slot, out):
 
 
 @inner
-def select(job, column):
+def select(system, job, column):
     """z and y of the bodies that are touched in the corrections as they are, into a column of the coupling."""
     for slot in range(job.own.shape[0]):
         at = EACH_BODY * slot
         for j in range(6):
-            job.coupling[at + j, column] += job.work[job.carriers[slot], X + j]
-        change_of_wrench(job, slot, job.q)
+            job.coupling[at + j, column] += system.work[job.carriers[slot], X + j]
+        change_of_wrench(system, job, slot, system.q)
         for j in range(6):
-            job.coupling[at + 6 + j, column] += job.q[j]
-
-
-@inner
-def keep_corrections(job, kept, moved):
-    """Corrections of lines and bodies into kept (T, 5), moved (B, 6)."""
-    for l in range(job.tables.shape[0]):
-        x, o = read(job.tables[l]).work.x, job.begins[l]
-        for i in range(x.shape[0]):
-            for j in range(SIZE):
-                kept[o + i, j] = x[i, j]
-    for b in range(job.work.shape[0]):
-        for j in range(6):
-            moved[b, j] = job.work[b, X + j]
-
-
-@inner
-def put_corrections(job, kept, moved):
-    """The same back."""
-    for l in range(job.tables.shape[0]):
-        x, o = read(job.tables[l]).work.x, job.begins[l]
-        for i in range(x.shape[0]):
-            for j in range(SIZE):
-                x[i, j] = kept[o + i, j]
-    for b in range(job.work.shape[0]):
-        for j in range(6):
-            job.work[b, X + j] = moved[b, j]
-
-
-@inner
-def add_corrections(job, part, kept, moved):
-    """A part of kept corrections to those of lines and bodies."""
-    for l in range(job.tables.shape[0]):
-        x, o = read(job.tables[l]).work.x, job.begins[l]
-        for i in range(x.shape[0]):
-            for j in range(SIZE):
-                x[i, j] += part * kept[o + i, j]
-    for b in range(job.work.shape[0]):
-        for j in range(6):
-            job.work[b, X + j] += part * moved[b, j]
+            job.coupling[at + 6 + j, column] += system.q[j]
 
 
 @inner
@@ -213,40 +351,40 @@ def touches(job, r):
 
 
 @inner
-def apply(job):
+def apply(system, job):
     """Couple corrections that were found without P and Q: less the responses times z and y."""
     last = job.coupling.shape[0]
     for r in range(last):
         job.coupling[r, last] = 0.0
-    select(job, last)
+    select(system, job, last)
     substitute_small(job.coupling, job.order)
     for r in range(last):
         if touches(job, r):
-            add_corrections(job, -job.coupling[r, last], job.responses[r], job.turned[r])
+            add_corrections(system, -job.coupling[r, last], job.responses[r], job.turned[r])
 
 
 @inner
-def couple(job):
-    """Couple the corrections of lines and bodies that touch; 0: that fails, 1: nothing touches, 2: done."""
+def couple(system, job):
+    """Couple the corrections of lines and bodies that touch; 0: that fails."""
     last = job.coupling.shape[0]
     if job.found[0] == 0:
-        return 1
-    keep_corrections(job, job.kept, job.moved)
+        return 1.0
+    keep_corrections(system, job.kept, job.moved)
     for r in range(last):
         for c in range(last):
             job.coupling[r, c] = 1.0 if r == c else 0.0
     for r in range(last):
         if not touches(job, r):
             continue
-        if not respond(job, r // EACH_BODY, r % EACH_BODY):
-            return 0
-        keep_corrections(job, job.responses[r], job.turned[r])
-        select(job, r)
+        if not respond(system, job, r // EACH_BODY, r % EACH_BODY):
+            return 0.0
+        keep_corrections(system, job.responses[r], job.turned[r])
+        select(system, job, r)
     if not factor_small(job.coupling, job.order):
-        return 0
-    put_corrections(job, job.kept, job.moved)
-    apply(job)
-    return 2
+        return 0.0
+    put_corrections(system, job.kept, job.moved)
+    apply(system, job)
+    return 1.0
 
 
 @inner
@@ -290,21 +428,21 @@ def substitute_small(A, order):
 
 @kernel
 def meet_bodies(table):
-    """Do what is asked of lines that touch bodies (CARRY, PRESS, STIFFEN, COUPLE, HOLD, AGAIN); 0: it fails."""
+    """Answer for bodies that lines touch (kernels.junctions.borders); corrections that are no iteration have none."""
     job = read_meeting(table)
-    task, phase = read(job.tables[0]).task, job.phase[0]
-    if phase == CARRY:
-        carry_shapes(job)
-    elif phase == PRESS:
-        press_bodies(job, task.cv)
-    elif phase == STIFFEN:
-        stiffen(job)
-        push_bodies(job)
-    elif phase == HOLD:
-        hold_rolling(job)
-    elif phase == AGAIN:
-        if job.found[0] > 0:
-            apply(job)
-    else:
-        return couple(job)
-    return 1
+    system = read_system(job.system)
+    question, couples = system.phase[0], system.asked.what != CORRECTION
+    if question in (BEFORE_MARCH, CARRY):
+        carry_shapes(system)
+    elif question == FORCE:
+        press_bodies(system, job, system.asked.scheme_cv)
+    elif question == BLOCK:
+        stiffen(system, job)
+        push_bodies(system, job)
+    elif question == HOLD:
+        hold_rolling(system)
+    elif question == COUPLE and couples:
+        return couple(system, job)
+    elif question == AGAIN and couples and job.found[0] > 0:
+        apply(system, job)
+    return 1.0

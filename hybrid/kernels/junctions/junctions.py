@@ -8,7 +8,7 @@ line hands over,
 
 goes by G^T into the balances of points and bodies: forces, and rho x force and moments.  A force F turns with the arm of
 its fairlead, which adds  [F]x [rho]x  to the moment.
-A point that lines are clamped to is a body without mass.
+A point that lines are clamped to is a body without mass.  Torques through catenary zones stand at the end of this file.
 """
 
 from __future__ import annotations
@@ -16,7 +16,37 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hybrid.kernels.algebra.rotations import cross, hat, mat_mat, vector
-from hybrid.kernels.junctions.bodies import LINES, X, add_own, reach_out
+from hybrid.kernels.junctions.bodies import (
+    LINES,
+    X,
+    adapt_springs,
+    add_own,
+    hold_turns,
+    move_bodies,
+    own_force,
+    reach_out,
+    size_of_moves,
+)
+from hybrid.kernels.junctions.borders import (
+    AGAIN,
+    BALANCE,
+    BEFORE_MARCH,
+    BLOCK,
+    COUPLE,
+    END,
+    FAR,
+    FORCE,
+    FORGET,
+    HOLD,
+    MEASURE,
+    NO_NUMBERS,
+    RELAX,
+    START,
+    STRENGTH,
+    TURNED,
+    UPDATE,
+    read_border,
+)
 from hybrid.kernels.junctions.carried_frames import TURNS, WITH_POINT, answer_of_end, place_frame, turns
 from hybrid.kernels.junctions.joined_lines import (
     COLUMNS,
@@ -32,18 +62,21 @@ from hybrid.kernels.junctions.joined_lines import (
     carry_turn,
     count_right,
     end_row,
+    factor_dense,
     last_block,
     moment_of_end,
     solve_back,
+    substitute_dense,
 )
-from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.junctions.network_job import read_system
+from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
-from hybrid.kernels.march.zone_torque import torsional_stiffness
+from hybrid.kernels.march.zone_torque import CORRECT, torsional_stiffness
 from hybrid.kernels.state.report import MOMENT_A, NET_A
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.job import read
+from hybrid.kernels.step.newton import CORRECTION, LARGEST_TURN, pass_torque
 
-START, END = 0, 1
 # Columns of S; its rows are as the first of them.
 TENSION = 0  # of the start
 AT = (1, 7)  # shift and turn (3 each) of the start, of the end
@@ -122,7 +155,7 @@ def put_functional(f, low, high, joined, S, e):
 
 @inner
 def hand_over(l, job, system, cv):
-    """What a line hands over: its rows and columns of S; cv: of this step (that in the job is being written)."""
+    """What a line hands over: its rows and columns of S; cv: of this step."""
     joints, seats, columns, parts, gaps, answers, S = (
         system.joints, system.seats, system.columns, system.parts, system.gaps, system.answers, system.S,
     )  # fmt: skip
@@ -286,8 +319,9 @@ def twist_ends(l, seats, job, at, A):
 
 
 @inner
-def assemble_junctions(system, m, cv, ca):
+def assemble_junctions(system, m):
     """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over."""
+    cv, ca = system.asked.scheme_cv, system.asked.scheme_ca
     tables, joints, net, A = system.tables, system.joints, system.net, system.A
     for r in range(m):
         for c in range(m + 1):
@@ -328,7 +362,7 @@ def hand_over_right(l, job, system):
 def gather_right_sides(system, m):
     """Another right-hand side of the equations, of those in the eliminated lines, into the last column of A.
 
-    Of points and bodies themselves there is none; ends have nowhere to go.
+    Of points and bodies themselves it is `right`; ends have nowhere to go.
     """
     tables, joints, seats, arms, points = system.tables, system.joints, system.seats, system.arms, system.net.shape[0]
     S, G, A, row, tensions = system.S, system.G, system.A, 0, count_tensions(system.joints)
@@ -349,6 +383,8 @@ def gather_right_sides(system, m):
                 for j in range(size):
                     for i in range(rows):
                         A[at + j, m] += G[k, i, j] * S[AT[k] + i, RIGHT]
+    for r in range(tensions, m):
+        A[r, m] += system.right[r - tensions]
 
 
 @inner
@@ -371,9 +407,9 @@ def shift_of(joint, tensions, points, arm, gap, clamped, A, m, q, o):
 
 
 @inner
-def correct_all(system, points, m):
+def correct_all(system, gaps, m):
     """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite."""
-    tables, joints, seats, arms, gaps = system.tables, system.joints, system.seats, system.arms, system.gaps
+    tables, joints, seats, arms, points = system.tables, system.joints, system.seats, system.arms, system.net.shape[0]
     columns, work, A, q = system.columns, system.work, system.A, system.q
     row, tensions = 0, count_tensions(joints)
     for b in range(work.shape[0]):
@@ -407,3 +443,115 @@ def move_joints(job, start, end):
             velocity[0, k] = v[0, k]
         if end >= 0:
             velocity[1, k] = v[n, k]
+
+
+@inner
+def place_all(system):
+    """Ends of all lines go to where their points and bodies are, from which no force is known yet."""
+    given = system.asked.what == CORRECTION
+    for p in range(system.net.shape[0]):
+        for k in range(3):
+            system.net[p, k] = 0.0
+    for b in range(system.work.shape[0]):
+        for k in range(6):
+            system.work[b, LINES + k] = 0.0
+    for l in range(system.tables.shape[0]):
+        place_ends(l, read(system.tables[l]), system, given)
+
+
+@inner
+def add_pulls(system):
+    """Forces of all lines on points, into `net`, and on bodies, into `work`."""
+    for l in range(system.tables.shape[0]):
+        for k in range(2):
+            joint = system.joints[l, k]
+            if joint >= 0:
+                report, clamped = read(system.tables[l]).work.report, turns(system.seats, l, k)
+                add_pull(joint, report, k, system.arms[l, k], clamped, system.net, system.work)
+
+
+@inner
+def weigh_bodies(system):
+    """Forces on bodies beside those of lines."""
+    for b in range(system.work.shape[0]):
+        own_force(system.bodies[b], system.old[b], system.new[b], system.work[b])
+
+
+@inner
+def solve_junctions(system, m):
+    """Corrections to what is left over; 0, NO_NUMBERS: as of kernels.junctions.borders."""
+    if m > 0 and not factor_dense(system.A, m):
+        return 0.0
+    substitute_dense(system.A, m)
+    return 1.0 if correct_all(system, system.gaps, m) < 0 else NO_NUMBERS
+
+
+@inner
+def solve_again(system, m):
+    """Corrections to other right-hand sides, by the factors of this iteration; 0: they are not finite."""
+    gather_right_sides(system, m)
+    substitute_dense(system.A, m)
+    return 1.0 if correct_all(system, system.still, m) < 0 else 0.0
+
+
+@kernel(inlined=False)
+def join_lines(table):
+    """Answer for points and bodies at which lines end (kernels.junctions.borders)."""
+    system = read_system(read_border(table).system)
+    question, asked, m = system.phase[0], system.asked, system.A.shape[1] - 1
+    if question == FORGET:
+        system.moves[STRENGTH] = 1.0
+    elif question == BEFORE_MARCH:
+        place_all(system)
+    elif question == FORCE:
+        add_pulls(system)
+    elif question == BALANCE:
+        weigh_bodies(system)
+    elif question == BLOCK:
+        assemble_junctions(system, m)
+    elif question == HOLD:
+        hold_turns(system.work, system.A, m - 6 * system.work.shape[0])
+    elif question == COUPLE:
+        return solve_junctions(system, m)
+    elif question == AGAIN:
+        return solve_again(system, m)
+    elif question == MEASURE:
+        system.moves[FAR], system.moves[TURNED] = size_of_moves(system.work)
+    elif question == UPDATE:
+        move_bodies(system.new, system.work, asked.scheme_cv, asked.scheme_ca, asked.part)
+    elif question == RELAX:
+        system.moves[STRENGTH] = adapt_springs(system.work, system.moves[STRENGTH], system.moves[TURNED], LARGEST_TURN)
+    return 1.0
+
+
+@inner
+def correct_torques(system):
+    """Corrections of lines with the torque through their catenary zones."""
+    for l in range(system.tables.shape[0]):
+        job = read(system.tables[l])
+        pass_torque(1, job.line, job.ends, job.new, job.work, CORRECT, system.asked.scheme_cv)
+
+
+@inner
+def forget_torques(system):
+    """How lines answer to torques is found anew in every solution."""
+    for l in range(system.tables.shape[0]):
+        known = read(system.tables[l]).work.torsion.known
+        if known.shape[0] > 0:
+            known[0] = -1.0
+
+
+@kernel
+def twist_lines(table):
+    """Answer for torques through catenary zones of lines (kernels.junctions.borders and kernels.march.zone_torque).
+
+    Columns and the small system are those of each line by itself, whose ends stay where corrections have put them: what
+    torques do between two ends that turn is in A already (`twist_ends`), and other right-hand sides have no more of it.
+    """
+    system = read_system(read_border(table).system)
+    question = system.phase[0]
+    if question == FORGET:
+        forget_torques(system)
+    elif question == COUPLE:
+        correct_torques(system)
+    return 1.0

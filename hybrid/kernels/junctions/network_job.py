@@ -44,17 +44,18 @@ class NetworkJob(NamedTuple):
     S: Floats  # (HANDED - 1, HANDED)
     G: Floats  # (2, 6, 6)
     A: Floats  # (m+5, m+1)
-    touch_table: NDArray[np.int64]  # of kernels.junctions.lines_contact.touch_system
+    right: Floats  # (3 P + 6 B,) right-hand side of points and bodies themselves, of other corrections of an iteration
+    still: Floats  # (L, 2, 3) zeros: gaps of those
+    moves: Floats  # (3,) of corrections, as kernels.junctions.borders has it
+    begins: NDArray[np.int64]  # (L,) where nodes of lines begin among those of all
+    marks: NDArray[np.int64]  # (T,) nodes with another right-hand side; empty: nothing needs one
     rides: NDArray[np.int64]  # (M,) the body that carries an obstacle, -1: none does; empty: no body has a shape
-    phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies and spin_sheaves
+    phase: NDArray[np.int64]  # (1,) what is asked of borders (kernels.junctions.borders)
     near: NDArray[np.int64]  # (L,) of all lines, how near they are to what is free (kernels.junctions.lone_lines)
     alone: NDArray[np.int64]  # (L,) and whether they are solved by themselves
-    meet_table: NDArray[np.int64]  # of kernels.junctions.body_contact.meet_bodies
-    spin_table: NDArray[np.int64]  # of kernels.junctions.joined_sheaves.spin_sheaves
+    borders: NDArray[np.int64]  # (K,) addresses of their kernels, in their order
+    border_tables: NDArray[np.int64]  # (K, ..) and their tables
     solver: int = 0  # address of the kernel that marches a line
-    touch: int = 0  # of touch_system; 0: no line touches itself
-    meet: int = 0  # of meet_bodies; 0: no body has a shape
-    spin: int = 0  # of spin_sheaves; 0: no sheave turns freely
 
 
 class NetworkTask(NamedNumbers):
@@ -75,6 +76,8 @@ class NetworkTask(NamedNumbers):
     part: float
     cut: float  # whether a step is taken as the last iteration has left it, converged or not
     tolerance: float
+    scheme_cv: float  # of the scheme of the step that is solved, or as cv, ca
+    scheme_ca: float
 
 
 def blank_system_job() -> NetworkJob:
@@ -83,7 +86,7 @@ def blank_system_job() -> NetworkJob:
     return NetworkJob(
         NetworkTask(), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
         z((1, 1, 1)), z(1), z((1, 1, 1)), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
-        z((2, 6, 6)), z((1, 1)), one, one, one, one, one, one, one,
+        z((2, 6, 6)), z((1, 1)), z(1), z((1, 2, 3)), z(3), one, one, one, one, one, one, one, two,
     )  # fmt: skip
 
 

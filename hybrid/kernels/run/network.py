@@ -1,8 +1,7 @@
 """Newton's method for lines that meet at points: one nonlinear loop for all of them, in space.
 
-Every line is marched along s by the kernel of a single line, which is called by its address; what it hands over is a
-relation between its ends (kernels.junctions.joined_lines).  The unknowns of the small system are the tensions of the last cells,
-the places of the points, and the places and rotations of the bodies (kernels.junctions.junctions); each line is then solved back.
+Every line is marched along s by the kernel of a single line, which is called by its address.  Whatever couples lines is a
+border, points and bodies as well; the loop knows them by their list alone (kernels.junctions.borders).
 Symbols and stopping rule as in kernels.step.newton.
 """
 
@@ -11,33 +10,31 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import get3
-from hybrid.kernels.junctions.bodies import (
-    LINES,
-    adapt_springs,
-    book_bodies,
-    end_bodies,
-    hold_turns,
-    move_bodies,
-    own_force,
-    predict_bodies,
-    size_of_moves,
-    start_here,
-)
-from hybrid.kernels.junctions.body_contact import CARRY, COUPLE, HOLD, PRESS, STIFFEN
-from hybrid.kernels.junctions.carried_frames import turns
-from hybrid.kernels.junctions.joined_lines import factor_dense, substitute_dense
-from hybrid.kernels.junctions.joined_sheaves import ROLL_ON, TURN
-from hybrid.kernels.junctions.junctions import (
+from hybrid.kernels.junctions.bodies import book_bodies, end_bodies, predict_bodies, start_here
+from hybrid.kernels.junctions.borders import (
+    BALANCE,
+    BEFORE_MARCH,
+    BLOCK,
+    CARRY,
+    COUPLE,
     END,
+    FAR,
+    FORCE,
+    FORGET,
+    HOLD,
+    MEASURE,
+    NO_NUMBERS,
+    PREDICT,
+    RELAX,
+    SAFE_PART,
+    SPECTRAL_RADIUS,
     START,
-    add_pull,
-    assemble_junctions,
-    correct_all,
-    count_tensions,
-    first_unknown,
-    move_joints,
-    place_ends,
+    STRENGTH,
+    TURNED,
+    UPDATE,
+    ask,
 )
+from hybrid.kernels.junctions.junctions import move_joints
 from hybrid.kernels.junctions.network_job import read_system, task_of
 from hybrid.kernels.laws.bending_slip import BEHIND_REST, BEHIND_STEP
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
@@ -64,21 +61,17 @@ from hybrid.kernels.step.job import call_quantities, call_reel, read
 from hybrid.kernels.step.newton import (
     ADDRESS,
     ASSEMBLY,
-    CORRECT,
     CORRECTION,
     CUT_SHORT,
     EQUILIBRIUM,
     FINISH,
     GAIN,
     LARGEST_TURN,
-    LIMIT,
     LOW_TENSION,
     NEAR,
     NOT_CONVERGED,
     NOT_FINITE,
     OK,
-    PREPARE,
-    RADIUS,
     REST,
     SINGULAR,
     SLACK,
@@ -91,7 +84,6 @@ from hybrid.kernels.step.newton import (
     follow_law,
     has_converged,
     most_turn,
-    pass_torque,
     round_off_tension,
     with_radius,
 )
@@ -99,7 +91,9 @@ from hybrid.kernels.step.step import LARGEST_STEP_TURN, States, begin_step, end_
 from hybrid.kernels.watch.extremes import first_strains, note_extremes
 
 JUNCTIONS = 5
-call_solver, call_touch, call_meet, call_spin = caller((0, 0, 0.0, 0)), caller(0), caller(0), caller(0)
+# Of an iteration: its corrections are found, and are to be made.
+OPEN = -2
+call_solver = caller((0, 0, 0.0, 0))
 # Places among the numbers of a job, whose first field is its task.
 TASK_CV = Task._fields.index("cv")
 TASK_CA = Task._fields.index("ca")
@@ -107,44 +101,17 @@ TASK_DT = Task._fields.index("dt")
 
 
 @inner
-def ask_bodies(system, phase):
-    """What is asked of bodies that lines touch (kernels.junctions.body_contact); 0: it fails."""
-    if system.meet == 0:
-        return 1
-    system.phase[0] = phase
-    return call_meet(system.meet, system.meet_table)
+def march_lines(system, steps):
+    """March all lines, and find what they and borders do to points and bodies.
 
-
-@inner
-def ask_sheaves(system, phase):
-    """What is asked of sheaves that turn freely (kernels.junctions.joined_sheaves); 0: it fails."""
-    if system.spin == 0:
-        return 1
-    system.phase[0] = phase
-    return call_spin(system.spin, system.spin_table)
-
-
-@inner
-def march_lines(system, given, steps):
-    """March all lines: force on each point into `net`, N, that on bodies into `work`.
-
-    given: the shifts of ends are known; steps: whether this is an iteration of a step, of which lines that are paid out
-    know (kernels.reel.payout.iterate).
+    steps: whether this is an iteration of a step, of which lines that are paid out know (kernels.reel.payout.iterate).
     Returns -1 or a line that failed, and its bad node.
     """
-    tables, joints, seats, arms, net, work = (
-        system.tables, system.joints, system.seats, system.arms, system.net, system.work,
-    )  # fmt: skip
-    for p in range(net.shape[0]):
-        net[p, 0], net[p, 1], net[p, 2] = 0.0, 0.0, 0.0
-    for b in range(work.shape[0]):
-        for k in range(6):
-            work[b, LINES + k] = 0.0
-    ask_bodies(system, CARRY)
+    tables, joints = system.tables, system.joints
+    ask(system, BEFORE_MARCH)
     for l in range(tables.shape[0]):
         job = read(tables[l])
         n = job.line.h.shape[0]
-        place_ends(l, job, system, given)
         if steps and job.iterated != 0:
             call_reel(job.iterated, job.reel_table)
         outcome, _, _, where = call_solver(system.solver, tables[l])
@@ -156,10 +123,7 @@ def march_lines(system, given, steps):
             return l, where
         if steps and job.iterated != 0:
             call_reel(job.iterated, job.reel_table)
-        for k in range(2):
-            if joints[l, k] >= 0:
-                add_pull(joints[l, k], job.work.report, k, arms[l, k], turns(seats, l, k), net, work)
-    ask_bodies(system, PRESS)
+    ask(system, FORCE)
     return -1, -1
 
 
@@ -186,26 +150,6 @@ def size_up(tables, ca):
 
 
 @inner
-def correct_torques(tables, cv):
-    """Corrections of lines with the torque through their catenary zones, which changes with them.
-
-    Ends stay where the correction has put them.
-    """
-    for l in range(tables.shape[0]):
-        job = read(tables[l])
-        pass_torque(1, job.line, job.ends, job.new, job.work, CORRECT, cv)
-
-
-@inner
-def forget_torques(tables):
-    """How lines answer to torques is found anew in every step."""
-    for l in range(tables.shape[0]):
-        known = read(tables[l]).work.torsion.known
-        if known.shape[0] > 0:
-            known[0] = -1.0
-
-
-@inner
 def follow_laws(tables, s):
     """Mean tensions of lines whose tensions are no multiples of strains, with the last correction."""
     for l in range(tables.shape[0]):
@@ -219,41 +163,6 @@ def end_slips(tables, part):
     for l in range(tables.shape[0]):
         job = read(tables[l])
         end_slip(job.line, job.ends, job.old, job.new, job.work, part)
-
-
-@inner
-def prepare_contact(tables, task, t):
-    """Before a try of a step to t (s): the part of the prediction that is safe, and the spectral radius, of all lines."""
-    safe, rho = 1.0, task.rho
-    for l in range(tables.shape[0]):
-        job = read(tables[l])
-        if job.contact[ADDRESS] > 0:
-            clock = job.books.clock
-            clock.now, clock.try_end, clock.step_before, clock.rho = t - task.dt, t, task.before, task.rho
-            clock.rho_before = task.rho_before
-            safe = min(safe, ask_contact(job.contact, job.contact_table, PREPARE))
-            rho = min(rho, ask_contact(job.contact, job.contact_table, RADIUS))
-    common = with_radius(task, rho)
-    for l in range(tables.shape[0]):
-        job = read(tables[l])
-        if job.contact[ADDRESS] > 0:  # so that each has that of all
-            own = ask_contact(job.contact, job.contact_table, RADIUS)
-            clock = job.books.clock
-            if own > rho:
-                clock.rho *= rho / own
-            clock.step_before, clock.rho_before = common.before, common.rho_before
-    return safe, rho
-
-
-@inner
-def safe_part(tables):
-    """The part of a correction by which no line passes through itself."""
-    part = 1.0
-    for l in range(tables.shape[0]):
-        job = read(tables[l])
-        if job.contact[ADDRESS] > 0:
-            part = min(part, ask_contact(job.contact, job.contact_table, LIMIT))
-    return part
 
 
 @inner
@@ -419,9 +328,7 @@ def predict_step(system, task, t):
 
     Its task and scheme, whether something turns too far, and by how much (rad), its line (-1: a body) and cell.
     """
-    safe, rho = 1.0, task.rho
-    if system.touch != 0:
-        safe, rho = prepare_contact(system.tables, task, t)
+    safe, rho = ask(system, PREDICT), min(task.rho, ask(system, SPECTRAL_RADIUS))
     task = with_radius(task, rho)
     s = scheme(task.rho, task.before, task.rho_before, task.dt)
     turn, _ = predict_bodies(system.old, system.new, system.work, s)
@@ -433,15 +340,116 @@ def predict_step(system, task, t):
 
 @inner
 def give_scheme(system, task, s):
-    """Tell all lines of the scheme with which they are marched; whether anything rubs, as a number."""
+    """Tell all lines and borders of the scheme with which they are marched; whether anything rubs, as a number."""
     rubs, tables, numbers = 0, system.tables, system.numbers
+    system.asked.scheme_cv, system.asked.scheme_ca = s.cv, s.ca
     for l in range(tables.shape[0]):
         numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
         job = read(tables[l])
         rubs |= job.line.bits & FRICTION
-        if system.touch != 0 and job.contact[ADDRESS] > 0:
+        if job.contact[ADDRESS] > 0:
             rubs |= job.contact[NEAR]
     return rubs
+
+
+@inner
+def first_not_finite(tables):
+    """The first line with a correction that is not finite, and where."""
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        total = 0.0
+        for i in range(job.work.x.shape[0]):
+            for k in range(job.work.x.shape[1]):
+                total += abs(job.work.x[i, k])
+        if not total < math.inf:
+            return l, first_bad(job.work.x, job.new.e)
+    return -1, -1
+
+
+@inner
+def find_corrections(system, task, s, it):
+    """Corrections of iteration `it` of all lines and borders, in space.
+
+    Returns OPEN, or the outcome with which the solution ends here, with line and cell or node where it fails.
+    """
+    tables = system.tables
+    line, where = march_lines(system, task.what == STEP)
+    if line >= 0:
+        report = read(tables[line]).work.report
+        if not report[RESIDUAL] < math.inf:
+            return NOT_FINITE, line, int(report[RESIDUAL_NODE])
+        return SINGULAR, line, where
+    ask(system, BALANCE)
+    if task.what == ASSEMBLY:
+        follow_laws(tables, s)  # rates of twist are known now
+        return OK, -1, -1
+    ask(system, BLOCK)
+    if task.what == JUNCTIONS:
+        return OK, -1, -1
+    if task.what == EQUILIBRIUM and it == 1:
+        ask(system, HOLD)
+    answer = ask(system, COUPLE)
+    if answer == NO_NUMBERS:
+        line, where = first_not_finite(tables)
+        return NOT_FINITE, line, where
+    if not answer > 0.0:
+        return (SINGULAR if answer == 0.0 else NOT_CONVERGED), -1, -1
+    return (OK if task.what == CORRECTION else OPEN), -1, -1
+
+
+@inner
+def find_part(system, task, s, it, rubs):
+    """The part of the corrections that is made, and their size as Newton compares it, its line and cell."""
+    shift, turn, size, line, where = size_up(system.tables, s.ca)
+    moves = system.moves
+    moves[FAR], moves[TURNED] = 0.0, 0.0
+    ask(system, MEASURE)
+    far, turned = moves[FAR] / task.limits.reach, moves[TURNED]
+    shift, turn, size = max(shift, far), max(turn, turned), max(size, max(turned, WHOLE * far))
+    part = min(1.0, 1.0 / shift) if shift > 0.0 else 1.0
+    if turn * part > LARGEST_TURN:
+        part = LARGEST_TURN / turn
+    if rubs != 0 and s.cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
+        part *= 0.5
+    return min(part, ask(system, SAFE_PART)), size, line, where
+
+
+@inner
+def make_corrections(system, s, part):
+    """Lines and borders move by a part of their corrections."""
+    system.asked.part = part
+    for l in range(system.tables.shape[0]):
+        job = read(system.tables[l])
+        update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
+    ask(system, UPDATE)
+
+
+@inner
+def iterate(system, task, s):
+    """Newton's iterations: outcome, their number, predicted next correction, line and cell, whether it was cut short."""
+    most, rubs = task.limits.most, give_scheme(system, task, s)
+    before, left, size = math.inf, math.inf, math.inf
+    outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
+    ask(system, FORGET)
+    while it < most and outcome == NOT_CONVERGED:
+        it += 1
+        found, line, where = find_corrections(system, task, s, it)
+        if found != OPEN:
+            outcome, before = found, math.inf
+            break
+        part, size, line, where = find_part(system, task, s, it, rubs)
+        make_corrections(system, s, part)
+        outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
+        before = size if part == 1.0 else math.inf
+        if task.what == EQUILIBRIUM:
+            outcome = NOT_CONVERGED if system.moves[STRENGTH] > 1.0 else outcome
+            ask(system, RELAX)
+    cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
+    if cut_short:
+        outcome = OK
+        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
+            left = size
+    return outcome, it, left, line, where, cut_short
 
 
 @kernel(inlined=False)
@@ -452,96 +460,17 @@ def solve_system(table):
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
     """
     system = read_system(table)
-    asked, tables, joints = system.asked, system.tables, system.joints
-    net, bodies, old, new, work, A = system.net, system.bodies, system.old, system.new, system.work, system.A
-    touch, t, task = system.touch, asked.time, task_of(asked)
-    m, most, count, points = A.shape[1] - 1, task.limits.most, tables.shape[0], net.shape[0]
+    tables, task = system.tables, task_of(system.asked)
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
-        task, s, fails, turn, line, cell = predict_step(system, task, t)
+        task, s, fails, turn, line, cell = predict_step(system, task, system.asked.time)
         if fails:
             return TURNED_TOO_FAR, 0, turn, line, cell
     else:
-        start_here(old, work)
-    forget_torques(tables)
-    rubs = give_scheme(system, task, s)
-    before, left, size, strength = math.inf, math.inf, math.inf, 1.0
-    outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
-    while it < most and outcome == NOT_CONVERGED:
-        it += 1
-        given = task.what == CORRECTION
-        line, where = march_lines(system, given, task.what == STEP)
-        if line >= 0:
-            outcome = SINGULAR
-            if not read(tables[line]).work.report[RESIDUAL] < math.inf:
-                outcome, where = NOT_FINITE, int(read(tables[line]).work.report[RESIDUAL_NODE])
-            break
-        if task.what == ASSEMBLY:
-            for b in range(work.shape[0]):
-                own_force(bodies[b], old[b], new[b], work[b])
-            follow_laws(tables, s)  # rates of twist are known now
-            outcome = OK
-            break
-        assemble_junctions(system, m, s.cv, s.ca)
-        ask_bodies(system, STIFFEN)
-        if task.what == JUNCTIONS:
-            outcome = OK
-            break
-        if task.what == EQUILIBRIUM and it == 1:
-            hold_turns(work, A, first_unknown(points, count_tensions(joints), points))
-            ask_bodies(system, HOLD)
-        if m > 0 and not factor_dense(A, m):
-            outcome = SINGULAR
-            break
-        substitute_dense(A, m)
-        line = correct_all(system, points, m)
-        if line >= 0:
-            bad = read(tables[line])
-            outcome, where = NOT_FINITE, first_bad(bad.work.x, bad.new.e)
-            break
-        if task.what != CORRECTION and ask_bodies(system, COUPLE) == 0:
-            outcome = SINGULAR
-            break
-        if task.what == STEP and ask_sheaves(system, TURN) == 0:
-            outcome = SINGULAR
-            break
-        correct_torques(tables, s.cv)
-        if touch != 0 and call_touch(touch, system.touch_table) == 0:
-            before = math.inf
-            break
-        if task.what == CORRECTION:
-            outcome = OK
-            break
-        shift, turn, size, line, where = size_up(tables, s.ca)
-        far, turned = size_of_moves(work)
-        far /= task.limits.reach
-        shift, turn, size = max(shift, far), max(turn, turned), max(size, max(turned, WHOLE * far))
-        part = min(1.0, 1.0 / shift) if shift > 0.0 else 1.0
-        if turn * part > LARGEST_TURN:
-            part = LARGEST_TURN / turn
-        if rubs != 0 and s.cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
-            part *= 0.5
-        if touch != 0:
-            part = min(part, safe_part(tables))
-        for l in range(count):
-            job = read(tables[l])
-            update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
-        move_bodies(new, work, s.cv, s.ca, part)
-        if task.what == STEP:
-            asked.part = part
-            ask_sheaves(system, ROLL_ON)
-        outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
-        before = size if part == 1.0 else math.inf
-        if task.what == EQUILIBRIUM:
-            outcome = NOT_CONVERGED if strength > 1.0 else outcome
-            strength = adapt_springs(work, strength, turned, LARGEST_TURN)
-    cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
-    if cut_short:
-        outcome = OK
-        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
-            left = size
+        start_here(system.old, system.work)
+    outcome, it, left, line, where, cut_short = iterate(system, task, s)
     if task.what == STEP or task.what == EQUILIBRIUM:
-        ask_bodies(system, CARRY)
+        ask(system, CARRY)
         follow_laws(tables, s)
         end_slips(tables, BEHIND_STEP if task.what == STEP else BEHIND_REST)
     if task.what == STEP:
@@ -551,6 +480,6 @@ def solve_system(table):
         elif cut_short:
             outcome = CUT_SHORT
     if task.what == ASSEMBLY and outcome == OK:
-        begin_books(tables, joints, t)
-        book_bodies(work, 0.0)
+        begin_books(tables, system.joints, system.asked.time)
+        book_bodies(system.work, 0.0)
     return outcome, it, left, line, where

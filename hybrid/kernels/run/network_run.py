@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, UNBENT, is_bent
-from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK
+from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK, read_members
 from hybrid.kernels.junctions.lone_lines import is_grouped_otherwise, is_touched_alone
-from hybrid.kernels.junctions.members_water import read_members
 from hybrid.kernels.junctions.network_job import read_system
 from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
@@ -96,7 +95,7 @@ class StepsJob(NamedTuple):
     outputs: Floats  # s, times of all outputs
     bodies: Floats  # (rows, B, BODY_SAMPLE) samples of bodies; those of lines are in their books
     worked: Floats  # (3, B, WORK) of bodies: now, before the last step, before the step before
-    members: NDArray[np.int64]  # (M, ..) tables of kernels.junctions.members_water.MembersJob, of bodies with members
+    members: NDArray[np.int64]  # (M, ..) tables of kernels.junctions.bodies.MembersJob, of bodies with members
     with_members: NDArray[np.int64]  # (M,) and which bodies these are
     watched_even: NDArray[np.int64]  # of a kernels.junctions.lines_distance.LinesJob, after a step of `even`
     watched_odd: NDArray[np.int64]
@@ -114,7 +113,7 @@ class StepsJob(NamedTuple):
     finder: int = 0  # and of find_near
     book: int = 0  # of book_system_step
     sampler: int = 0  # of sample_system
-    stirrer: int = 0  # of kernels.junctions.members_water.stir_members; 0: no body has members
+    stirrer: int = 0  # of kernels.junctions.bodies.stir_members; 0: no body has members
     watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
     follower: int = 0  # of kernels.mesh.zone_step.follow_zones; 0: no zones move, or Python follows them
     runner: int = 0  # of run_system, and of kernels.mesh.remesh.ask_cells and change_cells; 0: Python changes cells

@@ -53,9 +53,9 @@ from hybrid.kernels.junctions.bodies import (
     put_matrix,
     rotation,
 )
-from hybrid.kernels.junctions.joined_lines import last_block, substitute_dense
-from hybrid.kernels.junctions.junctions import END, correct_all, count_tensions, first_unknown, gather_right_sides
-from hybrid.kernels.junctions.junctions import START as BEGIN
+from hybrid.kernels.junctions.borders import END, answer_right_sides
+from hybrid.kernels.junctions.borders import START as BEGIN
+from hybrid.kernels.junctions.joined_lines import last_block
 from hybrid.kernels.junctions.network_job import read_system, task_of
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
@@ -327,23 +327,27 @@ def set_right_side(line_work, job, other, starts, ends):
 
 
 @inner
+def put_right_sides(system, right, part):
+    """A part of right-hand sides (B, 6) of bodies to where borders find them."""
+    first = 3 * system.net.shape[0]
+    for b in range(right.shape[0]):
+        for k in range(6):
+            system.right[first + 6 * b + k] = part * right[b, k]
+
+
+@inner
 def answer_joined(system, net, p):
     """Corrections of the other lines that move with points and bodies, and of these."""
     own = read_bodies(net.bodies[p])
-    m, points = system.A.shape[1] - 1, system.net.shape[0]
     for j in range(system.tables.shape[0]):
         job = read_job(net.lines[net.joined[j]])
         starts, ends = system.joints[j, BEGIN] >= 0, system.joints[j, END] >= 0
         set_right_side(job.work, job, read_other(job.tables[p]), starts, ends)
-    if m > 0:
+    if system.right.shape[0] > 0:
         own_right_sides(system, net, p)
-        gather_right_sides(system, m)
-        first = first_unknown(points, count_tensions(system.joints), points)
-        for b in range(own.right.shape[0]):
-            for k in range(6):
-                system.A[first + 6 * b + k, m] += own.right[b, k]
-        substitute_dense(system.A, m)
-        correct_all(system, points, m)
+        put_right_sides(system, own.right, 1.0)
+        answer_right_sides(system, system.borders.shape[0])
+        put_right_sides(system, own.right, 0.0)
 
 
 @inner

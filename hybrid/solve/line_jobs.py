@@ -1,0 +1,423 @@
+"""The tables by which kernels know the lines of a system: of all of them, of those solved together, of each alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW
+from hybrid.kernels.contact.self_contact import blank_contact_job
+from hybrid.kernels.junctions.bodies import U
+from hybrid.kernels.junctions.body_contact import CARRY
+from hybrid.kernels.junctions.carried_frames import SEAT
+from hybrid.kernels.junctions.lone_lines import find_near, lead_lone
+from hybrid.kernels.junctions.network_job import NetworkTask
+from hybrid.kernels.laws.obstacle_motion import carry_obstacles
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.run.entry import NO_PUSH, in_plane, in_space
+from hybrid.kernels.run.network import solve_system
+from hybrid.kernels.state.books import Books, blank_books
+from hybrid.kernels.state.obstacle_rows import FREE, MOVES
+from hybrid.kernels.state.report import (
+    PLANAR,
+)
+from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, Work, state_for
+from hybrid.kernels.step.job import blank_job
+from hybrid.kernels.step.newton import ASSEMBLY, RUN, Limits, Task
+from hybrid.kernels.watch.named_quantities import note_quantities
+from hybrid.solve.borders import (
+    JointJobs,
+    Rooms,
+    contact_of,
+    room_of_joints,
+    room_to_meet,
+    room_to_spin,
+    room_to_touch,
+    room_to_wind,
+)
+from hybrid.solve.joined import JoinedLine, NetworkState, is_answered_again, room_of_line
+from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
+from hybrid.solve.stepper import REACH
+
+
+def _always(room: dict[str, Any]) -> Callable[[Sequence[int]], dict[str, Any]]:
+    """Room of a border that all groups of lines have."""
+    return lambda _: room
+
+
+class LineJobs:
+    """Jobs of the lines of a system: of all, of those that are solved together, and of each by itself."""
+
+    # What is set by whoever solves for them (solve.network_solver).
+    tolerance: float  # of Newton's method in steps
+    body_work: Floats  # (B, WORK)
+    net: Floats  # (P, 3) N
+
+    def __init__(
+        self, lines: Sequence[JoinedLine], bodies: Floats, contacts: Sequence[SelfContact | None],
+        shared: SharedContact | None,
+    ) -> None:  # fmt: skip
+        """As of `NetworkSolver`."""
+        self.lines, self.bodies = tuple(lines), bodies
+        self._nodes = sum(x.line.s.size for x in lines)
+        self._fairleads = np.array([x.fairleads for x in lines], float).reshape(-1, 2, 3)
+        self._arms, self._gaps = np.zeros_like(self._fairleads), np.zeros_like(self._fairleads)
+        self._seats = np.array([x.seats for x in lines], float).reshape(-1, 2, SEAT)
+        self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
+        self._contacts, self.shared = {k: x for k, x in enumerate(contacts) if x is not None}, shared
+        self._rides = lines[0].rides  # obstacles are those of all lines
+        self._sheaves = int((lines[0].line.moved == FREE).sum())
+        # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.  Of
+        # each whether it always moves with others (-1), or else how near it is to a body or sheave that it may move.
+        self._near = np.array([-1 if max(x.joints) >= 0 else 0 for x in lines], np.int64)
+        together = [k for k in self._touching_lines if k not in self._contacts or lines[k].keeps_pace]
+        self._near[together] = -1
+        self._alone = np.zeros(len(lines), np.int64)
+        self._mixes = [bool(self._rides.size or self._sheaves) and near == 0 for near in self._near]
+        # Winches whose lengths may be unknowns of all lines; iterations of lines with winches that are by themselves.
+        each = zip(lines, self._near, self._mixes, strict=True)
+        self._winches = sum(x.winds and bool(near < 0 or mixes) for x, near, mixes in each)
+        self._wound: dict[int, int] = {}
+        self._reels: dict[int, NDArray[np.int64]] = {}  # tables of lines that are paid out
+        self.work = [room_of_line(x, self._keeps(k, x)) for k, x in enumerate(lines)]
+        self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
+        self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
+        self.turns: tuple[NetworkState, NetworkState] | None = None  # states between which steps go back and forth
+        self._twists = [bool(x.line.torsion.size) for x in lines]  # whether torques pass through zones of each line
+        self._pressed: dict[str, Any] = {}
+        self._pushes: dict[int, list[Floats]] = {}  # out of planes, of states of even parity and of odd, by line
+        self._marcher = 0  # address of the kernel that marches joined lines; 0: nobody has asked for it
+        self._phase, self._at_rest, self._asked = np.zeros(1, np.int64), np.zeros(1, np.int64), NetworkTask()
+
+    def _make_tables(self) -> None:
+        """Tables of all lines, and which are solved by themselves at first."""
+        blank, lines = Table(blank_job), self.lines
+        # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
+        self._numbers = np.zeros((2, len(lines), blank.numbers.size), np.int64)
+        self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in range(len(lines))]
+        self._rooms = self._make_rooms()
+        self._together = self._all = JointJobs(self._rooms, self._numbers, range(len(lines)))
+        self.lone: list[int] = []
+        self.joined = list(range(len(lines)))
+        self.lone_numbers = self._numbers[0, :0]
+        self._lone_tables: dict[int, Table] = {}
+        self._joined_tables = dict(enumerate(self._tables))
+        for k, (x, work, books) in enumerate(zip(lines, self.work, self.books, strict=True)):
+            limits = Limits(REACH * x.length, x.scale, 1)
+            self.bind_line(
+                k, task=Task(ASSEMBLY, limits=limits), line=x.line, sea=x.sea, ends=x.ends, work=work, books=books,
+                was=NO_PUSH, now=NO_PUSH,
+            )  # fmt: skip
+        self._group()
+
+    def _keeps(self, number: int, x: JoinedLine) -> bool:
+        """Whether all factors of a line may serve again: for contact, bodies, sheaves and winches."""
+        beside = bool(self._rides.size or self._sheaves or self._winches)
+        mixes = beside and (self._mixes[number] or self._near[number] < 0)
+        return x.winds or mixes or number in self._touching_lines
+
+    @property
+    def _touching_lines(self) -> set[int]:
+        """Numbers of the lines that touch themselves, or may touch others."""
+        return {*self._contacts, *(self.shared.lines if self.shared is not None else ())}
+
+    def _make_rooms(self) -> Rooms:
+        """What jobs of the lines work in."""
+        lines, points, bodies, nodes = self.lines, len(self.net), self.bodies, self._nodes
+        carried = [x.line.h.size + 1 if is_answered_again(x) else 0 for x in lines]
+        joints = room_of_joints(lines, carried, points, bodies)
+        joints |= {"net": self.net, "work": self.body_work}
+        self._matrix = joints["A"]
+        borders: dict[str, Any] = {"joints": {}}
+        if self._rides.size:
+            borders["shapes"] = self._pressed = room_to_meet(nodes, self._rides, len(bodies))
+        if self._winches:
+            borders["winches"] = room_to_wind(self._winches, nodes, len(bodies))
+        if self._sheaves:
+            borders["sheaves"] = room_to_spin(self._sheaves, nodes, len(bodies))
+        rows = {
+            "joints": self.joints, "seats": self._seats, "arms": self._arms, "fairleads": self._fairleads,
+            "gaps": self._gaps, "still": np.zeros_like(self._gaps), "allowed": self.allowed,
+            "floors": np.array([-np.inf if x.slackens else x.floor for x in lines]),
+            "first": np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64),
+            "begins": np.append(0, np.cumsum([x.line.s.size for x in lines])[:-1]).astype(np.int64),
+        }  # fmt: skip
+        whole = joints | {
+            "near": self._near, "alone": self._alone, "asked": self._asked, "rides": self._rides, "phase": self._phase,
+            "marks": np.zeros(nodes if len(borders) > 1 else 0, np.int64),
+        }  # fmt: skip
+        return Rooms(whole, rows, {name: _always(x) for name, x in borders.items()} | {"torques": self._torques_of})
+
+    def bind_line(self, number: int, **values: Any) -> None:
+        """Put values in their places in the jobs of a line."""
+        for table in self._tables[number]:
+            table.bind(**values)
+        if number in self._lone_tables:
+            self._lone_tables[number].bind(**self._by_itself(number, values))
+        elif self._together is not self._all:
+            for table in self._joined_tables[number]:
+                table.bind(**values)
+
+    def wind(self, number: int, alone: int, **values: Any) -> None:
+        """Put values in the jobs of a line that is paid out; alone: what its iterations call where it is by itself."""
+        self._wound[number], self._reels[number] = alone, values["reel_table"]
+        self.bind_line(number, **values)
+
+    def _by_itself(self, number: int, values: dict[str, Any]) -> dict[str, Any]:
+        """The same for a line that is solved by itself: what is free moves as told, and no factors serve again."""
+        found = {**values}
+        if "iterated" in values:
+            found["iterated"] = self._wound.get(number, 0)
+        if not self._mixes[number]:
+            return found
+        if (line := values.get("line")) is not None:
+            moved = line.moved.copy()
+            moved[moved == FREE] = MOVES
+            found["line"] = line._replace(moved=moved)
+        serve = number in self._contacts or self.lines[number].winds
+        if (work := values.get("work")) is not None and not (serve or work.torsion.known.size):
+            found["work"] = work._replace(X=work.X[: self.lines[number].line.s.size * ROW])
+        for name in {"old", "new"} & {*values}:
+            found[name] = values[name]._replace(sheave=NO_SHEAVES)
+        return found
+
+    def _group(self) -> None:
+        """Which lines are solved by themselves from now on, and tables for these and for the others."""
+        some = not any(self._mixes) or bool((self._near != 0).any())  # else what is free moves with the first line
+        self._alone[:] = (self._near == 0) & (some | (np.arange(len(self.lines)) > 0))
+        self.lone, self.joined = (np.flatnonzero(self._alone == x).tolist() for x in (1, 0))
+        self.lone_numbers = np.zeros((len(self.lone), self._numbers.shape[2]), np.int64)
+        self._lone_tables = {}
+        for k, numbers in zip(self.lone, self.lone_numbers, strict=True):
+            table, own = self._tables[k][0].again(numbers), {"line": self.lines[k].line, "work": self.work[k]}
+            table.bind(task=self._task_of_run(k), **self._by_itself(k, own | {"iterated": 0}))
+            self._lone_tables[k] = table
+        self._together, self._joined_tables = self._all, dict(enumerate(self._tables))
+        if self.lone and not self.is_apart:
+            numbers = np.zeros((2, len(self.joined), self._numbers.shape[2]), np.int64)
+            self._joined_tables = {
+                k: tuple(mine.again(x[j]) for mine, x in zip(self._tables[k], numbers, strict=True))
+                for j, k in enumerate(self.joined)
+            }
+            self._together = JointJobs(self._rooms, numbers, self.joined)
+            if self._marcher:
+                self._together.march_by(self._marcher)
+
+    @property
+    def mixes(self) -> bool:
+        """Whether a line may come near what is free, with which it is then solved."""
+        return any(self._mixes)
+
+    def find_near(self, now: NetworkState, t: float) -> None:
+        """Find which lines are near what is free in the state of now, t (s), and solve these with it from now on."""
+        self._bind_states(0, now, now)
+        for x in self.lines:
+            carry_obstacles(t, t, x.sea)
+        shifts = self.body_work[:, U : U + 3].copy()
+        self.body_work[:, U : U + 3] = 0.0
+        self._all.ask(CARRY)
+        self.body_work[:, U : U + 3] = shifts
+        find_near(self._all.jobs[0].numbers)
+
+    def regroup(self) -> dict[str, Any]:
+        """Solve lines with what they have been found near, and others by themselves: as of `take_turns`."""
+        self._group()
+        return self._bind_turns()
+
+    def take_line(self, number: int, line: Line) -> None:
+        """A line is in other arrays from now on."""
+        self.lines = tuple(x._replace(line=line) if k == number else x for k, x in enumerate(self.lines))
+        self.bind_line(number, line=line)
+        self._find_torques()
+
+    def _find_torques(self) -> None:
+        """Torques pass through catenary zones of lines, or do no more, from now on."""
+        twists = [bool(x.line.torsion.size) for x in self.lines]
+        if twists != self._twists:
+            self._twists = twists
+            for jobs in self._groups:
+                jobs.set_borders()
+
+    def _torques_of(self, lines: Sequence[int]) -> dict[str, Any] | None:
+        return {} if any(self._twists[k] for k in lines) else None
+
+    def adopt_cells(self, number: int, line: Line, sea: Sea, work: Work, books: Books) -> None:
+        """A line is in other arrays from now on, of which its jobs know."""
+        self.lines = tuple(x._replace(line=line, sea=sea) if k == number else x for k, x in enumerate(self.lines))
+        self.work[number], self.books[number] = work, books
+        self._find_torques()
+
+    def keep_factors(self) -> None:
+        """Keep all factors of all lines in every march from now on, for other right-hand sides."""
+        for k, (x, work) in enumerate(zip(self.lines, self.work, strict=True)):
+            self.work[k] = work._replace(X=np.zeros((x.line.h.size + 1) * (ROW + KEPT)))
+            self.bind_line(k, work=self.work[k])
+        if any(self._mixes):  # other right-hand sides have what lines may do to what is free
+            self._near[self._mixes], self._mixes = -1, [False] * len(self.lines)
+            self._group()
+
+    def tables_by_itself(self, number: int) -> tuple[Table, Table, Table]:
+        """Jobs of a line that is solved by itself: of that, and of steps of even and of odd parity."""
+        even, odd = self._tables[number]
+        return self._lone_tables[number], even, odd
+
+    def _task_of_run(self, number: int) -> Task:
+        return Task(RUN, limits=self.limits_by_itself(number))
+
+    def limits_by_itself(self, number: int) -> Limits:
+        """What Newton's method works with in a line that is solved by itself."""
+        return Limits(REACH * self.lines[number].length, self.lines[number].scale, MOST_OF_STEP, self.tolerance)
+
+    def marcher_of(self, number: int) -> int:
+        """Address of the kernel that solves steps of a line that is solved by itself."""
+        return self._kernel_of(number).address(self._numbers[0, number])
+
+    def _kernel_of(self, number: int) -> Any:
+        return in_plane if self.lines[number].line.bits & PLANAR else in_space
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether every line is solved by itself, whatever comes."""
+        return not (self.joined or len(self.net) or len(self.bodies) or any(self._mixes))
+
+    @property
+    def _marches_alone(self) -> bool:
+        """Whether forces of every line are found by itself, too: where it touches itself they are found with others."""
+        return self.is_apart and not self._contacts
+
+    def joint_solver(self) -> int:
+        """Address of the kernel that solves steps of lines that are joined; 0: none are, and it is not compiled."""
+        if self.is_apart:
+            return 0
+        self._let_march()
+        return solve_system.address(self._all.jobs[0].numbers)
+
+    def _let_march(self) -> None:
+        """Jobs of joined lines know the kernels that march them and couple them, which take long to compile."""
+        self._marcher = in_space.address(self._numbers[0, 0])
+        for jobs in self._groups:
+            jobs.march_by(self._marcher)
+
+    @property
+    def _groups(self) -> list[JointJobs]:
+        """Jobs of all lines, and of those that are solved together where these are others."""
+        return [self._all] if self._together is self._all else [self._all, self._together]
+
+    def _touch(self) -> None:
+        """Lines that touch themselves do so from now on, with the books as they are."""
+        states = [state_for(x.line) for x in self.lines]
+        tables = np.zeros((len(self.lines), Table(blank_contact_job).numbers.size), np.int64)
+        shared = np.array([[-1, 0]] * len(self.lines), np.int64)
+        for k, contact in self._contacts.items():
+            both = states[k], states[k]
+            numbers = contact.attach(self.lines[k].line, self.lines[k].ends, both, self.work[k], self.books[k])
+            self.bind_line(k, contact=contact.call, contact_table=numbers)
+            tables[k], shared[k] = numbers, (k, 0)
+        if self.shared is not None:
+            self._share(tables, shared)
+        room = room_to_touch(self._nodes, len(self.bodies), self._at_rest)
+        self._rooms.borders["contact"] = lambda of: contact_of(of, room, tables, shared)
+        for jobs in self._groups:
+            jobs.set_borders()
+
+    def _share(self, tables: NDArray[np.int64], shared: NDArray[np.int64]) -> None:
+        """Lines that may touch each other do so; the last of them is asked, and goes into the tables of all contact."""
+        found = self.shared
+        assert found is not None
+        one, both = found.attach(self._numbers, self.joints, self.books)
+        for k, begin in zip(found.lines, found.begins.tolist(), strict=True):
+            self.bind_line(k, contact=found.beside)
+            shared[k] = found.last, begin
+        for own in (self._tables, self._joined_tables):
+            for table, numbers in zip(own[found.last], both, strict=True):
+                table.bind(contact=found.call, contact_table=numbers)
+        tables[found.last] = one
+
+    @property
+    def line_tables(self) -> NDArray[np.int64]:
+        """(2, L, ..) jobs of all lines, of steps of even and of odd parity."""
+        return self._numbers
+
+    def look_at(self, states: NetworkState) -> None:
+        """Let the jobs of even parity lead from states to the same."""
+        self.turns = None
+        self._bind_states(0, states, states)
+
+    def keep_books(self, books: Sequence[Books]) -> None:
+        """Keep powers, work and extremes of the lines in these books from now on."""
+        self.books = list(books)
+        for k, each in enumerate(books):
+            asks = each.asked.size or each.walls.size
+            self.bind_line(
+                k, books=each, quantities=note_quantities.address(self._numbers[0, 0]) if asks else 0
+            )  # fmt: skip
+        if self._contacts or self.shared is not None:
+            self._touch()
+
+    def take_turns(self, states: tuple[NetworkState, NetworkState]) -> dict[str, Any]:
+        """Steps lead from the first state to the second and back from now on: what run.network_run.StepsJob has."""
+        self.turns = states
+        return self._bind_turns()
+
+    def jobs_of_joined(self) -> tuple[Table, Table]:
+        """Jobs of both parities without lines that are solved by themselves: none is left where all are."""
+        if self.joined or self._together is not self._all:
+            return self._together.jobs
+        even, odd = (x.again(np.empty_like(x.numbers)) for x in self._together.jobs)
+        for x in (even, odd):
+            x.bind(tables=self.lone_numbers[:0], joints=np.zeros((0, 2), np.int64))
+        return even, odd
+
+    def _bind_turns(self) -> dict[str, Any]:
+        """Let all jobs lead from one of the states that take turns to the other."""
+        assert self.turns is not None
+        old, new = self.turns
+        for parity, (a, b) in enumerate((self.turns, self.turns[::-1])):
+            self._bind_states(parity, a, b)
+        for k, contact in self._contacts.items():
+            contact.set_states(old.lines[k], new.lines[k])
+        for k, table in self._lone_tables.items():
+            table.bind(**self._by_itself(k, {"old": old.lines[k], "new": new.lines[k]}))
+            self._bind_pushes(k)
+        numbers, mixes = self._all.jobs[0].numbers, any(self._mixes)
+        return {
+            "even": numbers, "odd": self._all.jobs[1].numbers,
+            "joined_even": self._together.jobs[0].numbers, "joined_odd": self._together.jobs[1].numbers,
+            "joined": np.array(self.joined, np.int64), "lone": self.lone_numbers,
+            "lone_lines": np.array(self.lone, np.int64), "marchers": np.array(self._marchers(), np.int64),
+            "leader": lead_lone.address(numbers) if mixes else 0, "finder": find_near.address(numbers) if mixes else 0,
+        }  # fmt: skip
+
+    def _marchers(self) -> list[int]:
+        """Addresses of the kernels that solve steps of the lines that are solved by themselves."""
+        return [self.marcher_of(k) for k in self.lone]
+
+    def carry(self, number: int, pushes: list[Floats]) -> None:
+        """Carry a push out of its plane along with a line: (N+1, 4) of states of even parity, and of odd."""
+        self._pushes[number] = pushes
+        self._bind_pushes(number)
+
+    def _bind_pushes(self, number: int) -> None:
+        if number in self._pushes and number in self._lone_tables:
+            was, now = self._pushes[number]
+            self._lone_tables[number].bind(was=was, now=now)
+
+    def exchange_pushes(self) -> None:
+        """What belongs to states of odd parity does so to those of even from now on."""
+        for number, pushes in self._pushes.items():
+            pushes.reverse()
+            self._bind_pushes(number)
+
+    def _bind_states(self, parity: int, old: NetworkState, new: NetworkState) -> None:
+        for tables, a, b in zip(self._tables, old.lines, new.lines, strict=True):
+            tables[parity].bind(old=a, new=b)
+        self._all.bind_bodies(parity, old.bodies, new.bodies)
+        if self._together is not self._all:
+            for k, tables in self._joined_tables.items():
+                tables[parity].bind(old=old.lines[k], new=new.lines[k])
+            self._together.bind_bodies(parity, old.bodies, new.bodies)
