@@ -10,6 +10,7 @@ from hybrid.kernels.state.state import State, Work
 from hybrid.model.build import Model
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.payout import PayingOut
+from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.self_contact import SelfContact
 
 
@@ -48,8 +49,8 @@ class OnlyLine:
     @property
     def paying(self) -> PayingOut:
         """How long it is."""
-        assert self.run.payout is not None
-        return self.run.payout.lines[0]
+        assert self.line.paying is not None
+        return self.line.paying
 
     @property
     def contact(self) -> SelfContact:
@@ -60,8 +61,13 @@ class OnlyLine:
     @property
     def zones(self) -> Any:
         """Its zones, if they move."""
-        assert self.run.zones is not None
-        return self.run.zones.lines[0]
+        return self.zones_of_all.lines[0]
+
+    @property
+    def zones_of_all(self) -> Any:
+        """The part of the run that moves them."""
+        (part,) = (x for x in self.run.parts if isinstance(x, RunZones))
+        return part
 
     @property
     def iterations(self) -> int:

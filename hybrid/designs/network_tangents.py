@@ -56,6 +56,7 @@ from hybrid.kernels.state.report import ASSEMBLED, PLANAR, WAVES
 from hybrid.kernels.state.state import Batch, Floats, Line, State, batch_of_one, state_for
 from hybrid.kernels.watch.tangent_job import TANGENT_SIZES, blank_other
 from hybrid.model.ends import table_of_loads
+from hybrid.model.failure import weaknesses
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.plane import in_space
 from hybrid.model.resolution import Resolution
@@ -396,9 +397,10 @@ def refuse_system(run: NetworkRun) -> None:
         what
         | {
             "lines start as they are placed": found is None and len(model.body_places) > 0,
-            "lines touch each other": (found is not None and found.settled) or run.contact.shared is not None,
-            "zones move": run.zones is not None, "line is paid out": run.payout is not None,
-            "connections may break": bool(run.failures.all),
+            "lines touch each other": (found is not None and found.settled) or run.solver.shared is not None,
+            "zones move": any(x.manager is not None for x in run.lines),
+            "line is paid out": any(x.paying is not None for x in run.lines),
+            "connections may break": bool(weaknesses(run.system)),
             "a line is clamped to what turns with it": bool(model.seats[:, :, TURNS].any()),
             "a body has a shape": bool(model.rides.size),
             "a body has members": bool((run.solver.bodies[:, PIECES] > 0.0).any()),

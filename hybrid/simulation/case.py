@@ -405,7 +405,7 @@ class Case:
             for line in run.lines:
                 line.recorder.close("", "")
         for line in run.lines:
-            if line.contact is not None or line.name in run.contact.near_themselves:
+            if line.contact is not None or line.has_neared_itself:
                 self.near_themselves.add(line.name)
         cpu = clock.thread_time() - begin
         return {x.name: self._compared_line(x, run, cpu, judged=points is None) for x in run.lines}
@@ -425,7 +425,7 @@ class Case:
             resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
             resolution.every, rows=rows, forces=found.steps,
             catenary=found.catenary if moves else np.zeros(0),
-            touches=run.contact.lets_touch or bool(self.network.lines[name].contact.self), places=self.places[name],
+            touches=line.lets_touch or bool(self.network.lines[name].contact.self), places=self.places[name],
             extremes=extremes_about(held, self.points[name].s), rods=tuple(sorted(found.rods)),
         )  # fmt: skip
 

@@ -126,7 +126,7 @@ class CellChanges(Remesh):
     @staticmethod
     def may_change(run: OfRun, number: int, switching: ZoneSwitching) -> bool:
         """Whether cells of a line can change so in a run whose solver is attached."""
-        if run.payout is not None or not by_itself(run, number):
+        if any(x.paying is not None for x in run.lines) or not by_itself(run, number):
             return False
         model = run.model.models[number]
         plain = carries_all(model, switching) and not model.line.bits & REMEMBERS

@@ -20,7 +20,6 @@ from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.shared_contact import SharedContact
 from hybrid.zones.change import ZoneSwitching
 
 if TYPE_CHECKING:  # a line that is not paid out does without
@@ -45,6 +44,10 @@ class OfLine(Protocol):
     @property
     def paying(self) -> PayingOut | None: ...
     @property
+    def plane(self) -> HasPlane | None: ...
+    @property
+    def watched_by(self) -> LinesWatch | None: ...
+    @property
     def outputs_join(self) -> bool: ...
     @property
     def watch_table(self) -> Table | None: ...
@@ -55,19 +58,6 @@ class HasPlane(Protocol):
     """The plane of a line, and the push out of it."""
 
     pushes: tuple[Floats, Floats]
-
-
-class HasPlanes(Protocol):
-    """Those of all lines."""
-
-    def of(self, k: int) -> HasPlane | None: ...
-
-
-class HasContact(Protocol):
-    """Contact of lines."""
-
-    shared: SharedContact | None  # of lines with each other
-    watch: LinesWatch | None  # over lines between which no contact is computed
 
 
 class OfRun(Protocol):
@@ -81,12 +71,6 @@ class OfRun(Protocol):
     def t(self) -> float: ...
     @property
     def lines(self) -> Sequence[OfLine]: ...
-    @property
-    def payout(self) -> object: ...
-    @property
-    def planes(self) -> HasPlanes | None: ...
-    @property
-    def contact(self) -> HasContact: ...
     @property
     def asks_quantities(self) -> bool: ...
     def adopt_cells(self, number: int, model: Model, work: Work) -> None: ...
@@ -160,7 +144,7 @@ class OneOfMany:
         self._system, self._number, self.switching = run, number, switching
         line = run.lines[number]
         self.envelope, self.marked = line.envelope, line.marked
-        self._plane = None if run.planes is None else run.planes.of(number)
+        self._plane = line.plane
         self.table = LineTables(*run.solver.tables_by_itself(number))
         table = line.watch_table
         self.itself = WatchedLine(line, table) if table is not None else None
@@ -250,7 +234,8 @@ def ends_alone(batches: Sequence[Batch]) -> Batch:
 
 def by_itself(run: OfRun, number: int) -> bool:
     """Whether nothing but its own steps knows of the cells of a line, in a run whose solver is attached."""
-    line, watch = run.lines[number], run.contact.watch
+    line = run.lines[number]
+    watch = line.watched_by
     watched = watch is not None and watch.is_needed
     alone = number in run.solver.lone and not run.solver.mixes and not watched
     return alone and line.contact is None

@@ -47,7 +47,8 @@ from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stret
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.failure import FASTEST
-from hybrid.simulation.line_of_run import Around
+from hybrid.simulation.line_of_run import Around, HasPlane
+from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.slack_bends import note_laid
@@ -180,6 +181,9 @@ class LineResult:
         self._itself = LineWatch(self.envelope.itself, model)
         self.lets_touch = True  # whether contact begins by itself where the line comes near itself
         self.nears_itself = self.parts_itself = False  # whether contact with itself has to begin, or to end
+        self.has_neared_itself = False  # whether that was so at some time
+        self.watched_by: LinesWatch | None = None  # whether it meets others, between which no contact is computed
+        self.plane: HasPlane | None = None  # of a line alone
         self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
         record = wanted.record
         self.recorder = ComparisonRecorder(FORCE_COLUMNS) if record is None else record(self, found, outputs)

@@ -267,11 +267,9 @@ class LonePlanes(Part):
             for k, x in enumerate(run.model.models)
             if x.plane is not None
         }
+        for k, plane in self._lines.items():
+            run.lines[k].plane = plane
         self._leaving = self._nearing = frozenset[int]()  # after the last step
-
-    def of(self, k: int) -> LonePlane | None:
-        """What is known of the plane of line k; None: it has none."""
-        return self._lines.get(k)
 
     def _may(self, k: int) -> bool:
         """Whether nothing of line k has to be computed in space."""
@@ -327,10 +325,10 @@ class LonePlanes(Part):
             x.monitor.leave(self._model(k), x, self._run.state.lines[k])
         x.plane = None
 
-    def take_cells(self, k: int, line: Line) -> None:
-        """Line k goes on with other cells, to which steps have carried the push."""
-        if k in self._lines:
-            self._lines[k].monitor.take(line)
+    def adopt_cells(self, number: int, line: Line) -> None:
+        """Steps have carried the push to other cells of a line."""
+        if number in self._lines:
+            self._lines[number].monitor.take(line)
 
     def note_step(self) -> None:
         """Hear of what a step has flagged: pushes that are given anew, and lines that are to leave or to come back."""

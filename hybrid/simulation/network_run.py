@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from time import process_time as clock_now
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.state import books as b
+from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Floats, Moves, Work
 from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
@@ -25,7 +26,6 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.failure import write_snapshot
 from hybrid.simulation.line_result import WAITING
-from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.parts import EVERY_STEP
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import other_program, refused, require_same
@@ -36,12 +36,10 @@ from hybrid.simulation.run_checkpoint import (
 from hybrid.simulation.run_contact import (
     refuse_within_itself,
 )
-from hybrid.simulation.run_failures import Cuts, Failures
 from hybrid.simulation.run_of_lines import change_loads_of_lines
 from hybrid.simulation.run_record import RecordedRun
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, named
-from hybrid.simulation.run_zones import RunZones
-from hybrid.solve.joined import LineFailed, NetworkState
+from hybrid.solve.joined import LineFailed, NetworkState, NetworkTaken
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
@@ -52,9 +50,6 @@ from hybrid.store.hdf5_file import opened
 from hybrid.store.writer import Recorder
 from hybrid.zones.criteria import UserCriterion
 from hybrid.zones.manager import DomainManager
-
-if TYPE_CHECKING:
-    from hybrid.simulation.run_payout import RunPayout
 
 # Steps that Python has a part in, between two reports of the progress.
 LOOK = 16
@@ -79,13 +74,8 @@ class NetworkRun(RecordedRun):
     `new_run.new_run` makes it.
     """
 
-    cuts: Cuts
-    failures: Failures
     solver: NetworkSolver
     other: NetworkState  # the state after the next step
-    planes: LonePlanes | None = None
-    zones: RunZones | None = None
-    payout: RunPayout | None = None  # of lines that are paid out
     notes: Sequence[tuple[str, str]] = ()  # events (kind, text) of the whole of the run
     begun: Callable[[NetworkRun], None] | None = None  # called behind the first output
     loaded = 0.0  # s, loads that have stopped by then act no more
@@ -142,7 +132,6 @@ class NetworkRun(RecordedRun):
     def record_equilibrium(self) -> None:
         """Record the equilibrium that was found."""
         assert self.found is not None
-        self.contact.note_partners()
         try:
             self.solver = solver = self.found.solver
             if not self.found.settled:
@@ -150,8 +139,8 @@ class NetworkRun(RecordedRun):
             self._make_room(solver)
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, solver.anchor)  # what nothing holds has no report without its springs
-            self.contact.watch_lines()
-            self.contact.look_for_overlaps()
+            for part in self.parts:
+                part.at_rest()
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
                 line.note_equilibrium(x, state, None, self.found, self.turned)
             self.renew_other()
@@ -202,10 +191,10 @@ class NetworkRun(RecordedRun):
 
     def make_solver(self) -> None:
         """A solver for the model as it is."""
-        self.contact.note_partners()
         for part in self.parts:
             part.fit_lines()
-        contacts, shared = self.contact.of_lines(any(part.remeshes for part in self.parts))
+        remeshes = any(part.remeshes for part in self.parts)
+        contacts, shared = next(y for part in self.parts if (y := part.touching(remeshes)) is not None)
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         for line, x in zip(self.lines, lines, strict=True):
             line.held = np.minimum(x.ends.held, 1)
@@ -238,8 +227,8 @@ class NetworkRun(RecordedRun):
         self.model = replace(self.model, models=tuple(models))
         self.solver.adopt_cells(number, model.line, model.sea.values, work, line.books)
         line.adopt_cells(model)
-        if self.planes is not None:
-            self.planes.take_cells(number, model.line)
+        for part in self.parts:
+            part.adopt_cells(number, model.line)
 
     def renew_other(self) -> None:
         """Room for the state after the next step, of lines as they are now."""
@@ -369,8 +358,8 @@ class NetworkRun(RecordedRun):
 
     def _fitting(self) -> tuple[object, ...]:
         """What compiled steps are attached to: where it is the same, and they have come to a stop, they go on."""
-        models, reels = self.model.models, self.payout.lines.values() if self.payout is not None else ()
-        return self.solver, self.model, *(x.ends.moves() for x in models), *(x.reel for x in reels)
+        own = (x for attached_to in self.parts.attached_to for x in attached_to())
+        return self.solver, self.model, *(x.ends.moves() for x in self.model.models), *own
 
     def _go(self) -> int:
         """Compiled steps, until a code of kernels.state.books."""
@@ -428,8 +417,6 @@ class NetworkRun(RecordedRun):
                 line.attach(solver, (old, new), loop.clock, loop.counts)
         for attach in self.parts.attach:
             attach(loop)
-        for line in self.lines:
-            line.lets_touch = self.contact.lets_touch
         moves = [model.ends.moves() for model in self.model.models]
         if len(moves) != len(self._moved) or any(x is not y for x, y in zip(moves, self._moved, strict=True)):
             self._moved = moves
@@ -465,9 +452,13 @@ class NetworkRun(RecordedRun):
                 self._record_last()
             for line in self.lines:
                 line.write_down()  # what stopped the run before comes first
-            raise self.cuts.stopped(self.solver, self.loop.tried, dt)
+            raise self._explained(self.loop.tried, dt)
         self._go_back(False)
         self.loop.try_whole()
+
+    def _explained(self, taken: NetworkTaken, dt: float) -> LineFailed:
+        """Why no step of dt (s) leads on; 0: why there are no accelerations."""
+        return next(x for part in self.parts if (x := part.explains(taken, dt)) is not None)
 
     def _go_back(self, still: bool) -> None:
         """Whether forces are found of the state before a try, which the extremes know: it counts once."""
@@ -486,7 +477,8 @@ class NetworkRun(RecordedRun):
 
     def release(self, weakness: Weakness, why: str) -> None:
         """Let ends of lines go now, between two steps; why: for the event.  LineFailed."""
-        self.failures.release(weakness, why)
+        for part in self.parts:
+            part.break_now(weakness, why)
 
     def restart_steps(self) -> None:
         """Loads, or what holds the lines, are others now: accelerations jump."""
@@ -570,7 +562,7 @@ class NetworkRun(RecordedRun):
                 lengthening |= stack.enter_context(forces_on())
             taken = solver.consistent_accelerations(self.state, accelerations, self.t, lengthening)
         if taken.outcome != Outcome.OK:
-            raise self.cuts.stopped(solver, taken, 0.0)
+            raise self._explained(taken, 0.0)
 
     # --- other lines in mid-motion --------------------------------------------------------------------
 
@@ -582,6 +574,19 @@ class NetworkRun(RecordedRun):
         self.solver.bodies[:], self.solver.body_work[:] = bodies, work
         self.renew_other()
         self.evaluate_forces(after)
+
+    def go_on_changed(self, numbers: Iterable[int], after: str) -> None:
+        """Another solver, for lines of these numbers that have changed, and that share contact with those.
+
+        What that changes of the energy of contact is booked: of all lines, where a part knows that of the last step.
+        """
+        known = next((x for part in self.parts if (x := part.contact_before()) is not None), None)
+        of = range(len(self.lines)) if known is not None else numbers
+        before = {k: float(self.solver.work[k].report[SELF_CONTACT_ENERGY] if known is None else known[k]) for k in of}
+        self.renew_solver(after)
+        for k, energy in before.items():
+            more = float(self.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
+            self.lines[k].books.work[0, b.ZONES] += more
 
     def go_on_as_attached(self, after: str) -> None:
         """Go on with the same solver and states, for lines that have changed; after: as of `renew_solver`."""
@@ -601,3 +606,5 @@ class NetworkRun(RecordedRun):
         taken = self.solver.forces_in_motion(self.state, self.t)
         if taken.outcome != Outcome.OK:
             raise LineFailed(taken.line, taken.outcome, self.t, None, after)
+        for note in self.parts.note_forces:
+            note()

@@ -44,7 +44,8 @@ from hybrid.store.writer import AT_ONCE, WriteMode
 from hybrid.zones.criteria import UserCriterion
 
 if TYPE_CHECKING:  # what a run without winches does not load
-    pass
+    from hybrid.simulation.payout import PayingOut
+    from hybrid.simulation.run_payout import RunPayout
 
 
 class Recording(NamedTuple):
@@ -153,37 +154,36 @@ def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording
     me = proxy(run)  # for parts: in a circle a run would wait for the search for garbage
     moves, named = run.moves, dict(zip(first.model.names, first.scenes, strict=True))
     parts: list[Part] = []
+    payout: RunPayout | None = None
     if moves and any(x.payout is not None for x in run.model.models):
         from hybrid.simulation.run_payout import RunPayout
 
-        run.payout = RunPayout(me)
-        parts.append(run.payout)
+        payout = RunPayout(me)
+        parts.append(payout)
     run.rotations = Rotations(system, run.model)
     run.file = file_of(me, text, recording)
-    _add_lines(run, first, recording)
-    run.contact = RunContact(me, recording.touches, run.target is not None)
+    _add_lines(run, first, recording, payout.lines if payout is not None else {})
+    contact = RunContact(me, recording.touches, run.target is not None)
     if recording.planes and moves:
-        run.planes = LonePlanes(me, run.loop.counts, system.dimension == 2)
-        parts.append(run.planes)
+        parts.append(LonePlanes(me, run.loop.counts, system.dimension == 2))
     shaken = zip(named.items(), run.resolution.lines.values(), strict=True)
     vibrations = {name: VibrationSteps(scene, x) for (name, scene), x in shaken}
     run.quantities = RunQuantities(system, run.file.of_quantities(named))
     if moves:
         run.quantities.keep_ranges(run.lines)
-    run.failures, run.cuts = Failures(me), Cuts(me, run.target is None)
     if first.managers and moves:
-        run.zones = RunZones(me, first.managers, run.payout)
-        parts.append(run.zones)
+        parts.append(RunZones(me, first.managers, payout))
     if recording.parts and moves:
         called = {} if recording.asked is None else short_form(recording.asked.scene).names
-        parts.append(OwnParts(me, recording.parts, [called.get(name, name) for name in named], run.payout))
-    parts += [WatchedLines(me), run.contact, run.cuts, run.failures, VibrationsOfLines(vibrations, run.loop.clock)]
+        parts.append(OwnParts(me, recording.parts, [called.get(name, name) for name in named], payout))
+    parts += [WatchedLines(me), contact, Cuts(me, contact, run.target is None), Failures(me)]
+    parts += [VibrationsOfLines(vibrations, run.loop.clock)]
     run.parts = Parts([*parts, run.quantities, run.rotations, FloatingWatch(me, moves)])
 
 
-def _add_lines(run: NetworkRun, first: First, recording: Recording) -> None:
-    """Give a run its lines, each with what records it."""
-    reels, points = run.payout.lines if run.payout is not None else {}, recording.points or {}
+def _add_lines(run: NetworkRun, first: First, recording: Recording, paid: Mapping[int, PayingOut]) -> None:
+    """Give a run its lines, each with what records it; paid: those that are paid out, by number."""
+    points = recording.points or {}
     run.lines = []
     every = zip(run.model.names, first.scenes, run.model.models, run.state.lines, strict=True)
     for k, (name, scene, model, state) in enumerate(every):
@@ -191,7 +191,7 @@ def _add_lines(run: NetworkRun, first: First, recording: Recording) -> None:
         record = partial(run.file.line_recorder, manager=manager) if run.target is not None else None
         wanted = Wanted(record, points.get(name))
         shown, outputs = run.file.scene_of(scene), len(run.times)
-        line = LineResult(k, name, shown, model, run.found, state, outputs, wanted, reels.get(k))
+        line = LineResult(k, name, shown, model, run.found, state, outputs, wanted, paid.get(k))
         run.lines.append(line)
         line.manager = manager
     if not first.resumed:

@@ -10,11 +10,19 @@ from contextlib import AbstractContextManager
 from math import inf
 from typing import Any
 
-from hybrid.kernels.state.state import Floats
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.state.state import Floats, Line
+from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.run_points import Sampled
+from hybrid.solve.joined import LineFailed, NetworkTaken
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
+from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.shared_contact import SharedContact
+from hybrid.zones.plan import Change
 
 # What is asked of several parts is asked in this order.
 ORDER = (
@@ -77,6 +85,48 @@ class Part:
     def sync(self) -> None:
         """Compiled steps have come back: Python knows what they have changed."""
 
+    def attached_to(self) -> Iterable[object]:
+        """Arrays of its own that compiled steps are attached to: while they are the same, steps go on."""
+        return ()
+
+    def touching(self, remeshes: bool) -> tuple[list[SelfContact | None], SharedContact | None] | None:
+        """What touches in the solver to be made: each line itself, and all; remeshes: cells may have changed."""
+        return None
+
+    # --- what other parts ask of all of them ------------------------------------------------------------
+
+    def change_line(self, number: int, change: Callable[[Line], Line]) -> None:
+        """A line of the run, by number, is changed so on the same cells."""
+
+    def adopt_cells(self, number: int, line: Line) -> None:
+        """Compiled steps have given a line other cells."""
+
+    def switch_zones(self, number: int, change: Change, here: NDArray[np.bool_] | None) -> None:
+        """Zones of a line change so before a node leaves, or enters, at its winch; here: where nodes are to be."""
+
+    def let_go(self, ends: Iterable[tuple[int, int]]) -> None:
+        """Ends (line, 0 or 1) are to come loose now."""
+
+    def release(self, ends: Iterable[tuple[int, int]]) -> None:
+        """They have come loose in the models of the run."""
+
+    def break_now(self, weakness: Weakness, why: str) -> None:
+        """A program outside lets ends go; why: for the event.  LineFailed."""
+
+    def change_loads(self) -> None:
+        """Other loads act from now on in the models of the run."""
+
+    def fit_models(self, model: NetworkModel) -> NetworkModel:
+        """A model on cells of t = 0, with the cells of now."""
+        return model
+
+    def contact_before(self) -> Floats | None:
+        """Energy (L,) J of contact of each line before the last try; None: it does not know."""
+        return None
+
+    def note_forces(self) -> None:
+        """Forces have been found anew of the state of now."""
+
     # --- steps ----------------------------------------------------------------------------------------
 
     def begin_leg(self) -> None:
@@ -92,6 +142,10 @@ class Part:
     def gives_up(self, dt: float) -> bool:
         """No step of dt (s) leads on: whether one may now, as something is given up."""
         return False
+
+    def explains(self, taken: NetworkTaken, dt: float) -> LineFailed | None:
+        """Why no step of dt (s) leads on; dt 0: why there are no accelerations."""
+        return None
 
     def note_step(self) -> None:
         """After a step with one of the bits that it wants: books alone, nothing changes."""
@@ -125,6 +179,12 @@ class Part:
         """Steps have come to a stop, or are to begin."""
 
     # --- what is recorded -----------------------------------------------------------------------------
+
+    def at_rest(self) -> None:
+        """An equilibrium is to be recorded, whose forces are known: no other verb but `finish` is asked then."""
+
+    def gather(self) -> None:
+        """Events are about to be written, in the order in which they happened."""
 
     def log(self, rows: Floats) -> None:
         """Steps have been made, (n, L, 3): s; N, at start and end of each line."""
@@ -177,6 +237,8 @@ class Parts:
         self.note_step, self.after_step = (
             [(x.wants, verb) for x in parts for verb in _having([x], name)] for name in ("note_step", "after_step")
         )
+        self.attached_to, self.gather = _having(parts, "attached_to"), _having(parts, "gather")
+        self.note_forces = _having(parts, "note_forces")
         self.begins = sorted({t for x in parts for t in x.begins})  # s
 
     def __iter__(self) -> Iterator[Part]:

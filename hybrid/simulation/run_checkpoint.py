@@ -12,11 +12,10 @@ from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE
+from hybrid.model.failure import weaknesses
 from hybrid.scene.root import Scene
 from hybrid.simulation.old_checkpoints import FIRST_REPORT, FIRST_WORKS, as_of_line, is_of_cable, of_line
-from hybrid.simulation.parts import Parts
 from hybrid.simulation.restore import program, refused, resolution_tree
-from hybrid.simulation.run_failures import Failures
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.run import no_extremes
 from hybrid.store.checkpoint import digest_of, read_checkpoint
@@ -38,12 +37,6 @@ class KeptRun(RunOfLines, Protocol):
     leg: tuple[float, int]
     cpu: float  # s
     changed: int  # how many changes of loads have been made
-
-    @property
-    def parts(self) -> Parts: ...
-
-    @property
-    def failures(self) -> Failures: ...
 
     @property
     def interval(self) -> float: ...
@@ -74,7 +67,7 @@ def checkpoint(run: KeptRun) -> dict[str, Any]:
 def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
     """Go on as `checkpoint` has written, with a run that was made for it.  ValueError: that cannot be."""
     if is_of_cable(saved):
-        saved = as_of_line(saved, run.lines[0].name, run.model.models[0], run.failures.all)
+        saved = as_of_line(saved, run.lines[0].name, run.model.models[0], weaknesses(run.system))
     given, saved = saved, _of_today(run, saved)
     joined = [part.restore_joints(saved) for part in reversed(run.parts)]
     if any([*(part.restore_cells(saved) for part in reversed(run.parts)), *joined]):

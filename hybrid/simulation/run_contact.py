@@ -15,7 +15,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.contact.self_contact_law import OUTER
 from hybrid.kernels.junctions.lines_distance import JOINT
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT, SELF_CONTACT_ENERGY, SELF_FRICTION
+from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import touching_among
@@ -99,32 +99,31 @@ class RunContact(Part):
         lets_touch: whether contact begins by itself where lines come near themselves, else that is only noticed;
         watches: whether lines that pass through each other are told of.
         """
-        self._run, self.lets_touch, self._watches = run, lets_touch, watches
-        self.near_themselves = set[str]()  # names of lines that have come near themselves
+        self._run, self._watches = run, watches
+        for line in run.lines:
+            line.lets_touch = lets_touch
         self.shared: SharedContact | None = None  # of lines with each other
         self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
         self._met: set[Pair] = set()  # lines that have been said to touch
         self._passed: set[Pair] = set()  # and to pass through each other
         self._let_pass: set[Pair] = set()  # of lines that may meet, those between which it is not computed
+        self._note_partners()
 
     # --- solvers --------------------------------------------------------------------------------------
 
-    def note_partners(self) -> None:
+    def _note_partners(self) -> None:
         """Lines know whether they may touch others."""
         among = self._run.model.touching
         for line in self._run.lines:
             line.shares = among is not None and line.number in among.lines
 
-    def of_lines(self, remeshed: bool) -> tuple[list[SelfContact | None], SharedContact | None]:
-        """Contact of the lines as they are, of each with itself and of all, which goes on with what there was.
-
-        remeshed: whether cells may be others than before.
-        """
+    def touching(self, remeshes: bool) -> tuple[list[SelfContact | None], SharedContact | None]:
+        """Contact of the lines as they are, of each with itself and of all, which goes on with what there was."""
         run = self._run
         own = {line.number: line.contact for line in run.lines if line.shares and line.contact is not None}
         contacts, shared = [line.touch_itself(run.t) for line in run.lines], shared_of(run.model, rubs=True)
         if shared is not None and self.shared is not None and shared.lines == self.shared.lines:
-            shared.restore(self.shared.checkpoint(run.t), run.t, remeshed=remeshed)
+            shared.restore(self.shared.checkpoint(run.t), run.t, remeshed=remeshes)
         elif shared is not None and (own or self.shared is not None):
             shared.copy_from(self.shared, own, run.t)
         self.shared = shared
@@ -134,9 +133,14 @@ class RunContact(Part):
         """Look in the steps of another solver which lines pass through each other."""
         if self.watch is not None:
             self._note_passages()
-        self.watch_lines()
+        self._watch_lines()
 
-    def watch_lines(self) -> None:
+    def at_rest(self) -> None:
+        """Look which lines overlap in an equilibrium."""
+        self._watch_lines()
+        self._look_for_overlaps()
+
+    def _watch_lines(self) -> None:
         """Look from now on which lines overlap without contact, beside those that are known to."""
         if not self._watches:
             return
@@ -146,10 +150,12 @@ class RunContact(Part):
             run.loop.watch(*self.watch.attach(run.solver.line_tables))
         else:
             run.loop.watch_nothing()  # its tables are of the watch before, which is gone
+        for line in run.lines:
+            line.watched_by = self.watch
 
     # --- the start ------------------------------------------------------------------------------------
 
-    def look_for_overlaps(self) -> None:
+    def _look_for_overlaps(self) -> None:
         """Look which lines overlap without contact in the first state, and which the search for it has let cross."""
         run = self._run
         if self.watch is not None and self.watch.is_needed:
@@ -178,7 +184,7 @@ class RunContact(Part):
 
     def begin(self) -> None:
         """Likewise of lines that are near each other there."""
-        self.look_for_overlaps()
+        self._look_for_overlaps()
         if self.watch is not None and self.watch.near() and self._begin_between():
             self._run.balance()
 
@@ -206,11 +212,16 @@ class RunContact(Part):
             self._touch_each_other(between)
         return bool(near or between)
 
+    def restore_cells(self, saved: Mapping[str, Any]) -> bool:
+        """Lines know their partners again."""
+        self._note_partners()
+        return False
+
     def restore(self, saved: Mapping[str, Any]) -> None:
         """That has been said, and lines stick where they did."""
         self._passed, self._met, self._let_pass = (_pairs(saved[x]) for x in ("passed", "met", "let_pass"))
         if len(self._run.lines) > 1:
-            self.watch_lines()  # what has met since has not
+            self._watch_lines()  # what has met since has not
         if self.shared is not None:
             self.shared.restore(saved["contact"], self._run.t)
 
@@ -234,13 +245,12 @@ class RunContact(Part):
         """
         run = self._run
         near = [line for line in run.lines if line.nears_itself]
-        self.near_themselves |= {line.name for line in near}
-        if not self.lets_touch:
-            for line in near:
-                line.watch_itself_no_more(run.solver)
-            return
         begun = []
         for line in near:
+            line.has_neared_itself = True
+            if not line.lets_touch:
+                line.watch_itself_no_more(run.solver)
+                continue
             x, line.nears_itself = run.solver.lines[line.number], False
             model = run.model.models[line.number]
             energy = contact_of(model).energy_of(x.line, x.ends, run.state.lines[line.number])
@@ -254,12 +264,12 @@ class RunContact(Part):
                 line.meets_itself(run.t, run.last_step)
         if begun:
             self._let_touch(begun)
-            self._go_on(begun, "where contact of the line with itself begins")
+            run.go_on_changed(begun, "where contact of the line with itself begins")
 
     def _end_alone(self, numbers: Sequence[int]) -> None:
         """Contact is computed no longer of lines of these numbers, until they come near themselves again."""
         self._let_touch(numbers, touch=False)
-        self._go_on(numbers, "where contact of the line with itself ends")
+        self._run.go_on_changed(numbers, "where contact of the line with itself ends")
 
     def _let_touch(self, numbers: Iterable[int], touch: bool = True) -> None:
         """Lines touch themselves, or no longer; the solver has still to follow."""
@@ -269,20 +279,6 @@ class RunContact(Part):
             run, {k: partial(touching, friction=x) if touch else touching_no_more for k, x in frictions.items()}
         )
 
-    def _go_on(self, numbers: Sequence[int], after: str) -> None:
-        """Another solver, for lines of these numbers that touch themselves, or each other, now, or no longer.
-
-        The energy of contact that comes or goes so is booked.
-        """
-        run = self._run
-        if run.zones is not None:
-            run.zones.go_on()
-            return
-        before = [float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in numbers]
-        run.renew_solver(after)
-        for k, energy in zip(numbers, before, strict=True):
-            run.lines[k].books.work[0, b.ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
-
     # --- lines with each other ------------------------------------------------------------------------
 
     def _begin_between(self) -> bool:
@@ -290,7 +286,7 @@ class RunContact(Part):
         pairs = self._lines_near()
         if not pairs:  # they are let pass
             self._note_passages()
-            self.watch_lines()
+            self._watch_lines()
             return False
         now = self._run.model.touching.pairs if self._run.model.touching is not None else []
         self._change_pairs({*now, *pairs}, "where contact of lines with each other begins")
@@ -325,7 +321,7 @@ class RunContact(Part):
         numbers = set(run.model.touching.lines) if run.model.touching is not None else set()
         self._touch_each_other(pairs)
         numbers |= set(run.model.touching.lines) if run.model.touching is not None else set()
-        self._go_on(sorted(numbers), after)
+        run.go_on_changed(sorted(numbers), after)
 
     def _touch_each_other(self, pairs: Iterable[Pair]) -> None:
         """Models of which these lines touch each other, two each, and no others; the solver has to follow."""
@@ -343,6 +339,7 @@ class RunContact(Part):
             changes[k] = partial(change, scene=run.model.scenes[run.model.names[k]], touches=k in now)
         change_lines(run, changes)
         run.model = replace(run.model, touching=among)
+        self._note_partners()
 
     # --- given up -------------------------------------------------------------------------------------
 
@@ -391,7 +388,7 @@ class RunContact(Part):
 
     # --- what is told ---------------------------------------------------------------------------------
 
-    def note_meetings(self) -> None:
+    def gather(self) -> None:
         """An event for every two lines that have met, with contact or without, when they do first."""
         run, shared = self._run, self._run.solver.shared
         for a, c, t, s, other in sorted(shared.met() if shared is not None else (), key=lambda x: x[2]):

@@ -7,7 +7,7 @@ end of a line and its clamp goes with the clamp, and the twist of catenary zones
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -38,9 +38,9 @@ from hybrid.simulation.failure import Stopped, explanation, first_remedy, touch_
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.joined import LineFailed, NetworkState, NetworkTaken
-from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.run import Tried
+from hybrid.solve.shared_contact import SharedContact
 
 SAME_TIME = 1e-6  # of a step: a time so near is now
 
@@ -82,8 +82,8 @@ class Failures(Part):
         if found:
             self._go_on()
 
-    def release(self, weakness: Weakness, why: str) -> None:
-        """Break now what a program outside lets go; why: for the event."""
+    def break_now(self, weakness: Weakness, why: str) -> None:
+        """Break now what a program outside lets go."""
         self.all = (*self.all, weakness)
         self._break(len(self.all) - 1, why)
         self._go_on()
@@ -126,8 +126,8 @@ class Failures(Part):
         run, x = self._run, self.all[k]
         line, end = x.ends[0]
         run.output_due()
-        if run.payout is not None:
-            run.payout.let_go(x.ends)
+        for part in run.parts:
+            part.let_go(x.ends)
         before, states, energy = run.model.models, run.state.lines, 0.0
         self._part(k)
         for l, e in x.ends:
@@ -147,8 +147,8 @@ class Failures(Part):
         self.broken.append(k)
         for line, model in zip(run.lines, run.model.models, strict=True):
             line.follow(model)
-        if run.zones is not None:
-            run.zones.release(self.all[k].ends)
+        for part in run.parts:
+            part.release(self.all[k].ends)
         states = [
             x if x.turn.size == 3 * len(model.line.torsion) else x._replace(turn=NO_TURN)
             for x, model in zip(run.state.lines, run.model.models, strict=True)
@@ -174,14 +174,20 @@ def elastic(model: Model, t: float, state: State) -> float:
 # --- steps that are cut, that have become very short, or of which none leads on -----------------------
 
 
+class TouchingLines(Protocol):
+    """Contact of the lines of a run."""
+
+    shared: SharedContact | None  # with each other
+
+
 class Cuts(Part):
     """Steps that are cut, and those after which there is no other."""
 
     name, wants = "cuts", b.COLLAPSES | b.STEPS_CUT | b.STEPS_SLACK | b.ITERATIONS_CUT
 
-    def __init__(self, run: RunOfLines, compared: bool) -> None:
-        """compared: whether the run is only to be compared with."""
-        self._run, self._compared = run, compared
+    def __init__(self, run: RunOfLines, contact: TouchingLines, compared: bool) -> None:
+        """contact: of its lines; compared: whether the run is only to be compared with."""
+        self._run, self._contact, self._compared = run, contact, compared
 
     def after_step(self) -> None:
         """Events of steps that were cut."""
@@ -201,7 +207,7 @@ class Cuts(Part):
 
     def finish(self, status: str) -> None:
         """How many steps were taken before they had converged, and how many tries contact cost."""
-        run, shared = self._run, self._run.contact.shared
+        run, shared = self._run, self._contact.shared
         if status == "complete":
             count_iterations(run.loop.clock, run.loop.counts, run.span[1], run.noted)
         if shared is not None and (tries := shared.given_up):
@@ -210,7 +216,7 @@ class Cuts(Part):
     @property
     def _touching(self) -> str:
         """What touches now, a line itself or another one, for the text of a failure; empty: nothing."""
-        shared = self._run.contact.shared
+        shared = self._contact.shared
         pairs = shared.points_between() if shared is not None else []
         if any(a != c for (a, _), (c, _) in pairs):
             return TOUCH_EACH_OTHER
@@ -231,9 +237,9 @@ class Cuts(Part):
         if self._compared and tiny >= GIVE_UP:
             raise LineFailed(line.number, Outcome.COLLAPSED, run.t, s, text)
 
-    def stopped(self, solver: NetworkSolver, taken: NetworkTaken, dt: float) -> LineFailed:
+    def explains(self, taken: NetworkTaken, dt: float) -> LineFailed:
         """Why no step of dt (s) leads on; 0: why there are no accelerations."""
-        run = self._run
+        run, solver = self._run, self._run.solver
         if taken.line < 0:
             detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
             if dt == 0.0:

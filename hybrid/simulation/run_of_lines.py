@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Protocol
 
-import numpy as np
-
 from hybrid.kernels.junctions.bodies import DONE, SPRING
 from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Line, Work
@@ -22,9 +20,8 @@ from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
-from hybrid.simulation.line_of_run import HasContact, HasPlanes
 from hybrid.simulation.line_result import LineResult, LineStep
-from hybrid.simulation.parts import Part
+from hybrid.simulation.parts import Part, Parts
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
@@ -33,29 +30,6 @@ from hybrid.store.array_contents import ArrayRecorder
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
 from hybrid.zones.change import on_layout
-from hybrid.zones.plan import Change
-
-
-class MovingZones(Protocol):
-    """Zones that move: what has changed in the lines they are of."""
-
-    def change_line(self, number: int, change: Callable[[Line], Line]) -> None: ...
-
-    def release(self, ends: Iterable[tuple[int, int]]) -> None: ...
-
-    def change_loads(self) -> None: ...
-
-    def switch(self, number: int, change: Change, here: np.ndarray | None = ...) -> None: ...
-
-    def go_on(self, after: str = ...) -> None: ...
-
-
-class PaidLines(Protocol):
-    """Lines that are paid out."""
-
-    def let_go(self, ends: Iterable[tuple[int, int]]) -> None: ...
-
-    def fit_models(self, model: NetworkModel) -> NetworkModel: ...
 
 
 class RunOfLines(Protocol):
@@ -75,16 +49,7 @@ class RunOfLines(Protocol):
     found: LinesAtRest | None
 
     @property
-    def zones(self) -> MovingZones | None: ...
-
-    @property
-    def payout(self) -> PaidLines | None: ...
-
-    @property
-    def planes(self) -> HasPlanes | None: ...
-
-    @property
-    def contact(self) -> HasContact: ...
+    def parts(self) -> Parts: ...
 
     @property
     def recorder(self) -> Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder: ...
@@ -128,6 +93,8 @@ class RunOfLines(Protocol):
 
     def renew_solver(self, after: str) -> None: ...
 
+    def go_on_changed(self, numbers: Iterable[int], after: str) -> None: ...
+
     def go_on_as_attached(self, after: str) -> None: ...
 
     def gather_events(self) -> None: ...
@@ -141,8 +108,8 @@ def change_lines(run: RunOfLines, changes: Mapping[int, Callable[[Line], Line]])
     for k, change in changes.items():
         models[k] = replace(models[k], line=change(models[k].line))
         run.lines[k].follow(models[k])
-        if run.zones is not None:
-            run.zones.change_line(k, change)
+        for part in run.parts:
+            part.change_line(k, change)
     run.model = replace(run.model, models=tuple(models))
 
 
@@ -176,14 +143,15 @@ def with_loads_of(system: Network, other: Network) -> Network:
 
 
 def loaded_as(
-    model: NetworkModel, system: Network, t: float, fit: Callable[[NetworkModel], NetworkModel] | None = None
+    model: NetworkModel, system: Network, t: float, fits: Iterable[Callable[[NetworkModel], NetworkModel]] = ()
 ) -> NetworkModel:
     """The same network from t (s) on with the loads and motions of a system; what is joined or loose stays so.
 
-    fit: gives lines that are paid out the cells of now, in place of those of t = 0.
+    fits: each gives a model the cells of now of some lines, in place of those of t = 0.
     """
     other = build_system(system, model.resolution, model)
-    other = other if fit is None else fit(other)
+    for fit in fits:
+        other = fit(other)
     models = tuple(_line_as(*each, system, t) for each in zip(model.names, model.models, other.models, strict=True))
     touching = model.touching
     if touching is not None:
@@ -223,14 +191,13 @@ def change_loads_of_lines(run: RunOfLines, system: Network) -> None:
     for line in run.lines:
         line.write_down()
     run.gather_events()  # in the order in which they happen
-    fit = None if run.payout is None else run.payout.fit_models
-    run.system, run.model = system, loaded_as(run.model, system, run.t, fit)
+    run.system, run.model = system, loaded_as(run.model, system, run.t, [x.fit_models for x in run.parts])
     run.loaded = run.t  # loads that end now, or would have ended before, act no more
     run.start_from(run.rest)
     for line, model in zip(run.lines, run.model.models, strict=True):
         line.follow(model)
-    if run.zones is not None:
-        run.zones.change_loads()
+    for part in run.parts:
+        part.change_loads()
     done = run.solver.body_work[:, DONE:SPRING].copy()
     run.make_solver()
     run.solver.body_work[:, DONE:SPRING] = done

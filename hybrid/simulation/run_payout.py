@@ -18,7 +18,6 @@ from hybrid.kernels.mesh.stiffness_ramp import soften
 from hybrid.kernels.reel.payout import iterate, iterate_with_others, pay_out, stand_among
 from hybrid.kernels.reel.reel import MovingZones, ReelJob, zones_that_stay
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Floats, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
@@ -246,6 +245,10 @@ class RunPayout(Part):
             if k not in self.zones:
                 run.lines[k].cells = self._nodes.get(k)
 
+    def attached_to(self) -> Iterable[object]:
+        """Their reels."""
+        return (x.reel for x in self.lines.values())
+
     def sync(self) -> None:
         """Python knows of the nodes of now."""
         for x in self._nodes.values():
@@ -277,19 +280,7 @@ class RunPayout(Part):
                 self._change(k, x)
                 changed.append(k)
         if changed:
-            self._renew_solver(changed, "where a node enters or leaves at a winch")
-
-    def _renew_solver(self, changed: Collection[int], after: str) -> None:
-        """Another solver, as these lines have changed; after: what, for the text of a failure."""
-        run = self._run
-        if run.zones is not None:
-            run.zones.go_on(after)
-            return
-        touching = () if run.contact.shared is None else run.contact.shared.lines
-        before = {k: float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in {*changed, *touching}}
-        run.renew_solver(after)
-        for k, energy in before.items():
-            run.lines[k].books.work[0, b.ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
+            run.go_on_changed(self._touched(changed), "where a node enters or leaves at a winch")
 
     def stop(self, number: int, over: float) -> None:
         """The winch of a line stops, over a time (s), between two steps; ValueError: it cannot."""
@@ -299,7 +290,12 @@ class RunPayout(Part):
         held = paying.holds_tension
         paying.stop(run.t, over)
         if held:  # iterations ask nothing of the winch any more
-            self._renew_solver([number], "where a winch is stopped")
+            run.go_on_changed(self._touched([number]), "where a winch is stopped")
+
+    def _touched(self, changed: Iterable[int]) -> set[int]:
+        """These lines, and those that share contact."""
+        shared = self._run.solver.shared
+        return {*changed, *(() if shared is None else shared.lines)}
 
     def _change(self, k: int, paying: PayingOut) -> None:
         """A node enters at the winch of a line, or leaves it."""
@@ -307,8 +303,9 @@ class RunPayout(Part):
         line.write_down()  # with the reel as it is
         zones = self.zones.get(k)
         first = zones.before_change() if zones is not None else None
-        if first is not None and run.zones is not None:
-            run.zones.switch(k, *first)
+        if first is not None:
+            for part in run.parts:
+                part.switch_zones(k, *first)
             states = [*run.state.lines]
         if zones is not None:
             zones.hand_over(run.t, states[k])

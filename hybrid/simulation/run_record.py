@@ -20,7 +20,6 @@ from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.parts import Parts
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_checkpoint import files_of
-from hybrid.simulation.run_contact import RunContact
 from hybrid.simulation.run_file import LinesFile
 from hybrid.simulation.run_points import Sampled
 from hybrid.simulation.run_quantities import Rotations, RunQuantities
@@ -48,7 +47,6 @@ class RecordedRun:
     lines: list[LineResult]
     recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
     parts: Parts
-    contact: RunContact
     quantities: RunQuantities
     rotations: Rotations
     changes: Sequence[LoadChange[Network]] = ()  # of loads
@@ -159,7 +157,8 @@ class RecordedRun:
 
     def gather_events(self) -> None:
         """Record the events of the lines, in the result of the system with their names, as they happened."""
-        self.contact.note_meetings()
+        for gather in self.parts.gather:
+            gather()
         self.file.gather()
 
     def _output(self) -> None:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.errors import KINK_COUNTS, Outcome
 from hybrid.kernels.junctions.carried_frames import TURNS
@@ -145,7 +146,7 @@ class RunZones(Part):
         every = run.resolution.one.every
         self._run = run
         # (L,) J, of each line with itself and others, after the last accepted step
-        self.contact_energy = np.zeros(len(run.lines))
+        self._contact_energy = np.zeros(len(run.lines))
         self.lines = [_LineZones(k, run.model.models[k], x, every) for k, x in managers.items()]
         for k, x in managers.items():
             run.lines[k].manager = x
@@ -178,7 +179,7 @@ class RunZones(Part):
         loop.hold_zones([x.switching.table for x in self.lines])
         loop.bind_zones([x.bind(run, loop) for x in self.lines])
         mine = [run.lines[x.number] for x in self.lines]
-        if run.contact.shared is not None or any(x.contact is not None for x in mine):
+        if run.solver.shared is not None or any(x.contact is not None for x in mine):
             loop.counts.asks |= b.ASK_STEPS
         if any(x.observer.writes_criteria for x in mine):
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_STEPS
@@ -206,7 +207,7 @@ class RunZones(Part):
         """Criteria know how near lines come to themselves and each other, by the contact that the solver has now."""
         run = self._run
         horizons = {x.number: LOOKAHEAD * x.switching.manager.pace for x in self.lines}
-        shared = run.contact.shared
+        shared = solver.shared
         near = {} if shared is None else shared.watch_nearness(max(horizons.values()))
         for x in self.lines:
             contact = run.lines[x.number].contact
@@ -214,13 +215,17 @@ class RunZones(Part):
                 near[x.number] = contact.watch_nearness(horizons[x.number])
             x.switching.manager.near = near.get(x.number, np.zeros(0))
 
-    def _note_contact(self) -> None:
+    def contact_before(self) -> NDArray[np.float64]:
+        """Of the last state that steps have led to."""
+        return self._contact_energy
+
+    def note_forces(self) -> None:
         """Energy of contact of the state as it is, from which that of other cells is told, of all lines."""
-        self.contact_energy[:] = [work.report[SELF_CONTACT_ENERGY] for work in self._run.solver.work]
+        self._contact_energy[:] = [work.report[SELF_CONTACT_ENERGY] for work in self._run.solver.work]
 
     def begin(self) -> None:
         """Weigh the criteria of the first state."""
-        self._note_contact()
+        self.note_forces()
         for x in self.lines:
             x.switching.begin(self._ends(x), self._run.state.lines[x.number])
             if x.switching.manager.held:
@@ -292,7 +297,7 @@ class RunZones(Part):
         """Go on as `checkpoint` has written, of lines that have those zones.  ValueError: that cannot be."""
         for x in self.lines:
             x.switching.restore(saved["zones"][self._run.lines[x.number].name]["switching"])
-        self._note_contact()
+        self.note_forces()
 
     # --- steps ------------------------------------------------------------------------------------
 
@@ -329,7 +334,7 @@ class RunZones(Part):
     def note_step(self) -> None:
         """With the states exchanged: energy, and what should change."""
         run = self._run
-        self._note_contact()
+        self.note_forces()
         for x in self.lines:
             k = x.number
             state, before = run.state.lines[k], run.other.lines[k]
@@ -362,7 +367,7 @@ class RunZones(Part):
         if not RunKinds.apply(run, [x.switching for x, _ in changes]):
             for x, change in changes:
                 self._switch(x, change)
-            self.go_on()
+            run.go_on_changed((), AFTER_CHANGE)
             return
         if self._kinds is None or not self._kinds.fits:
             self._kinds = RunKinds(run)
@@ -382,7 +387,7 @@ class RunZones(Part):
         models[k] = model
         run.model = replace(run.model, models=tuple(models))
 
-    def switch(self, number: int, change: Change, here: np.ndarray | None = None) -> None:
+    def switch_zones(self, number: int, change: Change, here: np.ndarray | None) -> None:
         """Give a line other zones, whose solver has still to follow; here: as of `ZoneSwitching.switch`."""
         self._switch(next(x for x in self.lines if x.number == number), change, here)
 
@@ -440,18 +445,6 @@ class RunZones(Part):
     def changed(self) -> Collection[int]:
         """Of the lines whose zones move."""
         return [x.number for x in self.lines]
-
-    def go_on(self, after: str = AFTER_CHANGE) -> None:
-        """Another solver, for lines that have other cells, or touch themselves; after: what, for the text of a failure.
-
-        What that changes of the energy of contact is booked, of lines whose zones stay as well: of others they touch.
-        """
-        run = self._run
-        run.renew_solver(after)
-        before = self.contact_energy.copy()
-        self._note_contact()
-        for line, more in zip(run.lines, self.contact_energy - before, strict=True):
-            line.books.work[0, b.ZONES] += more
 
 
 # Kinds of cells that change between two steps of a run whose cells stay, in the arrays of the run: no solver is made,
@@ -553,8 +546,8 @@ class RunKinds:
     def apply(run: RunOfLines, switched: Sequence[ZoneSwitching]) -> bool:
         """Whether zones of these lines can change so between two steps of a run whose solver is attached."""
         attached = run.solver.turns is not None and run.solver.turns is run.loop.turns
-        alone = run.payout is None and run.contact.shared is None and not run.solver.meets
-        alone &= all(line.contact is None for line in run.lines)
+        alone = run.solver.shared is None and not run.solver.meets
+        alone &= all(line.contact is None and line.paying is None for line in run.lines)
         if not (attached and alone):
             return False
         return all(carries_all(x.model, x) and not x.zones.clock.share > 0.0 for x in switched)

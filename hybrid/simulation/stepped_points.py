@@ -313,16 +313,16 @@ class SteppedPoints(SettableObstacles):
     def _wind(self, name: str, length: float | None, rate: float) -> None:
         self._check_open()
         k, run = self._line(name), self._run
-        reels = {} if run.payout is None else run.payout.lines
-        if k not in reels:
+        paying = run.lines[k].paying
+        if paying is None:
             key = dotted(self._form.place(("lines", name, "connections", "end", "payout")))
             where = self._form.text(f"line {name}")
             raise ValueError(f"{where} has no `payout`: there is no {key}, nor one at its start; its length stays")
         from hybrid.simulation.payout import length_asked
 
-        side = ENDS[reels[k].plan.side]
+        side = ENDS[paying.plan.side]
         where = dotted(self._form.place(("lines", name, "connections", side, "payout")))
-        self._wound[k] = length_asked(run.scenes[k], reels[k], length, rate, where)
+        self._wound[k] = length_asked(run.scenes[k], paying, length, rate, where)
 
     # --- what it is now ---------------------------------------------------------------------------
 

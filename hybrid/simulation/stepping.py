@@ -96,6 +96,7 @@ class Simulation(SteppedPoints):
             self._stack.close()
             raise
         names = self._run.model.names
+        self._paid = [(k, x.paying) for k, x in enumerate(self._run.lines) if x.paying is not None]
         self._places = {
             point: [(names.index(line), int(end == "end")) for line, end in self._system.lines_at(point)]
             for point in self._system.points
@@ -187,7 +188,7 @@ class Simulation(SteppedPoints):
 
     def _start_courses(self, now: float, until: float) -> None:
         """What has been set is on its way from `now` to `until` (s)."""
-        for k, paying in self._run.payout.lines.items() if self._run.payout is not None else ():
+        for k, paying in self._paid:
             paying.go_on(now, until, self._wound.pop(k, None))
         one_step = until - now <= ONE_STEP * (self._fixed_step or self._run.last_step)
         for name, ends in self._driven.items():

@@ -36,8 +36,8 @@ def followed(rate: float) -> hybrid.Result:
 
 def change_cells(line: OnlyLine, random: np.random.Generator, part: float) -> None:
     """Other cells far from the winch: a part of the nodes that there might be."""
-    layout, zones = line.model.layout, line.run.zones
-    assert layout is not None and zones is not None
+    layout = line.model.layout
+    assert layout is not None
     here = np.zeros(layout.starts[-1] + 1, bool)
     for begin, size in zip(layout.starts, layout.parts, strict=False):
         cells = [(begin, begin + size)]
@@ -46,8 +46,8 @@ def change_cells(line: OnlyLine, random: np.random.Generator, part: float) -> No
             here[[a, b]] = True
             if b - a > 1 and random.random() < part:
                 cells += [(a, (a + b) // 2), ((a + b) // 2, b)]
-    zones.switch(0, line.zones.switching.manager.same_zones(), here)
-    zones.go_on()
+    line.zones_of_all.switch_zones(0, line.zones.switching.manager.same_zones(), here)
+    line.run.go_on_changed((), "where cells change")
 
 
 @pytest.mark.long
