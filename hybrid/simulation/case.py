@@ -66,8 +66,8 @@ from hybrid.simulation.run_sample import (
     usual_cells,
 )
 from hybrid.simulation.zones_at_rest import Start
-from hybrid.store.array_contents import ArrayRecorder, MemoryTarget, Target
-from hybrid.store.copying import group_of
+from hybrid.store.array_contents import MemoryTarget, Target
+from hybrid.store.copying import group_of, root_of
 from hybrid.store.envelope import GROUP as ENVELOPE
 from hybrid.store.hdf5_file import open_file
 from hybrid.store.limits import EXTREMES, extremes_about
@@ -272,9 +272,8 @@ class Case:
     def _move(self, run: NetworkRun, begin: float, first: bool) -> Samples:
         """A result to its end; begin: s of processor time, when it was begun; first: as of `_begin_result`."""
         recorder, target = run.recorder, run.target
-        assert target is not None and isinstance(recorder, Recorder | ArrayRecorder)
-        if isinstance(recorder, Recorder):
-            recorder.amended = self.beside_result is not None
+        assert target is not None and isinstance(recorder, Recorder)
+        recorder.amended = self.wants_errors
         with recorder, self._said():
             self._compute(run, self._result_interrupted)
         return self._compared(run, target, clock.process_time() - begin, self._take_late_file(recorder, first))
@@ -292,32 +291,33 @@ class Case:
         whole = Result(late.path, contents=late.contents) if late is not None else None
         stay, samples = target if late is None and isinstance(target, Path) else None, Samples()
         with ExitStack() as stack:
-            data = late.data if late is not None else stack.enter_context(open_file(target, summed=False))
+            file = stack.enter_context(open_file(target, summed=False)) if late is None else None
             result = stack.enter_context(written_result(target) if whole is None else nullcontext(whole))
             lines = self._by_line(result)
             for line in run.lines:
-                group = group_of(self.names[line.name])
-                samples[line.name] = self._sample_of(line, run, data, group, lines[line.name], cpu, stay)
+                data_of = partial(root_of, file) if late is None else late.data_of
+                samples[line.name] = self._sample_of(line, run, data_of, lines[line.name], cpu, stay)
         asked = {name for name, x in self.network.lines.items() if x.contact.self}
         self.touches_itself |= any(x.touches for name, x in samples.items() if name not in asked)
         return samples
 
     def _sample_of(
-        self, line: LineResult, run: NetworkRun, data: Any, group: str, result: Result, cpu: float, stay: Path | None
-    ) -> RunSample:
+        self, line: LineResult, run: NetworkRun, data_of: Callable[[str], Any], result: Result, cpu: float,
+        stay: Path | None,
+    ) -> RunSample:  # fmt: skip
         """What is compared of a line in a complete result.
 
-        data, result: the file, and the line in it; group: of the line in the file; stay: a file in which many outputs
-        may stay, None: there is none.
+        data_of: arrays of a line by its name in the scene, and of the whole by none; result: that of the line; stay: a
+        file in which many outputs may stay, None: there is none.
         """
-        name, model, scene = line.name, line.model, self.lines[line.name]
-        own, resolution = data[group] if group else data, run.resolution.lines[line.name]
+        name, model, scene, called = line.name, line.model, self.lines[line.name], self.names[line.name]
+        data, own, resolution = data_of(""), data_of(called), run.resolution.lines[name]
         stored = {x: own[x] for x in COMPARED if x in own}
         # they stay in the file, if they are many, and no finer result may replace it
         finer = any(requested_accuracy(x) is not None for x in self.lines.values())
         stays = stay if not finer and sum(x.size for x in stored.values()) > MOST_IN_MEMORY else None
         found = {
-            x: StoredArray(stays, group + x, self._places_of(x, name))
+            x: StoredArray(stays, group_of(called) + x, self._places_of(x, name))
             if stays is not None
             else self._at_places(x, y, name)
             for x, y in stored.items()
@@ -533,7 +533,8 @@ class CaseAtRest(Case):
 
     def record(self, resolution: NetworkResolution, target: Target, before: Tree | None = None) -> Samples:
         """Compute the result into a file, or memory; what is to be compared of it.  before: nobody goes on with it."""
-        begin, recording = clock.process_time(), Recording(pending=ERROR_ESTIMATE if self.wants_errors else "")
+        begin, pending = clock.process_time(), ERROR_ESTIMATE if self.wants_errors else ""
+        recording = Recording(WriteMode(late=True), pending=pending)
         return self._move(self._network_run(resolution, target, recording), begin, first=True)
 
     def beside(

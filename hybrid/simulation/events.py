@@ -35,10 +35,10 @@ class EventLog:
         """Those that wait: t (s), s_a, s_b (m), kind, text."""
         return [event for event, _ in self._waiting]
 
-    def write_to(self, sink: Sink) -> None:
-        """Write all that wait."""
-        for event, more in self._waiting:
-            sink.event(*event, **more)
+    def write_to(self, sink: Sink, words: Callable[[str], str]) -> None:
+        """Write all that wait; words: what makes texts of the scene of those of its network."""
+        for (*where, text), more in self._waiting:
+            sink.event(*where, words(text), **more)
         self._waiting.clear()
 
 

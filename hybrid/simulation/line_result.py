@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ from hybrid.kernels.state.books import (
     sample_size,
 )
 from hybrid.kernels.state.report import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, sampled_size, slip_size
+from hybrid.kernels.state.state import Batch, Ends, Floats, Line, State, Work, batch_of_one, sampled_size, slip_size
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.plane import as_begun, planar
@@ -42,7 +42,6 @@ from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.deferred_recorder import DeferredRecorder, OutputsAside, may_be_joined
 from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
@@ -58,9 +57,8 @@ from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.run import batch_of_rows, no_extremes
 from hybrid.solve.self_contact import SelfContact
-from hybrid.store.array_contents import ArrayRecorder
+from hybrid.store.recorder import Rows
 from hybrid.store.stored_rows import ComparisonRecorder
-from hybrid.store.writer import Recorder
 from hybrid.zones.manager import DomainManager
 
 if TYPE_CHECKING:
@@ -93,7 +91,7 @@ def twist_at_rest(x: JoinedLine, state: State) -> float:
 
 
 # What makes the recorder of a line: the equilibrium that it starts from, if it does, and outputs after the first.
-NewRecorder = Callable[["LineResult", "LinesAtRest | None", int], "Recorder | ArrayRecorder | ComparisonRecorder"]
+NewRecorder = Callable[["LineResult", "LinesAtRest | None", int], Rows]
 
 
 class Wanted(NamedTuple):
@@ -184,7 +182,7 @@ class LineResult:
         self.has_neared_itself = False  # whether that was so at some time
         self.watched_by: LinesWatch | None = None  # whether it meets others, between which no contact is computed
         self.plane: HasPlane | None = None  # of a line alone
-        self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
+        self.recorder: Rows | ComparisonRecorder
         record = wanted.record
         self.recorder = ComparisonRecorder(FORCE_COLUMNS) if record is None else record(self, found, outputs)
         self.books = self._own_books(state)
@@ -560,12 +558,6 @@ class LineResult:
 
     # --- the file -----------------------------------------------------------------------------------
 
-    def take_events(self) -> list[tuple[float, float, float, str, str]]:
-        """Record the events since the last call; they are returned: t, s_a, s_b, kind, text."""
-        noted = self.events.waiting()
-        self.events.write_to(self.recorder)
-        return noted
-
     def write_envelope(self, t: float) -> None:
         """Extremes up to t (s), for the file."""
         self.recorder.replace(self.envelope.values(self.model.nodes, self.books.extremes, t))
@@ -634,3 +626,49 @@ class LineResult:
         for k in (0, 1):
             if joints[k] < 0 and apart[k] > SAME_PLACE * model.length:
                 raise ValueError(f"an end of line {self.name} is {apart[k]:.3g} m from where it was: other files?")
+
+
+# Outputs of a line whose cells are others in each: they are put aside, and looked at and recorded together.
+
+# Nodes of the outputs that are put aside, at most; cells of a line whose outputs are looked at together, at least.
+MOST_ASIDE = 20_000
+FEWEST_JOINED = 4
+
+
+def may_be_joined(observer: Observer, line: Line) -> bool:
+    """Whether outputs of other cells can be looked at together: all that is written follows from their states."""
+    of_states = not observer.writes_criteria and observer.quantities is None
+    plain = not (
+        line.law.size or line.bend_law.size or line.slip_law.size or line.torsion.size or line.tension_twist.size
+    )
+    return of_states and plain and line.h.size >= FEWEST_JOINED
+
+
+class OutputsAside:
+    """Outputs that wait, each of a line of its own."""
+
+    def __init__(self, waiting: Iterable[tuple[Model, Output]] = ()) -> None:
+        self.waiting = [*waiting]
+
+    def __bool__(self) -> bool:
+        return bool(self.waiting)
+
+    @property
+    def full(self) -> bool:
+        """Whether they have so many nodes that no more should wait."""
+        return sum(x.line.s.size for _, x in self.waiting) > MOST_ASIDE
+
+    def put(self, model: Model, outputs: Iterable[Output]) -> None:
+        """Let outputs wait; model: of the cable, on whatever cells."""
+        self.waiting += [(model, x) for x in outputs]
+
+    def record(self, observer: Observer, recorder: Rows | ComparisonRecorder, diagnostics: Diagnostics | None) -> Stop:
+        """Record all, and look at them (None: nobody does): why going on would make no sense, if so."""
+        aside, self.waiting = self.waiting, []
+        outputs = [x for _, x in aside]
+        there, seen = observer.joined_observation(outputs)
+        values = there.values_of(seen)
+        observer.first_energy = there.first_energy
+        zones = [observer.rows_of(x.zones) for x in outputs]
+        recorder.save_batch(seen.batch.t.copy(), values, zones[0], zones[1:])
+        return None if diagnostics is None else diagnostics.joined_outputs(seen, values, aside)

@@ -120,8 +120,7 @@ class NetworkRun(RecordedRun):
                     raise ValueError(f"t = {self.t:g} s after an output at {point.t:g} s")
             self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
             self.other, self._between = self.state.copy(), True
-            recorder = self.file.again(file, point)
-        recorder.files = self.files
+            recorder = self.file.resume(file, point)
         if why := other_program(point):
             recorder.event(point.t, *self.file.span, OTHER_PROGRAM, why)
         self._begin, self._checked = clock_now() - self.cpu, self.steps

@@ -30,7 +30,7 @@ from hybrid.simulation.restore import kept_resolution
 from hybrid.simulation.run_checkpoint import kept_changes
 from hybrid.simulation.run_contact import RunContact
 from hybrid.simulation.run_failures import Cuts, Failures
-from hybrid.simulation.run_file import Asked, file_of
+from hybrid.simulation.run_file import Asked, RunFile
 from hybrid.simulation.run_of_lines import WatchedLines, loaded_as, with_loads_of
 from hybrid.simulation.run_quantities import Rotations, RunQuantities
 from hybrid.simulation.run_zones import RunZones
@@ -161,7 +161,7 @@ def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording
         payout = RunPayout(me)
         parts.append(payout)
     run.rotations = Rotations(system, run.model)
-    run.file = file_of(me, text, recording)
+    run.file = RunFile(me, text, recording)
     _add_lines(run, first, recording, payout.lines if payout is not None else {})
     contact = RunContact(me, recording.touches, run.target is not None)
     if recording.planes and moves:
@@ -188,7 +188,7 @@ def _add_lines(run: NetworkRun, first: First, recording: Recording, paid: Mappin
     every = zip(run.model.names, first.scenes, run.model.models, run.state.lines, strict=True)
     for k, (name, scene, model, state) in enumerate(every):
         manager = first.managers.get(k)
-        record = partial(run.file.line_recorder, manager=manager) if run.target is not None else None
+        record = partial(run.file.line_rows, manager=manager) if run.target is not None else None
         wanted = Wanted(record, points.get(name))
         shown, outputs = run.file.scene_of(scene), len(run.times)
         line = LineResult(k, name, shown, model, run.found, state, outputs, wanted, paid.get(k))

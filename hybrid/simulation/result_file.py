@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.machine.cache import cache_folder
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
     BEHIND,
@@ -40,12 +38,10 @@ from hybrid.model.sections import NEAR, SECTION_LIMITS, limits_along, outer_diam
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.envelope import Envelope
-from hybrid.store.array_contents import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.capacity import CORNERS
 from hybrid.store.code_checks import ROWS
 from hybrid.store.format import Field, Header, Text
-from hybrid.store.recorder import BaseRecorder
-from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
+from hybrid.store.recorder import Rows
 
 if TYPE_CHECKING:
     from hybrid.scene.quantities import Quantity
@@ -67,22 +63,14 @@ STEP_FIELDS = (
 )
 
 
-def result_recorder(
-    scene: LineScene,
-    model: Model,
-    observer: Observer,
-    target: Target,
-    texts: Mapping[str, Text],
-    found: LinesAtRest | None,
-    envelope: Envelope,
-    outputs: int = 0,
-    mode: WriteMode = AT_ONCE,
-    notes: Mapping[str, str] = MappingProxyType({}),
-) -> Recorder | ArrayRecorder:
-    """A new result, in a file or in memory; whether a file may be replaced was asked before anything was computed.
+def result_header(
+    scene: LineScene, model: Model, observer: Observer, texts: Mapping[str, Text], found: LinesAtRest | None,
+    envelope: Envelope, outputs: int, notes: Mapping[str, str],
+) -> Header:  # fmt: skip
+    """What the result of a line states before its first output.
 
     found: the equilibrium at the start; envelope: of what is computed, its values not yet known; outputs: after the
-    first, 0 of an equilibrium; mode: of a file; notes: texts that are attributes of the file unless they are empty.
+    first, 0 of an equilibrium; notes: texts that are attributes of the result unless they are empty.
     """
     attributes: dict[str, str | float | int] = {
         "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
@@ -101,18 +89,7 @@ def result_recorder(
     if observer.jumps.size:
         text = "arc lengths of point loads, joints and changes of section; right/* has the values just after them"
         fixed.append((Field("right/s", "m", text, observer.jumps.shape, ("right/s",)), observer.jumps))
-    steps = STEP_FIELDS if outputs else ()
-    recorder: Recorder | ArrayRecorder
-    header = Header(observer.s, observer.fields, steps, attributes, texts, fixed)
-    if isinstance(target, MemoryTarget):
-        recorder = ArrayRecorder(target, header)
-    else:
-        recorder = Recorder(
-            target, header, outputs=outputs + 1, overwrite=True, mode=mode, templates=cache_folder().parent
-        )
-    if model.layout is not None:
-        _note_neglected_bending(scene, model, recorder)
-    return recorder
+    return Header(observer.s, observer.fields, STEP_FIELDS if outputs else (), attributes, texts, fixed)
 
 
 def places_of_elevation(gauges: Floats) -> list[tuple[Field, Floats]]:
@@ -121,7 +98,7 @@ def places_of_elevation(gauges: Floats) -> list[tuple[Field, Floats]]:
     return [(Field("elevation_at", "m", text, gauges.shape, ("gauge", "xy")), gauges)] if len(gauges) else []
 
 
-def _note_neglected_bending(scene: LineScene, model: Model, recorder: BaseRecorder) -> None:
+def note_neglected_bending(scene: LineScene, model: Model, recorder: Rows) -> None:
     """Clamps and point loads in catenary zones: who wants their moment has to ask for it."""
     for s, text in _neglected_clamps(scene, model):
         recorder.event(0.0, s, s, "bending at clamp neglected", text)

@@ -18,7 +18,6 @@ from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.self_reach import touching
 from hybrid.scene.network_scene import Network
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
 from hybrid.simulation.line_result import LineResult, LineStep
 from hybrid.simulation.parts import Part, Parts
@@ -26,7 +25,6 @@ from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.store.array_contents import ArrayRecorder
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
 from hybrid.zones.change import on_layout
@@ -52,7 +50,7 @@ class RunOfLines(Protocol):
     def parts(self) -> Parts: ...
 
     @property
-    def recorder(self) -> Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder: ...
+    def recorder(self) -> Recorder | ComparisonRecorder: ...
 
     @property
     def noted(self) -> Sink: ...

@@ -14,20 +14,18 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.model.network import NetworkModel, NetworkResolution
 from hybrid.scene.network_scene import Network
-from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import Sink
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.parts import Parts
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_checkpoint import files_of
-from hybrid.simulation.run_file import LinesFile
+from hybrid.simulation.run_file import AnyRecorder, RunFile
 from hybrid.simulation.run_points import Sampled
 from hybrid.simulation.run_quantities import Rotations, RunQuantities
 from hybrid.solve.joined import LineFailed
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.store.array_contents import ArrayRecorder, Target
+from hybrid.store.array_contents import Target
 from hybrid.store.stored_rows import ComparisonRecorder
-from hybrid.store.writer import Recorder
 
 # Steps times cells from one checkpoint to the next, about 5 s of computing.
 WORK = 10_000_000
@@ -43,9 +41,9 @@ class RecordedRun:
     loop: NetworkSteps
     target: Target | None  # None: it is only to be compared with
     kept: bool  # whether it writes checkpoints
-    file: LinesFile
+    file: RunFile
     lines: list[LineResult]
-    recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
+    recorder: AnyRecorder
     parts: Parts
     quantities: RunQuantities
     rotations: Rotations
@@ -146,7 +144,7 @@ class RecordedRun:
         self.recorder.replace(self.quantities.range_values())
         self.gather_events()
         made = monotonic() - begin
-        if new and isinstance(self.recorder, Recorder):
+        if new:
             begins_late = self._checked < 0 and self.recorder.is_late
             self.cpu, self._checked = clock_now() - self._begin, self.steps
             self.recorder.checkpoint(self.content)

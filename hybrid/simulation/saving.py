@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from time import monotonic
 from typing import Any, NamedTuple
 
@@ -11,12 +11,15 @@ import numpy as np
 from hybrid.kernels.state.state import Floats
 from hybrid.model.ends import DrivenEnd
 from hybrid.model.network import NetworkModel
-from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.run_checkpoint import checkpoint, set_state
 from hybrid.simulation.stepped import Course
 from hybrid.solve.joined import NetworkState
+from hybrid.store.recorder import Mark, Rows
 from hybrid.store.writer import Recorder
+
+# Outputs and events, of which no more may be taken back: they are in memory.
+MOST_WAITING = 1000
 
 
 class Saved(NamedTuple):
@@ -27,7 +30,7 @@ class Saved(NamedTuple):
     run: Mapping[str, Any]  # arrays and plain values, as of a checkpoint
     model: NetworkModel  # with what had broken by then
     waiting: tuple[Any, ...]  # rows of each line that are not recorded yet
-    marks: tuple[int, ...]  # of the recorders
+    marks: tuple[Mark, ...]  # of the recorders
     stops: tuple[float, ...]  # s, that are still to come
     before: NetworkState  # the state before the last step
     stood: tuple[tuple[Floats, Floats], ...]  # positions (2, 3) m and frames (2, 9) of the ends of each line
@@ -39,21 +42,20 @@ class Saved(NamedTuple):
     wound: Mapping[int, tuple[float | None, float]]  # length (m) and rate (m/s) that lines are to have then
 
 
-def defer(run: NetworkRun) -> None:
-    """From now on, what is recorded can be taken back."""
-    if isinstance(run.recorder, DeferredRecorder):
-        return
-    assert isinstance(run.recorder, Recorder)
-    whole, run.recorder = run.recorder, DeferredRecorder(run.recorder)
-    for line in run.lines:
-        assert isinstance(line.recorder, Recorder)
-        line.recorder = run.recorder if line.recorder is whole else DeferredRecorder(line.recorder)
-
-
-def recorders(run: NetworkRun) -> list[DeferredRecorder]:
-    """Those of the system and of its lines, once they are deferred."""
+def recorders(run: NetworkRun) -> list[Rows]:
+    """Those of the system and of its lines."""
     found = dict.fromkeys((run.recorder, *(line.recorder for line in run.lines)))  # that of a cable is the only one
-    return [x for x in found if isinstance(x, DeferredRecorder)]
+    return [x for x in found if isinstance(x, Rows)]
+
+
+def marks_of(run: NetworkRun) -> tuple[Mark, ...]:
+    """Where all recorders stand."""
+    return tuple(x.mark() for x in recorders(run))
+
+
+def is_full(run: NetworkRun, marks: Sequence[Mark]) -> bool:
+    """Whether too much came after these marks."""
+    return any(x.since(mark) > MOST_WAITING for x, mark in zip(recorders(run), marks, strict=True))
 
 
 def commit(run: NetworkRun) -> None:
@@ -61,7 +63,7 @@ def commit(run: NetworkRun) -> None:
 
     LineFailed where an output says that going on would make no sense.
     """
-    assert isinstance(run.recorder, DeferredRecorder)
+    assert isinstance(run.recorder, Recorder)
     due, begin = run.recorder.due, monotonic()
     run.record_samples()
     run.write_log()
@@ -71,11 +73,8 @@ def commit(run: NetworkRun) -> None:
             line.write_envelope(run.t)
         run.recorder.replace(run.quantities.range_values())
     run.gather_events()
-    made = monotonic() - begin
-    for recorder in recorders(run):
-        recorder.commit()
     if due:
-        run.recorder.flush(made)
+        run.recorder.flush(monotonic() - begin)
 
 
 def kept(run: NetworkRun) -> dict[str, Any]:
@@ -86,7 +85,7 @@ def kept(run: NetworkRun) -> dict[str, Any]:
     run.gather_events()
     return {
         "run": copied(checkpoint(run)), "model": run.model, "waiting": tuple(line.waiting() for line in run.lines),
-        "marks": tuple(recorder.mark() for recorder in recorders(run)), "before": run.other.copy(),
+        "marks": marks_of(run), "before": run.other.copy(),
         "stood": tuple((x.ends.values.position.copy(), x.ends.values.frame.copy()) for x in run.model.models),
         "loads": tuple(model.ends.keep_loads() for model in run.model.models),
     }  # fmt: skip

@@ -28,7 +28,7 @@ from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.new_run import Recording, new_run, static_system
 from hybrid.simulation.own_parts import RunPart, checked_parts
 from hybrid.simulation.run_file import Asked
-from hybrid.simulation.saving import Saved, bring_back, commit, defer, kept, recorders
+from hybrid.simulation.saving import Saved, bring_back, commit, is_full, kept, marks_of
 from hybrid.simulation.stepped import ONE_STEP, SLIVER, end_of_step, in_space, iterations_allowed, one_thread
 from hybrid.simulation.stepped_points import SteppedPoints
 from hybrid.solve.joined import LineFailed
@@ -36,6 +36,7 @@ from hybrid.solve.network_steps import ROWS_OUTSIDE
 from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.hdf5_file import check_target, locked
 from hybrid.store.reader import Result, open_result, written_result
+from hybrid.store.recorder import Mark
 from hybrid.zones.criteria import UserCriterion
 
 # s of the wall, after which the time of the processor is read again: to read it may take as long as ten steps.
@@ -108,6 +109,7 @@ class Simulation(SteppedPoints):
         self._courses, self._moved = {}, {}
         self._seen = int(self._run.loop.counts.output)  # outputs that readers of the file have been shown
         self._final = 0  # how often what had been recorded was made final
+        self._marks: tuple[Mark, ...] = ()  # where recorders stood then
 
     def _read_scene(self, scene: Any) -> None:
         """The network to compute, whose ends are set, of a scene in either form."""
@@ -158,7 +160,7 @@ class Simulation(SteppedPoints):
         self._check_open()
         self._check_sound()
         until = self._checked_time(until)
-        if self._final and any(recorder.full for recorder in recorders(self._run)):
+        if self._final and is_full(self._run, self._marks):
             self._commit()
         self._start_courses(self.t, until)
         try:
@@ -239,7 +241,6 @@ class Simulation(SteppedPoints):
         """
         self._check_open()
         self._check_sound()
-        defer(self._run)
         self._commit()
         return self._kept()
 
@@ -263,6 +264,7 @@ class Simulation(SteppedPoints):
         except LineFailed as failed:
             raise self._fail(failed) from None
         self._final += 1
+        self._marks = marks_of(self._run)
 
     def _kept(self) -> Saved:
         paths = {name: [end.keep() for end in ends] for name, ends in self._driven.items()}

@@ -64,10 +64,11 @@ def amend(target: Path | io.BytesIO | LateFile, parts: Sequence[Part], before: T
             _add(file[part.group] if part.group else file, part, done)
 
     if isinstance(target, LateFile):
-        (part,) = parts
         if before is not None:
-            target.before = before or None
-        _add_to_arrays(target.contents, part, done)
+            target.leave(before)
+        for part in parts:
+            line = part.group.rpartition("/")[2]
+            _add_to_arrays(target.contents.parts[line] if line else target.contents, part, done)
         target.placed = False  # it may be there without them, because they took long
         target.place()
     else:
@@ -121,7 +122,7 @@ def _add_to_arrays(contents: ArrayContents, part: Part, done: bool) -> None:
     contents.attributes |= {key: x.item() if isinstance(x, np.generic) else x for key, x in attributes.items()}
     _say_what_is_to_come(contents.attributes, done, fields, len(kinds))
     if events:
-        table, end = Table(None, "events", EVENTS), float(contents.values("s", None)[-1])
+        table, end = Table("events", EVENTS), float(contents.values("s", None)[-1])
         table.add([contents.values(f"events/{x.name}", None) for x in EVENTS])
         for event in events:
             table.add_row((0.0, 0.0, end, *event, "", nan, nan, nan))
@@ -156,7 +157,8 @@ def _add(file: h5py.Group, part: Part, done: bool) -> None:
         file.attrs[name] = value
     _say_what_is_to_come(file.attrs, done, fields, len(kinds))
     if events:
-        table = Table(file, "events", EVENTS)
+        table = Table("events", EVENTS)
+        table.move(file)
         table.count = len(file["events/t"])
         for event in events:
             table.add_row((0.0, 0.0, float(file["s"][-1]), *event, "", nan, nan, nan))

@@ -12,11 +12,9 @@ from typing import Any, TypeVar
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5ds, h5o
 
 from hybrid.errors import ResultError
 from hybrid.store.format import chunk_rows, plain_text
-from hybrid.store.hdf5_file import in_memory
 from hybrid.store.integrity import check_stored
 from hybrid.store.recorder import Table
 
@@ -42,26 +40,6 @@ def copied(old: h5py.Group, new: h5py.Group, rows: Mapping[str, int] | None, wit
             new[name].dims[k].label = dim.label
             if dim.label in kept and dim.label != name:
                 new[name].dims[k].attach_scale(new[dim.label])
-
-
-def attach_anew(group: h5py.Group) -> None:
-    """Attach the scales of all datasets of a group, which HDF5 has copied there from another file.
-
-    The copied references lead nowhere: HDF5 does not translate those of dimensions, which are of variable length.
-    """
-    names: list[bytes] = []
-    group.id.links.visit(names.append)  # by HDF5's own interface: h5py takes three times as long
-    found = {name: h5o.open(group.id, name) for name in names}
-    all_data = {name: data for name, data in found.items() if isinstance(data, h5d.DatasetID)}
-    for data in all_data.values():
-        for attribute in (b"DIMENSION_LIST", b"REFERENCE_LIST"):
-            if h5a.exists(data, attribute):
-                h5a.delete(data, attribute)
-    for name, data in all_data.items():
-        for k in range(data.rank):
-            dim = h5ds.get_label(data, k)
-            if dim != name:
-                h5ds.attach_scale(data, all_data[dim], k)
 
 
 def names_in(file: h5py.Group, group: str) -> list[str]:
@@ -122,19 +100,6 @@ TOGETHER = 20
 R = TypeVar("R")  # what a line is opened as
 
 
-def add_parts(file: h5py.File, parts: Mapping[str, Callable[[], bytes]]) -> None:
-    """Put the results of lines into a new file of a system, one after another; parts: return the bytes of files."""
-    group = file.require_group(GROUP)
-    group.attrs["order"] = list(parts)
-    for k, (name, image) in enumerate(parts.items(), 1):
-        part = in_memory(image())
-        part.copy("/", group, name=name)
-        part.id.close()
-        attach_anew(group[name])
-        if k % TOGETHER == 0:
-            file.flush()
-
-
 def in_turn(tables: Sequence[Table]) -> Iterator[Sequence[Table]]:
     """Tables in groups between which a file is to be flushed."""
     for k in range(0, len(tables), TOGETHER):
@@ -144,6 +109,11 @@ def in_turn(tables: Sequence[Table]) -> Iterator[Sequence[Table]]:
 def group_of(line: str) -> str:
     """What names of datasets of a line begin with; nothing for the line without a name, whose result is the file."""
     return f"{GROUP}/{line}/" if line else ""
+
+
+def root_of(file: h5py.File, line: str) -> h5py.Group:
+    """The group of a line; the file itself of the line without a name."""
+    return file[f"{GROUP}/{line}"] if line else file
 
 
 def of_part(name: str, counts: Mapping[str, int]) -> dict[str, int]:

@@ -1,20 +1,36 @@
-"""What every recorder of a result does: outputs, steps and events are checked, and wait as rows of its tables."""
+"""A result as it grows in memory: outputs, steps and events are checked, and wait as rows of its tables."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from math import isfinite, nan
-from types import TracebackType
-from typing import Any, Self
+from types import SimpleNamespace, TracebackType
+from typing import Any, NamedTuple, Self
 
 import h5py
 import numpy as np
 from h5py import h5d, h5s, h5t
 
 from hybrid.errors import OMITTED, ResultError
-from hybrid.store.format import Field, cut, unsound
+from hybrid.store.array_contents import ArrayContents, ArrayDataset
+from hybrid.store.format import (
+    Field,
+    Header,
+    attributes_of_format,
+    check_names,
+    cut,
+    plain_text,
+    scale_values,
+    scales_of,
+    status_attributes,
+    tables_of,
+    unsound,
+    values_of_fixed,
+    write_attributes,
+)
 
 # Events of a kind that are written, of some 700 bytes each; a run that has more of them goes on, and says how many.
 MOST_OF_A_KIND = 10_000
@@ -30,30 +46,98 @@ def pause(made: float) -> float:
     return max(_PAUSE, _PART * made)
 
 
-class BaseRecorder:
-    """Tables of one result whose rows wait; a context manager that closes it with the right status."""
+class Mark(NamedTuple):
+    """Where a result stands, to come back to."""
 
-    def _begin(self, file: h5py.Group | None, tables: Mapping[str, Sequence[Field]]) -> None:
-        """Tables by group; file: where their datasets are, None: in memory alone."""
-        self._tables = tables
-        self._all = tuple(Table(file, group, columns) for group, columns in tables.items())
+    rows: tuple[int, ...]  # of its tables
+    last: float  # s, time of the last output
+    zones: list[tuple[str, float, float]] | None
+    happened: Counter[str]
+
+
+class Rows:
+    """One result as it grows in memory: what does not grow, and tables whose rows wait to be written.
+
+    Errors of its header, and of what it is given, are ResultErrors.
+    """
+
+    def __init__(self, header: Header) -> None:
+        fields, step_fields, fixed = header.fields, header.step_fields, header.fixed
+        check_names(fields, step_fields, fixed)
+        self._tables = tables_of(fields, step_fields)
+        self._all = tuple(Table(group, columns) for group, columns in self._tables.items())
         self._outputs, self._steps, self._zone_rows, self._events = self._all
-        fields, step_fields = tables["/"][1:], tables["steps"]
         self._names = {f.name for f in fields}
         self._step_names = [f.name for f in step_fields]
         self._finite_steps = [k for k, f in enumerate(step_fields) if not f.nan_ok]
         self._zones: list[tuple[str, float, float]] | None = None
         self.last = -np.inf  # time of the last output, s
-        self.files: Mapping[str, str] = {}  # digests of files that the run reads, for checkpoints
         self._happened: Counter[str] = Counter()  # events by kind
-        self._replaced: dict[str, np.ndarray] = {}  # values of what does not grow
+        self._replaced: dict[str, np.ndarray] = {}  # values of what does not grow, that are not written yet
+        self.closed = False
 
-    def _write_many_steps(self) -> None:
-        """Write rows of the log of the steps where there are many."""
+        scales = scales_of(np.size(header.grid_s), fields, [field for field, _ in fixed])
+        self._fixed = {name: ArrayDataset(field, (name,), scale_values(field)) for name, field in scales.items()}
+        self._fixed |= {f.name: ArrayDataset(f, f.dims, np.zeros(0)) for f, _ in fixed if f.name not in scales}
+        for name, values in values_of_fixed(np.asarray(header.grid_s, float), fixed).items():
+            self._fixed[name].values = values.copy()
+        self._attributes: dict[str, Any] = dict(attributes_of_format()) | status_attributes("running", "")
+        write_attributes(SimpleNamespace(attrs=self._attributes), header.attributes)
+        self._texts = {name: text for name, text in header.texts.items() if text}
+
+    def contents(self, parts: Mapping[str, ArrayContents] | None = None) -> ArrayContents:
+        """All of it that is not written; the rows of its tables wait no more.  parts: results of lines by name."""
+        data = dict(self._fixed)
+        for table in self._all:
+            for (name, column), field in zip(table.columns().items(), table.fields, strict=True):
+                dims = (name,) if name == table.scale else (table.scale, *field.dims)
+                data[name] = ArrayDataset(replace(field, name=name), dims, column, grows=True)
+            table.count += table.waiting
+            table.drop()
+        self._replaced.clear()
+        return ArrayContents(data, [x for x in self._tables if x != "/"], self._attributes, self._texts, parts)
 
     def close(self, status: str = "complete", message: str = "") -> None:
-        """End the result with a status of STATUS and a message."""
-        raise NotImplementedError
+        """End the result with a status of STATUS and a message; a second call does nothing."""
+        if self.closed:
+            return
+        if status not in STATUS:
+            raise ValueError(f"status {status!r} is none of {', '.join(STATUS)}")
+        self.closed = True
+        self._count_left_out()
+        self._attributes |= status_attributes(status, message)
+
+    # --- what can be taken back -----------------------------------------------------------------------
+
+    def mark(self) -> Mark:
+        """Where it stands."""
+        rows = tuple(table.count + table.waiting for table in self._all)
+        return Mark(rows, self.last, self._zones, self._happened.copy())
+
+    def since(self, mark: Mark) -> int:
+        """How many outputs and events came after a mark."""
+        stood = zip(self._all, mark.rows, strict=True)
+        return sum(x.count + x.waiting - rows for x, rows in stood if x is not self._steps)
+
+    def back_to(self, mark: Mark) -> None:
+        """Forget what came after a mark.  ValueError: it is written."""
+        for table, rows in zip(self._all, mark.rows, strict=True):
+            table.cut_to(rows)
+        self.last, self._zones, self._happened = mark.last, mark.zones, mark.happened.copy()
+
+    def resume_after(self, root: h5py.Group, rows: Mapping[str, int], happened: Mapping[str, int]) -> None:
+        """Stand behind rows that are in a group of a file; happened: events by kind."""
+        for table in self._all:
+            table.drop()
+            table.count = rows[table.scale] if table.fields else 0
+        self._happened = Counter(happened)
+        self.last = float(root["t"][-1])
+        zones = root["zones"]
+        last = zones["output"][:] == zones["output"][-1] if rows["zones/t"] else np.zeros(0, bool)
+        kinds = [plain_text(x) for x in zones["kind"][:][last]]
+        self._zones = list(zip(kinds, zones["s_a"][:][last].tolist(), zones["s_b"][:][last].tolist(), strict=True))
+
+    # --- what it is given -----------------------------------------------------------------------------
 
     def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
         """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then; errors as of `save_batch`."""
@@ -118,7 +202,6 @@ class BaseRecorder:
             name = self._step_names[self._finite_steps[k]]
             raise ResultError(f"'{name}' of the step log is not finite: {rows[i].tolist()}")
         self._steps.add(list(rows.T.copy()))
-        self._write_many_steps()
 
     def event(
         self,
@@ -151,7 +234,11 @@ class BaseRecorder:
 
     def replace(self, values: Mapping[str, np.ndarray]) -> None:
         """Other values for quantities of `fixed`, by name; written with the next flush."""
-        self._replaced.update(values)
+        for name, new in values.items():
+            field = self._fixed[name]
+            if np.shape(new) != field.values.shape:
+                raise ResultError(f"{name} has shape {np.shape(new)}, expected {field.values.shape}")
+            field.values = self._replaced[name] = np.array(new, field.values.dtype)
 
     # --- what is recorded so far ----------------------------------------------------------------------
 
@@ -160,21 +247,15 @@ class BaseRecorder:
         return self
 
     def __contains__(self, name: object, /) -> bool:
-        return name in self._names or self._has_fixed(str(name))
+        return name in self._names or name in self._fixed
 
     def __getitem__(self, name: str, /) -> np.ndarray:
         """A quantity of `fixed`, or the arc lengths of the grid."""
-        return self._fixed_values(name)
+        return self._fixed[name].values
 
     def rows_of(self, *names: str) -> Iterator[tuple[np.ndarray, ...]]:
         """Rows (n, ...) of fields over the outputs, so many at a time; "t": their times."""
         return self._outputs.rows_of(names)
-
-    def _has_fixed(self, name: str) -> bool:
-        raise NotImplementedError
-
-    def _fixed_values(self, name: str) -> np.ndarray:
-        raise NotImplementedError
 
     def __enter__(self) -> Self:
         return self
@@ -202,22 +283,18 @@ class Table:
     Rows wait as arrays until they are written through HDF5's own interface: h5py's slices take twice as long.
     """
 
-    def __init__(self, file: h5py.Group | None, group: str, fields: Sequence[Field]) -> None:
+    def __init__(self, group: str, fields: Sequence[Field]) -> None:
         self.fields, self._names = tuple(fields), [f"{group}/{field.name}".lstrip("/") for field in fields]
-        self.move(file)
+        self.move(None)
         self.scale = self._names[0] if fields else ""  # the first dataset says how many rows are complete
         self._blocks: list[list[np.ndarray]] = []  # waiting to be written, each with one array (n, ...) per field
         self.waiting = self.bytes_waiting = 0  # rows in them, and their bytes
         self.count = 0  # written rows
 
     def move(self, file: h5py.Group | None) -> None:
-        """Write to the datasets of the same names of another file, or of a group of it; opened when rows come."""
+        """Write to the datasets of a file, or of a group of it, opened when rows come; None: rows are kept."""
         self._file: h5py.Group | None = file
         self._datasets: list[h5d.DatasetID] = []
-
-    def leave(self) -> None:
-        """Hold no datasets, until `move`."""
-        self._file, self._datasets = None, []
 
     def _open(self) -> None:
         if self._file is not None and not self._datasets:
@@ -247,6 +324,16 @@ class Table:
     def drop(self) -> None:
         """Forget the rows that wait."""
         self._blocks, self.waiting, self.bytes_waiting = [], 0, 0
+
+    def cut_to(self, rows: int) -> None:
+        """Forget all rows but so many.  ValueError: some of them are written."""
+        if rows < self.count:
+            raise ValueError(f"{self.count} rows are written")
+        kept, left = self._blocks, rows - self.count
+        self.drop()
+        for block in kept:
+            self.add([x[:left] for x in block])
+            left -= min(left, len(block[0]))
 
     def add(self, columns: Sequence[np.ndarray]) -> None:
         """Let rows wait: one array (n, ...) per field, which nobody changes any more."""

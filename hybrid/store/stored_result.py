@@ -38,7 +38,7 @@ from typing import Any, Self
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.array_contents import MemoryTarget
+from hybrid.store.array_contents import ArrayContents, MemoryTarget
 from hybrid.store.contents import Contents, FileContents
 from hybrid.store.copying import Lines
 from hybrid.store.integrity import readable
@@ -321,7 +321,8 @@ class StoredResult:
 
     def line(self, name: str) -> Self:
         """A line of a result of several lines, as a result of its own; `lines` has their names."""
-        return type(self)(self._source, line=name)
+        contents = self._contents.part(name) if isinstance(self._contents, ArrayContents) else None
+        return type(self)(self._source, line=name, contents=contents)
 
     @property
     def line_name(self) -> str:

@@ -1,12 +1,8 @@
-"""The file of a result that is complete and in memory, made in one go when the run has ended.
+"""The file of a result, made in one go of what is in memory: of a short run when it has ended, of others as they begin.
 
-HDF5 takes longer to find room for some hundred arrays, to copy them there and to copy all of that again than a short
-run takes to compute them.  So it makes a template: a file with all datasets, whose arrays have their places and no
-values, and of which the bytes between these places are kept.  A new file is these bytes, to which HDF5 adds attributes,
-texts, rows of tables whose lengths differ from run to run, and checkpoints; the arrays go to the disk from where they
-are.
-
-Fields over the outputs have one chunk each, so that a run that goes on can add rows to a copy (store.copying).
+HDF5 takes 10 ms to make the 70 datasets of a line with their units and dimensions, and 1 ms to open a file that has
+them.  So a file begins as a template: the bytes of one with all datasets and no values, which are kept.  Files of many
+lines are made without one.
 
 A file that readers may open while it grows is flushed before and after every change of its lengths, and what is known
 of a result afterwards goes into a copy.  A run that takes less than the time for which outputs are held back anyhow
@@ -16,72 +12,88 @@ needs neither: its result waits in memory (`LateFile`), is added to until all is
 from __future__ import annotations
 
 import hashlib
-import io
 import os
 import zlib
-from bisect import bisect_right
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakSet
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5ds, h5p, h5s, h5t
+from h5py import h5a, h5d, h5ds, h5g, h5p, h5s, h5t
 
 from hybrid.store.array_contents import ArrayContents, ArrayDataset
 from hybrid.store.checkpoint import SLOTS, create_slots, write_before, write_slot
+from hybrid.store.copying import GROUP, TOGETHER
 from hybrid.store.format import (
     BLOCK,
     FORMAT_VERSION,
     STATUS_WIDTHS,
-    Field,
     annotate,
     attach_scales,
     attributes_of_format,
-    create_attributes,
-    create_scales,
-    create_table,
+    chunk_rows,
     fixed_text,
-    tables_of,
+    made,
     versions,
     write_texts,
 )
-from hybrid.store.hdf5_file import CACHE, LIBVER, beside, in_memory, unwritable
-from hybrid.store.hdf5_file import SLOTS as CHUNK_SLOTS
+from hybrid.store.hdf5_file import beside, image_of, in_memory, unwritable
 from hybrid.store.integrity import tail_of
-from hybrid.store.named_arrays import Tree, pack, unpack
-from hybrid.store.recorder import NUMBERS, write_rows
+from hybrid.store.named_arrays import Tree
+from hybrid.store.recorder import NUMBERS
 
-# Tables whose lengths are known when a run has ended: HDF5 writes their rows.
-TABLES = ("steps", "zones", "events")
-Part = bytearray | memoryview
 WAITS = 0.2  # s, that it waits at most while errors of the result are estimated, as outputs are held back
 # Bytes of all results in memory whose files are written; of those after them the arrays are read when they are needed.
 MOST_STAYING = 256_000_000
 _staying: WeakSet[ArrayContents] = WeakSet()
+# Lines in a file whose template is kept, of 80 kB each.
+MOST_KEPT = 8
+
+
+class Layout(NamedTuple):
+    """How a file is laid out, beside what is in it.
+
+    outputs: their number if it is known, which only makes small files smaller; templates: folder where templates of
+    files are kept, None: in this process alone.
+    """
+
+    outputs: int | None = None
+    templates: Path | None = None
+
+
+class Restart(NamedTuple):
+    """What a run that goes on needs.
+
+    checkpoints: packed, by number; before: what was found before the run.
+    """
+
+    checkpoints: dict[int, bytes]
+    before: Tree
 
 
 class LateFile:
     """A result in memory, to be added to until it is written to its place."""
 
-    def __init__(
-        self, path: Path, contents: ArrayContents, checkpoints: Mapping[int, bytes] | None, before: Tree | None,
-        templates: Path | None,
-    ) -> None:  # fmt: skip
-        """path: its place; checkpoints, before, templates: as of `parts_of_file`."""
+    def __init__(self, path: Path, contents: ArrayContents, restart: Restart | None, layout: Layout) -> None:
+        """path: its place; the others: as of `new_file`."""
         self.path, self.contents, self.placed = path, contents, False
-        self._checkpoints, self._templates = checkpoints, templates
+        self._restart, self._layout = restart, layout
         self._made = monotonic()  # s
-        self.before = before  # what a run that goes on needs, until all is done
 
-    @property
-    def data(self) -> dict[str, np.ndarray]:
-        """Its arrays by name."""
-        return {name: x.values for name, x in self.contents.data.items()}
+    def leave(self, before: Tree) -> None:
+        """What a run that goes on needs is this from now on, until all is done."""
+        if self._restart is not None:
+            self._restart = self._restart._replace(before=before)
+
+    def data_of(self, line: str) -> dict[str, np.ndarray]:
+        """Arrays of a line by name; those of the result itself of the line without a name."""
+        contents = self.contents.parts[line] if line else self.contents
+        return {name: x.values for name, x in contents.data.items()}
 
     def place_if_due(self) -> None:
         """Put it in its place where it has waited for as long as outputs are held back."""
@@ -98,13 +110,10 @@ class LateFile:
         self.placed = True
         new = beside(self.path)
         try:
-            parts = parts_of_file(self.contents, self._checkpoints, self.before, self._templates)
-            size = found = 0
+            image = image_of(new_file(self.contents, self._restart, self._layout))
             with new.open("wb") as file:
-                for part in parts:
-                    file.write(part)
-                    size, found = size + len(part), zlib.crc32(part, found)
-                file.write(tail_of(size, found))
+                file.write(image)
+                file.write(tail_of(len(image), zlib.crc32(image)))
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(new, self.path)
@@ -128,42 +137,116 @@ class LateFile:
         self.placed = True
 
 
-def parts_of_file(
-    contents: ArrayContents, checkpoints: Mapping[int, bytes] | None, before: Tree | None, templates: Path | None
-) -> list[Part]:
-    """The bytes of a file, one part after the other; arrays of the contents are among them.
+# ---- the file ---------------------------------------------------------------------------------------
 
-    checkpoints: packed, by the number of the slot; None: nobody can go on with it.  before: as of `Recorder`.
-    templates: folder where templates are kept.
-    """
-    arrays = {name: x for name, x in contents.data.items() if name.split("/")[0] not in TABLES}
-    tables = {name: [x.field for x in of_table(contents, name)] for name in TABLES}
-    shape = (
-        "whole", tuple((x.field, x.dims, x.values.shape, x.grows) for x in arrays.values()),
-        tuple((name, *fields) for name, fields in tables.items()), checkpoints is not None,
-    )  # fmt: skip
-    plan = unpack(kept(shape, lambda: _made(arrays, tables, checkpoints is not None), templates))
-    pieces = _Pieces(plan)
-    with h5py.File(pieces, "r+", libver=LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=CHUNK_SLOTS) as file:
-        write_attributes(file, contents.attributes)
-        write_texts(file, {name: contents.text(name) for name in contents.texts})
-        for name in TABLES:
-            _write_table(file, of_table(contents, name))
-        slots = [file[name] for name in SLOTS] if checkpoints else []
-        for number, data in (checkpoints or {}).items():
+
+def groups_of(contents: ArrayContents) -> Iterator[tuple[str, ArrayContents]]:
+    """A result and those of its lines, each with what its names begin with in a file."""
+    yield "", contents
+    for name, part in contents.parts.items():
+        yield f"{GROUP}/{name}/", part
+
+
+def new_file(contents: ArrayContents, restart: Restart | None, layout: Layout) -> h5py.File:
+    """A file in memory of a result, with the rows that it has; restart: None: nobody can go on with it."""
+    begin, parts = b"", [part for _, part in groups_of(contents)]
+    if len(parts) <= MOST_KEPT:
+        shape = tuple(_shape_of(group, part) for group, part in groups_of(contents))
+        whole = ("whole", shape, layout.outputs, restart is not None)
+        begin = kept(whole, lambda: _template(contents, restart is not None, layout), layout.templates)
+    file = in_memory(begin)
+    for k, (group, part) in enumerate(groups_of(contents), 1):
+        _fill(file, group, part, {} if begin else _create(file, group, part, layout.outputs))
+        if k % TOGETHER == 0:
+            file.flush()
+    if contents.parts:
+        file[GROUP].attrs["order"] = list(contents.parts)
+    if restart is not None:
+        if not begin:
+            create_slots(file)
+        slots = [file[name] for name in SLOTS] if restart.checkpoints else []
+        for number, data in restart.checkpoints.items():
             write_slot(slots, number, data)
-        write_before(file, before)
-    return list(pieces.with_arrays([arrays[name].values for name in plan["names"]]))
+        write_before(file, restart.before)
+    return file
 
 
-def of_table(contents: ArrayContents, table: str) -> list[ArrayDataset]:
-    """Columns of a table, the scale first."""
-    found = [x for name, x in contents.data.items() if name.startswith(f"{table}/")]
-    return sorted(found, key=lambda x: len(x.dims) > 1 or x.dims != (x.field.name,))
+def _shape_of(group: str, part: ArrayContents) -> Hashable:
+    """What the datasets of a result in a file depend on."""
+    of_rows = ((x.field, x.dims, x.values.shape[x.grows :], x.grows) for x in part.data.values())
+    return group, tuple(of_rows), tuple(part.groups)
 
 
-def write_attributes(file: h5py.File, attributes: Mapping[str, Any]) -> None:
-    """Root attributes besides those of all files, by HDF5's own interface: h5py takes five times as long."""
+def _template(contents: ArrayContents, resumable: bool, layout: Layout) -> bytes:
+    with in_memory() as file:
+        for group, part in groups_of(contents):
+            _create(file, group, part, layout.outputs)
+        if resumable:
+            create_slots(file)
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+def _create(file: h5py.File, group: str, part: ArrayContents, outputs: int | None) -> dict[str, h5d.DatasetID]:
+    """The datasets of a result in a new file, and the attributes that all results have; columns that grow are empty."""
+    root = file.require_group(group) if group else file
+    for name, value in attributes_of_format().items():
+        root.attrs[name] = value
+    for name in part.groups:
+        root.require_group(name)
+    datasets = dict[str, h5d.DatasetID]()  # to find them anew by their names takes a third of the time
+    for name, x in sorted(part.data.items(), key=lambda item: item[1].dims != (item[0],)):  # scales first
+        datasets[name] = data = _dataset(root.id, name, x, outputs)
+        if x.dims == (name,):
+            h5ds.set_scale(data, (name.rpartition("/")[2] if x.grows else name).encode())
+            h5ds.set_label(data, 0, name.encode())
+        else:
+            attach_scales(data, x.dims, [datasets[dim] for dim in x.dims])
+    return datasets
+
+
+def _dataset(root: h5g.GroupID, name: str, x: ArrayDataset, outputs: int | None) -> h5d.DatasetID:
+    """One of them, by HDF5's own interface: h5py takes four times as long."""
+    shape, dtype, how, most = x.values.shape, x.values.dtype, h5p.create(h5p.DATASET_CREATE), None
+    if x.grows:
+        if dtype.kind == "S":
+            dtype = h5py.string_dtype("utf-8", dtype.itemsize)
+        shape = (0, *shape[1:])
+        size = int(dtype.itemsize * np.prod(shape[1:], dtype=int))
+        few = outputs if x.dims[0] in ("t", "zones/t") else None
+        how.set_chunk((max(1, min(chunk_rows(size), BLOCK, few or BLOCK)), *shape[1:]))
+        most = (h5s.UNLIMITED, *shape[1:])
+    kind = NUMBERS.get(x.field.dtype) or h5t.py_create(dtype, logical=True)
+    space = h5s.create_simple(shape, most) if shape else h5s.create(h5s.SCALAR)
+    data = h5d.create(root, name.encode(), kind, space, how, _links())
+    annotate(data, x.field.unit, x.field.description, x.field.frame)
+    return data
+
+
+@cache
+def _links() -> h5p.PropLCID:
+    """Names with slashes make groups."""
+    links = h5p.create(h5p.LINK_CREATE)
+    links.set_create_intermediate_group(True)
+    return links
+
+
+def _fill(file: h5py.File, group: str, part: ArrayContents, known: Mapping[str, h5d.DatasetID]) -> None:
+    """Attributes, texts and values of a result; known: datasets that are open."""
+    root = file[group] if group else file
+    write_attributes(root, part.attributes)
+    write_texts(root, {name: made(text) for name, text in part.texts.items()})
+    for name, x in part.data.items():
+        if not x.values.size:
+            continue
+        data = known[name] if known else h5d.open(root.id, name.encode())
+        if x.grows:
+            data.set_extent(x.values.shape)
+        data.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(x.values), NUMBERS.get(x.field.dtype) or data.get_type())
+
+
+def write_attributes(root: h5py.Group, attributes: Mapping[str, Any]) -> None:
+    """Attributes besides those of all results, by HDF5's own interface: h5py takes five times as long."""
     text, scalar, always = h5py.string_dtype(), h5s.create(h5s.SCALAR), attributes_of_format()
     for name, value in attributes.items():
         if name in always:
@@ -172,162 +255,18 @@ def write_attributes(file: h5py.File, attributes: Mapping[str, Any]) -> None:
             array = fixed_text(value, h5py.string_dtype("utf-8", STATUS_WIDTHS[name]))
         else:
             array = np.array(value, text if isinstance(value, str) else None)
-        h5a.create(file.id, name.encode(), h5t.py_create(array.dtype, logical=True), scalar).write(array)
-
-
-def _write_table(file: h5py.File, columns: Sequence[ArrayDataset]) -> None:
-    for x in columns if columns and len(columns[0].values) else ():
-        data = h5d.open(file.id, x.field.name.encode())
-        data.set_extent(x.values.shape)
-        write_rows(data, 0, np.ascontiguousarray(x.values), NUMBERS.get(x.field.dtype) or data.get_type())
-
-
-# ---- the template ---------------------------------------------------------------------------------
-
-
-def _made(arrays: Mapping[str, ArrayDataset], tables: Mapping[str, Sequence[Field]], resumable: bool) -> bytes:
-    """A file without the values of its arrays: names and places of these, and what is between them."""
-    memory = io.BytesIO()
-    with h5py.File(memory, "w", libver=LIBVER) as file:
-        for name, value in attributes_of_format().items():
-            file.attrs[name] = value
-        made = dict[str, h5d.DatasetID]()  # to find them anew by their names takes a third of the time
-        for name, x in sorted(arrays.items(), key=lambda item: item[1].dims != (item[0],)):  # scales first
-            made[name] = data = _create(file, x)
-            if x.dims == (name,):
-                h5ds.set_scale(data, name.encode())
-                h5ds.set_label(data, 0, name.encode())
-            else:
-                attach_scales(data, x.dims, [made[dim] for dim in x.dims])
-        for name, fields in tables.items():
-            rows = len(arrays["t"].values) if name == "zones" else None  # as of a file that grows
-            create_table(file, name, [_within(name, field) for field in fields], rows)
-        if resumable:
-            create_slots(file)
-        places = sorted((_place(made[name]), name) for name, x in arrays.items() if x.values.size)
-        made.clear()
-    content = memory.getbuffer()
-    begins, pieces, at = [0], [], 0
-    for place, name in places:
-        pieces.append(bytes(content[at:place]))
-        at = place + arrays[name].values.nbytes
-        begins.append(at)
-    pieces.append(bytes(content[at:]))
-    plan = {"names": [name for _, name in places], "begins": begins, "sizes": [len(x) for x in pieces]}
-    return pack({**plan, "bytes": np.frombuffer(b"".join(pieces), "u1")})
-
-
-def _within(group: str, field: Field) -> Field:
-    return Field(**{**vars(field), "name": field.name.removeprefix(f"{group}/")})
-
-
-def _create(file: h5py.File, x: ArrayDataset) -> h5d.DatasetID:
-    """A dataset whose numbers have their place, where nothing is written."""
-    shape, dtype = x.values.shape, x.values.dtype
-    if dtype.kind == "S" and x.grows:
-        dtype = h5py.string_dtype("utf-8", dtype.itemsize)
-    kind = NUMBERS.get(x.field.dtype) or h5t.py_create(dtype, logical=True)
-    how, links = h5p.create(h5p.DATASET_CREATE), h5p.create(h5p.LINK_CREATE)
-    links.set_create_intermediate_group(True)
-    most: tuple[int, ...] | None = None
-    if x.grows:
-        most = (h5s.UNLIMITED, *shape[1:])
-        how.set_chunk(tuple(max(n, 1) for n in shape))
-    how.set_alloc_time(h5d.ALLOC_TIME_EARLY)
-    how.set_fill_time(h5d.FILL_TIME_NEVER)
-    space = h5s.create_simple(shape, most) if shape else h5s.create(h5s.SCALAR)
-    data = h5d.create(file.id, x.field.name.encode(), kind, space, how, links)
-    annotate(data, x.field.unit, x.field.description, x.field.frame)
-    return data
-
-
-def _place(data: h5d.DatasetID) -> int:
-    """Where in the file the numbers of a dataset are."""
-    if data.get_create_plist().get_layout() == h5d.CHUNKED:
-        return int(data.get_chunk_info(0).byte_offset)
-    return int(data.get_offset())
-
-
-class _Pieces(io.RawIOBase):
-    """A file as HDF5 sees it, of which only the pieces between arrays are there; the last one grows."""
-
-    def __init__(self, plan: Tree) -> None:
-        content, ends = plan["bytes"].tobytes(), np.cumsum(plan["sizes"]).tolist()
-        self._begins = plan["begins"]
-        self._pieces = [bytearray(content[a:b]) for a, b in zip([0, *ends], ends, strict=False)]
-        self._at = 0
-
-    @property
-    def _end(self) -> int:
-        return int(self._begins[-1]) + len(self._pieces[-1])
-
-    def _piece(self) -> tuple[bytearray, int, bool]:
-        """The piece with the present place, where in it that is, and whether it is the last."""
-        k = bisect_right(self._begins, self._at) - 1
-        return self._pieces[k], self._at - self._begins[k], k == len(self._pieces) - 1
-
-    def seek(self, at: int, whence: int = io.SEEK_SET) -> int:
-        self._at = self._end if whence == io.SEEK_END else at
-        return self._at
-
-    def tell(self) -> int:
-        return self._at
-
-    def readinto(self, out: Any) -> int:
-        piece, first, _ = self._piece()  # what HDF5 reads beyond a piece to save a second look, it does not use
-        out[:] = piece[first : first + len(out)].ljust(len(out), b"\0")
-        return len(out)
-
-    def write(self, data: Any) -> int:
-        piece, first, last = self._piece()
-        if first + len(data) > len(piece) and not last:
-            raise OSError(f"bytes {self._at} to {self._at + len(data)} of a file belong to an array")
-        if first > len(piece):
-            piece.extend(bytes(first - len(piece)))
-        piece[first : first + len(data)] = data
-        return len(data)
-
-    def truncate(self, size: int | None = None) -> int:
-        more = (self._at if size is None else size) - self._end
-        if more > 0:
-            self._pieces[-1].extend(bytes(more))
-        elif more < 0:
-            del self._pieces[-1][more:]
-        return self._end
-
-    def flush(self) -> None:
-        """Nothing waits."""
-
-    def with_arrays(self, arrays: Sequence[np.ndarray]) -> Iterator[Part]:
-        """The pieces, and the arrays between them."""
-        for piece, array in zip(self._pieces, arrays, strict=False):
-            yield piece
-            yield np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
-        yield self._pieces[-1]
+        h5a.create(root.id, name.encode(), h5t.py_create(array.dtype, logical=True), scalar).write(array)
 
 
 # Templates of result files: a file with all its datasets and no values, which a new result begins as.
 #
-# HDF5 takes 20 ms to make the 60 datasets of a result with their units and dimensions, and 1 ms to open a file that has
-# them.  So the bytes of a new file are kept, in this process and in a folder, under a key made of all that shapes them.
-# A template that is missing, cut off or spoilt is made anew; one that cannot be kept is made every time.
+# The bytes of a new file are kept, in this process and in a folder, under a key made of all that shapes them.  One that
+# is missing, cut off or spoilt is made anew; one that cannot be kept is made every time.
 
-_KEPT = 64  # files of 60 kB each; the oldest are deleted
+_KEPT = 64  # files of 80 kB a line; the oldest are deleted
 _DIGEST = 32  # bytes before the template, of the template
 _SUFFIX = ".template"
 _known: dict[tuple[Hashable, ...], bytes] = {}
-
-
-def template(
-    points: int, fields: Sequence[Field], step_fields: Sequence[Field], fixed: Sequence[Field], outputs: int | None,
-    resumable: bool, folder: Path | None,
-) -> bytes:  # fmt: skip
-    """A file in memory with datasets for results at so many points of the output grid.
-
-    outputs: how many, None: not known; resumable: whether it has checkpoints; folder: where templates are kept.
-    """
-    shape = (points, tuple(fields), tuple(step_fields), tuple(fixed), min(outputs or BLOCK, BLOCK), resumable)
-    return kept(shape, lambda: _new_template(*shape), folder)
 
 
 def kept(shape: tuple[Hashable, ...], make: Callable[[], bytes], folder: Path | None) -> bytes:
@@ -338,21 +277,6 @@ def kept(shape: tuple[Hashable, ...], make: Callable[[], bytes], folder: Path | 
             _known.clear()
         _known[shape] = _read(folder, key) or _kept(folder, key, make())
     return _known[shape]
-
-
-def _new_template(
-    points: int, fields: Sequence[Field], step_fields: Sequence[Field], fixed: Sequence[Field], rows: int,
-    resumable: bool,
-) -> bytes:  # fmt: skip
-    with in_memory() as file:
-        create_attributes(file)
-        create_scales(file, points, fields, fixed)
-        for group, columns in tables_of(fields, step_fields).items():
-            create_table(file, group, columns, rows if group in ("/", "zones") else None)
-        if resumable:
-            create_slots(file)
-        file.flush()
-        return bytes(file.id.get_file_image())
 
 
 @cache

@@ -52,17 +52,33 @@ def contents(path: Path) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize("errors", [False, True])
-def test_a_file_that_is_late_is_as_one_that_grew(errors: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def of_two_lines() -> dict[str, Any]:
+    """The same cable as two lines that meet."""
+    scene = described()
+    (section,), ends = scene.pop("cable")["sections"], scene.pop("ends")
+    points = {name: {k: v for k, v in end.items() if k != "kind"} for name, end in ends.items()}
+    line = {
+        "end": "middle", "sections": [section | {"length": 1.0}], "model": scene.pop("model"), "mesh": {"cells": 8},
+        "initial": scene.pop("initial"),
+    }  # fmt: skip
+    del scene["mesh"]
+    lines = {"first": line | {"start": "start"}, "second": line | {"start": "end"}}
+    return scene | {"points": points | {"middle": {"initial_guess": [0.75, 0, -0.5]}}, "lines": lines}
+
+
+@pytest.mark.parametrize("scene", [described(False), described(True), of_two_lines()], ids=["plain", "errors", "lines"])
+def test_a_file_that_is_late_is_as_one_that_grew(
+    scene: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     made: list[Path] = []
     place = LateFile.place
     monkeypatch.setattr(LateFile, "place", lambda self: made.append(self.path) or place(self))
     monkeypatch.setattr(writer, "pause", lambda _: 1e9)  # none are due, however busy the machine is
-    hybrid.run(described(errors), tmp_path / "late.h5").close()
+    hybrid.run(scene, tmp_path / "late.h5").close()
     assert tmp_path / "late.h5" in made
     made.clear()
     monkeypatch.setattr(writer, "pause", lambda _: -1.0)  # outputs are due at once
-    hybrid.run(described(errors), tmp_path / "grew.h5").close()
+    hybrid.run(scene, tmp_path / "grew.h5").close()
     assert not made
     assert contents(tmp_path / "late.h5") == contents(tmp_path / "grew.h5")
     assert {x.name for x in tmp_path.iterdir()} == {"grew.h5", "late.h5"}
@@ -89,12 +105,12 @@ def test_the_result_is_read_from_memory_as_from_its_file(tmp_path: Path, monkeyp
 
 
 def test_rows_are_added_to_a_copy_of_one_that_was_written_in_one_go(tmp_path: Path) -> None:
-    """Its outputs have one chunk, that of a copy some 64 kB."""
+    """In chunks of some 64 kB."""
     scene = described() | {"output": {"every": 0.005, "points": 101}}
     longer = scene | {"time": {"duration": 3.0, "step": 0.05}}
     hybrid.run(scene, tmp_path / "run.h5").close()
     with h5py.File(tmp_path / "run.h5") as file:
-        assert file["position"].chunks == file["position"].shape == (401, 101, 3)
+        assert file["position"].chunks == (27, 101, 3) and file["position"].shape == (401, 101, 3)
     hybrid.resume(tmp_path / "run.h5", until=3.0).close()
     with h5py.File(tmp_path / "run.h5") as file:
         assert file["position"].chunks == (27, 101, 3) and file["position"].shape == (601, 101, 3)

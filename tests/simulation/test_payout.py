@@ -16,8 +16,7 @@ from hybrid.errors import SceneError
 from hybrid.model.payout import law_of, length_at
 from hybrid.scene.payout import Payout
 from hybrid.simulation import line_result
-from hybrid.simulation.deferred_recorder import OutputsAside
-from hybrid.simulation.line_result import LineResult
+from hybrid.simulation.line_result import LineResult, OutputsAside
 from hybrid.simulation.payout_nodes import NodeChanges
 from tests.inside import OnlyLine
 

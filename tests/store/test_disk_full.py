@@ -100,14 +100,12 @@ def test_a_late_file_that_cannot_be_written_does_not_appear(tmp_path: Path) -> N
 
 
 LINES = """
-import io, resource, sys
+import resource, sys
 sys.path[:0] = [{here!r}]
 from hybrid.errors import ResultError
-from hybrid.store.writer import WriteMode
-from test_result_file import ONE, recorder, values
-parts = {{name: recorder(io.BytesIO()) for name in ("a", "b", "c")}}
-for part in parts.values():
-    part.lay_by()
+from test_result_file import GIVEN, ONE, recorder, values
+from hybrid.store.recorder import Rows
+parts = {{name: Rows(GIVEN) for name in ("a", "b", "c")}}
 resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
 kept = []  # nothing is let go of before the end
 try:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.store.array_contents import ArrayContents, ArrayRecorder, MemoryTarget
+from hybrid.store.array_contents import ArrayContents, MemoryTarget
 from hybrid.store.format import Field, Header
 from hybrid.store.reader import Result, written_result
+from hybrid.store.writer import Recorder
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 Pair = tuple[Result, Result]
@@ -66,9 +67,9 @@ def test_closed_it_keeps_what_was_read_and_nothing_else() -> None:
         result.label("tension")
 
 
-def _recorder(target: MemoryTarget) -> ArrayRecorder:
+def _recorder(target: MemoryTarget) -> Recorder:
     fields, fixed = [Field("x", "m", "a place", (2,), ("s",))], [(Field("k", "", "a number"), np.array(2.0))]
-    return ArrayRecorder(target, Header(np.array([0.0, 1.0]), fields, (), {"title": "t"}, {"scene": "a: 1"}, fixed))
+    return Recorder(target, Header(np.array([0.0, 1.0]), fields, (), {"title": "t"}, {"scene": "a: 1"}, fixed))
 
 
 def test_a_run_that_fails_says_so() -> None:
@@ -84,10 +85,9 @@ def test_what_cannot_be_kept_is_refused() -> None:
     recorder = _recorder(MemoryTarget())
     with pytest.raises(hybrid.ResultError, match="not finite"):
         recorder.save(0.0, {"x": np.array([0.0, np.nan])}, [("rod", 0.0, 1.0)])
-    recorder.replace({"k": np.zeros(3)})
     with pytest.raises(hybrid.ResultError, match="k has shape"):
-        recorder.close()
+        recorder.replace({"k": np.zeros(3)})
     with pytest.raises(hybrid.ResultError, match="increasing"):
-        ArrayRecorder(MemoryTarget(), Header(np.array([1.0, 0.0]), (), (), {}))
+        Recorder(MemoryTarget(), Header(np.array([1.0, 0.0]), (), (), {}))
     with pytest.raises(hybrid.ResultError, match="written by the recorder itself"):
-        ArrayRecorder(MemoryTarget(), Header(np.array([0.0, 1.0]), (), (), {"status": "x"}))
+        Recorder(MemoryTarget(), Header(np.array([0.0, 1.0]), (), (), {"status": "x"}))

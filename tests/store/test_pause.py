@@ -12,8 +12,8 @@ import pytest
 import hybrid
 from hybrid.simulation import network_run
 from hybrid.simulation.line_result import LineResult
-from hybrid.store import array_contents, writer
-from hybrid.store.array_contents import ArrayRecorder, MemoryTarget
+from hybrid.store import writer
+from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.format import Header
 
 GIVEN = Header(np.zeros(1), (), (), {})
@@ -21,10 +21,8 @@ GIVEN = Header(np.zeros(1), (), (), {})
 
 @pytest.fixture(params=["memory", "file"])
 def recorder(request: pytest.FixtureRequest, tmp_path: Path, now: list[float]) -> Iterator[Any]:
-    if request.param == "memory":
-        yield ArrayRecorder(MemoryTarget(), GIVEN)
-        return
-    with writer.Recorder(tmp_path / "x.h5", GIVEN) as recorder:
+    target = MemoryTarget() if request.param == "memory" else tmp_path / "x.h5"
+    with writer.Recorder(target, GIVEN) as recorder:
         yield recorder
 
 
@@ -32,8 +30,7 @@ def recorder(request: pytest.FixtureRequest, tmp_path: Path, now: list[float]) -
 def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """A clock that stands still, s."""
     time = [100.0]
-    for module in (array_contents, writer):
-        monkeypatch.setattr(module, "monotonic", lambda: time[0])
+    monkeypatch.setattr(writer, "monotonic", lambda: time[0])
     return time
 
 
@@ -69,7 +66,7 @@ def test_outputs_of_lines_are_made_together(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(LineResult, "write_down", counted)
     found = []
     for pause in (0.0, 100.0):
-        monkeypatch.setattr(array_contents, "pause", lambda _, pause=pause: pause)
+        monkeypatch.setattr(writer, "pause", lambda _, pause=pause: pause)
         calls.clear()
         with hybrid.run(scene) as result:
             found.append(

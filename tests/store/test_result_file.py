@@ -22,6 +22,7 @@ from hybrid.store.envelope import stored_window
 from hybrid.store.format import Field, Header
 from hybrid.store.hdf5_file import SLOTS, created, hold_metadata, in_memory
 from hybrid.store.reader import Result, open_result
+from hybrid.store.recorder import Rows
 from hybrid.store.records import Event, Zone
 from hybrid.store.selection import MARK
 from hybrid.store.writer import Recorder
@@ -45,10 +46,12 @@ ONE = [("catenary", 0.0, 1.5), ("rod", 1.5, 2.0)]
 TWO = [("catenary", 0.0, 1.0), ("rod", 1.0, 2.0)]
 
 
+GIVEN = Header(S, FIELDS, STEPS, {"title": "Tëst", "seed": 7}, {"scene": "title: Tëst\n"})
+
+
 def recorder(target: object, **more: object) -> Recorder:
-    given = Header(S, FIELDS, STEPS, {"title": "Tëst", "seed": 7}, {"scene": "title: Tëst\n"})
     stated = {name: more.pop(name) for name in Header._fields if name in more}
-    return Recorder(target, given._replace(**stated), **more)  # type: ignore[arg-type]
+    return Recorder(target, GIVEN._replace(**stated), **more)  # type: ignore[arg-type]
 
 
 def values(t: float) -> dict[str, np.ndarray]:
@@ -310,6 +313,24 @@ def test_every_logged_step_is_kept(tmp_path: Path) -> None:
     assert len(open_result(tmp_path / "run.h5").steps["t"]) == 5000
 
 
+def test_what_came_after_a_mark_is_taken_back_until_it_is_written(tmp_path: Path) -> None:
+    with recorder(tmp_path / "run.h5") as r:
+        r.save(0.0, values(0.0), ONE)
+        mark = r.mark()
+        for way in ("first", "second"):
+            r.log({"t": 0.5, "residual": 0.0, "dt": 0.5, "iterations": 1})
+            r.event(0.5, 0.0, 1.0, "note", way)
+            r.save(0.5, values(0.5), TWO)
+            if way == "first":
+                r.back_to(mark)
+        r.flush()
+        with pytest.raises(ValueError, match="rows are written"):
+            r.back_to(mark)
+    result = open_result(tmp_path / "run.h5")
+    assert result.times.tolist() == [0.0, 0.5] and result["steps/t"].tolist() == [0.5]
+    assert [e.text for e in result.events] == ["second"] and result.zones[1] == [Zone(*x) for x in TWO]
+
+
 # ---- nonsense -------------------------------------------------------------------------------------
 
 
@@ -443,14 +464,13 @@ assert result._contents.is_open and result.tension.shape == (4, 5)
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_results_that_wait_to_be_parts_keep_no_file_open(tmp_path: Path) -> None:
-    """HDF5 takes 5 MB for a file in memory, and 64 kB more for each dataset if it may choose: 6 GB for 1000 lines."""
-    parts = {name: recorder(io.BytesIO(), attributes={"title": name}) for name in ("a", "b")}
+def test_results_of_lines_are_parts_of_one_file(tmp_path: Path) -> None:
+    """HDF5 takes 5 MB for a file, and 64 kB more for each dataset if it may choose: 6 GB for 1000 lines."""
     opened = len(h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE))
+    parts = {name: Rows(GIVEN._replace(attributes={"title": name})) for name in ("a", "b")}
     for name, part in parts.items():
-        part.lay_by()
         part.event(0.0, 0.0, 1.0, "note", f"of {name}")
-    assert len(h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE)) == opened - 2
+    assert len(h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE)) == opened
     path = tmp_path / "many.h5"
     with recorder(path, parts=parts) as whole:
         assert h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE)[-1].get_access_plist().get_cache()[1:3] == (SLOTS, 0)

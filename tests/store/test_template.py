@@ -59,7 +59,7 @@ def test_a_template_that_was_kept_is_used_and_gives_the_same_file(
     def refused(*_: object) -> bytes:
         raise AssertionError("made anew")
 
-    monkeypatch.setattr(store, "_new_template", refused)
+    monkeypatch.setattr(store, "_template", refused)
     write(kept.parent, tmp_path / "second.h5")
     assert content(tmp_path / "second.h5") == content(tmp_path / "first.h5")
     write(kept.parent, tmp_path / "longer.h5", length=3.0)  # values are no part of it
