@@ -27,6 +27,7 @@ from random_scenes import random_scene
 import hybrid
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.mesh import Zone
+from hybrid.scene.read import one_line
 from hybrid.zones import change as zoning
 
 pytestmark = pytest.mark.bench
@@ -260,7 +261,7 @@ def test_adaptive_flicker() -> None:
 def time_scale(text: Text) -> float:
     from hybrid.model.build import build
 
-    return build(hybrid.validate_scene(text)).time_scale
+    return build(one_line(hybrid.validate_scene(text))).time_scale
 
 
 # --- cost ------------------------------------------------------------------------------------------------------------

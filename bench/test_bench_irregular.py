@@ -13,6 +13,7 @@ import pytest
 import hybrid
 from hybrid.accuracy.error_statistics import STATISTICS, statistics_of
 from hybrid.model.resolution import first_resolution
+from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import RunSample
 
 pytestmark = pytest.mark.bench
@@ -49,7 +50,7 @@ def statistics(result: hybrid.Result) -> dict[str, np.ndarray]:
     """STATISTICS of the end forces, N."""
     forces = np.column_stack([np.array(result[f"steps/{name}"]) for name in ("t", "end_force_start", "end_force_end")])
     values = {name: np.array(result[name]) for name in ("reaction_start", "reaction_end")}
-    run = RunSample(first_resolution(hybrid.validate_scene(storm(1))), values, 1, 1, 0.0, forces=forces)
+    run = RunSample(first_resolution(one_line(hybrid.validate_scene(storm(1)))), values, 1, 1, 0.0, forces=forces)
     found = statistics_of(run, 1)
     return {name: np.array([found[x].values[name][0, 0] for x in STATISTICS]) for name in values}
 

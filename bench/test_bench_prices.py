@@ -19,6 +19,7 @@ import pytest
 import hybrid
 from hybrid.model.build import build
 from hybrid.model.model_costs import step_time
+from hybrid.scene.read import one_line
 
 pytestmark = pytest.mark.bench
 ROUNDS, STEPS = int(os.environ.get("HYBRID_BENCH_ROUNDS", "5")), 300
@@ -74,7 +75,7 @@ def timed(text: dict[str, Any], cells: int, model: Any) -> tuple[float, float, f
 def foretold(text: dict[str, Any], cells: int, name: str, rods: float) -> float:
     """us of a step by the prices."""
     asked = hybrid.validate_scene(copy.deepcopy(text) | {"mesh": {"cells": cells}, "model": {"kind": "rod"}})
-    return 1e6 * step_time(asked, build(asked), rods, cells - rods, moves=name.startswith("zones"))
+    return 1e6 * step_time(one_line(asked), build(one_line(asked)), rods, cells - rods, moves=name.startswith("zones"))
 
 
 @pytest.mark.parametrize("space", [True, False], ids=["space", "plane"])

@@ -28,6 +28,7 @@ from hybrid.kernels.watch import observed_outputs
 from hybrid.model.build import build
 from hybrid.model.plane import planar, untwist
 from hybrid.outputs import output_grid
+from hybrid.scene.read import one_line
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stability import seed
 from hybrid.solve.stepper import Stepper
@@ -170,7 +171,7 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
         return time.process_time() - begin, total
 
     scenes = of_duration(4.0), of_duration(12.0)
-    model = build(scenes[1])
+    model = build(one_line(scenes[1]))
     sea, ends = model.sea.at(0.0), model.ends.at(0.0)
     start = at_rest(model).state.lines[0]
     assert model.plane is not None

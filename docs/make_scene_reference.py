@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from hybrid.scene.combinations import REFUSALS
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene, Table
 
 PAGE = Path(__file__).with_name("scene.md")

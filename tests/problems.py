@@ -39,6 +39,7 @@ from hybrid.kernels.run.entry import assembly, block_rows, workspace
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, State
 from hybrid.model.build import Model, build
+from hybrid.scene.read import one_line
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest
 from hybrid.solve.stepper import Stepper
@@ -127,7 +128,7 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
     `kick` changes the state at t = 0, for what a scene has no word for: a velocity that varies along s.
     """
     time = what.require_time()
-    model = build(what)
+    model = build(one_line(what))
     stepper = Stepper(
         model.line, model.length, model.tension_scale, model.slack_floor if model.slack == "stop" else -np.inf
     )

@@ -32,6 +32,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.state import state_for
 from hybrid.model.build import Model, build
+from hybrid.scene.read import one_line
 from hybrid.solve.borders import JointJobs
 
 BARE = {"length": 2.0, "mass": 0.1}
@@ -152,7 +153,7 @@ each_scene = pytest.mark.parametrize(("asked", "bits"), SCENES.values(), ids=SCE
 
 @each_scene
 def test_only_what_is_asked_for_has_a_bit_and_numbers(asked: hybrid.Scene, bits: int) -> None:
-    model = build(asked)
+    model = build(one_line(asked))
     line = model.line
     assert line.bits == bits
     for name, bit in SEA_PARAMETERS.items():
@@ -201,7 +202,7 @@ def test_what_is_off_is_worked_by_nothing() -> None:
 
 @pytest.mark.parametrize("kind", ["catenary", "rod"])
 def test_elements_and_spins_are_where_the_rod_is(kind: str) -> None:
-    line = build(scene(BENDS, kind)).line
+    line = build(one_line(scene(BENDS, kind))).line
     inner = line.element[1:-1]
     assert (inner == (kind == "rod")).all() and (line.spin == (kind == "rod")).all()
     assert not line.element[[0, -1]].any(), "pinned and free ends have no element"
@@ -209,7 +210,7 @@ def test_elements_and_spins_are_where_the_rod_is(kind: str) -> None:
 
 
 def test_a_joint_is_a_node_without_an_element() -> None:
-    model: Model = build(scene(BENDS, HYBRID))
+    model: Model = build(one_line(scene(BENDS, HYBRID)))
     joint = int(np.argmin(np.abs(model.line.s - 1.0)))
     assert model.line.element.tolist() == [0] + [1] * (joint - 1) + [0] * (model.cells - joint + 1)
     assert model.line.spin.tolist() == [1] * joint + [0] * (model.cells - joint)
@@ -289,7 +290,7 @@ def test_the_third_dimension_is_there_where_something_leaves_the_plane(asked: hy
     """All scenes above lie in a plane; with a guess along x and an end load along y none does."""
     said = {entry.what: entry for entry in hybrid.plan(asked).contents}
     assert said[PLANE].on and not said["torsion"].on
-    assert hybrid.plan(asked).unknowns == 3 * build(asked).cells + 2
+    assert hybrid.plan(asked).unknowns == 3 * build(one_line(asked)).cells + 2
     data = asked.model_dump(exclude_none=True)
     data["initial"] = {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, -1]}
     data["ends"]["end"] = {"kind": "free", "force": [0.0, 0.1, 0.0]}
@@ -297,16 +298,16 @@ def test_the_third_dimension_is_there_where_something_leaves_the_plane(asked: hy
     said = {entry.what: entry for entry in plan.contents}
     assert not said[PLANE].on and "ends.end.force leaves" in said[PLANE].why
     assert said["torsion"].on == ("rod" in {zone.kind for zone in plan.zones})
-    assert plan.unknowns > 3 * build(asked).cells + 2
+    assert plan.unknowns > 3 * build(one_line(asked)).cells + 2
 
 
 def test_a_plane_has_no_spins_no_torque_and_no_push_in_space() -> None:
     """Nothing across the plane is computed in it; nothing of a plane is there in space."""
     flat, space = (hybrid.run(scene(BENDS | TORSION, "rod", dimension=d)) for d in (2, 3))
     assert not flat.velocity[..., 1].any() and not flat.torque.any() and not space.torque.any()
-    assert np.isnan(build(scene(BENDS, "rod", dimension=3)).line.plane).all()
-    assert build(scene(BENDS, "rod", dimension=3)).line.bits == build(scene(BENDS, "rod")).line.bits
-    assert build(scene(BENDS, "rod", dimension=2)).line.bits == PLANAR
+    assert np.isnan(build(one_line(scene(BENDS, "rod", dimension=3))).line.plane).all()
+    assert build(one_line(scene(BENDS, "rod", dimension=3))).line.bits == build(scene(BENDS, "rod")).line.bits
+    assert build(one_line(scene(BENDS, "rod", dimension=2))).line.bits == PLANAR
 
 
 def test_the_contents_name_every_optional_part() -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import (
     CatenaryModel,
     Clamped,
@@ -23,7 +24,6 @@ from hybrid.scene.schema import (
     Pinned,
     RodModel,
     RodZone,
-    Scene,
     Section,
     ZonesModel,
 )

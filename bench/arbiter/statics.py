@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hybrid.scene.schema import Scene
+from hybrid.scene.root import Scene
 
 from .guess import guesses
 from .line import Line, line_of

@@ -20,8 +20,8 @@ import numpy as np
 
 import hybrid
 from hybrid.model.plan import output_times
-from hybrid.scene.read import SceneLike, as_scene
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import SceneLike, as_scene, one_line
+from hybrid.scene.root import Scene
 from hybrid.simulation.progress import interrupts
 from hybrid.store.tradeoff_table import DONE, FAILED, REFERENCE, Row, TradeTable
 from hybrid.studies.levels import LevelTable, level_row
@@ -74,7 +74,7 @@ def _found(store: RunStore, run: PeerRun, repeat: int, scene: Scene) -> Found:
     row = Row(run.code, run.model, run.settings, FAILED, run.unsupported)
     if run.unsupported:
         return replace(row, status=adapters.UNSUPPORTED), {}
-    row = replace(row, key=key_of(scene, repeat, adapters.fingerprint(run)) + run.tag)
+    row = replace(row, key=key_of(one_line(scene), repeat, adapters.fingerprint(run)) + run.tag)
     found = store.load(row.key)
     if found is None:
         store.report(run.name, 0.0)
@@ -93,7 +93,7 @@ def _with_errors(row: Row, values: Mapping[str, np.ndarray], exact: Mapping[str,
         return row
     forces = np.max([force_difference(values[x], exact[x]) for x in END_FORCES], axis=0)
     # The median tells a transient at the start, or one impact, from an error that lasts.
-    worst, usual = [0.0, *output_times(scene)][int(forces.argmax())], float(np.median(forces))
+    worst, usual = [0.0, *output_times(one_line(scene))][int(forces.argmax())], float(np.median(forces))
     cause = f"largest error of its end force at t = {worst:g} s; median error {usual:.3g} N"
     return with_errors(replace(row, cause=cause), values, exact, scene.length)
 

@@ -26,8 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.model.network import build_system
-from hybrid.scene.schema import Scene
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import Scene, in_full
 from hybrid.simulation.equilibrium import equilibrium_of
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
@@ -97,7 +96,7 @@ def one_march(scene: Scene) -> Slopes:
 
 def production(scene: Scene) -> Slopes:
     """The elimination along s; the clamp itself stands first."""
-    network = network_of(scene)
+    network = in_full(scene)
     model = build_system(network)
     chords, s = equilibrium_of(network, model, 0.0).state.lines[0].e, model.models[0].line.s
     middle, slope = 0.5 * (s[1:] + s[:-1]), chords[:, 2] / np.linalg.norm(chords, axis=1)

@@ -22,7 +22,6 @@ from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import model_is_free
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import missing_time
-from hybrid.scene.short_form import network_of
 from hybrid.simulation.case import Case, CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.own_parts import RunPart, checked_parts, require_parts
@@ -67,7 +66,7 @@ def run(
     _check(scene, criterion)
     case = Case(scene, criterion)
     case.parts = checked_parts(parts)
-    free = [name for name in scene.lines if criterion is None and model_is_free(scene.scene_of(name))]
+    free = [name for name in scene.lines if criterion is None and model_is_free(scene.asked_scene(name))]
     compile_beside(with_models(scene, dict.fromkeys(free, "rod")))  # most often chosen: they compile the least
     target = _target(output, overwrite, case.wants_errors)
     with locked(_path(output)), _supervised(case, progress):
@@ -160,7 +159,6 @@ def first_at_rest(scene: Any) -> tuple[Any, NetworkResolution]:
 
 def _check(scene: Any, criterion: UserCriterion | None = None) -> None:
     """SceneError: its motions are none; TypeError: there is nothing that a criterion could ask for."""
-    network_of(scene)  # which is checked with its motions
     if criterion is not None and not scene.adaptive:
         raise TypeError(NO_ZONES)
 

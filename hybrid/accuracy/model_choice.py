@@ -34,7 +34,6 @@ from hybrid.scene.analysis import RodModel
 from hybrid.scene.cable import Section
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import AdaptiveModel, Environment, LineScene
-from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.case import Case
 from hybrid.simulation.layer_mesh import layered, shown
 from hybrid.simulation.mesh_survey import CELLS, STEPS, Survey, lack_along, with_survey
@@ -149,13 +148,13 @@ def rods_instead_of_slack(scene: Scene, error: ComputationError) -> Instead | No
     """A scene with rods in place of catenaries that stood for no model; None: they did not, or did not go slack."""
     if error.outcome != Outcome.SLACK or error.t is None:
         return None
-    name, network, form = error.line_name, network_of(scene), short_form(scene)
-    line = next((x for key, x in network.lines.items() if form.names[key] == name), None)
-    if line is None or line.model is not None or payout_of(scene.scene_of(name)) is not None:
+    called = scene.form.names
+    name = next((x for x in scene.lines if called[x] == error.line_name), None)
+    if name is None or scene.lines[name].model is not None or payout_of(scene.scene_of(name)) is not None:
         return None
-    sections, given = _stiffened(line.sections, scene.environment)
-    text = f"{f'line {name}: ' * bool(name)}{_text(error, given)}"
-    text += "; no other line has changed" * (len(form.names) > 1)
+    sections, given = _stiffened(scene.lines[name].sections, scene.environment)
+    text = f"{f'line {name}: ' * bool(called[name])}{_text(error, given)}"
+    text += "; no other line has changed" * (len(called) > 1)
     return Instead(scene.with_lines({name: {"sections": sections, "model": RodModel()}}), text)
 
 

@@ -24,8 +24,7 @@ from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.resolution import Resolution
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.analysis import CatenaryZone, Mesh, RodModel, RodZone, ZonesModel
-from hybrid.scene.network import JoinedLine
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import JoinedLine, Network
 from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample, Samples
 
 Stretches = Collection[tuple[float, float]]  # m, of s
@@ -52,8 +51,6 @@ class Comparable(Protocol):
 
     @property
     def names(self) -> Mapping[str, str]: ...
-    @property
-    def network(self) -> Network: ...
     def instead(self, scene: Any) -> AbstractContextManager[None]: ...
     def sample(self, resolution: NetworkResolution) -> Samples: ...
 
@@ -64,7 +61,7 @@ def with_model_errors(case: Comparable, runs: Samples, costs: list[float]) -> Sa
     costs: s of processor time, to which that of the rods is added.  All lines get the error, because what one of them
     leaves out moves the others.
     """
-    network = case.network
+    network = case.scene
     names = [name for name, x in runs.items() if leaves_bending_out(network.lines[name], x)]
     if not names:
         return dict(runs)
@@ -94,7 +91,7 @@ def goes_by_cells(case: Comparable, runs: Samples) -> bool:
     They do not beside joints of rods and catenaries, and where a line touches down: bending fades within a cell there.
     An equilibrium costs little on any cells.
     """
-    network = case.network
+    network = case.scene
     left_out = [x for name, x in runs.items() if leaves_bending_out(network.lines[name], x)]
     return not case.moves or any(x.rods or may_touch(network) for x in left_out)
 

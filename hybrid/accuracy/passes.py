@@ -220,8 +220,8 @@ class Passes:
             if case.wants_errors:
                 finely = comparison_resolutions(resolution, moves=True)
                 passes += [(ESTIMATION, x.one) for x in finely]
-                named = (x for x in case.network.lines.values() if x.model is not None)
-                own = may_touch(case.network)
+                named = (x for x in case.scene.lines.values() if x.model is not None)
+                own = may_touch(case.scene)
                 rods = replace((resolution if own else finely[0]).one, fineness=1.0)  # on nodes that are given
                 passes += [(ESTIMATION, rods)] * any(can_leave_bending_out(x) for x in named)
             case.progress.expect(passes, resolution.one)

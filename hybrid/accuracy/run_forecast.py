@@ -10,7 +10,7 @@ import time as clock
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from hybrid.solve.joined import LineFailed
 from hybrid.store.stored_rows import ComparisonRecorder
 
 if TYPE_CHECKING:
-    from hybrid.scene.network_scene import Network
+    from hybrid.scene.network import Network
 
 
 # s of processor time that the pre-run and the first steps of the result may take, and a pre-run that chooses the model.
@@ -60,12 +60,6 @@ LATER = 3.0
 MOST_FINER = 9.0
 
 
-@overload
-def plan(scene: LineScene, *, measure: bool = True) -> Plan: ...
-@overload
-def plan(scene: Network, *, measure: bool = True) -> NetworkPlan: ...
-@overload
-def plan(scene: SceneLike, *, measure: bool = True) -> Any: ...
 def plan(scene: SceneLike, *, measure: bool = True) -> Any:
     """What would be computed for a scene (a Scene, the path of a scene file, or a dict), and how long it would take.
 
@@ -198,9 +192,9 @@ def _measured(scene: Scene, found: NetworkPlan) -> NetworkPlan:
     seconds, most = _of_passes(scenes, setup, motion, plans)
     if any(x.contact.self for x in scenes.values()):  # by name: the first steps show nothing of it
         seconds, most = seconds + (TOUCHING - 1.0) * motion, most + (MOST_TOUCHING - 1.0) * motion
-    if case.network.slack_becomes_rod:
+    if case.scene.slack_becomes_rod:
         most += (TOUCHING - 1.0) * motion
-    made, lines = zip(finely.lines.values(), case.scene.scenes_of_lines.values(), strict=True), dict[str, Plan]()
+    made, lines = zip(finely.lines.values(), case.scene.asked_scenes.values(), strict=True), dict[str, Plan]()
     for name, called, (resolution, line) in zip(found.lines, scenes, made, strict=True):
         model, choice = build(line, resolution), choices.get(called, NAMED)
         lines[name] = _of_line(case, called, scenes[called], plans[called], model, choice)
@@ -240,7 +234,7 @@ def _dearer(plans: Iterable[Plan]) -> float:
 
 def _later(case: _Probe, run: NetworkRun) -> float:
     """How much dearer a step is than the first ones, once loads and motions that grow from nothing have grown."""
-    if len(run.lines) == 1 or run.t >= min(_grown(case.network), case.scene.require_time().duration):
+    if len(run.lines) == 1 or run.t >= min(_grown(case.scene), case.scene.require_time().duration):
         return 1.0
     return max(1.0, LATER / max(float(np.mean(case.iterations)), 1.0))
 

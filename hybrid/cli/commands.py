@@ -190,7 +190,8 @@ def trade(
         from hybrid.cli.tables import judged, trade_table
         from hybrid.scene.read import one_line
 
-        asked = one_line(load(console, scene, settings), str(scene))
+        asked = load(console, scene, settings)
+        one_line(asked, str(scene))
         folder = output or Path(scene.with_suffix(".trade").name)
         console.left = f"{folder} keeps the runs that are done; the same command makes the others"
         console.note(f"runs and tables go to the folder {folder}")
@@ -260,10 +261,11 @@ def schema(
     lines: Annotated[bool, flag("--lines", help="Of scenes with points and lines alone.")] = False,
 ) -> None:
     """Print the JSON schema of a scene, for editors."""
-    from hybrid.scene.root import Scene, form_of
+    from hybrid.scene.network import Network
+    from hybrid.scene.root import Scene
 
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
-    print(json.dumps(dialect | (form_of({"lines": {}}) if lines else Scene).model_json_schema(), indent=2))
+    print(json.dumps(dialect | (Network if lines else Scene).model_json_schema(), indent=2))
 
 
 def _count(n: int, what: str) -> str:

@@ -250,17 +250,17 @@ def _results(scene: Scene, motion: bool) -> list[str]:
     """What engineers ask first."""
     from hybrid.designs.wanted import of_line
 
-    tensions = [f"{of_line(x)}tension@{end}" for x in scene.lines for end in ("start", "end")]
+    tensions = [f"{of_line(x)}tension@{end}" for x in scene.asked_lines for end in ("start", "end")]
     if motion:
         return [f"max {name}" for name in tensions]
-    bent = [x for x in scene.lines if scene.scene_of(x).model.kind != "catenary"]
+    bent = [x for x in scene.asked_lines if scene.asked_scene(x).model.kind != "catenary"]
     return [*tensions, *(f"max {of_line(x)}curvature" for x in bent)]
 
 
 def _numbers(scene: Scene) -> list[str]:
     """All numbers of the sections that are not 0."""
     out = []
-    for line, x in scene.lines.items():
+    for line, x in scene.asked_lines.items():
         for i, section in enumerate(x.cable.sections):
             for name, value in section.model_dump().items():
                 if isinstance(value, float) and value != 0.0 and name != "max_strain":

@@ -19,7 +19,7 @@ from hybrid.store.capacity import kink_torque
 
 if TYPE_CHECKING:
     from hybrid.model.plan import NetworkPlan, Plan
-    from hybrid.scene.network_scene import Network
+    from hybrid.scene.network import Network
     from hybrid.scene.root import Scene
     from hybrid.simulation.run_quantities import Listed
 
@@ -286,7 +286,7 @@ def _cpu(scene: Scene, plan: Plan | NetworkPlan) -> str:
     finer = any(x.most_runs > x.runs for x in each.values())
     why = "finer runs are needed" if finer else "a line goes slack and becomes a rod"
     notes = [f"up to {span(most)} if {why}"] if most is not None and most > 1.05 * plan.seconds else []
-    if any(scene.scene_of(name).contact.self for name in each):  # and nobody knows for how long it touches
+    if any(scene.asked_scene(name).contact.self for name in each):  # and nobody knows for how long it touches
         notes.append("several times as much while it touches itself")
     notes += [] if plan.measured else ["estimated from tables: no step was tried"]
     return f"about {span(plan.seconds)} of CPU for all runs" + (f" ({'; '.join(notes)})" if notes else "")

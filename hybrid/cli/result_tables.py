@@ -44,7 +44,8 @@ SHOWN = 8
 def show_motion(console: Console, asked: Any, result: Result, target: Path) -> tuple[str, dict[str, Any]]:
     """Print what a run has reached; what to say of it behind its length, and for programs."""
     console.events(result.events)
-    zones = {name: zones_over_time(line) for name, line in result.each_line() if name in asked.adaptive}
+    adaptive = {asked.form.names[name] for name in asked.adaptive}
+    zones = {name: zones_over_time(line) for name, line in result.each_line() if name in adaptive}
     for name, found in [*zones.items()][:MOST_LISTED]:
         console.show(partial(zones_line, found, target, name))
     errors = _show_errors(console, result)
@@ -244,11 +245,10 @@ def check_holding(asked: Any, stiffness: str | None, offsets: str | None, reach:
         raise SceneError([Complaint("--reach", f"{reach:g}", "a point or body to shift", "--offsets point:NAME")])
     given = {name: at for name, at in (("--stiffness", stiffness), ("--offsets", offsets)) if at is not None}
     if given:
-        from hybrid.scene.short_form import network_of
         from hybrid.simulation.lines_stiffness import target_of
 
         for at in given.values():
-            target_of(network_of(asked), at)
+            target_of(asked, at)
     if offsets is not None:
         if reach is None:
             fix = "add --reach 20 (m), the largest offset to either side"

@@ -19,7 +19,6 @@ from hybrid.errors import ResultError, optional_package
 from hybrid.scene.base import places_of_files
 from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.scene.root import Scene
-from hybrid.scene.short_form import ENDS
 from hybrid.simulation.stepping import Simulation
 from hybrid.store.selection import check_target, write_atomically
 
@@ -99,13 +98,13 @@ def _yaml(data: Any) -> str:
 def _interface(scene: Scene) -> dict[str, Any]:
     """What may be set of the ends or points, and where they begin."""
     with Simulation(scene) as made:
-        time, several = scene.require_time(), bool(scene.points)
+        time, several = scene.require_time(), "" not in scene.asked_lines
         points = {
             name: {
                 "settable": sorted(made.settable(name)),
                 "position": np.round(made.point(name).position, 12).tolist(),
             }
-            for name in (scene.points or ENDS)
+            for name in scene.points
         }
         found: dict[str, Any] = {"step": time.step, "duration": time.duration}
         if several:

@@ -24,7 +24,7 @@ from hybrid.kernels.state.state import Floats, Line
 from hybrid.linear.loaded_line import stiffness_by_water
 from hybrid.model.bodies import loads_of
 from hybrid.model.network import NetworkModel, bodies_of
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.points import Fairlead
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver

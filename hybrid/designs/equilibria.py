@@ -98,7 +98,7 @@ class Point:
     def nodes(self, case: str, name: str) -> Floats:
         """Arc lengths (N+1,) of the nodes of a line, m."""
         rest = self.rests[case]
-        return rest.lines[list(rest.scene.lines).index(name)].model.line.s
+        return rest.lines[list(rest.scene.asked_lines).index(name)].model.line.s
 
     def shapes(self) -> dict[str, dict[str, Floats]]:
         """Places (N+1, 3) of the nodes of every line, m, by case; "" is the name of a line that is alone.

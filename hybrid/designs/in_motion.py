@@ -26,7 +26,6 @@ from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import Spread
-from hybrid.scene.short_form import short_form
 
 # Parts of a number by which runs differ: differences of second order by both, from which one of fourth order follows.
 # Of steps that are solved to rounding: of forces at anchors with friction 1e-3 left 4e-5, or found no step, and 3e-4
@@ -141,7 +140,7 @@ def followed(
     else:
         others = others_in(course)
     base = Motion(asked, wanted, course, smooth=smooth, begun=others.begin)
-    of = dict(zip(course.lines, asked.lines, strict=True))  # of lines of the network, their names in the scene
+    of = dict(zip(course.lines, asked.asked_lines, strict=True))  # of lines of the network, their names in the scene
     names = {line: sorted({x.name for x in wanted if x.line == name}) for line, name in of.items()}
     found = others.results({line: x for line, x in names.items() if x})
     here, *beside = [[base.beside({of[k]: x for k, x in y.items()}, wanted) for y in each] for each in found]
@@ -174,7 +173,7 @@ def by_differences(
 def places_of_lines(scene: Scene, wanted: Sequence[Wanted]) -> dict[str, list[float]]:
     """Places that are wanted, m, of lines of the network by name."""
     asked = [x for x in wanted if x.at is not None and np.isfinite(x.at)]
-    names = short_form(scene).names.items()
+    names = scene.form.names.items()
     return {name: [float(x.at or 0.0) for x in asked if x.line == called] for name, called in names}
 
 
@@ -196,10 +195,10 @@ class Motion:
         self.course, self.smooth = course, smooth
         self._smooth: dict[Wanted, Floats] = {}  # extremes of parabolas, where they have been asked for
         more = places_of_lines(scene, wanted) if smooth else None
-        self._cables = {k: x.cable for k, x in scene.lines.items()}
+        self._cables = {k: x.cable for k, x in scene.asked_lines.items()}
         each_step = any(x.over == "t" for x in wanted)
         with replay(scene, course, finer, more, each_step, begun) as result:
-            lines: dict[str, Any] = dict(zip(scene.lines, result.lines.values(), strict=True))
+            lines: dict[str, Any] = dict(zip(scene.asked_lines, result.lines.values(), strict=True))
             self.steps = {name: np.array(x["steps/t"]) for name, x in lines.items()}
             self.zones = {name: list(_zones(x)) for name, x in lines.items()}
             self.begin = {name: np.array(x.position[0]) for name, x in lines.items()}

@@ -181,11 +181,11 @@ def _where(task: TaskFile[Design], cells: dict[str, str], scene: AnyScene, line:
     """Case and line of a row; "": there is one."""
     asked, cases = task.asked.measured, task.asked.cases
     assert asked is not None
-    case, name = cells.get("case", next(iter(cases), "")), cells.get("line", next(iter(scene.lines)))
+    case, name = cells.get("case", next(iter(cases), "")), cells.get("line", next(iter(scene.asked_lines)))
     if case not in (list(cases) or [""]):
         raise SceneError([Complaint("case", case, f"one of: {', '.join(cases)}", line=line)], asked.file)
-    if name not in scene.lines:
-        raise SceneError([Complaint("line", name, f"one of: {', '.join(scene.lines)}", line=line)], asked.file)
+    if name not in scene.asked_lines:
+        raise SceneError([Complaint("line", name, f"one of: {', '.join(scene.asked_lines)}", line=line)], asked.file)
     return case, name
 
 

@@ -23,7 +23,7 @@ from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
 from hybrid.designs.contact_at_rest import ContactAtRest
 from hybrid.designs.gradients import Factors, Gradients
 from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, moment_on_body
-from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, number_of, with_number
+from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, number_in, with_number
 from hybrid.designs.wanted import Wanted, parse_wanted
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
@@ -38,12 +38,11 @@ from hybrid.scene.analysis import Output
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.new_run import static_system
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
@@ -82,8 +81,8 @@ class NetworkAtRest(OfScene):
         """
         wanted = [parse_wanted(scene, x, moves=False) for x in of]
         self.scene, resolution = first_at_rest(scene.without_friction())
-        system, self._form = network_of(self.scene), short_form(self.scene)
-        refuse_use(self.scene, "derivatives", given="hybrid sensitivity")
+        system, self._form = self.scene, self.scene.form
+        refuse_use(self.scene.written, "derivatives", given="hybrid sensitivity")
         finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
         resolution = replace(resolution, lines=finely)
         with self._form.said():
@@ -99,7 +98,7 @@ class NetworkAtRest(OfScene):
             x._replace(line=model.line) for x, model in zip(run.found.solver.lines, run.model.models, strict=True)
         ]
         self._free = [[k for k in (0, 1) if x.joints[k] >= 0] for x in joined]
-        called = dict(zip(scene.lines, self._names, strict=True))
+        called = dict(zip(scene.asked_lines, self._names, strict=True))
         self._order = [(name, k) for name in self._names for k, x in enumerate(wanted) if called[x.line] == name]
         solver = NetworkSolver(joined, len(run.found.solver.net), run.found.solver.bodies)
         self._bodies, self._model = BodiesAtRest(solver, run.state, run.model), run.model
@@ -281,7 +280,7 @@ class NetworkAtRest(OfScene):
         for there, here in sorted(pairs, key=lambda x: -len(x[1])):
             if re.match(rf"{re.escape(here)}\b", key):
                 with suppress(SceneError):
-                    number_of(self._system, there + key.removeprefix(here))
+                    number_in(self._system, there + key.removeprefix(here))
                     return there + key.removeprefix(here)
         return key
 
@@ -290,10 +289,10 @@ class NetworkAtRest(OfScene):
         found = list[_Changed]()
         there = self._key_in(key)
         for d in (step, -step):
-            if number == 0.0:
-                refuse_use(with_number(self.scene, key, d), "derivatives", given=key)  # what it switches on
-            scene = with_number(self._system, there, number + d)
             try:
+                if number == 0.0:  # what it switches on
+                    refuse_use(with_number(self.scene, key, d).written, "derivatives", given=key)
+                scene = with_number(self._system, there, number + d)
                 changed = self._changed(scene, key)
             except ValueError:
                 raise at_a_bound(key, number) from None

@@ -60,7 +60,7 @@ from hybrid.model.failure import weaknesses
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.plane import in_space
 from hybrid.model.resolution import Resolution
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.line_result import observer_of
 from hybrid.simulation.network_run import NetworkRun

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -13,7 +14,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.base import Invalid, Table, unit_of
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.read import read_text, scene_text, text_of
 from hybrid.scene.root import Scene
 from hybrid.scene.yaml_source import Node, Unreadable, from_text
@@ -43,9 +44,16 @@ NAMED = ("lines", "points", "bodies", "obstacles")
 
 def number_of(scene: Scene, key: str) -> float:
     """The value of a key such as `cable.sections[0].length`; SceneError: it has no number."""
-    value: Any = scene.model_dump(mode="python")
+    return number_in(scene.written, key)
+
+
+def number_in(tables: Table, key: str) -> float:
+    """The same of tables, whatever form they have."""
+    value: Any = tables
     for part in PART.findall(key):
         try:
+            if isinstance(value, Table):
+                value = {name: getattr(value, name) for name in type(value).model_fields}
             value = value[_index(part)] if isinstance(value, list | tuple) else value[part]
         except (KeyError, IndexError, TypeError, ValueError):
             expected = "a key of the scene that has a number"
@@ -95,7 +103,7 @@ def size_of(asked: Scene, key: str, number: float) -> float:
 
 def unit_of_key(scene: Scene, key: str) -> str:
     """The unit that the reference of scenes has for a key; "": none."""
-    value, unit = cast(Any, scene), ""
+    value, unit = cast(Any, scene.written), ""
     for part in PART.findall(key):
         if isinstance(value, Table):
             unit, value = unit_of(type(value).model_fields.get(part)), getattr(value, part)
@@ -113,7 +121,7 @@ class OfScene:
     @property
     def shapes(self) -> dict[str, Floats]:
         """Places (N+1, 3) of the nodes of every line, m."""
-        return {name: line.state.r.copy() for name, line in zip(self.scene.lines, self.lines, strict=True)}
+        return {name: line.state.r.copy() for name, line in zip(self.scene.asked_lines, self.lines, strict=True)}
 
     def number(self, key: str) -> float:
         """The value of a key of the scene."""
@@ -138,22 +146,20 @@ def changed_scene(scene: AnyScene, key: str, value: float) -> AnyScene:
 
 
 def with_number(scene: AnyScene, key: str, value: float) -> AnyScene:
-    """The scene with another number at a key, unchecked: tables beside the key are those of the scene itself."""
-    found: AnyScene = _put(scene, PART.findall(key), float(value))
-    return found
+    """The scene with another number at a key, not `allowed` as yet: tables beside it are those of the scene itself."""
+    first, *rest = PART.findall(key)
+    tables = scene.written if first in type(scene.written).model_fields else scene
+    return scene.model_copy(update={first: _put(getattr(tables, first), rest, float(value))})
 
 
-def is_allowed(scene: Scene) -> bool:
-    """Whether a scene that was made by `with_number` is one that could be read."""
-    try:
-        type(scene).model_validate(scene.model_dump(mode="python"))
-    except Invalid:
-        return False
-    return True
+def allowed(scene: AnyScene) -> AnyScene:
+    """A scene that was made by `with_number`; Invalid: it is none that could be read."""
+    scene.model_validate(scene.model_dump(mode="python"))
+    return scene
 
 
 def is_allowed_line(system: Network, name: str) -> bool:
-    """The same of one line of several that was made by `with_number`."""
+    """Whether a line of a network that was made by `with_number` is one that could be read."""
     try:
         system.checked_scene(name)
     except Invalid:
@@ -165,13 +171,13 @@ def scene_with(scene: AnyScene, keys: Sequence[tuple[str, ...]], x: Floats) -> A
     """A scene with values at keys of each unknown; SceneError: it may not have these."""
     given = [(key, float(value)) for group, value in zip(keys, x, strict=True) for key in group]
     changed = scene
-    for key, value in given:
-        changed = with_number(changed, key, value)
-    if not is_allowed(changed):
+    with suppress(Invalid):
         for key, value in given:
-            scene = changed_scene(scene, key, value)
-        return scene
-    return changed
+            changed = with_number(changed, key, value)
+        return allowed(changed)
+    for key, value in given:
+        scene = changed_scene(scene, key, value)
+    return scene
 
 
 def _put(value: Any, parts: list[str], number: float) -> Any:

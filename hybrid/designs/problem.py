@@ -324,8 +324,8 @@ def _result(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, 
         fix = "a target, which takes it as it is"
         expected = "a result that changes evenly: where contact begins goes by the nodes that come to the bed"
         raise task.refusal([Finding((*at, "quantity"), expected, fix)])
-    if (asked.line or "") not in scene.lines:
-        expected = "nothing: the scene has one line" if "" in scene.lines else f"one of: {', '.join(scene.lines)}"
+    if (asked.line or "") not in scene.asked_lines:
+        expected = "nothing: the scene has one line" if "" in scene.asked_lines else f"one of: {', '.join(scene.lines)}"
         raise task.refusal([Finding((*at, "line"), expected)])
     place = f"@sections[{asked.section}]" if asked.section is not None else ""
     if asked.at is not None:
@@ -368,7 +368,7 @@ def _pieces(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, 
 
 def cable_of(scene: AnyScene, line: str | None) -> Any:
     """The cable of a line; None: of the line without a name."""
-    return scene.lines[line or ""].cable
+    return scene.asked_lines[line or ""].cable
 
 
 def refused_result(task: TaskFile[Design], error: SceneError) -> SceneError:

@@ -18,10 +18,9 @@ from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.resolution import Resolution, accuracy_of
 from hybrid.model.sections import NEAR
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.read import read_text, scene_text
 from hybrid.scene.root import Scene
-from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.new_run import Recording, run_system
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import kept_resolution
@@ -59,7 +58,7 @@ class Course(NamedTuple):
     def network(self, scene: Any) -> Network:
         """The network that computes a scene with other numbers in a replay; its errors are not estimated."""
         made = scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})
-        network = network_of(made.with_lines({name: {"model": x.model} for name, x in self.scene.lines.items()}))
+        network = made.with_lines({name: {"model": x.model} for name, x in self.scene.lines.items()})
         if scene.output.errors:  # lines pass each other as where these are estimated
             network = passing_each_other(network)
         return network.model_copy(update={"dimension": self.dimension})
@@ -72,7 +71,7 @@ def course_of(scene: Any) -> Course:
     may leave.  ComputationError: one is pushed out of it.
     """
     if not _is_open(scene):
-        first = NetworkResolution.first(network_of(scene))
+        first = NetworkResolution.first(scene)
         course = Course(scene, first.lines)
         flat = build_system(course.as_asked().network(scene), first).models
         if scene.dimension is None and any(x.plane is not None for x in flat):
@@ -86,7 +85,7 @@ def course_of(scene: Any) -> Course:
             computed: Any = read_text(result.scene_text)[0]
             part = next(x for _, x in result.each_line())
             ends = tuple(np.array(part["steps/t"], float).tolist())
-        found = dict(kept_resolution(network_of(computed), path).lines)
+        found = dict(kept_resolution(computed, path).lines)
     if any(x.local is not None for x in found.values()):
         longest = float(np.diff([0.0, *ends]).max())
         found = {k: replace(x, local=None, later=0.0, step=longest, ends=ends) for k, x in found.items()}
@@ -113,7 +112,7 @@ def replay(
     SceneError, ComputationError: as of `hybrid.run`.
     """
     network, target = with_outputs(scene, course, more, each_step, finer), MemoryTarget()
-    with short_form(course.scene).said():
+    with course.scene.form.said():
         run_system(
             network, target, scene_text(network), ProgressReporter(None, scene.require_time().duration), lambda: False,
             resolution=NetworkResolution(course.resolutions(finer), course.tolerance), recording=Recording(begun=begun),
@@ -165,5 +164,5 @@ def _halved(resolution: Resolution) -> Resolution:
 def _is_open(scene: Scene) -> bool:
     """Whether it leaves steps or cells to the program, which a run shows."""
     layers = any(x.resolution is not None for x in scene.lines.values())
-    asked = (accuracy_of(scene.scene_of(name)) for name in scene.lines)
+    asked = (accuracy_of(scene.asked_scene(name)) for name in scene.asked_lines)
     return layers or scene.require_time().controlled or any(x is not None for x in asked)

@@ -100,8 +100,9 @@ def way_at_rest(asked: Scene, rest: NetworkAtRest) -> str:
     bed = asked.environment.seabed
     rubs = [bed and bed.friction, *(y.friction for y in asked.obstacles.values())]
     contact = rest.contact
-    if contact is not None and asked.contact is not None:
-        rubs.append(asked.contact.friction)
+    if contact is not None:
+        between = asked.contact.friction if asked.contact is not None else 0.0
+        rubs += [between, *(x.contact.friction for x in asked.lines.values())]
     begun = [f"lines {a} and {b} begin to touch" for a, b in contact.begins] if contact is not None else []
     return ", ".join([AT_REST, *(["friction left out"] if any(rubs) else []), *begun])
 

@@ -62,18 +62,18 @@ def of_line(name: str) -> str:
 
 def parse_wanted(asked: Scene, text: str, moves: bool) -> Wanted:
     """The parts of a result, of a run (moves) or of its equilibrium.  SceneError: it is none."""
-    found, first = NAME.match(text), next(iter(asked.lines))
+    found, first = NAME.match(text), next(iter(asked.asked_lines))
     over, line, name, axis, at = found.groups() if found is not None else ("", "", "", "", "")
     known = bool(over) if moves else over in (None, "max", "min")
-    if found is None or not known or (line or "") not in asked.lines:
+    if found is None or not known or (line or "") not in asked.asked_lines:
         of, example = of_line(first and "LINE"), f"{'max ' * moves}{of_line(first)}tension@end"
         ways = f"max, min, mean, std, last or t=TIME, and {of}NAME@S" if moves else f"{of}NAME@S, max or min {of}NAME"
-        expected = f"{ways}{' of ' if first else ''}{', '.join(asked.lines)}, such as {example}"
+        expected = f"{ways}{' of ' if first else ''}{', '.join(asked.asked_lines)}, such as {example}"
         raise SceneError([Complaint("of", text, expected, example)])
     time = math.nan
     if (over or "").startswith("t="):
         over, time = "t", _time_of(asked, text, over.removeprefix("t="))
-    cable, section = asked.lines[line or ""].cable, OF_SECTION.match(at or "")
+    cable, section = asked.asked_lines[line or ""].cable, OF_SECTION.match(at or "")
     if section is not None and int(section[1]) >= len(cable.sections):
         expected = f"a section of the line, which has {len(cable.sections)}, counted from 0"
         raise SceneError([Complaint("of", text, expected, f"sections[{len(cable.sections) - 1}]")])

@@ -54,10 +54,9 @@ from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching
 from hybrid.model.network import NetworkModel, NetworkResolution
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
-from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.new_run import static_system
 from hybrid.solve.contact_stability import contact_stiffness
 from hybrid.solve.joined import JoinedLine, NetworkState
@@ -384,9 +383,9 @@ class Rest:
     tips: Mapping[tuple[str, int], str] = field(default_factory=dict)  # points that are one end (0, 1) alone, in words
 
 
-def rest_of(scene: Any, resolution: NetworkResolution) -> Rest:
+def rest_of(system: Any, resolution: NetworkResolution) -> Rest:
     """The equilibrium of a scene on such cells; ComputationError: there is none."""
-    system, form = network_of(scene), short_form(scene)
+    form = system.form
     with form.said():
         run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
     assert run.found is not None

@@ -14,7 +14,6 @@ from hybrid.kernels.machine.compile import is_warm
 from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import plan
 from hybrid.model.resolution import model_is_free
-from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import located_in, read_text
 from hybrid.simulation.case import CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
@@ -73,8 +72,6 @@ def equilibrium(scene: Scene, made: Any) -> Result:
     It is looked for as `hybrid static` does, from the scene alone: from the last picture Newton's method might find
     another one, where there are several.
     """
-    for name in scene.lines:
-        check_motions(scene.scene_of(name))
     update: dict[str, Any] = {"errors": False}
     if isinstance(scene.output.points, int):
         cells = max(sum(line.cells) for _, line in made.each_line())

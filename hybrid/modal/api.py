@@ -329,8 +329,9 @@ def _error(fine: _ModesOnMesh, coarse: _ModesOnMesh, k: int) -> float | None:
 
 def of_first_length(asked: Scene) -> list[str]:
     """What is to be known of a line that is paid out."""
-    paid = [f"line {name} is" if name else "the line is" for name in asked.lines if payout_of(asked.scene_of(name))]
-    return [f"{who} paid out: all of this is of its first length, to which it does not return" for who in paid]
+    paid = [name for name in asked.asked_lines if payout_of(asked.asked_scene(name))]
+    whose = [f"line {name} is" if name else "the line is" for name in paid]
+    return [f"{who} paid out: all of this is of its first length, to which it does not return" for who in whose]
 
 
 def _doubts(found: _ModesOnMesh, unstable: int, free: list[str], chosen: np.ndarray) -> Iterator[str]:

@@ -51,7 +51,7 @@ def response(scene: SceneLike, friction: bool = True, check: float | None = None
     equilibrium.
     """
     asked = as_scene(scene)
-    refuse_use(asked, "response")
+    refuse_use(asked.written, "response")
     rest = equilibrium_of(asked, friction=friction)
     refuse_motions(rest.models, rest.names)
     omegas = frequencies_of(rest.models, [x.members.sea.waves for x in rest.floats if x.members is not None])

@@ -13,7 +13,7 @@ from hybrid.model.build import Model
 from hybrid.model.ends import first_director, transported
 from hybrid.model.layout import LineOnBase
 from hybrid.scene.ends import Triple
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 
 STRAIGHT = (1.0, 0.0, 0.0)  # direction of a line through a free point in axes of that, where none is given
 SECOND = 1e-3  # weight of the material axis of the first line at a free point against directions of lines

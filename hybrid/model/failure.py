@@ -16,7 +16,7 @@ from hybrid.model.build import Model
 from hybrid.model.layout import LineOnBase
 from hybrid.model.line import with_spin_inertia
 from hybrid.model.network import NetworkModel
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.points import Failure
 
 

@@ -14,12 +14,12 @@ from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.contents import Entry
 from hybrid.model.self_reach import payouts, self_reach
 from hybrid.scene.bodies import FreeBody
+from hybrid.scene.network import Network, SomeScene
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, LinesContact
-from hybrid.scene.root import Scene, SomeScene
 from hybrid.scene.schema import LineScene
 
 if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.network_scene import Network
+    from hybrid.scene.network import Network
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def beside_others(line: Line) -> Line:
     return line._replace(bits=line.bits | MAY_MEET)
 
 
-def that_may_meet(system: Scene, scenes: Mapping[str, LineScene]) -> tuple[int, ...]:
+def that_may_meet(system: Network, scenes: Mapping[str, LineScene]) -> tuple[int, ...]:
     """Numbers of the lines that touch each other from where they come near, because a scene says nothing of contact.
 
     scenes: of the lines by name.  They have diameters, steps are given, and no error is estimated (scene.combinations).
@@ -97,7 +97,7 @@ def that_may_meet(system: Scene, scenes: Mapping[str, LineScene]) -> tuple[int, 
     time = system.time
     if system.contact is not None or system.dimension == 2 or time is None or not (time.step or time.tolerance):
         return ()
-    found = tuple(k for k, name in enumerate(system.lines) if _may_meet(scenes[name]))
+    found = tuple(k for k, x in enumerate(scenes.values()) if _may_meet(x))
     return found if len(found) > 1 else ()
 
 

@@ -17,7 +17,7 @@ from hybrid.model.material import Material, tension_floor
 from hybrid.model.mesh import Grading
 from hybrid.model.resolution import Resolution, accuracy_of, holds_stress, requested_accuracy, wants_errors
 from hybrid.scene.accuracy import of_unnamed_model
-from hybrid.scene.root import SomeScene
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, LineScene, RodModel
 
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
@@ -103,9 +103,9 @@ def with_model(scene: LineScene, kind: str) -> LineScene:
     return scene.model_copy(update=changed)
 
 
-def with_models(scene: SomeScene, kinds: Mapping[str, str]) -> SomeScene:
+def with_models(scene: Scene, kinds: Mapping[str, str]) -> Scene:
     """The same with models of these kinds for lines by name, as of `with_model`."""
-    lines = {name: with_model(scene.scene_of(name), kind) for name, kind in kinds.items()}
+    lines = {name: with_model(scene.asked_scene(name), kind) for name, kind in kinds.items()}
     return scene.with_lines({name: {"model": x.model, "accuracy": x.accuracy} for name, x in lines.items()})
 
 

@@ -26,7 +26,7 @@ from hybrid.model.sea import Surroundings, surroundings
 from hybrid.model.sections import stiffeners_of
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.ends import Pinned
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
 
 # Part of the length by which nodes may move: further than that, another one has been chosen for a place that needs one.

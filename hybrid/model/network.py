@@ -38,7 +38,7 @@ from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.body_shapes import way_out
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import Connections, Fairlead
 from hybrid.scene.schema import LineScene

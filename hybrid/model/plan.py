@@ -7,7 +7,7 @@ from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, isnan
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,11 +24,10 @@ from hybrid.model.payout import PayoutForecast, naming_connection
 from hybrid.model.resolution import first_resolution, model_is_free, predicted_runs
 from hybrid.model.sections import limits_along, outer_diameter
 from hybrid.scene.read import SceneLike, as_scene
-from hybrid.scene.root import Scene
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import LineScene, SceneTables
 
 if TYPE_CHECKING:
-    from hybrid.scene.network_scene import Network
+    pass
 
 
 class CriticalTorque(NamedTuple):
@@ -110,7 +109,7 @@ def equal_steps(
     return first, done, count, length
 
 
-def size_of_result(scene: Scene) -> float:
+def size_of_result(scene: SceneTables) -> float:
     """Bytes of the file of a run, roughly."""
     return (scene.require_time().duration / scene.output_interval + 1.0) * scene.size_of_output
 
@@ -175,12 +174,6 @@ class NetworkPlan:
         )  # fmt: skip
 
 
-@overload
-def plan(scene: LineScene) -> Plan: ...
-@overload
-def plan(scene: Network) -> NetworkPlan: ...
-@overload
-def plan(scene: SceneLike) -> Any: ...
 def plan(scene: SceneLike) -> Any:
     """What would be computed for a scene (a Scene, the path of a scene file, or a dict); nothing is computed.
 
@@ -191,7 +184,7 @@ def plan(scene: SceneLike) -> Any:
 
 def plan_of_lines(scene: Any) -> NetworkPlan:
     """The same of every line of a scene, and of all together."""
-    scenes, plans = scene.scenes_of_lines, dict[str, Plan]()
+    scenes, plans = scene.asked_scenes, dict[str, Plan]()
     for name, line in scenes.items():
         if scene.time:
             refuse_too_much(line)

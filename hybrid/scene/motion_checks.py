@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import Time
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.cable import Cable, Environment
@@ -51,15 +50,6 @@ class Moving(Protocol):
 
     @property
     def environment(self) -> Environment: ...
-
-
-def check_motions(scene: Moving) -> None:
-    """SceneError if a motion cannot be read, does not start from rest, jumps, is too fast, or ends too early."""
-    found = motion_findings(
-        {name: getattr(scene, name) for name in ("ends", "time", "cable", "environment", "obstacles")}
-    )
-    if found:
-        raise SceneError([Complaint(dotted(f.at), f.given or "motion", f.expected, f.fix) for f in found])
 
 
 def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:

@@ -1,6 +1,6 @@
 """Several lines that meet at points and bodies: a scene with `points` and `lines` in place of `cable` and `ends`.
 
-What contradicts in it is found by `scene.network_scene`, which checks each line as a scene of its own, between
+What contradicts in it is found by `scene.network_checks`, which checks each line as a scene of its own, between
 the places where its two points are, or are first looked for.
 """
 
@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import accumulate, combinations, pairwise
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -61,8 +61,7 @@ from hybrid.scene.points import (
     Name,
     Point,
 )
-from hybrid.scene.root import Scene
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import LineScene, SceneTables
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
@@ -184,8 +183,8 @@ class NetworkOutput(Output):
         return self.points.get(line, DEFAULT_POINTS) if isinstance(self.points, dict) else self.points
 
 
-class NetworkTables(Scene):
-    """Lines, the points where they end and meet, what acts on them, and what is asked; not checked."""
+class Network(SceneTables):
+    """Lines, the points where they end and meet, what acts on them, and what is asked."""
 
     instead: ClassVar[Mapping[str, str]] = {
         "ends": "a scene with lines has points, at which they end",
@@ -238,7 +237,7 @@ class NetworkTables(Scene):
 
     def key_of(self, name: str) -> str:
         """The key of the table that says what a line is made of."""
-        return f"lines.{name}"
+        return f"lines.{name}" if name else "cable"
 
     @property
     def adaptive(self) -> tuple[str, ...]:
@@ -589,3 +588,6 @@ class NetworkTables(Scene):
         motions = [(getattr(x, "motion", None), getattr(x, "position", None)) for x in given]
         moved = [Held(motion, place, (1.0, 0.0, 0.0)) for motion, place in motions if motion is not None]
         return lasting_period([*moved_in(None, self.obstacles), *((x, x.motion) for x in moved)], self.environment)
+
+
+SomeScene = TypeVar("SomeScene", bound=Network)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, get_type_hints
+from typing import Any, Generic, TypeVar, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -20,14 +20,11 @@ from hybrid.scene.analysis import usual_model
 from hybrid.scene.base import Finding, Place, Renamed, Table, as_written, dotted, places_of_files
 from hybrid.scene.checks import contradictions
 from hybrid.scene.motion_checks import motion_findings
-from hybrid.scene.root import Scene, form_of
-from hybrid.scene.schema import LineScene
+from hybrid.scene.network import Network
+from hybrid.scene.root import Scene, names_lines
+from hybrid.scene.schema import LineScene, SceneTables
 from hybrid.scene.schema_messages import explain
 from hybrid.scene.yaml_source import Node, Spot, Unreadable, from_data, from_text, override
-
-if TYPE_CHECKING:
-    from hybrid.scene.network_scene import Network
-
 
 # Bytes: a scene is a page or two, which is read in milliseconds, and this in some seconds.
 LARGEST_SCENE = 4_000_000
@@ -47,13 +44,13 @@ class RenamedKey(FutureWarning):
 SceneLike = Scene | str | PathLike[str] | Mapping[str, Any]
 
 
-def as_scene(scene: SceneLike) -> LineScene | Network:
+def as_scene(scene: SceneLike) -> Scene:
     """The scene given as a `Scene`, as the path of a scene file, or as a dict of its tables.
 
     SceneError if it is refused; TypeError if it is none of these.
     """
     if isinstance(scene, Scene):
-        return scene  # type: ignore[return-value]  # of one of the two forms
+        return scene
     if isinstance(scene, str) and "\n" in scene:
         raise TypeError("a scene is expected, or the path of a scene file; for YAML text: hybrid.parse_scene(text)")
     if isinstance(scene, str | PathLike):
@@ -75,9 +72,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     return _warn_renamed(*read_scene(path, overrides))
 
 
-def read_scene(
-    path: str | PathLike[str], overrides: Sequence[str] = ()
-) -> tuple[LineScene | Network, list[RenamedKey]]:
+def read_scene(path: str | PathLike[str], overrides: Sequence[str] = ()) -> tuple[Scene, list[RenamedKey]]:
     """Read a scene file as `load_scene` does; with the notes on renamed keys, instead of warnings."""
     return read_text(text_of(Path(path)), str(path), overrides)
 
@@ -133,25 +128,24 @@ def _without_collection() -> Iterator[None]:
 
 def one_line(scene: Scene, file: str = "") -> LineScene:
     """A scene of one cable; SceneError if it is of several lines, which is not what is asked for."""
-    if not isinstance(scene, LineScene):
+    if "" not in scene.asked_lines:
         fix = "hybrid.run, static, plan and Simulation take several lines"
         raise SceneError(
             [Complaint("lines", f"{len(scene.lines)} lines", "one cable, with `cable` and `ends`", fix)], file
         )
-    return scene
+    return scene.asked_scene("")
 
 
 @_without_collection()
-def read_text(text: str, file: str = "", overrides: Sequence[str] = ()) -> tuple[LineScene | Network, list[RenamedKey]]:
+def read_text(text: str, file: str = "", overrides: Sequence[str] = ()) -> tuple[Scene, list[RenamedKey]]:
     """Read a scene as `parse_scene` does; with the notes on renamed keys, instead of warnings."""
     try:
         root, complaints = from_text(text)
     except Unreadable as error:
         raise SceneError([error.complaint], file) from None
     data = root.plain()
-    schema = form_of(data)
     if isinstance(root.value, dict):
-        complaints += [c for c in (override(root, each, schema) for each in overrides) if c is not None]
+        complaints += [c for c in (override(root, each, _schema_of(data)) for each in overrides) if c is not None]
         data = root.plain()
     for table, key, path in places_of_files(data):  # absolute: a scene is used from anywhere
         if path and "\0" not in path:
@@ -175,8 +169,8 @@ def located_in(error: SceneError, text: str, file: str = "", overrides: Sequence
         return error
     if isinstance(root.value, dict):
         for each in overrides:
-            override(root, each, form_of(root.plain()))
-    complaints, keys = [], {*LineScene.model_fields, *form_of({"lines": {}}).model_fields}
+            override(root, each, _schema_of(root.plain()))
+    complaints, keys = [], {*LineScene.model_fields, *Network.model_fields}
     for complaint in error.complaints:
         at = tuple(int(x) if x.isdigit() else x for x in re.findall(r"\w+", complaint.where))
         place = _find(root, at, False)[2] if at and at[0] in keys else None  # an option has no place in the file
@@ -191,7 +185,7 @@ def validate_scene(data: Any) -> Scene:
     return _warn_renamed(*_from_data(data))
 
 
-def _from_data(data: Any) -> tuple[LineScene | Network, list[RenamedKey]]:
+def _from_data(data: Any) -> tuple[Scene, list[RenamedKey]]:
     try:
         return _validated(data, from_data(data), [], "")
     except RecursionError:  # a table that is deep, or holds itself
@@ -199,7 +193,7 @@ def _from_data(data: Any) -> tuple[LineScene | Network, list[RenamedKey]]:
         raise SceneError([Complaint("scene", "nested too deeply", "a scene", fix)]) from None
 
 
-def scene_text(scene: Scene) -> str:
+def scene_text(scene: SceneTables) -> str:
     """The scene as YAML; `parse_scene` reads it back to an equal scene."""
     import yaml
 
@@ -250,7 +244,7 @@ def _renamed(data: Any, scene: Any, path: Place = ()) -> Iterator[tuple[Place, s
             yield from _renamed(entry, made, (*path, i))
 
 
-def _notes(data: Any, scene: Scene, root: Node, file: str) -> list[RenamedKey]:
+def _notes(data: Any, scene: SceneTables, root: Node, file: str) -> list[RenamedKey]:
     """A note for each renamed key or word, where it stands first."""
     notes: dict[tuple[str, str], RenamedKey] = {}
     for path, old, now in _renamed(data, scene):
@@ -259,35 +253,35 @@ def _notes(data: Any, scene: Scene, root: Node, file: str) -> list[RenamedKey]:
     return list(notes.values())
 
 
-def _validated(
-    data: Any, root: Node, complaints: list[Complaint], file: str
-) -> tuple[LineScene | Network, list[RenamedKey]]:
+def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) -> tuple[Scene, list[RenamedKey]]:
     scene: Any = None
     found: list[tuple[Finding, bool]] = []
     if isinstance(data, dict | Scene):
-        schema = form_of(data)
         try:
-            scene = schema.model_validate(data)
+            scene = Scene.model_validate(data)
         except ValidationError as error:
+            schema = _schema_of(data)
             found = [each for one in error.errors(include_url=False) for each in explain(schema, one)]
-        if schema is LineScene:
-            found += [(finding, False) for finding in _of_short_form(data, scene)]
+            if schema is LineScene:
+                found += [(finding, False) for finding in _of_readable(data)]
     else:
         fix = "begin with tables such as `cable:` and `ends:`"
         found = [(Finding((), "a table with cable, ends, initial and model", fix), False)]
     complaints = complaints + [complaint_of(root, finding, at_key) for finding, at_key in found]
     if complaints or scene is None:
         raise SceneError(in_order(complaints), file)
-    return scene, _notes(data, scene, root, file)
+    return scene, _notes(data, scene.written, root, file)
 
 
-def _of_short_form(data: Any, scene: LineScene | None) -> Iterator[Finding]:
-    """What is wrong with motions of a cable; where it cannot be read, with those of its tables that can be."""
-    if scene is not None:
-        tables = {name: getattr(scene, name) for name in LineScene.model_fields}
-    else:
-        tables = _readable_tables(data)
-        yield from contradictions(tables)
+def _schema_of(data: Any) -> type[SceneTables]:
+    """The tables that a scene has in the form in which it is written."""
+    return Network if names_lines(data) else LineScene
+
+
+def _of_readable(data: Any) -> Iterator[Finding]:
+    """What is wrong with a cable that cannot be read, with those of its tables that can be."""
+    tables = _readable_tables(data)
+    yield from contradictions(tables)
     yield from motion_findings(tables)
 
 

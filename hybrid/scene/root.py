@@ -1,28 +1,27 @@
-"""The root of every scene: what its two forms, `cable` with `ends` and `points` with `lines`, have in common."""
+"""The one root of a scene: points, bodies, lines and their environment, also where it was written as a cable."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Self
 
-from pydantic import Field, GetCoreSchemaHandler
+from pydantic import ModelWrapValidatorHandler as Handler
+from pydantic import (
+    PrivateAttr,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 from pydantic.json_schema import models_json_schema
-from pydantic_core import CoreSchema, core_schema
 
-from hybrid.errors import SceneError
-from hybrid.scene.accuracy import Accuracy
-from hybrid.scene.analysis import OUTPUTS, PER_PERIOD, UNASKED_BYTES, VALUES, Time, missing_time
-from hybrid.scene.base import Table, Text
-from hybrid.scene.cable import Environment
-from hybrid.scene.motion_tables import Motion
-from hybrid.scene.obstacles import Obstacles
-
-# Where the classes of the two forms are, which know this one: of one cable, and of points and lines.
-SHORT, LONG = ("hybrid.scene.schema", "LineScene"), ("hybrid.scene.network_scene", "Network")
-# pydantic leaves a bound under its own name where a validator of ours stands before the number
-_STANDARD = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+from hybrid.scene.base import Finding, refuse
+from hybrid.scene.motion_checks import motion_findings
+from hybrid.scene.network import Network
+from hybrid.scene.network_checks import findings_of
+from hybrid.scene.schema import LineScene, SceneTables, standard_schema
+from hybrid.scene.short_form import ShortForm, changes_cable, line_of, network_tables, short_form
 
 
 def names_lines(data: Any) -> bool:
@@ -30,129 +29,124 @@ def names_lines(data: Any) -> bool:
     return isinstance(data, Mapping) and ("lines" in data or "points" in data) and "cable" not in data
 
 
-def form_of(data: Any) -> type[Scene]:
-    """The class of the form in which a scene or its tables are written; it takes some time to make."""
-    if isinstance(data, Scene):
-        return type(data)
-    home, name = LONG if names_lines(data) else SHORT
-    found: type[Scene] = getattr(import_module(home), name)  # by name: both are made of this file
-    return found
+def _of_cable(key: str) -> Any:
+    """A table of a scene that was written as a cable; AttributeError: it was not."""
+
+    def table(scene: Scene) -> Any:
+        if scene.written is scene:
+            raise AttributeError(key)
+        return getattr(scene.written, key)
+
+    return property(table)
 
 
-class Scene(Table):
-    """What is there and what is asked: lines, points and bodies, or a cable and its ends, and their environment."""
+class Scene(Network):
+    """What is there and what is asked: points, bodies, lines, and their environment.
 
-    title: Text = Field(default="", description="a line for people; it heads plots and reports")
-    environment: Environment = Field(default=Environment(), description="what acts from outside")
+    `cable` and `ends`, the short form of one line, are turned into these where a scene is read; `form` tells what
+    everything is called there, and a scene is written as it was read.
+    """
 
-    if TYPE_CHECKING:  # what both forms have, each in its own way, and what the short one has
+    _short: bool = PrivateAttr(default=False)
+
+    # What Python code reads of a cable: tables that a network has under its lines and points.
+    cable, ends, initial, model = (_of_cable(key) for key in ("cable", "ends", "initial", "model"))
+    mesh, resolution = (_of_cable(key) for key in ("mesh", "resolution"))
+
+    if TYPE_CHECKING:
 
         def __init__(self, **tables: Any) -> None: ...
-        @property
-        def lines(self) -> Mapping[str, Any]: ...
-        @property
-        def points(self) -> Mapping[str, Any]: ...
-        @property
-        def bodies(self) -> Mapping[str, Any]: ...
-        @property
-        def cable(self) -> Any: ...
-        @property
-        def ends(self) -> Any: ...
-        @property
-        def initial(self) -> Any: ...
-        @property
-        def model(self) -> Any: ...
-        @property
-        def mesh(self) -> Any: ...
-        @property
-        def resolution(self) -> Any: ...
-        @property
-        def contact(self) -> Any: ...
-        @property
-        def obstacles(self) -> Obstacles: ...
-        @property
-        def time(self) -> Time | None: ...
-        @property
-        def output(self) -> Any: ...
-        @property
-        def accuracy(self) -> Accuracy | None: ...
-        @property
-        def dimension(self) -> Literal[2, 3] | None: ...
-        @property
-        def free(self) -> tuple[str, ...]: ...
-        @property
-        def adaptive(self) -> tuple[str, ...]: ...
-        @property
-        def starts_as_placed(self) -> bool: ...
-        @property
-        def motions(self) -> list[Motion]: ...
-        @property
-        def length(self) -> float: ...
-        @property
-        def points_kept(self) -> int: ...
-        @property
-        def lasting_period(self) -> float: ...
-        @property
-        def scenes_of_lines(self) -> Mapping[str, Any]: ...
-        def scene_of(self, name: str) -> Any: ...
-        def key_of(self, name: str) -> str: ...
-        def without_friction(self) -> Self: ...
-        def with_lines(self, changes: Mapping[str, Mapping[str, Any]]) -> Self: ...
 
-    def __new__(cls, **tables: Any) -> Self:
-        """A scene of the form in which its tables are written."""
-        kind: Any = form_of(tables) if cls is Scene else cls
-        found: Self = super().__new__(kind)
-        return found
+    def __eq__(self, other: object) -> bool:
+        """Whether all tables are the same, in whatever form they were written."""
+        return isinstance(other, Scene) and dict(self) == dict(other)
 
+    @model_validator(mode="wrap")
     @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(_as_written) if cls is Scene else handler(source)
+    def _as_written(cls, data: Any, handler: Handler[Self]) -> Self:
+        """A scene of its tables, in either form."""
+        line = data
+        if isinstance(data, Mapping) and not names_lines(data):
+            line = LineScene.model_validate(data)
+        if not isinstance(line, LineScene):
+            return handler(data)
+        refuse(motion_findings({name: getattr(line, name) for name in LineScene.model_fields}))
+        try:
+            scene = handler(network_tables(line))
+        except ValidationError as error:
+            refuse(_refused(line, error))
+            raise
+        scene._short = True
+        scene._known_scenes["", ()] = line
+        return scene
+
+    @model_validator(mode="after")
+    def _no_contradiction(self) -> Self:
+        for findings in findings_of(self):
+            refuse(findings)
+        return self
+
+    @model_serializer(mode="wrap")
+    def _written(self, handler: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
+        keys = ("mode", "by_alias", "exclude_unset", "exclude_defaults", "exclude_none", "include", "exclude")
+        asked = {key: getattr(info, key) for key in keys}
+        return self.written.model_dump(**asked) if self._short else dict(handler(self))
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """The same with other tables, in the form in which it was written or as a network."""
+        if self._short and changes_cable(update or {}):
+            return self.model_validate(self.asked_scene("").model_copy(update=update))
+        return super().model_copy(update=update, deep=deep)
 
     @classmethod
     def model_json_schema(cls, *args: Any, **kwargs: Any) -> dict[str, Any]:
-        """JSON Schema of a scene file; bounds in the words that editors know."""
-        if cls is not Scene:
-            return dict(_standard(super().model_json_schema(*args, **kwargs)))
-        short, long = form_of({}), form_of({"lines": {}})
-        refs, found = models_json_schema([(short, "validation"), (long, "validation")])
+        """JSON Schema of a scene file, in either form."""
+        refs, found = models_json_schema([(LineScene, "validation"), (Network, "validation")])
         keys = {"if": {"anyOf": [{"required": ["lines"]}, {"required": ["points"]}], "not": {"required": ["cable"]}}}
-        forms = {"then": refs[long, "validation"], "else": refs[short, "validation"]}
-        return dict(_standard(keys | forms | found))
+        forms = {"then": refs[Network, "validation"], "else": refs[LineScene, "validation"]}
+        return dict(standard_schema(keys | forms | found))
 
-    def require_time(self) -> Time:
-        """The `time` table; SceneError if there is none."""
-        if self.time is None:
-            raise SceneError([missing_time()])
-        return self.time
+    # --- as it was written ----------------------------------------------------------------------
 
     @property
-    def size_of_output(self) -> int:
-        """Bytes of an output in the file, roughly."""
-        asked = self.output.errors
-        wanted = self.accuracy is not None or (self.time is not None and self.time.controlled)
-        return int(8 * VALUES * self.points_kept * (1 + (wanted if asked is None else asked)))
+    def written(self) -> SceneTables:
+        """The tables in the form in which it was written."""
+        return self.asked_scene("") if self._short else self
 
     @property
-    def output_interval(self) -> float:
-        """Time between two outputs [s]."""
-        if self.output.every is not None:
-            return float(self.output.every)
-        time = self.require_time()
-        wanted = max(OUTPUTS, math.ceil(min(PER_PERIOD * time.duration / self.lasting_period, 1e9)))
-        most = max(OUTPUTS, int(UNASKED_BYTES / self.size_of_output))
-        return max(time.duration / min(wanted, most), time.step or 0.0)
+    def form(self) -> ShortForm:
+        """What keys, lines and places are called where it was written."""
+        return short_form(self.asked_scene("")) if self._short else ShortForm((), {name: name for name in self.lines})
+
+    @property
+    def asked_lines(self) -> Mapping[str, Any]:
+        """The lines by the names that they have where the scene was written, "" of a cable."""
+        return {"": self.asked_scene("")} if self._short else self.lines
+
+    @property
+    def asked_scenes(self) -> dict[str, LineScene]:
+        """Each line with the points that it carries, by the same names."""
+        return {"": self.asked_scene("")} if self._short else self.scenes_of_lines
+
+    def asked_scene(self, name: str) -> LineScene:
+        """A line as it was asked for; name: here or where it was written."""
+        if not self._short:
+            return self.scene_of(name)
+        known = self._known_scenes
+        if ("", ()) not in known:
+            known["", ()] = line_of(self)
+        return known["", ()]
 
 
-SomeScene = TypeVar("SomeScene", bound=Scene)
+def in_full(scene: Scene) -> Scene:
+    """The scene with points and lines, also where it was written as a cable."""
+    return Scene.model_validate(network_tables(scene.asked_scene(""))) if scene.written is not scene else scene
 
 
-def _as_written(data: Any) -> Scene:
-    """A scene of the form in which its tables are written; one that is read already as it is."""
-    return form_of(data).model_validate(data)
-
-
-def _standard(schema: Any) -> Any:
-    if isinstance(schema, dict):
-        return {_STANDARD.get(k, k) if not isinstance(v, dict) else k: _standard(v) for k, v in schema.items()}
-    return [_standard(x) for x in schema] if isinstance(schema, list) else schema
+def _refused(line: LineScene, error: ValidationError) -> Iterator[Finding]:
+    """What the network of a cable refuses, where the cable has it."""
+    form = short_form(line)
+    for each in error.errors(include_url=False):
+        at = tuple(x for x in each["loc"] if not str(x).startswith("<"))
+        for x in (each.get("ctx") or {}).get("findings") or [Finding((), "what a network of one line has")]:
+            yield form.finding(Finding((*at, *x.at), x.expected, x.fix, x.given))

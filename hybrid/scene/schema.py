@@ -8,13 +8,19 @@ The tables live in five files (`cable`, `attachments`, `sea`, `ends`, `task`); i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from hybrid.errors import SceneError
 from hybrid.scene.accuracy import Accuracy, AskedAccuracy
 from hybrid.scene.analysis import (
+    OUTPUTS,
+    PER_PERIOD,
+    UNASKED_BYTES,
+    VALUES,
     AdaptiveModel,
     CatenaryModel,
     CatenaryZone,
@@ -32,10 +38,9 @@ from hybrid.scene.analysis import (
     ZonesModel,
     missing_time,
     usual_model,
-    without_friction,
 )
 from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
-from hybrid.scene.base import Table, Vector, refuse
+from hybrid.scene.base import Table, Text, Vector, refuse
 from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section, Vortices
 from hybrid.scene.checks import contradictions
 from hybrid.scene.end_loads import Load
@@ -52,7 +57,6 @@ from hybrid.scene.obstacles import (
     SphereObstacle,
     TorusObstacle,
 )
-from hybrid.scene.root import Scene
 from hybrid.scene.sea import (
     Current,
     CurrentPoint,
@@ -126,7 +130,6 @@ __all__ = [
     "Resolution",
     "RodModel",
     "RodZone",
-    "Scene",
     "Seabed",
     "Section",
     "SheaveObstacle",
@@ -151,9 +154,67 @@ __all__ = [
 ]  # fmt: skip
 
 
-# What a scene with `cable` and `ends` is read as, and how the model of each line of a network sees that line
-# (`Network.scene_of`).  What computes a whole scene takes its network (`short_form.network_of`).
-class LineScene(Scene):
+# pydantic leaves a bound under its own name where a validator of ours stands before the number
+_STANDARD = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+
+
+class SceneTables(Table):
+    """What a scene and a line of it have in common: a title, the environment, and how densely results are kept."""
+
+    title: Text = Field(default="", description="a line for people; it heads plots and reports")
+    environment: Environment = Field(default=Environment(), description="what acts from outside")
+
+    if TYPE_CHECKING:  # what each has in its own way
+
+        @property
+        def time(self) -> Time | None: ...
+        @property
+        def output(self) -> Any: ...
+        @property
+        def accuracy(self) -> Accuracy | None: ...
+        @property
+        def points_kept(self) -> int: ...
+        @property
+        def lasting_period(self) -> float: ...
+
+    @classmethod
+    def model_json_schema(cls, *args: Any, **kwargs: Any) -> dict[str, Any]:
+        """JSON Schema; bounds in the words that editors know."""
+        return dict(standard_schema(super().model_json_schema(*args, **kwargs)))
+
+    def require_time(self) -> Time:
+        """The `time` table; SceneError if there is none."""
+        if self.time is None:
+            raise SceneError([missing_time()])
+        return self.time
+
+    @property
+    def size_of_output(self) -> int:
+        """Bytes of an output in the file, roughly."""
+        asked = self.output.errors
+        wanted = self.accuracy is not None or (self.time is not None and self.time.controlled)
+        return int(8 * VALUES * self.points_kept * (1 + (wanted if asked is None else asked)))
+
+    @property
+    def output_interval(self) -> float:
+        """Time between two outputs [s]."""
+        if self.output.every is not None:
+            return float(self.output.every)
+        time = self.require_time()
+        wanted = max(OUTPUTS, math.ceil(min(PER_PERIOD * time.duration / self.lasting_period, 1e9)))
+        most = max(OUTPUTS, int(UNASKED_BYTES / self.size_of_output))
+        return max(time.duration / min(wanted, most), time.step or 0.0)
+
+
+def standard_schema(schema: Any) -> Any:
+    """A JSON schema whose bounds have their standard names."""
+    if isinstance(schema, dict):
+        return {_STANDARD.get(k, k) if not isinstance(v, dict) else k: standard_schema(v) for k, v in schema.items()}
+    return [standard_schema(x) for x in schema] if isinstance(schema, list) else schema
+
+
+# The tables of the short form of a scene, and what the model of each line of a network is made of.
+class LineScene(SceneTables):
     """One line without a name, its ends, the world around it, and what is asked."""
 
     instead: ClassVar[Mapping[str, str]] = {"solver": "leave it out: every scene is solved by elimination"}
@@ -192,21 +253,6 @@ class LineScene(Scene):
         "computed in a plane where the whole scene lies in one, for as long as nothing could push it out of it [-]",
     )
 
-    # What the long form has as well, so that nobody has to ask which of the two it is.
-    points: ClassVar[Mapping[str, Any]] = {}
-    bodies: ClassVar[Mapping[str, Any]] = {}
-    free: ClassVar[tuple[str, ...]] = ()
-
-    @property
-    def lines(self) -> dict[str, LineScene]:
-        """The lines by name: this one, whose name is empty."""
-        return {"": self}
-
-    @property
-    def adaptive(self) -> tuple[str, ...]:
-        """Names of the lines whose zones move."""
-        return ("",) if isinstance(self.model, AdaptiveModel) else ()
-
     @property
     def starts_as_placed(self) -> bool:
         """Whether the motion starts where the scene has the line, at rest, and not in equilibrium."""
@@ -216,19 +262,6 @@ class LineScene(Scene):
     def motions(self) -> list[Motion]:
         """How ends are moved."""
         return [end.prescribed_motion for end in self.ends.both if end.prescribed_motion is not None]
-
-    @property
-    def scenes_of_lines(self) -> dict[str, LineScene]:
-        """Each line with the points that it carries, by name: this one."""
-        return self.lines
-
-    def scene_of(self, name: str) -> LineScene:
-        """A line as a scene of its own: there is one."""
-        return self.lines[name]
-
-    def key_of(self, name: str) -> str:
-        """The key of the table that says what a line is made of."""
-        return "cable"
 
     @property
     def length(self) -> float:
@@ -244,17 +277,6 @@ class LineScene(Scene):
     def lasting_period(self) -> float:
         """The shortest period of waves and motions [s]; infinity: there is none."""
         return lasting_period(moved_in(self.ends, self.obstacles), self.environment)
-
-    def without_friction(self) -> Self:
-        """The same whose equilibrium neglects friction, unless the scene says how it settles."""
-        return self.with_lines({"": {"initial": without_friction(self.initial)}})
-
-    def with_lines(self, changes: Mapping[str, Mapping[str, Any]]) -> Self:
-        """The same with other tables, or other `sections`, of lines by name."""
-        update = dict(changes.get("", {}))
-        if "sections" in update:
-            update["cable"] = self.cable.model_copy(update={"sections": update.pop("sections")})
-        return self.model_copy(update=update) if update else self
 
     @model_validator(mode="before")
     @classmethod

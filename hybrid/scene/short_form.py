@@ -18,26 +18,25 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
-from pydantic import ValidationError
-
-from hybrid.errors import Complaint, ComputationError, SceneError
+from hybrid.errors import ComputationError, SceneError
 from hybrid.scene.analysis import CatenaryModel, Output
 from hybrid.scene.base import Finding, Place, dotted
-from hybrid.scene.combinations import value_at
-from hybrid.scene.ends import End, Release
-from hybrid.scene.network_scene import Network
-from hybrid.scene.points import Failure
-from hybrid.scene.root import Scene
+from hybrid.scene.cable import Contact
+from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned, Release
+from hybrid.scene.network import Network
+from hybrid.scene.points import ClampedConnection, Connection, Failure, FreePoint, Point
 from hybrid.scene.schema import LineScene
 
 LINE = "cable"
 ENDS = ("start", "end")
-MOST_KEPT = 8  # networks, of the scenes asked for last: to validate one takes 1 ms, and it keeps the scene of its line
 # Tables of a scene that a line has.
 OF_LINE = ("mesh", "resolution", "contact", "initial")
+# Those that both forms have.
+SAME = ("title", "environment", "obstacles", "time", "accuracy", "dimension")
+# Keys of the output that are by name of the line.
+OF_PLACES = ("points", "history")
 # Of an end by its kind: the kind of its point, what keys of the point are called there, which keys the connection has.
 POINTS: dict[str, tuple[str, dict[str, str], tuple[str, ...]]] = {
     "pinned": ("fixed", {"release_at": "break_at"}, ("payout",)),
@@ -57,10 +56,6 @@ WORDS = {
     "a moment at a point": "an end moment",
     "points and bodies move otherwise": "the ends move otherwise",
 }
-
-
-class NotInNetwork(SceneError):
-    """The scene of a cable has what a network of one line cannot have yet."""
 
 
 @dataclass(frozen=True)
@@ -126,32 +121,9 @@ class ShortForm:
         return Finding(self.place(found.at), self.text(found.expected), self.text(found.fix), given)
 
 
-class _This:
-    """A scene as a key: itself, and none that is equal."""
-
-    def __init__(self, scene: LineScene) -> None:
-        self.scene = scene
-
-    def __hash__(self) -> int:
-        return id(self.scene)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _This) and other.scene is self.scene
-
-
-def network_of(scene: Scene) -> Network:
-    """The network that computes what a scene asks for: itself, or of one line.  NotInNetwork: there is none yet."""
-    if isinstance(scene, LineScene):
-        return _made_of(_This(scene))
-    assert isinstance(scene, Network)
-    return scene
-
-
-@lru_cache(maxsize=MOST_KEPT)
-def _made_of(key: _This) -> Network:
-    """The network of a scene, kept for whoever asks for it next."""
-    scene = key.scene
-    made = {name: _end(getattr(scene.ends, name)) for name in ENDS}
+def network_tables(scene: LineScene) -> dict[str, Any]:
+    """The tables of the network of a cable."""
+    made = {name: _point_of(getattr(scene.ends, name)) for name in ENDS}
     line: dict[str, Any] = {name: getattr(scene, name) for name in OF_LINE if getattr(scene, name) is not None}
     line |= {"start": "start", "end": "end", "connections": {name: held for name, (_, held) in made.items()}}
     line |= {key: getattr(scene.cable, key) for key in type(scene.cable).model_fields}
@@ -161,24 +133,33 @@ def _made_of(key: _This) -> Network:
         "points": {name: point for name, (point, _) in made.items()}, "lines": {LINE: line},
         "output": _output(scene.output),
     }  # fmt: skip
-    same = ("title", "environment", "obstacles", "time", "accuracy", "dimension")
-    tables |= {name: getattr(scene, name) for name in same if getattr(scene, name) is not None}
-    kept = {}  # an accuracy of a model that is chosen, in whose place no error figure is wanted
-    if scene.output.errors is False and "accuracy" in tables:
-        kept["accuracy"] = tables.pop("accuracy")
-    try:
-        return Network.model_validate(tables).model_copy(update=kept)
-    except ValidationError as error:
-        raise NotInNetwork(list(_complaints(scene, error))) from None
+    return tables | {name: getattr(scene, name) for name in SAME if getattr(scene, name) is not None}
 
 
-def short_form(scene: Scene) -> ShortForm:
-    """Where the keys of the network of a scene are in that."""
-    if not isinstance(scene, LineScene):
-        return ShortForm((), {name: name for name in scene.lines})
+def line_of(network: Network) -> LineScene:
+    """The cable of which a network was made."""
+    line = network.lines[LINE]
+    tables: dict[str, Any] = {name: getattr(line, name) for name in (*OF_LINE, "cable")}
+    tables |= {name: getattr(network, name) for name in SAME}
+    tables |= {"model": line.chosen_model, "accuracy": line.accuracy or network.accuracy}
+    tables["ends"] = Ends(**{name: _end_of(network.points[name], getattr(line.connections, name)) for name in ENDS})
+    kept = {key: getattr(network.output, key) for key in Output.model_fields}
+    kept |= {"points": network.output.points_of(LINE), "history": network.output.history.get(LINE)}
+    kept["quantities"] = {name: q.model_copy(update={"line": None}) for name, q in kept["quantities"].items()}
+    return LineScene.model_construct(**tables, output=Output.model_construct(**kept))
+
+
+def changes_cable(update: Mapping[str, Any]) -> bool:
+    """Whether changes of a scene are of tables that a cable has, and a network has not, or of another kind."""
+    kinds = {key: type(update[key]) in (Output, Contact) for key in ("output", "contact") if key in update}
+    return any(kinds.values()) or bool({"cable", "ends", "model", *OF_LINE} - {"contact"} & {*update})
+
+
+def short_form(scene: LineScene) -> ShortForm:
+    """Where the keys of the network of a cable are in its scene."""
     pairs: list[tuple[Place, Place]] = [(("lines", LINE), ("cable",))]
     pairs += [(("lines", LINE, name), (name,)) for name in ("model", *OF_LINE)]
-    pairs += [(("output", name, LINE), ("output", name)) for name in ("points", "history")]
+    pairs += [(("output", name, LINE), ("output", name)) for name in OF_PLACES]
     for name in ENDS:
         _, called, _ = POINTS[getattr(scene.ends, name).kind]
         pairs += [(("points", name), ("ends", name)), (("lines", LINE, "connections", name), ("ends", name))]
@@ -186,7 +167,7 @@ def short_form(scene: Scene) -> ShortForm:
     return ShortForm(tuple(pairs), {LINE: ""})
 
 
-def _end(end: End) -> tuple[dict[str, Any], dict[str, Any]]:
+def _point_of(end: End) -> tuple[dict[str, Any], dict[str, Any]]:
     """The point of an end, and how the line is connected to it."""
     kind, called, connected = POINTS[end.kind]
     given = {key: getattr(end, key) for key in type(end).model_fields if key != "kind"}
@@ -194,6 +175,19 @@ def _end(end: End) -> tuple[dict[str, Any], dict[str, Any]]:
     point = {called.get(key, key): _table(x) for key, x in given.items() if key not in connected}
     held = {key: x for key, x in given.items() if key in connected}
     return {"kind": kind} | point, {"kind": "clamped" if "tangent" in held else "pinned"} | held
+
+
+def _end_of(point: Point, held: Connection) -> End:
+    """The end of a cable from its point and how the line is connected to that."""
+    clamped, body = isinstance(held, ClampedConnection), isinstance(point, FreePoint) and point.is_body
+    made = {"fixed": Clamped if clamped else Pinned, "guided": Guided, "free": Body if body else Free}[point.kind]
+    _, called, connected = POINTS[made.model_fields["kind"].default]
+    keys = [key for key in made.model_fields if key != "kind"]
+    given = {key: getattr(held if key in connected else point, called.get(key, key)) for key in keys}
+    if isinstance(when := given.get("release_at"), Failure):
+        given["release_at"] = Release(time=when.time, tension=when.tension)
+    end: End = made(**given)
+    return end
 
 
 def _table(value: Any) -> Any:
@@ -205,18 +199,7 @@ def _output(output: Output) -> dict[str, Any]:
     """What is kept, by the name of the line where lines have their own."""
     found = {key: getattr(output, key) for key in type(output).model_fields if getattr(output, key) is not None}
     found["quantities"] = {name: q.model_copy(update={"line": LINE}) for name, q in output.quantities.items()}
-    for key in ("points", "history"):
+    for key in OF_PLACES:
         if isinstance(found.get(key), tuple):
             found[key] = {LINE: found[key]}
     return found
-
-
-def _complaints(scene: LineScene, error: ValidationError) -> Iterator[Complaint]:
-    """What a network refuses, where the scene has it."""
-    form = short_form(scene)
-    for each in error.errors(include_url=False):
-        at = tuple(x for x in each["loc"] if not str(x).startswith("<"))
-        findings = (each.get("ctx") or {}).get("findings") or [Finding((), "what a network of one line has")]
-        for x in findings:
-            found = form.finding(Finding((*at, *x.at), x.expected, x.fix, x.given))
-            yield Complaint(dotted(found.at), found.given or value_at(scene, found.at), found.expected, found.fix)

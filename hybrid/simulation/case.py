@@ -9,7 +9,6 @@ import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -38,7 +37,6 @@ from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors, layer_e
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.layer_mesh import rods_at_rest
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
@@ -80,7 +78,7 @@ from hybrid.store.writer import Recorder, WriteMode
 from hybrid.zones.criteria import UserCriterion, with_names
 
 if TYPE_CHECKING:
-    from hybrid.scene.network_scene import Network
+    from hybrid.scene.network import Network
 
 
 # Of every step, what extremes of the end forces follow from.
@@ -144,7 +142,7 @@ class Case:
     @property
     def names(self) -> Mapping[str, str]:
         """Names of the lines of the network, each with that of the line in the scene."""
-        return short_form(self.scene).names
+        return self.scene.form.names
 
     def _points_of(self, scene: LineScene) -> OutputPoints:
         """Where outputs of a line are."""
@@ -153,18 +151,13 @@ class Case:
         return output_points(scene, longest_out(scene), not winch_side(scene))
 
     @property
-    def network(self) -> Network:
-        """The same as a network."""
-        return network_of(self.scene)
-
-    @property
     def lines(self) -> dict[str, LineScene]:
         """The lines by name, as scenes of their own."""
-        return {name: self.scene.scene_of(called) for name, called in self.names.items()}
+        return {name: self.scene.asked_scene(name) for name in self.scene.lines}
 
     def with_models(self, kinds: Mapping[str, str]) -> Any:
         """The scene with models of these kinds for lines by name."""
-        return with_models(self.scene, {self.names[name]: kind for name, kind in kinds.items()})
+        return with_models(self.scene, kinds)
 
     @contextmanager
     def instead(self, scene: Any) -> Iterator[None]:
@@ -183,7 +176,7 @@ class Case:
     @property
     def from_rest(self) -> bool:
         """Whether it begins from an equilibrium, or is one."""
-        return not (self.moves and (self.scene.starts_as_placed or self.network.may_break))
+        return not (self.moves and (self.scene.starts_as_placed or self.scene.may_break))
 
     @property
     def _duration(self) -> float:
@@ -240,7 +233,7 @@ class Case:
 
     def resume(self, source: Path, target: Path, before: Tree | None = None) -> Samples:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
-        resolution = kept_resolution(self.network, source)
+        resolution = kept_resolution(self.scene, source)
         first = self._takes_its_place(target)
         begin = self._begin_result(resolution.one, first)
         recording = Recording(WriteMode(before or {}), source, ERROR_ESTIMATE if before else "")
@@ -297,7 +290,7 @@ class Case:
             for line in run.lines:
                 data_of = partial(root_of, file) if late is None else late.data_of
                 samples[line.name] = self._sample_of(line, run, data_of, lines[line.name], cpu, stay)
-        asked = {name for name, x in self.network.lines.items() if x.contact.self}
+        asked = {name for name, x in self.scene.lines.items() if x.contact.self}
         self.touches_itself |= any(x.touches for name, x in samples.items() if name not in asked)
         return samples
 
@@ -330,7 +323,7 @@ class Case:
         held: dict[str, Any] = {}
         if self._judges(name):
             held = {x: own[x][()] for x in _datasets(own, ENVELOPE, EXTREMES)}
-            asked = (x for x, q in self.network.output.quantities.items() if q.line == name)
+            asked = (x for x, q in self.scene.written.output.quantities.items() if q.line == name)
             held |= {full: data[full][()] for x in asked if (full := f"{EXTREMES}/{x}") in data}
         moves, notes, forces = line.manager is not None, Notes(), np.zeros((0, 3))
         if self.moves:
@@ -347,7 +340,7 @@ class Case:
 
     def _judges(self, name: str) -> bool:
         """Whether limits are held against extremes of a line, or ranges of it are asked for by name."""
-        asked = any(x.line == name for x in self.network.output.quantities.values())
+        asked = any(x.line == name for x in self.scene.written.output.quantities.values())
         return self.moves and self.wants_errors and (asked or has_limits(self.lines[name]))
 
     def _places_of(self, name: str, line: str) -> np.ndarray | None:
@@ -425,7 +418,7 @@ class Case:
             resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
             resolution.every, rows=rows, forces=found.steps,
             catenary=found.catenary if moves else np.zeros(0),
-            touches=line.lets_touch or bool(self.network.lines[name].contact.self), places=self.places[name],
+            touches=line.lets_touch or bool(self.scene.lines[name].contact.self), places=self.places[name],
             extremes=extremes_about(held, self.points[name].s), rods=tuple(sorted(found.rods)),
         )  # fmt: skip
 
@@ -467,23 +460,22 @@ class Case:
 
     def _said(self) -> AbstractContextManager[None]:
         """What fails within, in the words of the scene."""
-        return short_form(self.scene).said()
+        return self.scene.form.said()
 
     def _network_run(self, resolution: NetworkResolution, target: Target | None, recording: Recording) -> NetworkRun:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
-        network, changes = self.network, [replace(x, scene=network_of(x.scene)) for x in self.changes]
         recording = recording._replace(planes=True, asked=Asked(self.scene, self.changes), parts=self.parts)
         if recording.points is None:
             recording = recording._replace(points=self.points)
         with self._said():
             if recording.source is None:
                 recording = recording._replace(start=self._first_state(resolution))
-            texts, end = self._texts, (self.criterion, changes)
-            return new_run(network, target, texts[0], self.moves, resolution, recording, *end)
+            texts, end = self._texts, (self.criterion, self.changes)
+            return new_run(self.scene, target, texts[0], self.moves, resolution, recording, *end)
 
     def _first_state(self, resolution: NetworkResolution) -> Start:
         """The first state, which may have been kept for a run of this resolution."""
-        (kept, self._start), network = (self._start, None), self.network
+        (kept, self._start), network = (self._start, None), self.scene
         if kept is not None and kept[0] is network and _is_same(kept[1], resolution):
             return kept[2]
         with at_once(self.interrupted):
@@ -491,7 +483,7 @@ class Case:
 
     def first_shapes(self, resolution: NetworkResolution) -> dict[str, tuple[Model, State]]:
         """Models and first states of a run, by line; they are kept for that of this resolution, if it comes next."""
-        network = self.network
+        network = self.scene
         if network.adaptive:  # as rods, before zones are found
             return rods_at_rest(network, resolution, self.moves)
         with self._said():

@@ -23,7 +23,7 @@ from hybrid.model.initial_shape import GIVEN, HUNG, first_state, hung
 from hybrid.model.lines_contact import touching_among
 from hybrid.model.network import NetworkModel
 from hybrid.model.self_reach import touching
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.simulation.lines_contact import JUMP, crossed, jumps, shared_of, watched_pairs
 from hybrid.simulation.self_watch import diameters, least_bending
 from hybrid.solve.contact_statics import settled_system, touching_solver

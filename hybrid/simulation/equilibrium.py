@@ -30,7 +30,8 @@ from hybrid.model.network import NetworkModel, balanced_places, starts_between
 from hybrid.model.plane import as_kept, leaves_plane, planar
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.base import dotted
-from hybrid.scene.network_scene import Network, floating_groups
+from hybrid.scene.network import Network
+from hybrid.scene.network_checks import floating_groups
 from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.contact_equilibrium import letting_touch, settle, with_contact

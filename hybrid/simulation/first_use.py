@@ -20,7 +20,6 @@ from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import Equilibrium, LineScene
-from hybrid.scene.short_form import network_of, short_form
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.entry.in_plane", "run.entry.in_space")
@@ -52,10 +51,9 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     static: those of its equilibrium, whose stability is judged where there are rods and no end moments.  Whether a line
     is in a plane follows from the scene; rarely its first shape leaves the plane.
     """
-    network, form = network_of(scene), short_form(scene)
-    lines = {name: scene.scene_of(called) for name, called in form.names.items()}
-    together = {x for pair in network.touching_pairs for x in pair}
-    together |= {name for name, x in network.lines.items() if network.is_joined(x.start) or network.is_joined(x.end)}
+    lines = {name: scene.asked_scene(name) for name in scene.lines}
+    together = {x for pair in scene.touching_pairs for x in pair}
+    together |= {name for name, x in scene.lines.items() if scene.is_joined(x.start) or scene.is_joined(x.end)}
     alone = {name: x for name, x in lines.items() if name not in together}
     planar = {name: x for name, x in alone.items() if not _is_in_space(x, scene.dimension)}
     found = [SOLVER[0]] * bool(planar) + [SOLVER[1]] * (len(planar) < len(lines))
@@ -70,7 +68,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
         found += [CRITERIA] if static else [*ZONE_CHANGES, ZONES]
     if not static and any(payout_of(x) is not None for x in lines.values()):
         found += PAYOUT_OF_LINES
-    if network.touching_pairs or touch_themselves:
+    if scene.touching_pairs or touch_themselves:
         found += TOUCHING_LINES
     if touch_themselves:
         found.append(TOUCHING)

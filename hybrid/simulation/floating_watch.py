@@ -29,7 +29,7 @@ from hybrid.kernels.state.report import OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.network import NetworkModel, build_system
 from hybrid.scene.attachments import sphere_diameter
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.plane import OUT
 from hybrid.scene.points import FixedPoint, FreePoint
 from hybrid.simulation.equilibrium import equilibrium_of

@@ -23,7 +23,7 @@ from hybrid.model.mesh import DEFAULT_CELLS, GROWTH, SAMPLES, Grading, layers
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free, shows_bends, wants_survey
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.mesh_survey import MORE
 from hybrid.simulation.progress import at_once

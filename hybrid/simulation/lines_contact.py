@@ -29,7 +29,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.lines_contact import Touching, joined_ends_of
 from hybrid.model.network import NetworkModel
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.simulation.self_watch import diameters, least_bending
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.shared_contact import SharedContact, TouchingLine

@@ -25,11 +25,9 @@ from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import nearest
 from hybrid.scene.bodies import FixedBody, FreeBody, HeldBody
 from hybrid.scene.body_shapes import BodyShape
-from hybrid.scene.network import JoinedLine
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import JoinedLine, Network
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
-from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.contact_equilibrium import contacts_of
 from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.equilibrium import equilibrium_of
@@ -90,9 +88,8 @@ def stiffness(scene: SceneLike, at: str) -> Stiffness:
     SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
     """
     asked = as_scene(scene)
-    system, form = network_of(asked), short_form(asked)
-    with form.said():
-        return _stiffness_at(system, at)
+    with asked.form.said():
+        return _stiffness_at(asked, at)
 
 
 def _stiffness_at(system: Network, at: str) -> Stiffness:
@@ -241,8 +238,7 @@ def offsets(scene: SceneLike, at: str, distances: Sequence[float], heading: floa
     Errors: as of `stiffness`; the distance at which no equilibrium is found is in the message.
     """
     asked = as_scene(scene)
-    system, form = network_of(asked), short_form(asked)
-    target_of(system, at)
+    target_of(asked, at)
     try:
         known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())
     except (TypeError, ValueError):
@@ -251,8 +247,8 @@ def offsets(scene: SceneLike, at: str, distances: Sequence[float], heading: floa
         given = f"{distances!r:.60} m, heading {heading!r:.20}"
         fix = "give finite numbers, such as --reach 20 --heading 90"
         raise SceneError([Complaint("offsets", given, "distances (m) and a heading (deg)", fix)])
-    with form.said():
-        return _offsets_at(system, at, distances, heading)
+    with asked.form.said():
+        return _offsets_at(asked, at, distances, heading)
 
 
 def _offsets_at(system: Network, at: str, distances: Sequence[float], heading: float) -> Offsets:
@@ -389,8 +385,7 @@ def _held(system: Network, kind: str, name: str, pose: tuple[Floats, Floats], sh
         changed = {"bodies": {**system.bodies, name: FixedBody(position=at, rotation=turned)}}
         if not _points_of(system, kind, name):  # which no scene holds
             del changed["bodies"][name]
-    read, _ = read_text(scene_text(system.model_copy(update=changed)))  # so that lines too short are refused
-    moved = network_of(read)
+    moved: Network = read_text(scene_text(system.model_copy(update=changed)))[0]  # so that lines too short are refused
     if shape is None:
         return moved
     held = HeldBody(position=at, rotation=turned, shape=shape)

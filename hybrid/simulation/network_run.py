@@ -21,7 +21,7 @@ from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on
 from hybrid.scene.motion_checks import ramp_ends
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.failure import write_snapshot

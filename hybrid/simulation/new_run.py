@@ -15,9 +15,8 @@ from hybrid.kernels.state.state import state_for
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.plan import output_times
 from hybrid.model.sections import OutputPoints
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import short_form
 from hybrid.simulation.floating_watch import FloatingWatch
 from hybrid.simulation.line_result import LineResult, Wanted
 from hybrid.simulation.lone_planes import LonePlanes
@@ -174,7 +173,7 @@ def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording
     if first.managers and moves:
         parts.append(RunZones(me, first.managers, payout))
     if recording.parts and moves:
-        called = {} if recording.asked is None else short_form(recording.asked.scene).names
+        called = {} if recording.asked is None else recording.asked.scene.form.names
         parts.append(OwnParts(me, recording.parts, [called.get(name, name) for name in named], payout))
     parts += [WatchedLines(me), contact, Cuts(me, contact, run.target is None), Failures(me)]
     parts += [VibrationsOfLines(vibrations, run.loop.clock)]

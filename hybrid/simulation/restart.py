@@ -21,7 +21,6 @@ from hybrid.model.sections import OutputPoints
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.base import dotted
 from hybrid.scene.read import as_scene, read_text, scene_text
-from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.restore import kept_resolution, refused, restored_points
 from hybrid.store.checkpoint import read_before, read_checkpoint
 from hybrid.store.hdf5_file import opened
@@ -123,9 +122,9 @@ def _found(path: Path) -> tuple[Remaining[Any], bool]:
             scene = _as_often(as_begun(scene_of_file, lines, meets), result)
             told = [(t, as_begun(read_text(text)[0], lines, meets)) for t, text in _told(path, result)]
             with refused(path):
-                points = {name: _points_of(part, scene.scene_of(name)) for name, part in lines.items()}
+                points = {name: _points_of(part, scene.asked_scene(name)) for name, part in lines.items()}
             done = result.done and not before
-    changes, resolution = tuple(LoadChange(*x) for x in told), kept_resolution(network_of(scene), path)
+    changes, resolution = tuple(LoadChange(*x) for x in told), kept_resolution(scene, path)
     unasked = _touching_unasked(scene_of_file, lines)
     return Remaining(scene, changes, resolution, before, False, reached, points, unasked, parts), done
 
@@ -137,7 +136,7 @@ def _points_of(result: Result, scene: LineScene) -> OutputPoints:
 
 def _longer(left: Remaining[Any], until: float) -> Remaining[Any]:
     """The same until another time (s), with outputs as often as before."""
-    of_line = "".join(f".lines[{name!r}]" for name in [*left.scene.lines][:1] if name)
+    of_line = "".join(f".lines[{name!r}]" for name in [*left.scene.asked_lines][:1] if name)
     _refuse_what_is_no_later_time(until, left.reached, f"hybrid.open(path){of_line}.at(t=...)")
     _refuse_before_changes(left.changes, until)
     every = left.scene.output_interval
@@ -157,13 +156,12 @@ def _scene_until(scene: Any, until: float, every: float) -> Any:
 
 def _refuse_more_out(before: Any, after: Any, until: float) -> None:
     """SceneError: by `until` (s) more of a line is out than its result has points for."""
-    one, other, form = network_of(before), network_of(after), short_form(before)
-    for name in one.lines:
-        scene, longer = one.scene_of(name), other.scene_of(name)
+    for name in before.lines:
+        scene, longer = before.scene_of(name), after.scene_of(name)
         out = longest_out(longer)
         if out > longest_out(scene) * (1.0 + SAME_PLACE):
             end = ("start", "end")[winch_side(scene)]
-            where = dotted(form.place(("lines", name, "connections", end, "payout", "longest")))
+            where = dotted(before.form.place(("lines", name, "connections", end, "payout", "longest")))
             expected = f"a time up to which at most {longest_out(scene):.6g} m are out, for which the result has points"
             fix = f"run the scene again with {where}"
             raise _refused("until", f"{until:g} s, when {out:.6g} m are out", expected, fix)
@@ -174,17 +172,16 @@ def _check(last: LoadChange[Any], changed: Any, resolution: NetworkResolution, b
     from hybrid.model.network import build_system
 
     _check_what_changes(last, changed, begin, end)
-    before, system, form = network_of(last.scene), network_of(changed), short_form(last.scene)
-    old = build_system(before, resolution)
-    new = build_system(system, resolution, old)
+    old = build_system(last.scene, resolution)
+    new = build_system(changed, resolution, old)
     for name, one, other, joints in zip(old.names, old.models, new.models, old.joints, strict=True):
         other.ends.copy_frames(one.ends)
         for k, end_name in enumerate(("start", "end")):
             if joints[k] < 0:
-                point = getattr(system.lines[name], end_name)
-                body = system.body_of(point)
-                place = ("points", point) if body is None else ("bodies", getattr(system.points[point], "body", ""))
-                _refuse_jump(one, other, k, begin, dotted(form.place((*place, "motion"))))
+                point = getattr(changed.lines[name], end_name)
+                body = changed.body_of(point)
+                place = ("points", point) if body is None else ("bodies", getattr(changed.points[point], "body", ""))
+                _refuse_jump(one, other, k, begin, dotted(last.scene.form.place((*place, "motion"))))
 
 
 def as_begun(scene: Scene, lines: Mapping[str, Result], meets: bool) -> Scene:
@@ -198,7 +195,8 @@ def as_begun(scene: Scene, lines: Mapping[str, Result], meets: bool) -> Scene:
 
 def _touching_unasked(scene: Scene, lines: Mapping[str, Result]) -> list[str]:
     """Lines whose contact with themselves would be computed unasked, and has not been."""
-    return [name for name, x in lines.items() if "self_contact" not in x and self_reach(scene.scene_of(name)).may]
+    names = scene.form.names.items()
+    return [x for x, name in names if "self_contact" not in lines[name] and self_reach(scene.asked_scene(x)).may]
 
 
 def with_own_contact(scene: Scene, names: Sequence[str], asked: bool | None) -> Scene:

@@ -34,7 +34,7 @@ from hybrid.zones.criteria import UserCriterion
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.model.network import NetworkResolution
-    from hybrid.scene.network_scene import Network
+    from hybrid.scene.network import Network
 
 # Rooms that have a part in the numbers of a file.
 COMPUTES = ("accuracy", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store", "zones")

@@ -13,7 +13,7 @@ from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE
 from hybrid.model.failure import weaknesses
-from hybrid.scene.root import Scene
+from hybrid.scene.base import Table
 from hybrid.simulation.old_checkpoints import FIRST_REPORT, FIRST_WORKS, as_of_line, is_of_cable, of_line
 from hybrid.simulation.restore import program, refused, resolution_tree
 from hybrid.simulation.run_of_lines import RunOfLines
@@ -180,6 +180,6 @@ def kept_changes(source: Path, most: int) -> int:
         return made
 
 
-def files_of(scene: Scene) -> dict[str, str]:
+def files_of(scene: Table) -> dict[str, str]:
     """Digests of the files that a scene reads, by path."""
     return {path: digest_of(Path(path)) for path in scene.named_files()}

@@ -15,7 +15,7 @@ from hybrid.kernels.machine.cache import cache_folder
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import short_form
+from hybrid.scene.short_form import ShortForm
 from hybrid.simulation.events import Sink
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.restart import LoadChange, changes_text
@@ -80,10 +80,11 @@ class RunFile:
 
     def __init__(self, run: FiledRun, text: Text, asks: Filing) -> None:
         """text: the scene, as the file has it."""
-        scene: Any = run.system if asks.asked is None else asks.asked.scene
-        self._run, self._text, self._asks, self._form = run, text, asks, short_form(scene)
+        scene = asks.asked.scene if asks.asked is not None else None
+        self._run, self._text, self._asks = run, text, asks
+        self._form = ShortForm((), {}) if scene is None else scene.form
         # The scene of the only line, if it has no name.
-        self._alone: LineScene | None = scene if "" in scene.lines else None
+        self._alone: LineScene | None = scene.asked_lines.get("") if scene is not None else None
 
     @property
     def _length(self) -> float:

@@ -16,7 +16,7 @@ from hybrid.model.build import Model
 from hybrid.model.failure import unclamped, without_hold
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.self_reach import touching
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import Sink
 from hybrid.simulation.line_result import LineResult, LineStep

@@ -22,7 +22,7 @@ from hybrid.model.bodies import angles_of
 from hybrid.model.network import NetworkModel
 from hybrid.outputs.probes import elevation, elevation_field
 from hybrid.scene.bodies import FreeBody
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, Point
 from hybrid.store.format import Field
 

@@ -17,12 +17,11 @@ from hybrid.outputs.obstacle_forces import KEYS, Lines, pair_fields, pair_forces
 from hybrid.outputs.quantities import Quantities
 from hybrid.outputs.section_use import StepQuantities
 from hybrid.scene.bodies import FreeBody
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.quantities import KINDS, Quantity
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import network_of
 from hybrid.simulation.line_result import LineResult, observer_of
 from hybrid.simulation.parts import Part
 from hybrid.simulation.result_file import STEP_FIELDS, limits_of
@@ -281,12 +280,12 @@ def listed_outputs(scene: SceneLike) -> list[Listed]:
     Of several lines: what is recorded of points and bodies, and of every line under `lines/<name>/`.
     """
     asked = as_scene(scene)
-    free, moves = [name for name in asked.lines if model_is_free(asked.scene_of(name))], asked.time is not None
+    free, moves = [name for name in asked.lines if model_is_free(asked.asked_scene(name))], asked.time is not None
     asked = with_models(asked, dict.fromkeys(free, "adaptive"))
-    system, scenes, found = network_of(asked), asked.scenes_of_lines, list[Listed]()
-    model = build_system(system)
+    scenes, found = asked.asked_scenes, list[Listed]()
+    model = build_system(asked)
     if "" not in scenes:  # which would record the quantities itself, and has no points beside it
-        found = _over_time([*fields_of(system), *fields_of_pairs(model), *RunQuantities(system, scenes).fields])
+        found = _over_time([*fields_of(asked), *fields_of_pairs(model), *RunQuantities(asked, scenes).fields])
     for (name, each), built in zip(scenes.items(), model.models, strict=True):
         fields = observer_of(each, built, moves).fields
         found += _over_time(fields, steps=moves, begin=group_of(name))

@@ -13,7 +13,7 @@ import numpy as np
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.model.network import NetworkModel, NetworkResolution
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.simulation.events import Sink
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.parts import Parts

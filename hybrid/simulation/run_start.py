@@ -16,7 +16,7 @@ from hybrid.scene.bodies import FixedBody
 from hybrid.scene.end_loads import Triple
 from hybrid.scene.motion import motion_record
 from hybrid.scene.motion_tables import Motion
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.points import FixedPoint
 from hybrid.scene.schema import LineScene, Points
 from hybrid.simulation.contact_equilibrium import refuse_start_in_obstacles

@@ -14,7 +14,7 @@ from hybrid.kernels.state.state import Floats, State, obstacles_now
 from hybrid.model.ends import STILL, DrivenEnd, rotation_vector
 from hybrid.model.mesh import Zone
 from hybrid.model.sea import Surroundings
-from hybrid.scene.root import SomeScene
+from hybrid.scene.network import SomeScene
 
 
 class CableState(NamedTuple):

@@ -26,7 +26,7 @@ from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.model.sea import Surroundings
 from hybrid.scene.base import dotted
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.points import Fairlead
 from hybrid.scene.short_form import ENDS, ShortForm
 from hybrid.simulation.network_run import NetworkRun

@@ -17,10 +17,9 @@ from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.ends import DrivenEnd, contradictions
 from hybrid.model.network import NetworkResolution
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.scene.schema import missing_time
-from hybrid.scene.short_form import network_of, short_form
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.layer_mesh import layered, rods_at_rest
 from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, with_survey
@@ -117,7 +116,7 @@ class Simulation(SteppedPoints):
             raise SceneError([missing_time()])
         contact = {name: {"contact": x.contact.of_ends_that_are_set()} for name, x in scene.lines.items()}
         self.scene = in_space(scene.with_lines(contact))
-        self._system, self._form = network_of(self.scene), short_form(self.scene)
+        self._system, self._form = self.scene, self.scene.form
 
     def _begun(self, most: int, criterion: UserCriterion | None, parts: Sequence[RunPart]) -> NetworkRun:
         """The run at its start; most: iterations that a step may take.  ComputationError."""

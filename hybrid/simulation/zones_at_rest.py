@@ -15,7 +15,7 @@ from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import refined
 from hybrid.model.network import NetworkModel
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.schema import AdaptiveModel, LineScene
 from hybrid.simulation.contact_equilibrium import nearness_in
 from hybrid.simulation.equilibrium import equilibrium_of, joined_lines, solve_from

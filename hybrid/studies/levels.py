@@ -155,8 +155,8 @@ def trade_levels(
     refuse_peers(former)
     for name in former:
         raise TypeError(f"trade_levels() got an unexpected keyword argument {name!r}")
-    scene = one_line(as_scene(scene))
-    scene.require_time()
+    tables = one_line(as_scene(scene))
+    tables.require_time()
     specs = []
     for level, asked in LEVELS.items():
         for model in MODELS:
@@ -164,16 +164,16 @@ def trade_levels(
                 continue  # what it follows is not asked
             more = {"curvature_error": ALONG} if model == FOLLOWING else {}
             kind = "adaptive" if model == FOLLOWING else model
-            specs.append((level, model, level_spec(scene, kind, f"level {level}", asked, more)))
+            specs.append((level, model, level_spec(tables, kind, f"level {level}", asked, more)))
     with interrupts() as stopped:
         store = RunStore(Path(folder), progress, 1 + len(specs), stopped)
-        best, exact = store.get(level_spec(scene, "rod", "reference", REFERENCE), required=True)
+        best, exact = store.get(level_spec(tables, "rod", "reference", REFERENCE), required=True)
         rows = []
         for level, model, spec in specs:
             row, values = store.get(replace(spec, times=repeat))
-            rows.append(level_row(level, model, row, values, exact, scene.length))
+            rows.append(level_row(level, model, row, values, exact, tables.length))
     facts = (*store.facts, *([("command", f"`{command}`")] if command else []))
-    table = LevelTable(scene.title, best, tuple(rows), facts)
+    table = LevelTable(tables.title, best, tuple(rows), facts)
     table.write(store.folder)
     return table
 

@@ -25,6 +25,7 @@ from hybrid.scene.accuracy import of_length
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.base import Kinds
 from hybrid.scene.read import as_scene, one_line, scene_text
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene, Model
 from hybrid.simulation.progress import Progress
 from hybrid.store.reader import Result
@@ -196,7 +197,7 @@ class RunStore:
                 what = spec.name + (f", {k + 1} of {spec.times}" if spec.times > 1 else "")
                 self.report(what, 0.0)
                 begin = clock.process_time()
-                result = run(scene, progress=self._reporter(what))
+                result = run(Scene.model_validate(scene), progress=self._reporter(what))
                 spent.append(clock.process_time() - begin)
         except ComputationError as error:
             if required:

@@ -70,36 +70,36 @@ def trade(
     KeyboardInterrupt leaves a table of the finished runs.
     """
     target, progress = _renamed(former, target, progress)
-    scene = one_line(as_scene(scene))
-    scene.require_time()
-    names = _models(scene, models)
-    goal = reference or _finer(scene, accuracies)
-    checks = [_asked(scene, x, "accuracies") for x in accuracies]
-    wanted = _asked(scene, target, "for")
-    _must_be_finer(_asked(scene, goal, "reference"), goal, checks)
+    tables = one_line(as_scene(scene))
+    tables.require_time()
+    names = _models(tables, models)
+    goal = reference or _finer(tables, accuracies)
+    checks = [_asked(tables, x, "accuracies") for x in accuracies]
+    wanted = _asked(tables, target, "for")
+    _must_be_finer(_asked(tables, goal, "reference"), goal, checks)
     if repeat < 1:
         raise SceneError([Complaint("repeat", str(repeat), "1 or more runs, of which the median counts", "--repeat 3")])
-    notes = _notes(scene, names, models is None)
+    notes = _notes(tables, names, models is None)
     kinds = [kind for kind, reason in names.items() if not reason or models is not None]
-    rod = "rod" if _refusal(scene, "rod", goal) == "" else kinds[0]
-    specs = [replace(run_spec(scene, kind, x), times=repeat) for x in accuracies for kind in kinds]
+    rod = "rod" if _refusal(tables, "rod", goal) == "" else kinds[0]
+    specs = [replace(run_spec(tables, kind, x), times=repeat) for x in accuracies for kind in kinds]
     with interrupts() as stopped:
         store = RunStore(Path(folder), progress, 2 + len(specs), stopped)
-        best, reference_values = store.get(run_spec(scene, rod, goal), required=True)
+        best, reference_values = store.get(run_spec(tables, rod, goal), required=True)
         rows = [replace(best, status=REFERENCE)]
         limits: list[tuple[float | None, float | None]] = [(None, None)]
         largest = _largest_end_force(reference_values)
         try:
-            check, _ = _compared(store, run_spec(scene, rod, _coarser(goal)), reference_values, scene.length)
+            check, _ = _compared(store, run_spec(tables, rod, _coarser(goal)), reference_values, tables.length)
             rows.append(replace(check, status=CHECK) if check.status != FAILED else check)
             limits.append((None, None))
             for spec, want in zip(specs, [x for x in checks for _ in kinds], strict=True):
-                rows.append(_compared(store, spec, reference_values, scene.length)[0])
+                rows.append(_compared(store, spec, reference_values, tables.length)[0])
                 limits.append(_bounds(want, largest))
         finally:
             position, end_force = _bounds(wanted, largest)
             table = TradeTable(
-                scene.title, target, scene.length, largest, position, end_force, tuple(rows), tuple(notes),
+                tables.title, target, tables.length, largest, position, end_force, tuple(rows), tuple(notes),
                 (*store.facts, *_measured(store, repeat, command)), store.total - len(rows),
             )  # fmt: skip
             table = _written(judged(table, limits), kinds, store.folder)

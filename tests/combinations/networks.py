@@ -11,7 +11,8 @@ import yaml
 import hybrid
 from hybrid import Result, Scene
 from hybrid.scene.read import as_scene
-from hybrid.scene.short_form import LINE, network_of
+from hybrid.scene.root import in_full
+from hybrid.scene.short_form import LINE
 
 SAME = 1e-9  # of the scale of a dataset: round-off that a motion of some hundred steps lets grow
 # What says how Newton's method went, and clocks: no quantity of the line.
@@ -46,7 +47,7 @@ def both(tables: dict[str, Any], rest: bool = False) -> tuple[Result, Result]:
     """The results of a cable and of its network; rest: of their equilibria."""
     scene = exact_scene(tables)
     compute = hybrid.static if rest else hybrid.run
-    return compute(scene), compute(network_of(scene))
+    return compute(scene), compute(in_full(scene))
 
 
 def differences(cable: Result, network: Result, same: float = SAME) -> list[Difference]:

@@ -12,7 +12,7 @@ import yaml
 from numpy.typing import NDArray
 
 from hybrid.scene.read import as_scene, scene_text
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import in_full
 from tests.problems import tables_with
 
 LENGTH, OUTPUTS = 12.0, 5
@@ -223,7 +223,7 @@ def exchanged(tables: Tables) -> Tables:
 
 def as_network(tables: Tables) -> Tables:
     """The scene as a network of one line."""
-    found: Tables = yaml.safe_load(scene_text(network_of(as_scene(tables))))
+    found: Tables = yaml.safe_load(scene_text(in_full(as_scene(tables))))
     return found
 
 

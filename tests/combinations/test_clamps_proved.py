@@ -12,7 +12,7 @@ from scipy.optimize import root
 import hybrid
 from hybrid.kernels.laws.bending_slip import EACH, beside_spring, slip_answer
 from hybrid.model.build import build
-from hybrid.scene.read import as_scene
+from hybrid.scene.read import as_scene, one_line
 from tests.combinations.pairs import ADAPTIVE, BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_network
 from tests.problems import tables_with
 
@@ -123,7 +123,7 @@ def test_a_clamp_on_a_spring_is_one_turned_by_its_moment(rest: str) -> None:
 def test_the_bend_beside_a_spring_is_the_root_of_its_balance() -> None:
     """Of 200 states of two layers in two axes: against a root found otherwise; derivatives against differences."""
     tables = tables_with(BASE, {START: CLAMP | {"bend_stiffness": SPRING}} | REST["slip"])
-    line = build(as_scene(tables)).line
+    line = build(one_line(as_scene(tables))).line
     half, noise, apart, slopes = 0.5 * line.h[0], np.random.default_rng(1), [], []
     E = 8.0 / half
     for _ in range(200):

@@ -12,14 +12,16 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 import hybrid
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.scene.combinations import REFUSALS
 from hybrid.scene.read import _readable_tables, as_scene
+from hybrid.scene.root import Scene, in_full
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE, NotInNetwork, network_of
+from hybrid.scene.short_form import LINE
 from tests.combinations.pairs import (
     FEATURES,
     LENGTH,
@@ -65,10 +67,10 @@ def test_every_pair_is_read_or_refused_by_the_table() -> None:
         again = refusal(turned(scene))
         assert bool(why) == bool(again), (names, why, again)
         if not why:
-            assert as_scene(as_network(scene)) == network_of(as_scene(scene)), names
+            assert as_scene(as_network(scene)) == in_full(as_scene(scene)), names
         elif refused_as_cable(scene):
-            with pytest.raises(NotInNetwork):  # several lines are refused what one cable is
-                network_of(unchecked(scene))
+            with pytest.raises(ValidationError):  # several lines are refused what one cable is
+                Scene.model_validate(unchecked(scene))
     assert read > 0.9 * len(NAMES)
 
 

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
+from hybrid.scene.read import one_line
 
 pytestmark = pytest.mark.needs("simpleeval")
 
@@ -400,7 +401,7 @@ def _with(scene, length):
 def _cells(scene, length):
     from hybrid.model.build import build
 
-    return int(np.searchsorted(build(hybrid.validate_scene(_with(scene, length))).line.s, length - 1e-6))
+    return int(np.searchsorted(build(one_line(hybrid.validate_scene(_with(scene, length)))).line.s, length - 1e-6))
 
 
 SAG = {"length": 130.0, "mass": 20.0, "diameter": 0.1, "axial_stiffness": 1e7, "bending_stiffness": 500.0}

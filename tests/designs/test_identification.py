@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.scene.read import scene_text
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import in_full
 
 EI, MASS = "cable.sections[0].bending_stiffness", "cable.sections[0].mass"
 G, W = 9.81, 0.05
@@ -68,7 +68,7 @@ def test_stiffness_and_its_deviation(folder):
 
 
 def test_the_only_line_needs_no_column_of_its_name(folder):
-    named = scene_text(network_of(hybrid.load_scene("rod.yaml")))
+    named = scene_text(in_full(hybrid.load_scene("rod.yaml")))
     Path("rod.yaml").write_text(named)
     Path("design.yaml").write_text(DESIGN.replace(EI, EI.replace("cable", "lines.cable")))
     (estimate,) = hybrid.design("design.yaml").estimates

@@ -19,7 +19,7 @@ from hybrid.designs.tangents import Unfollowed
 from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.scene.read import as_scene
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import in_full
 
 G, A, PERIOD = 9.81, 1.0, 8.0
 W = 2.0 * np.pi / PERIOD
@@ -157,7 +157,7 @@ def test_a_replay_is_the_run_and_its_derivatives_those_of_short_steps(model, mes
     assert (ours.errors < 1e-6 * np.abs(ours.derivatives)).all()
 
 
-@pytest.mark.parametrize("form", [lambda scene: scene, network_of], ids=["cable", "named"])
+@pytest.mark.parametrize("form", [lambda scene: scene, in_full], ids=["cable", "named"])
 def test_a_replay_has_the_model_that_was_chosen(form):
     """Of a scene that names none, with other numbers."""
     section = {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e8, "bending_stiffness": 10.0}
@@ -172,7 +172,7 @@ def test_peaks_of_a_named_line_are_those_of_all_its_nodes():
     """As of a cable: with three outputs along it the bend at the touchdown was none of them."""
     more = {"time": {"duration": 0.5, "step": 0.05}, "output": {"points": 3, "every": 0.1}}
     cable, found = hybrid.validate_scene(on_the_bed("rod") | more), []
-    for scene, of in ((cable, "max curvature"), (network_of(cable), "max cable/curvature")):
+    for scene, of in ((cable, "max curvature"), (in_full(cable), "max cable/curvature")):
         found.append(Motion(scene, [parse_wanted(scene, of, moves=True)], course_of(scene), smooth=True).values[0])
     assert found[1] == pytest.approx(found[0], rel=1e-9) and found[0] > 0.0
 

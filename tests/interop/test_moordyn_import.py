@@ -17,7 +17,8 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.interop.moordyn import ImportedScene
 from hybrid.interop.moordyn.cables import _rotated
-from hybrid.scene.schema import Body, Clamped, Free, Pinned, Scene
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import Body, Clamped, Free, Pinned
 
 
 def only(name: str, line: int | None = None) -> ImportedScene:

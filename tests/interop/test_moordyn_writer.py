@@ -13,9 +13,8 @@ from test_moordyn_systems import RISER
 import hybrid
 from hybrid.interop.moordyn import export_moordyn, import_moordyn
 from hybrid.interop.moordyn.writer import deck_of
-from hybrid.scene.network_scene import Network
 from hybrid.scene.read import as_scene, read_text, scene_text
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import in_full
 
 
 class Straight:
@@ -24,7 +23,7 @@ class Straight:
     def __init__(self, scene: Any) -> None:
         self.scene_text = scene_text(scene)
         self.lines: dict[str, Any] = {}
-        if isinstance(scene, Network):
+        if isinstance(scene, hybrid.Scene) and "" not in scene.asked_lines:
             self.lines = {name: Straight(scene.scene_of(name)) for name in scene.lines}
             self._arrays = {}
             for name, body in scene.bodies.items():
@@ -98,7 +97,7 @@ def test_bodies_come_back(tmp_path: Path) -> None:
     given = scene.model_dump(mode="json", exclude_none=True)
     given["bodies"]["body1"]["hydrostatics"] = {"heave": 10}
     del given["bodies"]["body1"]["volume"], given["bodies"]["body1"]["centre_of_buoyancy"]
-    other, _ = read_text(scene_text(Network.model_validate(given)))
+    other, _ = read_text(scene_text(hybrid.Scene.model_validate(given)))
     with pytest.raises(hybrid.SceneError, match=r"bodies.body1.hydrostatics"):
         deck_of(Straight(other))
 
@@ -203,7 +202,7 @@ def test_clamps_of_several_lines_are_rods_and_come_back(tmp_path: Path) -> None:
             "leg": {"start": "low", "end": "far", "sections": [pipe], "model": "catenary", "mesh": {"cells": 10}},
         },
     }  # fmt: skip
-    scene = Network.model_validate(tables)
+    scene = hybrid.Scene.model_validate(tables)
     made = back(scene, tmp_path)
     ours, theirs = scene.lines["pipe"], made.lines["line1"]
     for end in ("start", "end"):
@@ -214,10 +213,10 @@ def test_clamps_of_several_lines_are_rods_and_come_back(tmp_path: Path) -> None:
     assert np.abs(shapes[0]["position"][-1] - shapes[1]["position"][-1] - [0.0, 0.0, 5.0]).max() < 1e-6
     held["end"]["bend_stiffness"] = 1e3
     with pytest.raises(hybrid.SceneError, match=r"lines\.pipe\.connections\.end"):
-        back(Network.model_validate(tables), tmp_path)
+        back(hybrid.Scene.model_validate(tables), tmp_path)
 
 
-@pytest.mark.parametrize(("form", "where"), [(as_scene, "ends.end"), (lambda x: network_of(as_scene(x)), "points.end")])
+@pytest.mark.parametrize(("form", "where"), [(as_scene, "ends.end"), (lambda x: in_full(as_scene(x)), "points.end")])
 def test_a_guided_end_is_refused(form: Any, where: str) -> None:
     section = {"length": 12.0, "mass": 2.0, "bending_stiffness": 5.0}
     ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "guided", "tangent": [1, 0, 0]}}

@@ -17,6 +17,7 @@ from hybrid.model.ends import EndConditions, EndLoad
 from hybrid.model.sea import Surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.motion import EndMotion
+from hybrid.scene.read import one_line
 from hybrid.scene.schema import Harmonic, Motion, Travel
 
 ROUND_OFF = 1e-14  # of the size of what is compared
@@ -250,7 +251,7 @@ def test_a_scene_gives_arrays_of_one_type() -> None:
     scene = hybrid.validate_scene({"cable": cable, "ends": still, "initial": "equilibrium", "model": "catenary"})
     from hybrid.model.build import build
 
-    model = build(scene)
+    model = build(one_line(scene))
     check(model.ends, model.sea)
     check(conditions(KINDS["everything"], None, waters()), waters())
     assert len(ends_of.signatures) == 1

@@ -14,6 +14,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.laws import surfaces
 from hybrid.kernels.laws.obstacles import half_thickness
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 
 STRAND = 0.01
 DATA = Path(__file__).parents[1] / "data"
@@ -63,7 +64,7 @@ def sea() -> Around:
 
 
 def around(scene: hybrid.Scene) -> Around:
-    values = build(scene).sea.values
+    values = build(one_line(scene)).sea.values
     return Around(values.obstacles, values.boxes, values.facets)
 
 

@@ -27,7 +27,7 @@ from hybrid.live.server import LARGEST_MESSAGE, Guard, listen, make_app
 from hybrid.live.session import Session
 from hybrid.model.plan import plan
 from hybrid.scene.read import as_scene, read_text, scene_text
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import in_full
 
 
 @pytest.fixture(scope="module")
@@ -260,7 +260,7 @@ time: {duration: 4}
 """
 
 
-@pytest.mark.parametrize("form", [as_scene, network_of])
+@pytest.mark.parametrize("form", [as_scene, in_full])
 @pytest.mark.parametrize("model, kind", [("", "rod"), ("model: catenary\n", "catenary")])
 def test_a_scene_that_names_no_model_is_shown_as_the_plan_has_it(model: str, kind: str, form: Any) -> None:
     scene = form(read_text(TWO_SECTIONS + model)[0])

@@ -11,6 +11,7 @@ from problems import at_rest, pinned, scene
 import hybrid
 from hybrid.model.build import build
 from hybrid.model.coarsen import FEWEST, coarser, refined
+from hybrid.scene.read import one_line
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -20,7 +21,7 @@ def hanging(cells, **more):
     clump = {"attachments": [{"kind": "clump", "at": 3.3, "mass": 2.0}]} if more.pop("clump", False) else {}
     what = scene(section, pinned(), pinned(7.0, 0, 0), cells=cells, gravity=10.0, **more).model_dump(exclude_none=True)
     what["cable"] |= clump
-    return build(hybrid.validate_scene(what))
+    return build(one_line(hybrid.validate_scene(what)))
 
 
 def test_places_that_matter_keep_their_nodes():

@@ -21,6 +21,7 @@ from hybrid.model.failure import without_hold
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.plane import in_space, planar
+from hybrid.scene.read import one_line
 from tests.inside import OnlyLine
 
 ROUND = 1e-12
@@ -107,13 +108,13 @@ def check(line: Line, cable: Material, but: set[str] = WITHOUT_INERTIA, shape: L
 
 def test_the_walk_meets_every_field() -> None:
     """All fields have numbers in the line that others are held against, so that none is equal for want of any."""
-    model = build(tether(model="rod"))
+    model = build(one_line(tether(model="rod")))
     silent = {name for name in ALONG_LINE if not np.nan_to_num(getattr(model.line, name)).any()}
     assert not silent, "a field that is nothing anywhere: give the scene what makes it something"
 
 
 def test_lines_of_zones_have_every_field() -> None:
-    model = build(tether())
+    model = build(one_line(tether()))
     assert model.layout is not None and model.on_base is not None
     random = np.random.default_rng(3)
     for _ in range(3):
@@ -158,7 +159,7 @@ def test_payout_keeps_every_field(model: Any, rate: float) -> None:
     "change", [lambda x: without_hold(x, 1, 0.0).line, lambda x: in_space(planar(x.line, np.eye(3)))]
 )
 def test_release_and_the_plane_keep_every_field(change: Callable[[Model], Line]) -> None:
-    model = build(tether(model="rod"))
+    model = build(one_line(tether(model="rod")))
     line = change(model)
     for name in ALONG_LINE:
         np.testing.assert_array_equal(getattr(line, name), getattr(model.line, name), err_msg=name)

@@ -10,6 +10,7 @@ from hybrid.kernels.laws.loads import body_drag, half_cell_drag
 from hybrid.kernels.machine.compile import kernel
 from hybrid.model.build import build
 from hybrid.model.initial_shape import current_drag
+from hybrid.scene.read import one_line
 
 
 @kernel
@@ -46,7 +47,7 @@ def test_drag_on_the_first_shape_is_that_of_the_kernels():
             "mesh": {"cells": 6},
         }
     )
-    model = build(scene)
+    model = build(one_line(scene))
     line, sea, r = model.line, model.sea.values, model.start.r
     expected = np.zeros_like(r)
     u = [tuple(-np.array([np.interp(z, sea.z, sea.current[:, k]) for k in range(3)])) for z in r[:, 2]]
@@ -77,4 +78,4 @@ def test_a_line_that_falls_into_a_point_has_no_first_shape_of_loads():
             "mesh": {"cells": 16},
         }
     )
-    assert np.isfinite(build(scene).start.r).all()
+    assert np.isfinite(build(one_line(scene)).start.r).all()

@@ -12,6 +12,7 @@ from hybrid.kernels.state.report import FRICTION, SEABED
 from hybrid.model.build import build
 from hybrid.model.failure import without_hold
 from hybrid.model.line import NO_INERTIA, line_on
+from hybrid.scene.read import one_line
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROUND = 4e-16  # a product and a sum may be one operation
@@ -21,7 +22,7 @@ ROUND = 4e-16  # a product and a sum may be one operation
 def test_a_line_on_base_cells_is_that_of_the_material(name: str) -> None:
     """Sections, floats, end bodies, waves, a seabed with friction; any base cells rod, any of their nodes there."""
     scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["model={kind: adaptive, curvature_error: 0.05}"])
-    model = build(scene)
+    model = build(one_line(scene))
     assert model.layout is not None and model.on_base is not None
     random = np.random.default_rng(1)
     for _ in range(3):
@@ -40,7 +41,7 @@ def test_an_end_that_is_let_go_holds_no_later_line() -> None:
     scene = hybrid.load_scene(EXAMPLES / "s_tether.yaml")
     data = scene.model_dump(mode="json", exclude_none=True)
     data["ends"]["end"] = {"kind": "clamped", "position": [20, 0, -30], "tangent": [0, 0, -1]}
-    model = build(hybrid.validate_scene(data | {"model": "adaptive"}))
+    model = build(one_line(hybrid.validate_scene(data | {"model": "adaptive"})))
     assert model.layout is not None and model.on_base is not None
     assert model.on_base.line(model.layout, model.line.bits).element[-1] == 1
     free = without_hold(model, 1, 0.0)

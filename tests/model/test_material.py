@@ -11,6 +11,7 @@ from problems import clamped, pinned, scene
 
 import hybrid
 from hybrid.model.material import TENSION_FLOOR, material, tension_floor
+from hybrid.scene.read import one_line
 
 SECTION = {"length": 60.0, "mass": 3.0, "diameter": 0.05, "bending_stiffness": 40.0, "axial_stiffness": 1e6}
 SUBMERGED = 9.81 * (3.0 - 1025 * pi / 4 * 0.05**2)  # N/m
@@ -18,14 +19,16 @@ SUBMERGED = 9.81 * (3.0 - 1025 * pi / 4 * 0.05**2)  # N/m
 
 def cable(fluid=None, attachments=(), model="catenary", **section):
     return material(
-        hybrid.validate_scene(
-            {
-                "environment": {"gravity": 9.81, **({"fluid": fluid} if fluid else {})},
-                "cable": {"sections": [SECTION | section], "attachments": list(attachments)},
-                "ends": {"start": pinned(), "end": pinned(50.0, 0, 0)},
-                "initial": "equilibrium",
-                "model": model,
-            }
+        one_line(
+            hybrid.validate_scene(
+                {
+                    "environment": {"gravity": 9.81, **({"fluid": fluid} if fluid else {})},
+                    "cable": {"sections": [SECTION | section], "attachments": list(attachments)},
+                    "ends": {"start": pinned(), "end": pinned(50.0, 0, 0)},
+                    "initial": "equilibrium",
+                    "model": model,
+                }
+            )
         )
     )
 

@@ -13,7 +13,8 @@ from hybrid.accuracy import run_forecast
 from hybrid.accuracy.run_forecast import Seen, _cost_of_a_step, _steps_a_second, _still_to_come
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.scene.read import as_scene
-from hybrid.scene.short_form import LINE, network_of
+from hybrid.scene.root import in_full
+from hybrid.scene.short_form import LINE
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -42,7 +43,7 @@ def test_a_network_of_one_line_has_the_plan_of_its_cable() -> None:
     """With what each model would cost, where the program chooses one."""
     asked = scene("1%", "model=adaptive")
     of_cable = hybrid.plan(asked, measure=False)
-    assert of_cable.choice and hybrid.plan(network_of(asked), measure=False).lines[LINE] == of_cable
+    assert of_cable.choice and hybrid.plan(in_full(asked), measure=False).lines[LINE] == of_cable
 
 
 @pytest.mark.parametrize(
@@ -52,7 +53,7 @@ def test_its_words_are_those_of_the_cable(name: str, own: str) -> None:
     """What zones that move may need, how a line is paid out, and when it throws a loop."""
     asked = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["model=adaptive", "mesh=null"] * (own == "mesh"))
     said = []
-    for form in (asked, network_of(asked)):
+    for form in (asked, in_full(asked)):
         rows = plan_rows(form, hybrid.plan(form, measure=False))
         text = " ".join(" ".join(rows).split())
         said.append({key: text[text.index(key) + len(key) :] for key in (own, "forces", "accuracy")})
@@ -61,7 +62,7 @@ def test_its_words_are_those_of_the_cable(name: str, own: str) -> None:
         assert said[1][key].startswith(begin), key
 
 
-@pytest.mark.parametrize("form", [as_scene, network_of])
+@pytest.mark.parametrize("form", [as_scene, in_full])
 def test_what_the_first_steps_show_is_in_the_plan(form: Callable[[Any], hybrid.Scene]) -> None:
     """Cells that the mesh pre-run grades, and steps, are those of the result; without it they come from tables."""
     asked = form(scene("3%"))

@@ -10,8 +10,8 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.model.plausibility import implausible
-from hybrid.scene.read import read_scene
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import one_line, read_scene
+from hybrid.scene.root import Scene
 
 ROOT = Path(__file__).parents[2]
 CHAIN = {"mass": 20.0, "diameter": 0.05, "axial_stiffness": 8.5e7, "bending_stiffness": 50.0}
@@ -94,8 +94,8 @@ SECTIONS = {
 @pytest.mark.parametrize("name", SECTIONS)
 def test_a_section_in_a_wrong_unit_is_noted_at_its_place(name: str) -> None:
     section, key, words = SECTIONS[name]
-    notes = [x for x in implausible(scene(section)) if f"cable.sections[1].{key}: expected" in x.why]
-    assert len(notes) >= 1, list(implausible(scene(section)))
+    notes = [x for x in implausible(one_line(scene(section))) if f"cable.sections[1].{key}: expected" in x.why]
+    assert len(notes) >= 1, list(implausible(one_line(scene(section))))
     assert any(words in x.why for x in notes), notes
     assert all(x.s == (50.0, 250.0) for x in notes)
 
@@ -113,7 +113,7 @@ def test_a_float_in_a_wrong_unit_is_noted_at_its_place(name: str) -> None:
     sections = {"sections": [{"length": 50.0} | CHAIN, {"length": 200.0} | CHAIN]}
     for x, expected in ((given, 1), ({"buoyancy": 2000.0, "mass": 150.0}, 0), ({"buoyancy": 50.0, "mass": 150.0}, 0)):
         cable = sections | {"attachments": [{"kind": "float", "at": 120.0} | x]}
-        notes = list(implausible(scene(cable=cable)))
+        notes = list(implausible(one_line(scene(cable=cable))))
         assert len(notes) == expected, notes
         for note in notes:
             assert words in note.why and note.why.startswith("cable.attachments[0].mass: expected")
@@ -135,7 +135,7 @@ SLEEVES = {
 def test_a_sleeve_that_does_not_fit_is_noted(name: str) -> None:
     given, words = SLEEVES[name]
     cable = {"sections": [{"length": 50.0} | CHAIN, {"length": 200.0} | CHAIN]}
-    notes = list(implausible(scene(cable=cable | {"attachments": [given | {"range": [48.0, 52.0]}]})))
+    notes = list(implausible(one_line(scene(cable=cable | {"attachments": [given | {"range": [48.0, 52.0]}]}))))
     assert len(notes) == bool(words), notes
     for note in notes:
         assert note.why.startswith(f"cable.attachments[0].{words}") and note.s == (48.0, 52.0)
@@ -160,7 +160,7 @@ def test_waves_of_a_file_in_hertz_are_noted(tmp_path: Path) -> None:
         (path := tmp_path / f"sea{unit}.csv").write_text(
             f"amplitude,frequency,direction,phase\n0.5,{0.6 / unit},0,0\n0.2,{1.2 / unit},0,90\n"
         )
-        notes = list(implausible(scene(**environment(waves={"kind": "components", "file": str(path)}))))
+        notes = list(implausible(one_line(scene(**environment(waves={"kind": "components", "file": str(path)})))))
         assert [x.why.startswith("environment.fluid.waves.file: expected at most 40 s") for x in notes] == [
             True
         ] * expected
@@ -170,7 +170,7 @@ def test_waves_of_a_file_in_hertz_are_noted(tmp_path: Path) -> None:
 def test_surroundings_in_a_wrong_unit_are_noted(name: str) -> None:
     changes, words = SURROUNDINGS[name]
     step = {"time": {"duration": 60.0, "step": 0.02}} if "ends" in changes else {}
-    notes = list(implausible(scene(**changes | step)))
+    notes = list(implausible(one_line(scene(**changes | step))))
     assert any(words in x.what and "expected" in x.why for x in notes), notes
 
 
@@ -242,7 +242,7 @@ def between(apart: float, *sections: dict[str, Any]) -> list[Any]:
             "end": {"kind": "pinned", "position": [apart, 0, -50.0]},
         },
     }
-    return list(implausible(scene(**changes)))
+    return list(implausible(one_line(scene(**changes))))
 
 
 def test_a_line_too_short_for_the_way_between_its_ends_is_noted() -> None:
@@ -280,7 +280,7 @@ def test_lines_that_bear_their_strain_are_not_noted(section: dict[str, Any]) -> 
 def test_no_example_is_called_implausible(path: Path) -> None:
     read, *_ = read_scene(path)
     assert isinstance(read, Scene)
-    assert list(implausible(read)) == []
+    assert list(implausible(one_line(read))) == []
 
 
 STEEL, WIRE = {"mass": 20.0, "diameter": 0.05}, {"mass": 0.7, "diameter": 0.014}
@@ -307,7 +307,7 @@ REAL = {
 
 @pytest.mark.parametrize("name", REAL)
 def test_real_lines_are_not_called_implausible(name: str) -> None:
-    assert list(implausible(scene(REAL[name]))) == []
+    assert list(implausible(one_line(scene(REAL[name])))) == []
 
 
 @pytest.mark.parametrize(
@@ -321,7 +321,7 @@ def test_a_force_at_an_end_is_noted_from_where_the_page_says(force: float, verdi
         with pytest.raises(SceneError, match=r"ends\.end\.force(?s:.*)less than 1e\+13 N"):
             scene(ends=ends)
         return
-    noted = [x for x in implausible(scene(ends=ends)) if "at an end" in x.what]
+    noted = [x for x in implausible(one_line(scene(ends=ends))) if "at an end" in x.what]
     assert [x.why for x in noted] == (
         ["ends.end.force: expected at most 1e+08 N, which the strongest moorings bear: is it in N?"] if verdict else []
     )

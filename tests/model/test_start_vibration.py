@@ -11,6 +11,7 @@ from numpy.polynomial import Polynomial
 
 import hybrid
 from hybrid.model.resolution import first_resolution, longest_period, start_vibrations
+from hybrid.scene.read import one_line
 
 LENGTH, EA, MASS = 12.0, 1e5, 2.0
 PERIOD = 4.0 * LENGTH * (MASS / EA) ** 0.5
@@ -43,7 +44,7 @@ RAMP = Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 def test_what_a_ramp_leaves(phase):
     """The free part of q''/w^2 + q = u at both ends of the ramp, by the series of u there."""
     w, k, o = 2.0 * pi / PERIOD, EA / LENGTH, pi
-    found = start_vibrations(hybrid.validate_scene(sag(heave(1.0, phase))))
+    found = start_vibrations(one_line(hybrid.validate_scene(sag(heave(1.0, phase)))))
     assert [x.t for x in found] == [0.0, 1.0]
     for x in found:
         assert x.period == pytest.approx(PERIOD)
@@ -56,12 +57,12 @@ def test_what_a_ramp_leaves(phase):
 
 def test_a_move_and_a_line_that_does_not_stretch():
     travel = {"travel": {"by": [0.0, 0.3, 0.4], "over": 1.0, "begin": 0.5}}
-    begin, end = start_vibrations(hybrid.validate_scene(sag(travel)))
+    begin, end = start_vibrations(one_line(hybrid.validate_scene(sag(travel))))
     assert (begin.t, end.t) == (0.5, 1.5) and begin.force == end.force
     assert begin.force == pytest.approx(EA / LENGTH * 0.5 * 60.0 * (PERIOD / (2.0 * pi)) ** 3, rel=0.05)
     stiff = sag(heave(1.0))
     del stiff["cable"]["sections"][0]["axial_stiffness"]
-    assert not start_vibrations(hybrid.validate_scene(stiff))
+    assert not start_vibrations(one_line(hybrid.validate_scene(stiff)))
 
 
 @pytest.mark.parametrize(("rigid", "times"), [(1e-6, 4.0), (1e5, 2.0 * pi * sqrt(1e5)), (1.0, 2.0 * pi / 0.860334)])
@@ -79,7 +80,7 @@ def test_steps_show_a_vibration_that_matters():
     """Of ordinary ramps it does not, nor of positions alone; in long runs it would take too many steps."""
 
     def step(ramp, asked="1%", duration=3.0):
-        return first_resolution(hybrid.validate_scene(sag(heave(ramp), duration, accuracy=asked))).step
+        return first_resolution(one_line(hybrid.validate_scene(sag(heave(ramp), duration, accuracy=asked)))).step
 
     assert step(1.0) == pytest.approx(PERIOD / 48.0)
     assert step(4.0) == 2.0 / 12.0 and step(1.0, "1 cm") == step(1.0, duration=60.0) == 1.0 / 12.0

@@ -9,6 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.model.sea import surroundings
+from hybrid.scene.read import one_line
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PLACES = [[0.0, 0.0], [30.0, 10.0], [-12.5, 4.0]]
@@ -42,7 +43,7 @@ def test_many_components_and_the_same_after_a_resume(tmp_path: Path) -> None:
     scene = hybrid.parse_scene(LINE.format(waves=waves, places=PLACES))
     file = tmp_path / "run.h5"
     hybrid.run(scene, file)
-    sea = surroundings(scene, 8)
+    sea = surroundings(one_line(scene), 8)
     with hybrid.open(file) as result:
         expected = [[sea.elevation(x, y, float(t))[0] for x, y in PLACES] for t in result.times]
         assert result.elevation == pytest.approx(np.array(expected), abs=1e-9)

@@ -13,9 +13,9 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene import combinations as c
 from hybrid.scene.combinations import REFUSALS, Use, refuse_use
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.read import read_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.root import Scene
 from tests.problems import tables_with
 
 CABLE: dict[str, Any] = {

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from pydantic import ValidationError
 from scene_texts import OCEAN, change, complaints
 
 from hybrid.errors import SceneError
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import parse_scene
-from hybrid.scene.schema import Harmonic, Motion, Scene
+from hybrid.scene.read import parse_scene, validate_scene
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import Harmonic, Motion
 
 Array = NDArray[np.float64]
 
@@ -343,22 +344,20 @@ def test_files_with_and_without_jumps(tmp_path: Path, form: str, kind: str) -> N
         values[:, 0] += 0.8 * t
     path = _csv(tmp_path / "m.csv", t, {"": values}, form)
     if kind == "smooth":
-        scene = _scene(f"{{file: {path}}}", "[0, 0, 0]")
-        check_motions(scene)
+        _scene(f"{{file: {path}}}", "[0, 0, 0]")
         assert np.isfinite(EndMotion(Motion(file=path), np.zeros(3)).at(1e9)[0]).all()
     else:
         said = _refusal(f"{{file: {path}}}", "[0, 0, 0]")
         assert "at t = 0, because the cable starts at rest" in said if kind == "start" else "at t = 60" in said
 
 
-def test_check_motions_names_the_end_without_a_file() -> None:
-    scene = _scene(HEAVE)
-    wrong = scene.model_dump()
+def test_motions_are_checked_wherever_a_scene_is_made() -> None:
+    wrong = _scene(HEAVE).model_dump()
     wrong["ends"]["end"]["motion"]["ramp"] = None
-    with pytest.raises(SceneError) as caught:
-        check_motions(Scene.model_validate(wrong))
-    assert caught.value.complaints[0].where == "ends.end.motion"
-    assert caught.value.complaints[0].line is None
+    with pytest.raises(SceneError, match=r"ends\.end\.motion"):
+        validate_scene(wrong)
+    with pytest.raises(ValidationError, match=r"ends\.end\.motion"):
+        Scene(**wrong)
 
 
 def test_the_motion_files_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

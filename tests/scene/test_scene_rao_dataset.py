@@ -18,6 +18,7 @@ from test_scene_vessel import FAIRLEAD, HEADING, scene, table
 import hybrid
 from hybrid.model.build import build
 from hybrid.scene.rao_file import read_rao
+from hybrid.scene.read import one_line
 
 DOFS = ["Surge", "Sway", "Heave", "Roll", "Pitch", "Yaw"]
 W = np.array([np.inf, 1.2, 0.3, 0.7, 2.0])  # as computed for added mass at infinity, in any order
@@ -91,7 +92,7 @@ def test_a_scene_moves_as_with_the_table_of_the_same_numbers(tmp_path: Path) -> 
     def heave(w: float) -> float:
         return 1.0 / (1.0 + w * w)
 
-    by_table = build(scene(table(tmp_path, {"heave": heave, "heave_phase": 30.0, "pitch": 1.5})))
+    by_table = build(one_line(scene(table(tmp_path, {"heave": heave, "heave_phase": 30.0, "pitch": 1.5}))))
     w = np.linspace(0.05, 12.0, 600)
     rao = np.zeros((600, 2, 2), complex)  # Capytaine: Re(X exp(-i w t)), so a lag is a positive angle
     rao[:, :, 0] = (heave(w) * np.exp(1j * math.radians(30.0)))[:, None]
@@ -102,7 +103,7 @@ def test_a_scene_moves_as_with_the_table_of_the_same_numbers(tmp_path: Path) -> 
     )
     data.to_netcdf(tmp_path / "ship.nc")
     made = scene(str(tmp_path / "ship.nc"))
-    by_dataset = build(made)
+    by_dataset = build(one_line(made))
     for t in (3.0, 20.0, 33.3):
         assert by_dataset.ends.at(t).position[1] == pytest.approx(by_table.ends.at(t).position[1], abs=1e-9)
     assert made.ends.named_files() == [str(tmp_path / "ship.nc")]
@@ -141,7 +142,7 @@ def test_a_vessel_drifts_slowly_about_its_mean_place(tmp_path: Path) -> None:
     drift = {"surge": {"amplitude": 3.0, "period": 120.0, "phase": 40.0},
              "yaw": [{"amplitude": 2.0, "period": 150.0}, {"amplitude": 0.5, "period": 80.0}]}  # fmt: skip
     rao = table(tmp_path, {"heave": 1.0})
-    still, moved = build(scene(rao)), build(scene(rao, drift=drift))
+    still, moved = (build(one_line(scene(rao, **more))) for more in ({}, {"drift": drift}))
     c, s, (x, y, _) = math.cos(math.radians(HEADING)), math.sin(math.radians(HEADING)), FAIRLEAD
     for t in (25.0, 39.0):  # after the ramp of the waves
         surge = 3.0 * math.sin(2 * math.pi * t / 120.0 + math.radians(40.0))

@@ -13,8 +13,9 @@ from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS, SUSPE
 
 from hybrid.errors import SceneError
 from hybrid.scene import yaml_nodes, yaml_source
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene, load_scene, parse_scene, read_text, scene_text, validate_scene
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import (
     Cable,
     CatenaryModel,
@@ -28,7 +29,6 @@ from hybrid.scene.schema import (
     Pinned,
     RodModel,
     RodZone,
-    Scene,
     Section,
     Straight,
     ZonesModel,

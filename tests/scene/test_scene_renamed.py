@@ -13,7 +13,8 @@ from hybrid.errors import SceneError
 from hybrid.scene.base import FORMER_NAMES, Table
 from hybrid.scene.checks import CHECKS
 from hybrid.scene.read import RenamedKey, load_scene, parse_scene, read_scene, validate_scene
-from hybrid.scene.schema import AdaptiveModel, Body, JonswapWaves, LineScene, Modules, PowerLawCurrent, Scene
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import AdaptiveModel, Body, JonswapWaves, LineScene, Modules, PowerLawCurrent
 
 MODEL = "{kind: adaptive, hold_time: 2.0, force_rod: [[0, 10]], force_catenary: [[200, 250]]}"
 ADAPTIVE = change(OCEAN, "{kind: catenary}", MODEL)

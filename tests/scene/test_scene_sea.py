@@ -10,6 +10,7 @@ from scene_texts import AT_REST, OCEAN, SEA, SEA_LIST, SEA_TOO, SEA_UNIFORM, cha
 
 from hybrid.errors import SceneError
 from hybrid.scene.read import parse_scene, scene_text, validate_scene
+from hybrid.scene.root import Scene
 from hybrid.scene.schema import (
     Body,
     Cable,
@@ -32,7 +33,6 @@ from hybrid.scene.schema import (
     Pinned,
     PowerLawCurrent,
     RegularWaves,
-    Scene,
     Seabed,
     Section,
     Travel,

@@ -11,6 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 
 WAVES = {"kind": "regular", "height": 2.0, "period": 9.0, "direction": 30.0, "phase": 25.0, "ramp": 18.0}
 SEA = {
@@ -58,7 +59,7 @@ def scene(rao: str, waves: dict[str, Any] = WAVES, clamped: bool = False, **vess
 
 def test_a_vessel_that_heaves_with_the_surface_at_its_origin(tmp_path: Path) -> None:
     """Heave 1 m/m without lag: the fairlead is as high as the surface at the origin, the wave's ramp included."""
-    model = build(scene(table(tmp_path, {"heave": 1.0})))
+    model = build(one_line(scene(table(tmp_path, {"heave": 1.0}))))
     for t in (0.0, 3.0, 17.0, 25.0):
         height = model.sea.elevation(ORIGIN[0], ORIGIN[1], t)[0]
         assert model.ends.at(t).position[1, 2] == pytest.approx(FAIRLEAD[2] + height, abs=1e-9)
@@ -66,7 +67,7 @@ def test_a_vessel_that_heaves_with_the_surface_at_its_origin(tmp_path: Path) -> 
 
 def test_phases_lag_behind_the_crest(tmp_path: Path) -> None:
     """90 deg of lag is a quarter of a period."""
-    model = build(scene(table(tmp_path, {"heave": 1.0, "heave_phase": 90.0})))
+    model = build(one_line(scene(table(tmp_path, {"heave": 1.0, "heave_phase": 90.0}))))
     for t in (30.0, 33.3):
         height = model.sea.elevation(ORIGIN[0], ORIGIN[1], t - 9.0 / 4.0)[0]
         assert model.ends.at(t).position[1, 2] == pytest.approx(FAIRLEAD[2] + height, abs=1e-9)
@@ -74,11 +75,11 @@ def test_phases_lag_behind_the_crest(tmp_path: Path) -> None:
 
 def test_arms_and_headings(tmp_path: Path) -> None:
     """Surge is along the bow; pitch lifts a point ahead by - x, roll one to port by y; a clamped end turns with it."""
-    alone = build(scene(table(tmp_path, {"surge": 1.0})))
+    alone = build(one_line(scene(table(tmp_path, {"surge": 1.0}))))
     t, c, s = 25.0, math.cos(math.radians(HEADING)), math.sin(math.radians(HEADING))
     base, eta = alone.ends.motions[1].base, alone.sea.elevation(ORIGIN[0], ORIGIN[1], t)[0]
     np.testing.assert_allclose(alone.ends.at(t).position[1] - base, [c * eta, s * eta, 0.0], rtol=0, atol=1e-9)
-    turned = build(scene(table(tmp_path, {"pitch": 1.5, "roll": 0.7}), clamped=True))
+    turned = build(one_line(scene(table(tmp_path, {"pitch": 1.5, "roll": 0.7}), clamped=True)))
     pitch, roll = math.radians(1.5 * eta), math.radians(0.7 * eta)
     x, y, z = FAIRLEAD
     body = np.cross([roll, pitch, 0.0], [x, y, z])
@@ -96,7 +97,7 @@ def test_the_spectrum_of_the_fairlead_is_that_of_the_waves_times_the_square_of_t
     def heave(w: np.ndarray | float) -> np.ndarray | float:
         return 1.0 / (1.0 + (w / 0.7) ** 4)
 
-    model = build(scene(table(tmp_path, {"heave": heave}), SEA))
+    model = build(one_line(scene(table(tmp_path, {"heave": heave}), SEA)))
     t = np.arange(20.0, 3620.0, 0.5)
     z = np.array([model.ends.at(x).position[1, 2] for x in t]) - FAIRLEAD[2]
     eta = np.array([model.sea.elevation(ORIGIN[0], ORIGIN[1], x)[0] for x in t])
@@ -112,7 +113,7 @@ def test_the_spectrum_of_the_fairlead_is_that_of_the_waves_times_the_square_of_t
 def test_it_runs_and_resumes_with_its_table(tmp_path: Path) -> None:
     """The end is where the harmonics say, in compiled steps; the table is among the files of the result."""
     made = scene(table(tmp_path, {"heave": 0.8, "pitch": 0.5, "pitch_phase": 40.0}))
-    model = build(made)
+    model = build(one_line(made))
     with hybrid.run(made) as result:
         for k in (10, 50, 80):
             wanted = model.ends.at(float(result.t[k])).position[1]
@@ -132,7 +133,7 @@ REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]] =
 def test_what_is_refused(tmp_path: Path, name: str) -> None:
     more, vessel, waves, text = REFUSED[name]
     with pytest.raises(hybrid.SceneError, match=text):
-        build(scene(table(tmp_path, {"heave": 1.0}, **more), waves, **vessel))
+        build(one_line(scene(table(tmp_path, {"heave": 1.0}, **more), waves, **vessel)))
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import pytest
 import hybrid
 from hybrid.model.build import build
 from hybrid.scene.motion_file import RecordRefused, continuous, matrices_of, read_record, vectors_of
+from hybrid.scene.read import one_line
 
 ORIGIN, HEADING, FAIRLEAD = np.array([5.0, -3.0, 0.5]), 30.0, np.array([20.0, 4.0, -2.0])
 T = np.arange(0.0, 31.0, 0.1)
@@ -64,7 +65,7 @@ def history(tmp_path: Path) -> str:
 @pytest.mark.parametrize("clamped", [False, True])
 def test_the_fairlead_goes_where_the_vessel_takes_it(history: str, clamped: bool) -> None:
     made = scene(history, clamped)
-    model = build(made)
+    model = build(one_line(made))
     rest = attitude(0, 0, HEADING)
     for t in (0.0, 7.3, 20.0, 29.5):
         at = motion(t)
@@ -84,7 +85,7 @@ def test_one_that_is_under_way_is_blended_in(tmp_path: Path) -> None:
     with pytest.raises(hybrid.SceneError, match="ramp"):
         hybrid.run(scene(file))
     made = scene(file, ramp=12.0)
-    model = build(made)
+    model = build(one_line(made))
     assert model.ends.at(0.0).position[1] == pytest.approx(made.ends.end.position)
     at = rows[200, 1:]
     assert model.ends.at(20.0).position[1] == pytest.approx(at[:3] + attitude(*at[3:]) @ FAIRLEAD, abs=2e-6)

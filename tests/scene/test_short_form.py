@@ -10,38 +10,40 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene.base import Finding
-from hybrid.scene.network_scene import Network
 from hybrid.scene.points import FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.read import as_scene, read_text, scene_text
+from hybrid.scene.root import Scene, in_full
 from hybrid.scene.schema import Ends, LineScene
-from hybrid.scene.short_form import LINE, POINTS, network_of, short_form
+from hybrid.scene.short_form import LINE, POINTS, line_of
 from tests.combinations.pairs import CLAMP, END, FEATURES, START, scene_of
 from tests.problems import tables_with
 
 FORCE, MOMENT = [40.0, 3.0, 30.0], [0.0, 5.0, 0.0]
 
 
-def scene(*names: str, **changes: Any) -> LineScene:
+def scene(*names: str, **changes: Any) -> Scene:
     return as_scene(tables_with(scene_of(*names), {key.replace("__", "."): x for key, x in changes.items()}))
 
 
 @pytest.mark.parametrize("name", FEATURES)
 def test_a_cable_with_any_feature_is_a_network_that_is_read_back(name: str) -> None:
-    made = network_of(scene(name))
-    again, _ = read_text(scene_text(made))
-    assert isinstance(again, Network) and again == made
+    cable = scene(name)
+    for made in (cable, in_full(cable)):
+        again, _ = read_text(scene_text(made))
+        assert again == made and again.asked_lines.keys() == made.asked_lines.keys()
+    assert dict(cable) == dict(in_full(cable)) and scene_text(line_of(cable)) == scene_text(cable)
 
 
 @pytest.mark.parametrize("network", [False, True])
 def test_both_forms_are_a_scene_however_it_is_made(network: bool) -> None:
-    made = network_of(scene()) if network else scene()
+    made = in_full(scene()) if network else scene()
     tables = made.model_dump(mode="json", exclude_none=True)
     again = [hybrid.Scene(**tables), hybrid.Scene.model_validate(made), hybrid.parse_scene(scene_text(made))]
     again += [hybrid.Scene.model_validate_json(json.dumps(tables)), hybrid.validate_scene(tables)]
     assert isinstance(made, hybrid.Scene) and all(x == made and type(x) is type(made) for x in again)
     schema = hybrid.Scene.model_json_schema()
     form = schema["then" if network else "else"]["$ref"].rpartition("/")[2]
-    assert schema["$defs"][form]["properties"].keys() == type(made).model_fields.keys()
+    assert schema["$defs"][form]["properties"].keys() == type(made.written).model_fields.keys()
 
 
 @pytest.mark.parametrize(("name", "now"), [
@@ -70,11 +72,11 @@ def _one_of_each_end() -> list[Any]:
 
 
 def test_ends_that_nothing_holds_are_points_with_their_loads() -> None:
-    free = network_of(scene("clamp", **{END.replace(".", "__"): {"kind": "free", "force": FORCE, "moment": MOMENT}}))
+    free = scene("clamp", **{END.replace(".", "__"): {"kind": "free", "force": FORCE, "moment": MOMENT}})
     point = free.points["end"]
     assert isinstance(point, FreePoint) and point.force == (40.0, 3.0, 30.0) and point.moment == (0.0, 5.0, 0.0)
     assert isinstance(free.points["start"], FixedPoint) and free.clamp(LINE, "start") is not None
-    guided = network_of(scene(**{END.replace(".", "__"): {"kind": "guided", "tangent": [1, 0, 0], "force": FORCE}}))
+    guided = scene(**{END.replace(".", "__"): {"kind": "guided", "tangent": [1, 0, 0], "force": FORCE}})
     held = guided.clamp(LINE, "end")
     assert isinstance(guided.points["end"], GuidedPoint) and held is not None and held.tangent == (1.0, 0.0, 0.0)
     assert guided.scene_of(LINE).ends.end == Ends.model_validate({
@@ -84,13 +86,13 @@ def test_ends_that_nothing_holds_are_points_with_their_loads() -> None:
 
 def test_both_ends_may_be_let_go_at_times_of_their_own() -> None:
     let_go = {f"{START}.release_at": {"time": 0.2}, f"{END}.release_at": {"tension": 50.0}}
-    made = network_of(as_scene(tables_with(scene_of(), let_go)))
+    made = as_scene(tables_with(scene_of(), let_go))
     start, end = (made.points[x].break_at for x in ("start", "end"))  # type: ignore[union-attr]
     assert start is not None and end is not None and (start.time, end.tension) == (0.2, 50.0)
 
 
 def test_places_and_messages_of_a_network_are_said_in_words_of_the_scene() -> None:
-    form = short_form(scene("body"))
+    form = scene("body").form
     for there, here in {
         ("points", "end", "force", "until"): ("ends", "end", "thrust", "until"),
         ("points", "start", "position"): ("ends", "start", "position"),
@@ -104,13 +106,13 @@ def test_places_and_messages_of_a_network_are_said_in_words_of_the_scene() -> No
         assert form.place(there) == here
     said = form.text("line cable breaks from point end; see lines.cable.sections[0] and points.start.break_at")
     assert said == "the cable breaks from ends.end; see cable.sections[0] and ends.start.release_at"
-    assert short_form(network_of(scene("body"))).text("point end gives way") == "point end gives way"
+    assert in_full(scene("body")).form.text("point end gives way") == "point end gives way"
     found = form.finding(Finding(("points", "end", "initial_guess"), "a place near lines.cable.initial"))
     assert found.at == ("ends", "end", "initial_guess") and found.expected == "a place near initial"
 
 
 def test_a_moment_at_the_end_of_a_line_is_for_a_rod_without_a_body() -> None:
-    tables = network_of(scene("body")).model_dump(mode="json", exclude_none=True)
+    tables = in_full(scene("body")).model_dump(mode="json", exclude_none=True)
     with pytest.raises(SceneError, match="nothing there takes a moment"):
         as_scene(tables_with(tables, {"points.end.moment": MOMENT}))
 
@@ -122,13 +124,13 @@ def test_a_moment_at_the_end_of_a_line_is_for_a_rod_without_a_body() -> None:
      "lets it spin|lets the line spin"),
 ])  # fmt: skip
 def test_a_guided_point_that_is_none_is_refused(wrong: tuple[dict[str, Any], str]) -> None:
-    tables = network_of(scene()).model_dump(mode="json", exclude_none=True)
+    tables = in_full(scene()).model_dump(mode="json", exclude_none=True)
     with pytest.raises(SceneError, match=wrong[1]):
         as_scene(tables_with(tables, wrong[0]))
 
 
 def test_a_free_point_where_lines_meet_says_where_it_is_first() -> None:
-    tables = network_of(scene("free end")).model_dump(mode="json", exclude_none=True)
+    tables = in_full(scene("free end")).model_dump(mode="json", exclude_none=True)
     second = tables["lines"]["cable"] | {"start": "end", "end": "far"}
     more = {"lines.second": second, "points.far": {"position": [20.0, 0.0, 0.0]}}
     with pytest.raises(SceneError, match="the lines that meet here"):

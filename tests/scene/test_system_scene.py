@@ -9,8 +9,7 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene.bodies import FixedBody, FreeBody, Hydrostatics
-from hybrid.scene.network import JoinedLine, NetworkOutput
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import JoinedLine, Network, NetworkOutput
 from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
 from hybrid.scene.read import read_text, scene_text
 

@@ -26,7 +26,7 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import j0
 
 from hybrid.errors import SceneError
-from hybrid.scene.schema import Scene
+from hybrid.scene.root import Scene
 
 DATA = json.loads((Path(__file__).parents[1] / "data" / "suspension.json").read_text())
 

@@ -24,7 +24,9 @@ from hybrid.model.build import build
 from hybrid.model.mesh import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
-from hybrid.scene.short_form import LINE, network_of
+from hybrid.scene.read import one_line
+from hybrid.scene.root import in_full
+from hybrid.scene.short_form import LINE
 from hybrid.simulation.result_checks import cubic_spline
 from hybrid.simulation.run_sample import RunSample
 
@@ -475,7 +477,7 @@ def test_rods_of_a_coarse_mesh_have_fewer_cells():
     })  # fmt: skip
     s = np.linspace(0.0, 100.0, 201)
     bends = grading(s, 0.02 + 0.05 * np.exp(-(((s - 50.0) / 15.0) ** 2)), np.zeros(SAMPLES), 100.0)
-    meshes = [build(scene, Resolution(x, 0.1, None, 1e-3, bends)).layout for x in (0.375, 0.75, 1.5, 3.0)]
+    meshes = [build(one_line(scene), Resolution(x, 0.1, None, 1e-3, bends)).layout for x in (0.375, 0.75, 1.5, 3.0)]
     counts = [layout.parts.sum() for layout in meshes]
     assert [layout.parts.max() for layout in meshes] == [1, 1, 1, 1]
     np.testing.assert_allclose(np.divide(counts[1:], counts[:-1]), 2.0, rtol=0.1)
@@ -679,7 +681,7 @@ def test_a_reader_does_not_lose_the_figure(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("form", [lambda scene: scene, network_of], ids=["cable", "named"])
+@pytest.mark.parametrize("form", [lambda scene: scene, in_full], ids=["cable", "named"])
 def test_what_steps_damp_out_is_said(form):
     """A stiff rod let go swings as a pendulum; its bending vibrations are far below what a step may be wrong by."""
     data = {

@@ -15,6 +15,7 @@ from hybrid.accuracy.refinement import Free
 from hybrid.accuracy.snap_scatter import snap_excess, snap_times
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.model.sections import output_points
+from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.named_arrays import pack, unpack
 
@@ -207,7 +208,7 @@ def test_chance_in_means_over_windows_is_seen_from_window_to_window(scatter, unc
     assert chance == pytest.approx(2.0 * scatter * np.sqrt(2.0 / 50.0), rel=0.4)
     assert ("windows uncertain" in {kind for kind, _ in control.notes}) == uncertain
     saved = unpack(pack(control.line.statistics["windows_largest"].checkpoint()))
-    again = StatisticEstimate.restored(saved, SCENE, (1, 1, 0))
+    again = StatisticEstimate.restored(saved, one_line(SCENE), (1, 1, 0))
     np.testing.assert_array_equal(again.chance, chance)
 
 
@@ -257,7 +258,7 @@ def test_a_largest_force_that_snaps_may_exceed_is_not_judged(scatter, uncertain)
     assert ("largest force uncertain" in {kind for kind, _ in control.notes}) == uncertain
     again = OneLine(asked, Free(False, False, False), sample, sample, irregular=True).line
     tree = control.line.checkpoint() | {"estimate": None, "statistics": {}}
-    again.restore(unpack(pack(tree)), SCENE, output_points(SCENE))
+    again.restore(unpack(pack(tree)), SCENE, output_points(one_line(SCENE)))
     np.testing.assert_array_equal(again.excess, control.line.excess)
 
 

@@ -20,6 +20,7 @@ from scipy.integrate import quad, solve_ivp
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 from hybrid.solve.stability import is_stable
 from tests.inside import OnlyLine
 
@@ -209,7 +210,7 @@ def test_a_rod_that_is_judged_at_rest_may_have_a_law_of_stretch(name: str) -> No
 
 
 def test_judging_stability_leaves_the_law_of_stretch_of_a_line_alone() -> None:
-    model = build(hybrid.validate_scene(bar({"tension_strain": TABLE}, HISTORY, model="rod")))
+    model = build(one_line(hybrid.validate_scene(bar({"tension_strain": TABLE}, HISTORY, model="rod"))))
     line, ends = model.line, model.ends.at(0.0)
     line.ck[:] = 1e-7
     law = line.law.copy()

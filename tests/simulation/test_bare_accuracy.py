@@ -13,7 +13,7 @@ from hybrid.accuracy.refinement import asked_text, bounds_of, judge, not_asked_t
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.model_costs import with_model
 from hybrid.model.resolution import Reach, Resolution, first_resolution, for_motion, requested_accuracy
-from hybrid.scene.read import as_scene, parse_scene, scene_text
+from hybrid.scene.read import as_scene, one_line, parse_scene, scene_text
 from hybrid.simulation.run_sample import RunSample
 
 LENGTH, DIAMETER = 100.0, 0.04
@@ -55,7 +55,7 @@ def run(moved: float, curvature: float = 0.1, tension: float = 200.0, outputs: i
 
 
 def sizes(asking: hybrid.Scene, found: RunSample) -> dict[str, float]:
-    asked = requested_accuracy(asking)
+    asked = requested_accuracy(one_line(asking))
     assert asked is not None
     return {x.name if x.limit is None else x.limit.limit: x.size for x in bounds_of(asked, found)}
 
@@ -85,12 +85,12 @@ def test_position_of_an_equilibrium_is_a_part_of_its_sag() -> None:
 
 def test_the_first_result_begins_as_fine_as_the_pre_run_shows() -> None:
     """Where the line moves by a hundredth of its length; not where it lies straight, nor where a length is asked."""
-    bare, first = scene(), first_resolution(scene())
-    finer = for_motion(first, bare, Reach(1.1, 5.0))
+    bare, first = scene(), first_resolution(one_line(scene()))
+    finer = for_motion(first, one_line(bare), Reach(1.1, 5.0))
     assert first.local is not None and finer.local is not None
     assert finer.fineness > first.fineness and finer.local <= 0.05 * 0.022
-    assert for_motion(first, bare, Reach(0.0, 0.4 * DIAMETER)) == first
-    assert for_motion(first, scene({"position": "1 m"}), Reach(5.0, 5.0)) == first
+    assert for_motion(first, one_line(bare), Reach(0.0, 0.4 * DIAMETER)) == first
+    assert for_motion(first, one_line(scene({"position": "1 m"})), Reach(5.0, 5.0)) == first
 
 
 def test_what_is_named_takes_precedence() -> None:
@@ -123,7 +123,7 @@ def test_curvature_is_asked_where_something_rests_on_it() -> None:
 def test_a_rod_that_the_program_chooses_is_none_that_was_named(pipe: dict[str, float] | None) -> None:
     """Also when it is read back from the file of a result, where its model is named."""
     for asking in (scene(pipe=pipe), scene(None, pipe=pipe)):
-        chosen = with_model(asking, "rod")
+        chosen = with_model(one_line(asking), "rod")
         for found in (asking, chosen, parse_scene(scene_text(chosen))):
             assert sizes(found, run(5.0)) == pytest.approx(sizes(asking, run(5.0)))
         assert ("curvature" in sizes(chosen, run(5.0))) == (pipe is not None)
@@ -146,7 +146,7 @@ def test_a_limit_is_held_where_it_is() -> None:
         {"length": 50.0, "mass": 3.0, "diameter": 0.04, "bending_stiffness": 40.0},
     ]
     data = scene({"position": "1 m"}).model_dump(mode="json", exclude_none=True)
-    asked = requested_accuracy(hybrid.validate_scene(data | {"cable": {"sections": sections}}))
+    asked = requested_accuracy(one_line(hybrid.validate_scene(data | {"cable": {"sections": sections}})))
     assert asked is not None
     found = run(5.0, curvature=0.18)
     found = RunSample(
@@ -167,7 +167,7 @@ def test_no_limit_of_bending_is_asked_of_a_catenary() -> None:
 
 
 def test_what_is_not_asked_is_said_beside_what_is_met() -> None:
-    asked, found = requested_accuracy(scene()), run(5.0)
+    asked, found = requested_accuracy(one_line(scene())), run(5.0)
     assert asked is not None
     moment = {"bending_moment": np.full((3, 11), 4.5), "curvature": np.full((3, 11), 0.05)}
     assert "bending moment is not asked, its error is 90 %" in not_asked_text(

@@ -11,7 +11,8 @@ import pytest
 import hybrid
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.read import as_scene
-from hybrid.scene.short_form import LINE, network_of
+from hybrid.scene.root import in_full
+from hybrid.scene.short_form import LINE
 from hybrid.simulation import line_result
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample
@@ -75,7 +76,7 @@ def test_many_outputs_go_into_a_file(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert_same(kept, stored)
 
 
-@pytest.mark.parametrize("form", [as_scene, lambda x: network_of(as_scene(x))], ids=["cable", "named"])
+@pytest.mark.parametrize("form", [as_scene, lambda x: in_full(as_scene(x))], ids=["cable", "named"])
 def test_errors_that_were_not_estimated_are_made_up_for(form: Any, monkeypatch: Any, tmp_path: Path) -> None:
     """A result that is complete, but for its errors."""
     tables = SCENE | {"model": "catenary", "time": {"duration": 0.2, "step": 0.02}, "output": {"errors": True}}
@@ -93,7 +94,7 @@ def test_errors_that_were_not_estimated_are_made_up_for(form: Any, monkeypatch: 
     assert "error_total_position" in hybrid.resume(path).attributes
 
 
-@pytest.mark.parametrize("form", [as_scene, lambda x: network_of(as_scene(x))], ids=["cable", "named"])
+@pytest.mark.parametrize("form", [as_scene, lambda x: in_full(as_scene(x))], ids=["cable", "named"])
 def test_a_line_that_is_let_go_is_not_at_rest(form: Any) -> None:
     """Its end forces then have the order of a start."""
     held = Case(form(SCENE), None)

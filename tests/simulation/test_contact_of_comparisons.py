@@ -11,12 +11,13 @@ from test_self_contact_default import led_through
 
 import hybrid
 from hybrid.model.network import NetworkResolution
-from hybrid.scene.short_form import LINE, network_of
+from hybrid.scene.root import in_full
+from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import Samples
 
 Form = Callable[[Any], Any]
-FORMS = pytest.mark.parametrize("form", [lambda scene: scene, network_of], ids=["cable", "named"])
+FORMS = pytest.mark.parametrize("form", [lambda scene: scene, in_full], ids=["cable", "named"])
 OUTPUT = {"every": 0.1, "points": 21, "errors": True}
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 

@@ -11,17 +11,18 @@ import pytest
 import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 from hybrid.simulation.diagnostics import FIRST_MOMENTS, GAIN_NOTED, Diagnostics
 from hybrid.simulation.events import EventLog
 
 MODEL = build(
-    hybrid.validate_scene(
+    one_line(hybrid.validate_scene(
         {
             "cable": {"sections": [{"length": 10, "mass": 1.0}]},
             "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
             "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10},
         }
-    )
+    ))
 )  # fmt: skip
 
 

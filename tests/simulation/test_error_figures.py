@@ -12,6 +12,7 @@ from hybrid.accuracy.error_estimate import Estimate
 from hybrid.model.build import twist_rate
 from hybrid.model.material import material
 from hybrid.model.resolution import Resolution
+from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import RunSample
 
 # Estimated over true error, as asked of the project; where it is below, an event must say that it is uncertain.
@@ -299,7 +300,7 @@ def test_a_moment_twists_only_what_takes_its_torque(start, more, twisted):
         "initial": "equilibrium" if "position" in start else straight,
         "ends": {"start": start, "end": {"kind": "free", "moment": [0, 2.0, 0]}},
     })  # fmt: skip
-    rate = twist_rate(scene, material(scene), np.array([10.0]))
+    rate = twist_rate(one_line(scene), material(one_line(scene)), np.array([10.0]))
     assert rate[0] == pytest.approx((4.0 if "moment" in start else 2.0) if twisted else 0.0)
 
 

@@ -21,6 +21,7 @@ from hybrid.accuracy.extreme_errors import ExtremeErrors, figures, order_of
 from hybrid.accuracy.refinement import figures as told_of
 from hybrid.accuracy.refinement import judge
 from hybrid.model.resolution import Resolution, has_limits, requested_accuracy
+from hybrid.scene.read import one_line
 from hybrid.simulation.progress import ESTIMATION, REFINEMENT
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.limits import EXTREME_ERRORS, extremes_about
@@ -154,7 +155,7 @@ def test_what_has_limits(limit: dict[str, Any], there: bool) -> None:
     data = bare().model_dump(mode="json", exclude_none=True)
     for bounds, judged in (({}, False), ({"smallest": 1.0}, True), ({"largest": 9.0}, True)):
         data["output"]["quantities"] = {"gap": {"kind": "clearance", "point": [40, 0, -9]} | bounds}
-        assert has_limits(hybrid.validate_scene(data)) is judged
+        assert has_limits(one_line(hybrid.validate_scene(data))) is judged
 
 
 # --- runs -------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ import pytest
 import hybrid
 from hybrid import Result
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 from hybrid.simulation.hockling_watch import Loops, note_hockling, note_loops
 
 HEIGHT = 2.0  # m
@@ -176,7 +177,7 @@ def test_a_loop_that_forms_slowly_is_foreseen(model: Any, time: dict[str, float]
 
 def test_a_stretch_that_the_torque_alone_cannot_bend_is_too_short() -> None:
     """Greenhill: a pinned line without tension, of length l, is bent by M = 2 pi EI/l."""
-    model, s = build(twisted(0.0)), np.linspace(0.0, 4.0, 401)
+    model, s = build(one_line(twisted(0.0))), np.linspace(0.0, 4.0, 401)
     torque, found = np.full((1, 401), 6.0), []
     for length in (0.95, 1.05):
         tension = np.full((1, 401), 20.0)  # needed: 18 N

@@ -10,6 +10,7 @@ import pytest
 import hybrid
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.model.resolution import Resolution, requested_accuracy
+from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import RunSample
 
 
@@ -120,7 +121,7 @@ def test_parts_of_a_force_that_is_nothing_are_not_asked(more):
     result = hybrid.static(straight(**more))
     assert result.mesh[0].kinds.size < 1000
     assert not {"accuracy missed", "error uncertain", "not converged"} & {e.kind for e in result.events}
-    asked = requested_accuracy(hybrid.validate_scene(straight(**more)))
+    asked = requested_accuracy(one_line(hybrid.validate_scene(straight(**more))))
     assert asked.round_off("N") == pytest.approx(2.5e-12)
     assert asked.round_off("N m") == pytest.approx(5.0e-12)
     assert asked.round_off("m") == 0.0

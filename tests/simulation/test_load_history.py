@@ -9,7 +9,7 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
-from hybrid.scene.read import scene_text
+from hybrid.scene.read import one_line, scene_text
 from hybrid.simulation.result_checks import jolts
 
 ROWS: list[list[float]] = [[0, 0, 0, 0], [0.5, 3, 0, -1], [0.7, -2, 0, 0], [1.4, 1, 0, 0]]
@@ -171,8 +171,8 @@ def pulled(time: dict[str, float], **changes: object) -> hybrid.Scene:
 def test_a_slope_that_jumps_shakes_the_line_by_as_much_as_is_said() -> None:
     made = pulled({"duration": 0.35, "step": 2e-4})
     travel = 2.0 * np.sqrt(0.5 / 2e3)
-    assert [x for x, _, _ in jolts(made)] == [0.1, 0.4, 1.0]
-    _, size, period = jolts(made)[0]
+    assert [x for x, _, _ in jolts(one_line(made))] == [0.1, 0.4, 1.0]
+    _, size, period = jolts(one_line(made))[0]
     assert (size, period) == pytest.approx((10.0 * travel, 4.0 * travel))
     with hybrid.run(made) as result:
         slow = 10.0 + 10.0 * np.clip(result.t - 0.1, 0.0, 0.3)

@@ -13,7 +13,7 @@ from test_system_contact import HOSE
 
 import hybrid
 from hybrid.kernels.state.report import PLANAR
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import in_full
 from hybrid.solve.network_solver import NetworkSolver
 from tests.combinations.networks import differences, events_differ
 
@@ -35,7 +35,7 @@ def flat(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
 
 
 def as_network(tables: Any) -> hybrid.Scene:
-    return network_of(hybrid.validate_scene(tables))
+    return in_full(hybrid.validate_scene(tables))
 
 
 def same(network: Any, cable: Any, part: float = 1e-9) -> None:

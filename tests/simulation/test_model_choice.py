@@ -16,6 +16,7 @@ from hybrid.model.build import build
 from hybrid.model.model_costs import CHOSEN, REST, Cost, cheapest
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import model_is_free
+from hybrid.scene.read import one_line
 from hybrid.scene.short_form import LINE
 from hybrid.simulation.case import Case
 from tests.said import both_ways, line_of, said
@@ -120,12 +121,12 @@ def test_rods_after_catenaries_that_leave_out_too_much(monkeypatch, network):
 def test_zones_move_where_the_scene_asks_for_it(more):
     scene = hybrid.validate_scene(TAUT | more)
     assert scene.model.kind == "adaptive"
-    assert not model_is_free(scene)
+    assert not model_is_free(one_line(scene))
 
 
 def test_a_criterion_asks_for_zones_that_move():
     short = hybrid.validate_scene(TAUT | {"time": {"duration": 1.0}})
-    assert model_is_free(short)
+    assert model_is_free(one_line(short))
     result = hybrid.run(short, criterion=lambda look: 0.0 * look.s)
     assert kind_of(result) == "adaptive"
 
@@ -152,7 +153,7 @@ def test_zones_that_move_have_the_mesh_of_rods(curvature: str) -> None:
     def layout(model, accuracy):
         scene = hybrid.validate_scene(CLAMPED | {"model": model, "accuracy": accuracy})
         case = Case(scene, None)
-        return build(scene, surveyed(case).one)
+        return build(one_line(scene), surveyed(case).one)
 
     asked = {"position": "1%", "tension": "1%", "curvature": curvature}
     rods, moving = (layout(model, asked) for model in ("rod", MOVING))

@@ -13,8 +13,9 @@ import hybrid
 from hybrid.accuracy.model_errors import leaves_bending_out
 from hybrid.accuracy.refinement import Free
 from hybrid.model.resolution import first_resolution
-from hybrid.scene.read import as_scene
-from hybrid.scene.short_form import LINE, network_of
+from hybrid.scene.read import as_scene, one_line
+from hybrid.scene.root import in_full
+from hybrid.scene.short_form import LINE
 from hybrid.simulation.run_sample import RunSample, restored_sample
 from hybrid.store.named_arrays import pack, unpack
 from hybrid.store.stored_rows import MissingRows
@@ -115,14 +116,14 @@ def test_one_way_only():
 
 
 def made_up(resolution: Any = None, **more: Any) -> RunSample:
-    x = first_resolution(span(2.0, "catenary")) if resolution is None else resolution
+    x = first_resolution(one_line(span(2.0, "catenary"))) if resolution is None else resolution
     position = np.full((9, 4, 3), 0.01 / x.fineness)
     return RunSample(x, {"position": position}, round(100 * x.fineness), round(10 / x.step), 0.0, **more)
 
 
 def test_a_line_that_was_rod_everywhere_at_some_time_leaves_bending_out_at_others() -> None:
     """Rods that come and go along the whole of it: it had no error of the model, and no word of that."""
-    line = network_of(as_scene(span(2.0, {"kind": "adaptive"}, mesh=None))).lines[LINE]
+    line = in_full(as_scene(span(2.0, {"kind": "adaptive"}, mesh=None))).lines[LINE]
     everywhere = ((0.0, 12.0), (10.0, 20.3))
     assert leaves_bending_out(line, made_up(rods=everywhere, catenary=np.array([0.0, 0.5, 0.4])))
     assert not leaves_bending_out(line, made_up(rods=everywhere, catenary=np.zeros(3)))
@@ -153,17 +154,17 @@ def test_what_bending_changes_in_a_run_whose_outputs_are_in_a_file_is_computed_a
     run = made_up(model_error={"position": np.ones((9, 4))})
     scene, shape = span(2.0, "catenary"), (9, 4, 0)
     tree = unpack(pack(run.checkpoint()))
-    assert restored_sample(tree, scene, shape).model_error["position"].shape == (9, 4)
+    assert restored_sample(tree, one_line(scene), shape).model_error["position"].shape == (9, 4)
     tree = unpack(pack(replace(run, rows={"kept": 1}, forces=np.ones((2, 3))).checkpoint()))
     with pytest.raises(MissingRows):
-        restored_sample(tree, scene, shape, tmp_path / "run.h5")
+        restored_sample(tree, one_line(scene), shape, tmp_path / "run.h5")
 
 
 def test_a_run_of_a_checkpoint_of_1_0_is_read() -> None:
     """It has what the estimate was bounded by and doubted for, and whether it was followed along the run."""
     tree = unpack(pack(made_up().checkpoint()))
     tree |= {"bound": 0.1, "doubt": np.zeros(4), "resolution": tree["resolution"] | {"follow": True}}
-    assert restored_sample(tree, span(2.0, "catenary"), (9, 4, 0)).cells == made_up().cells
+    assert restored_sample(tree, one_line(span(2.0, "catenary")), (9, 4, 0)).cells == made_up().cells
 
 
 # --- where there is none -----------------------------------------------------------------------

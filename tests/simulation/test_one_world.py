@@ -11,7 +11,8 @@ import pytest
 import hybrid
 from hybrid.errors import ComputationError
 from hybrid.scene.read import as_scene
-from hybrid.scene.short_form import LINE, network_of
+from hybrid.scene.root import in_full
+from hybrid.scene.short_form import LINE
 from hybrid.store.reader import open_result
 from tests.combinations.networks import both, differences, events_differ
 from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, S, scene_of
@@ -93,7 +94,7 @@ def test_a_winch_at_rest_holds_its_line() -> None:
         "cable": {"sections": [section]}, "ends": {"start": {"kind": "free"}, "end": winch}, "mesh": {"cells": 30},
         "initial": "equilibrium", "model": "catenary", "time": {"duration": 5.0, "step": 0.1},
     }  # fmt: skip
-    network = hybrid.static(network_of(hybrid.validate_scene(tables))).lines[LINE]
+    network = hybrid.static(in_full(hybrid.validate_scene(tables))).lines[LINE]
     cable = hybrid.static(tables)
     np.testing.assert_allclose(network.tension, cable.tension, rtol=1e-9)
     assert network.tension.max() > 100.0
@@ -103,7 +104,7 @@ def test_a_winch_at_rest_holds_its_line() -> None:
 def test_a_start_from_which_no_step_leads_on_is_in_the_file(network: bool, tmp_path: Path) -> None:
     scene = as_scene(scene_of("obstacle") | {"dimension": 2})
     with pytest.raises(ComputationError, match="leaves the plane"):
-        hybrid.run(network_of(scene) if network else scene, tmp_path / "run.h5")
+        hybrid.run(in_full(scene) if network else scene, tmp_path / "run.h5")
     with open_result(tmp_path / "run.h5") as result:
         assert result.status == "failed"
         assert result.times.tolist() == [0.0]

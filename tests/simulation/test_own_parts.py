@@ -12,7 +12,7 @@ from bits import Stopping, differences, went_on
 import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.state.books import ASK_STEPS
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import in_full
 from hybrid.simulation.new_run import Recording, new_run
 from hybrid.store.array_contents import MemoryTarget
 
@@ -313,7 +313,7 @@ class Last(hybrid.RunPart):
 def test_a_part_without_steps_asks_for_none_of_them() -> None:
     scene = hanging({"rate": 0.0})
     del scene["ends"]["end"]["payout"]
-    network = network_of(hybrid.validate_scene(scene))
+    network = in_full(hybrid.validate_scene(scene))
     for part, asks in ((Last(), 0), (Ending(1.0), ASK_STEPS)):
         run = new_run(network, MemoryTarget(), "", True, recording=Recording(parts=[part]))
         run.begin_motion()

@@ -12,6 +12,7 @@ from test_payout import G, clamped, hanging, sagging
 import hybrid
 from hybrid.model.build import build
 from hybrid.model.payout import lengths_at
+from hybrid.scene.read import one_line
 
 FINE = 0.005  # s
 
@@ -38,7 +39,7 @@ def off(result: hybrid.Result, exact: hybrid.Result, name: str = "position") -> 
 
 def entries(scene: dict[str, Any], t: np.ndarray) -> np.ndarray:
     """Numbers of the steps after which a node enters."""
-    plan = build(hybrid.validate_scene(scene)).payout
+    plan = build(one_line(hybrid.validate_scene(scene))).payout
     assert plan is not None
     lengths, _ = lengths_at(plan.law, t)
     out = np.floor((lengths - plan.layer[0] - 0.85 * 2.5) / 2.5 + 1e-9)

@@ -15,7 +15,7 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B, PHASE
 from hybrid.model.build import build
-from hybrid.scene.read import as_scene
+from hybrid.scene.read import as_scene, one_line
 from hybrid.simulation.payout import PayingOut
 from tests.inside import OnlyLine
 
@@ -126,7 +126,7 @@ def test_polyester_that_stays_below_its_highest_tension_is_a_longer_rope() -> No
 def test_lift_grows_with_the_length_that_is_out() -> None:
     """A node that enters takes lift from its neighbours and has their phase: of what is out all sheds, and no more."""
     scene = as_scene(shedding())
-    model = build(scene)
+    model = build(one_line(scene))
     paying = PayingOut(model)
     line = paying.on(model, 107.3).line
     paying.reel.numbers[0] = 107.3

@@ -16,6 +16,7 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.model.build import build
 from hybrid.model.plane import WHAT
+from hybrid.scene.read import one_line
 from hybrid.simulation.lone_planes import PlaneMonitor
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -61,7 +62,7 @@ def test_the_gallery_in_its_plane_and_in_space(name: str) -> None:
         assert np.abs(flat.position - space.position).max() < SAME * space.s[-1]
         assert np.abs(flat.tension - space.tension).max() < 10 * SAME * np.abs(space.tension).max()
         assert [len(z) for z in flat.zones] == [len(z) for z in space.zones]
-        n = build(example(name)).plane
+        n = build(one_line(example(name))).plane
         assert n is not None and np.abs(flat.velocity @ n[2]).max() == 0.0
 
 

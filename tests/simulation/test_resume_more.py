@@ -15,7 +15,7 @@ import hybrid
 import hybrid.simulation.run_record
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import in_full
 from hybrid.simulation import case, restore, zones_at_rest
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, hdf5_file
@@ -104,7 +104,7 @@ def test_an_end_that_is_moved_from_a_time_on(tmp_path, whole):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("form", [lambda x: x, network_of], ids=["cable", "network"])
+@pytest.mark.parametrize("form", [lambda x: x, in_full], ids=["cable", "network"])
 def test_a_change_is_made_where_the_run_stands_and_not_at_its_last_output(form, tmp_path, monkeypatch):
     """Outputs every second, stopped half-way between two: the file has the time at which the change was made."""
     scene = form(swinging(output={"every": 1.0, "points": 11}))

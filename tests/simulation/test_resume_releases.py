@@ -16,6 +16,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import OTHER_PROGRAM
+from hybrid.scene.read import one_line
 from hybrid.simulation import restore
 from hybrid.simulation.old_checkpoints import as_of_line
 from hybrid.store.checkpoint import read_checkpoint
@@ -128,10 +129,12 @@ def test_what_is_of_another_line_or_of_no_cable_is_refused(tmp_path: Path) -> No
     path = kept("result_1.0_plane.h5.gz", tmp_path)
     with opened(path) as file, open_result(path) as result:
         saved, scene = read_checkpoint(file).state, hybrid.parse_scene(result.scene_text)
-    model = hybrid.model.build.build(scene)
+    model = hybrid.model.build.build(one_line(scene))
     assert set(as_of_line(saved, "cable", model, ())["lines"]) == {"cable"}
     with pytest.raises(ValueError, match="surplus: not in the checkpoint of any cable"):
         as_of_line(saved | {"surplus": 1.0}, "cable", model, ())
-    longer = hybrid.model.build.build(scene.model_copy(update={"mesh": scene.mesh.model_copy(update={"cells": 7})}))
+    longer = hybrid.model.build.build(
+        one_line(scene.model_copy(update={"mesh": scene.mesh.model_copy(update={"cells": 7})}))
+    )
     with pytest.raises(ValueError, match="nodes that are not those of the line"):
         as_of_line(saved, "cable", longer, ())

@@ -12,7 +12,7 @@ import hybrid
 from hybrid.accuracy.run_forecast import _grown
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import ComputationError, Outcome
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene
 
 SECTION = {"length": 10.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5}

@@ -17,6 +17,7 @@ from hybrid.kernels.contact.self_contact_pairs import WINDOW
 from hybrid.kernels.contact.self_distance import INSIDE
 from hybrid.model.build import build
 from hybrid.model.self_reach import LOOP, self_reach
+from hybrid.scene.read import one_line
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 
@@ -138,16 +139,16 @@ def test_a_hose_whose_end_is_lowered_touches_itself() -> None:
 )  # fmt: skip
 def test_where_it_cannot_be_it_is_off_and_says_why(more: dict[str, Any], why: str) -> None:
     scene = hybrid.validate_scene(led_through(**more))
-    reach = self_reach(scene)
+    reach = self_reach(one_line(scene))
     assert not reach.asked and not reach.may and why in reach.why
-    entry = next(x for x in build(scene).contents if x.what == "contact of the line with itself")
+    entry = next(x for x in build(one_line(scene)).contents if x.what == "contact of the line with itself")
     assert not entry.on and why in entry.why
 
 
 def test_without_a_diameter_it_is_off() -> None:
     scene = led_through()
     del scene["cable"]["sections"][0]["diameter"]
-    assert "diameter" in self_reach(hybrid.validate_scene(scene)).why
+    assert "diameter" in self_reach(one_line(hybrid.validate_scene(scene))).why
 
 
 def test_the_smallest_loop_is_that_of_contact() -> None:
@@ -155,7 +156,7 @@ def test_the_smallest_loop_is_that_of_contact() -> None:
 
 
 def test_it_is_on_where_the_slack_makes_a_loop() -> None:
-    plan = build(hybrid.validate_scene(led_through()))
+    plan = build(one_line(hybrid.validate_scene(led_through())))
     entry = next(x for x in plan.contents if x.what == "contact of the line with itself")
     assert entry.on and "near itself" in entry.why
     assert plan.plane is not None  # nothing is computed in space before the line comes near itself

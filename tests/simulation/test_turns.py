@@ -14,8 +14,9 @@ import hybrid
 from hybrid.model.build import build
 from hybrid.model.network import build_system
 from hybrid.scene.motion import EndMotion
+from hybrid.scene.read import one_line
+from hybrid.scene.root import in_full
 from hybrid.scene.schema import Motion
-from hybrid.scene.short_form import network_of
 from hybrid.simulation import equilibrium
 from tests.said import both_ways, line_of, said
 
@@ -92,8 +93,8 @@ def test_too_few_cells_for_the_turns_are_refused():
 
 
 def test_an_equilibrium_that_has_lost_a_turn_is_refused(monkeypatch):
-    model = build_system(network_of(taut(second={"turns": 3})))
-    lost = build(taut(second={"turns": 2})).start
+    model = build_system(in_full(taut(second={"turns": 3})))
+    lost = build(one_line(taut(second={"turns": 2}))).start
     (state,) = (x.start for x in model.models)
     text, s = equilibrium.lost_turns(model, 0.0, 0, state._replace(a1=lost.a1))
     assert s == 100.0 and re.search(r"connections.end.turns: 3;.*start with 3 turns.*have 2$", text)

@@ -18,7 +18,8 @@ from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.bodies import frame_of
 from hybrid.model.build import build
 from hybrid.model.network import build_system
-from hybrid.scene.short_form import network_of
+from hybrid.scene.read import one_line
+from hybrid.scene.root import in_full
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.new_run import new_run
 
@@ -85,7 +86,7 @@ def test_offsets_of_a_point_to_which_lines_are_clamped() -> None:
 @pytest.mark.parametrize(("cuts", "flips"), [([16], (0, 0)), ([16], (1, 1)), ([8, 16, 30], (0, 1, 1, 0))])
 def test_a_rod_cut_at_any_node_is_the_same_rod(cuts: list[int], flips: tuple[int, ...], normal: Any) -> None:
     """Points are first looked for 15 m and more beside their places; the axes of points are found as well."""
-    model = build(hybrid.validate_scene(in_one_piece(normal)))
+    model = build(one_line(hybrid.validate_scene(in_one_piece(normal))))
     whole = at_rest(model, np.inf).state.lines[0]
     found = equilibrium(in_pieces(cuts, flips, normal)).found
     assert found is not None and found.iterations <= 20 and len(found.path) == 1
@@ -494,5 +495,5 @@ def test_between_held_points_the_first_shape_carries_the_frame(points: dict[str,
             "model": "rod",
         }
     )
-    alone, joined = build(scene), build_system(network_of(scene)).models[0]
+    alone, joined = build(one_line(scene)), build_system(in_full(scene)).models[0]
     assert np.allclose(joined.ends.values.frame, alone.ends.values.frame, rtol=0, atol=1e-12)

@@ -18,6 +18,7 @@ import hybrid
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.run.entry import block_rows, correction
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 from hybrid.solve.stepper import Stepper
 
 LENGTH, FAR = 1000.0, 1000.0
@@ -132,7 +133,7 @@ def test_long_line_at_low_tension(stiffness, tension):
             "time": {"duration": 1.0, "step": 0.01},
         }
     )  # fmt: skip
-    model = build(scene)
+    model = build(one_line(scene))
     stepper = Stepper(model.line, model.length, model.tension_scale, model.slack_floor)
     state = model.start.copy()
     x = model.line.s / 1000.0

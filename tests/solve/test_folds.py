@@ -11,8 +11,8 @@ import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import Line, State
 from hybrid.model.network import NetworkModel, build_system
-from hybrid.scene.network_scene import Network
-from hybrid.scene.short_form import network_of
+from hybrid.scene.network import Network
+from hybrid.scene.root import in_full
 from hybrid.simulation.equilibrium import equilibrium_of, group_of
 from hybrid.solve.flaws import FOLDED, folds
 from hybrid.solve.joined import NetworkState
@@ -32,7 +32,7 @@ def hairpin(cells: int, model: str = "rod", apart: float = 0.0, **more: Any) -> 
 
 
 def model_of(tables: dict[str, Any]) -> tuple[Network, NetworkModel]:
-    network = network_of(hybrid.validate_scene(tables))
+    network = in_full(hybrid.validate_scene(tables))
     return network, build_system(network)
 
 

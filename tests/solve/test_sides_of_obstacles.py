@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hybrid.model.build import build
-from hybrid.scene.read import as_scene
+from hybrid.scene.read import as_scene, one_line
 from hybrid.solve.flaws import behind_obstacles, obstacles_left
 from tests.validation.obstacle_scenes import over_pipe
 
@@ -21,7 +21,7 @@ SHAPES = {
 @pytest.mark.parametrize("kind", SHAPES)
 def test_a_shape_on_the_other_side_of_an_obstacle_is_told_from_the_same_side(kind: str) -> None:
     tables = over_pipe(obstacles={"thing": SHAPES[kind] | {"at": AT.tolist()}})
-    model = build(as_scene(tables))
+    model = build(one_line(as_scene(tables)))
     line, sea = model.line, model.sea.at(0.0)
     width = 0.5 * float(model.cable.outer_diameter.max())
     x = np.linspace(-4.0, 4.0, line.s.size)
@@ -49,7 +49,7 @@ def test_a_line_below_a_ring_is_behind_it_and_one_through_its_hole_is_not(
         "ring": 0.6,
         "radius": 0.1,
     }
-    model = build(as_scene(over_pipe(obstacles={"ring": ring})))
+    model = build(one_line(as_scene(over_pipe(obstacles={"ring": ring}))))
     state = model.start.copy()
     width = float(np.sign(height) * 0.5 * model.cable.outer_diameter.max() * (1 if axis == "y" else -1))
     state.r[:] = AT + np.stack([np.linspace(-4.0, 4.0, model.line.s.size), *np.zeros((2, model.line.s.size))], axis=1)

@@ -13,6 +13,7 @@ from scipy.special import ellipe, ellipk
 import hybrid
 from hybrid.model.build import build
 from hybrid.scene.depths import Depths
+from hybrid.scene.read import one_line
 from hybrid.solve.stability import Stability
 
 SPAN, WEIGHT = 100.0, 50.0 * 9.81
@@ -113,7 +114,7 @@ def test_the_softest_motion_of_a_strut_is_that_of_euler(cells: int) -> None:
         "initial": {"kind": "straight", "direction": [1, 0, 0]}, "model": "rod", "mesh": {"cells": cells},
         "dimension": 3, "time": {"duration": 1.0, "step": 0.1},
     })  # fmt: skip
-    model = build(scene)
+    model = build(one_line(scene))
     state = model.start.copy()
     state.T[:] = -P
     stability = Stability(model.line, model.sea.at(0.0), model.length, model.tension_scale)

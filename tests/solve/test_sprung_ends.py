@@ -12,6 +12,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import build
 from hybrid.model.line import ABOUT_CHORDS, line_on
+from hybrid.scene.read import one_line
 
 LENGTH, CELLS = 30.0, 20
 SECTION = {
@@ -75,7 +76,7 @@ def test_a_cable_on_springs_is_the_line_on_springs_of_several() -> None:
 def test_rods_that_come_and_go_have_the_same_springs(k: int) -> None:
     held = (START, END | {"bend_stiffness": 0.0})
     section = SECTION | {"bending_stiffness": 500.0}
-    model = build(hybrid.validate_scene(one(*held, cable={"sections": [section]}, model="adaptive")))
+    model = build(one_line(hybrid.validate_scene(one(*held, cable={"sections": [section]}, model="adaptive"))))
     assert model.on_base is not None and model.layout is not None
     line = model.on_base.line(model.layout, model.line.bits)
     other = line_on(model.cable, model.layout.nodes, model.layout.rod_cells, inertia=ABOUT_CHORDS)

@@ -15,6 +15,7 @@ import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import Model, build
+from hybrid.scene.read import one_line
 from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.new_run import new_run
 from hybrid.solve.joined import JoinedLine, NetworkState, joined_ends
@@ -34,7 +35,7 @@ def piece(kind: str, length: float, a: np.ndarray, b: np.ndarray, cells: int) ->
         "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": kind,
         "mesh": {"cells": cells}, "environment": WATER,
     }  # fmt: skip
-    return build(hybrid.validate_scene(tables))
+    return build(one_line(hybrid.validate_scene(tables)))
 
 
 class Cut:

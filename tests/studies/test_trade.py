@@ -18,6 +18,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
+from hybrid.scene.read import one_line
 from hybrid.store.tradeoff_table import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
 from hybrid.studies import runs, tradeoff
 from hybrid.view.study_report import plot_trade
@@ -183,12 +184,12 @@ def test_who_asks_for_other_programs_is_told_where_they_are(compute: Any, tmp_pa
 
 
 def test_a_run_keeps_the_scene_and_drops_its_resolution() -> None:
-    asked = hybrid.validate_scene(runs.scene_data(scene(), "adaptive", "0.3%"))
+    asked = hybrid.validate_scene(runs.scene_data(one_line(scene()), "adaptive", "0.3%"))
     assert asked.mesh is None and asked.time is not None and asked.time.step is None
     assert asked.accuracy is not None and asked.accuracy.position == "0.3%"
     assert asked.model.kind == "adaptive" and asked.model.tolerance is None and asked.model.force_rod == ((0.0, 1.0),)
     assert asked.cable == scene().cable and asked.ends == scene().ends and asked.output.points == 25
-    assert runs.scene_data(scene(), "rod", "1%")["model"] == {"kind": "rod"}
+    assert runs.scene_data(one_line(scene()), "rod", "1%")["model"] == {"kind": "rod"}
 
 
 def test_models_are_those_of_the_schema_that_the_scene_admits() -> None:
@@ -197,7 +198,7 @@ def test_models_are_those_of_the_schema_that_the_scene_admits() -> None:
     data = soft.model_dump(mode="json", exclude_none=True)
     del data["cable"]["sections"][0]["bending_stiffness"]
     soft = hybrid.validate_scene(data | {"model": "catenary"})
-    admitted = [kind for kind, why in tradeoff._models(soft, None).items() if not why]
+    admitted = [kind for kind, why in tradeoff._models(one_line(soft), None).items() if not why]
     assert "catenary" in admitted and "rod" not in admitted
 
 
@@ -230,7 +231,7 @@ def test_a_scene_without_time_is_refused(tmp_path: Path) -> None:
     ("accuracies", "reference"), [(["10%", "3%"], "0.03%"), (["0.06%"], "0.02%"), (["3 cm"], "0.03%")]
 )
 def test_the_reference_is_finer_than_the_ladder(accuracies: list[str], reference: str) -> None:
-    assert tradeoff._finer(scene(), accuracies) == reference
+    assert tradeoff._finer(one_line(scene()), accuracies) == reference
     assert (
         tradeoff._coarser("0.03%") == "0.09%"
         and tradeoff._coarser("8%") == "10%"

@@ -20,8 +20,8 @@ from hybrid.model.bodies import body_model
 from hybrid.model.build import build
 from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody, turned
-from hybrid.scene.network_scene import Network
-from hybrid.scene.read import as_scene
+from hybrid.scene.network import Network
+from hybrid.scene.read import as_scene, one_line
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.network_solver import NetworkSolver
@@ -402,12 +402,12 @@ def thrown(friction: float, step: float) -> tuple[Any, list[float], Any, float]:
         initial_guess=(1.2, 0.3, 0.0), initial_rotation=(10, 20, 30), mass=2.0, inertia=(0.1, 0.2, 0.25),
         centre=(0.05, 0.02, -0.03), shape={"kind": "sphere", "radius": 0.3, "friction": friction, "stiffness": 1e4},
     )  # fmt: skip
-    model = build(hybrid.validate_scene({
+    model = build(one_line(hybrid.validate_scene({
         "environment": {"gravity": 1e-15}, "cable": {"sections": [section]}, "contact": {"self": False},
         "ends": {"start": "free", "end": "free"}, "model": "rod", "mesh": {"cells": 60}, "dimension": 3,
         "initial": {"kind": "points", "points": [[0, 0, 0.35], [3, 0, 0.35]]}, "obstacles": body.surface("ball"),
         "time": {"duration": 1.0, "step": 0.1},
-    }))  # fmt: skip
+    })))  # fmt: skip
     state = model.start.copy()
     state.v[:] = (0.5, 0.0, -4.0)
     one = body_model("ball", body, 0.0, 0.0)

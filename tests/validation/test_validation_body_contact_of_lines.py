@@ -20,7 +20,7 @@ from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import shared_of

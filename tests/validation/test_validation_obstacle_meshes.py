@@ -12,6 +12,7 @@ import hybrid
 from hybrid.errors import ResultError
 from hybrid.kernels.laws.obstacles import distances
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 from hybrid.view.figure import Area
 from hybrid.view.obstacles import closed_way, obstacles_at, outlines, rings, surfaces
 from hybrid.view.projections import view_named
@@ -116,7 +117,7 @@ def test_no_step_carries_a_line_through(folder: Path) -> None:
     tables = falling(0.02, 20.0, obstacles={"bar": bar})
     tables["initial"]["origin"] = [-1.0, 0.0, 0.5]
     tables["cable"]["sections"][0]["max_strain"] = 0.2
-    result, sea = hybrid.run(tables), build(hybrid.validate_scene(tables)).sea.values
+    result, sea = hybrid.run(tables), build(one_line(hybrid.validate_scene(tables))).sea.values
     away = np.array([distances(sea, x)[0].min() for x in result.position])
     assert -0.01 < away.min() < 1e-3
     assert result.position[:, 50, 2].min() > 0.05
@@ -134,7 +135,7 @@ def test_a_result_is_drawn_without_the_file_and_not_gone_on_with(folder: Path, t
     )
     tables["time"] = {"duration": 0.04, "step": 0.01}
     hybrid.run(tables, tmp_path / "run.h5").close()
-    sea = build(hybrid.validate_scene(tables)).sea.values
+    sea = build(one_line(hybrid.validate_scene(tables))).sea.values
     text_stl(Path(file), prism(0.31, 6, 0.8))
     with pytest.raises(ResultError, match=r"hull\.stl"):
         hybrid.resume(tmp_path / "run.h5", until=0.06)

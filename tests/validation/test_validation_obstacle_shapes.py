@@ -10,6 +10,7 @@ import pytest
 import hybrid
 from hybrid.kernels.laws.obstacles import distances
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 from hybrid.view.figure import Area
 from hybrid.view.obstacles import outlines, surfaces
 from hybrid.view.projections import view_named
@@ -58,7 +59,7 @@ def test_tension_grows_by_the_exponential_of_the_angle(kind: str) -> None:
 def test_a_smooth_surface_presses_by_tension_over_radius(kind: str) -> None:
     """T/R by the law of contact from the penetration, on the inside of a ring and in a groove."""
     tables = over(kind, 10.0, friction=0.0)
-    result, sea = ran(tables), build(hybrid.validate_scene(tables)).sea.values
+    result, sea = ran(tables), build(one_line(hybrid.validate_scene(tables))).sea.values
     x = result.position[-1]
     *_, stiffness, _, onset, _ = sea.obstacles[0]
     depth = 0.5 * onset - distances(sea, x)[0][x[:, 2] > 0.2 * CENTRELINE]
@@ -87,7 +88,7 @@ def laid() -> Any:
 
 def test_an_equilibrium_over_a_beam_is_found_from_the_scene_alone(laid: Any) -> None:
     """It lies on the beam that its catenary would pass through, and nowhere deeper than it may."""
-    away = distances(build(hybrid.validate_scene(over_box())).sea.values, laid.position[0])[0]
+    away = distances(build(one_line(hybrid.validate_scene(over_box()))).sea.values, laid.position[0])[0]
     assert -0.05 * 0.05 < away.min() < 0.0
     assert {e.kind for e in laid.events} == {"static friction neglected"}
 
@@ -115,7 +116,7 @@ def test_no_step_carries_a_line_through(kind: str) -> None:
         "kind": "straight", "direction": [1, 0, 0], "origin": [-1.0, 0.0, 0.5], "velocity": [0, 0, -20]}}  # fmt: skip
     tables["cable"]["sections"][0]["max_strain"] = 0.2
     result = ran(tables)
-    sea = build(hybrid.validate_scene(tables)).sea.values
+    sea = build(one_line(hybrid.validate_scene(tables))).sea.values
     away = np.array([distances(sea, x)[0].min() for x in result.position])
     assert -0.01 < away.min() < 1e-3
     assert result.position[:, 50, 2].min() > 0.05
@@ -137,7 +138,7 @@ def test_drawings_of_boxes_rings_and_sheaves() -> None:
     tables["time"] = {"duration": 0.02, "step": 0.01}
     scene = hybrid.validate_scene(tables)
     result = hybrid.run(scene)
-    sea = build(scene).sea.values
+    sea = build(one_line(scene)).sea.values
     drawn = surfaces(result, np.array([[-4.0, -4.0, -4.0], [4.0, 4.0, 4.0]]))
     for each in drawn:
         x = np.column_stack([each[a] for a in "xyz"])

@@ -15,6 +15,7 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, capstan, heavy_capstan, over_pipe
 
 MU = 0.3
@@ -59,7 +60,7 @@ def test_energy_of_a_capstan_is_booked(slid: Any) -> None:
 def test_a_smooth_drum_presses_by_tension_over_radius() -> None:
     """T/R along the arc, by the law of contact from the penetration; and the tension is the same everywhere."""
     tables = capstan(0.0, 10.0)
-    result, sea = ran(tables), build(hybrid.validate_scene(tables)).sea.values
+    result, sea = ran(tables), build(one_line(hybrid.validate_scene(tables))).sea.values
     *_, stiffness, _, onset, _ = sea.obstacles[0]
     depth = -distances(result, -1, CENTRELINE) + 0.5 * onset
     pressure = stiffness * np.where(depth < onset, 0.5 * depth**2 / onset, depth - 0.5 * onset)
@@ -104,7 +105,7 @@ def test_an_equilibrium_over_a_pipe_is_found_from_the_scene_alone(laid: Any) -> 
 
 def test_ends_and_pipe_bear_the_weight(laid: Any) -> None:
     """The force of the pipe as the derivative of the energy that it stores by a shift of the line."""
-    model = build(hybrid.validate_scene(over_pipe()))
+    model = build(one_line(hybrid.validate_scene(over_pipe())))
     r, shift = laid.position[0], 1e-7 * np.eye(3)
     energy = [stored_energy(model.line, model.sea.values, r + k * x) for x in shift for k in (-1.0, 1.0)]
     pressed = -np.diff(np.array(energy).reshape(3, 2), axis=1)[:, 0] / 2e-7
@@ -191,7 +192,7 @@ def test_a_line_that_sinks_into_a_soft_obstacle_is_said() -> None:
 def test_the_program_places_cells_that_follow_a_radius() -> None:
     tables = falling(0.01)
     del tables["mesh"]
-    model = build(hybrid.validate_scene(tables))
+    model = build(one_line(hybrid.validate_scene(tables)))
     assert model.line.h.max() <= 0.25 * (0.1 + 0.01)
     assert any(x.what.startswith("obstacle pipe: cylinder") and x.on for x in model.contents)
 

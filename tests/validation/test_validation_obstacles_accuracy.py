@@ -9,6 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.model.resolution import first_resolution
+from hybrid.scene.read import one_line
 from tests.validation.obstacle_scenes import over_pipe
 
 Tables = dict[str, Any]
@@ -118,7 +119,7 @@ def test_steps_resolve_the_motion_of_an_obstacle() -> None:
         ({"spin": {"rate": -5.0, "ramp": 3.0}}, 0.05), ({"spin": {"rate": 0.1, "ramp": 1.5}}, 0.125),
         ({"motion": {"travel": {"by": [0, 0, 0.1], "over": 2.4}}}, 0.2),
     ):  # fmt: skip
-        assert first_resolution(hybrid.validate_scene(scene(None, 6.0, **pipe))).step == pytest.approx(
+        assert first_resolution(one_line(hybrid.validate_scene(scene(None, 6.0, **pipe)))).step == pytest.approx(
             longest, rel=1e-9
         )
 

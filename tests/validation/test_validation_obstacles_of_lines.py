@@ -12,7 +12,7 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.model.network import build_system
-from hybrid.scene.network_scene import Network
+from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, Tables, drum, half_turn, over_pipe
 

@@ -13,6 +13,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.state.obstacle_rows import OBSTACLE, PIECE_END, STIFFNESS, STRAND, THINNER
 from hybrid.model.build import build
 from hybrid.model.obstacles import obstacle_rows
+from hybrid.scene.read import one_line
 from hybrid.simulation.payout_nodes import NodeChanges
 from tests.combinations.pairs import as_network, seen_by, turned_and_mirrored
 from tests.problems import tables_with
@@ -240,8 +241,8 @@ def test_obstacles_are_as_hard_as_what_will_be_out_asks_for() -> None:
     whole = hybrid.validate_scene(tables_with(scene, {"cable.sections": [section, *reel]}))
     paid = tables_with(scene, {"ends.end.payout": {"rate": 10.0, "ramp": 0.1, "until": 6.0, "reel": reel,
                                                    "longest": 72.0}})  # fmt: skip
-    (row,), (now,) = obstacle_rows(whole), obstacle_rows(hybrid.validate_scene(scene))
-    (found,) = obstacle_rows(hybrid.validate_scene(tables_with(paid, {"time.duration": 1.0})))
+    (row,), (now,) = obstacle_rows(one_line(whole)), obstacle_rows(hybrid.validate_scene(scene))
+    (found,) = obstacle_rows(one_line(hybrid.validate_scene(tables_with(paid, {"time.duration": 1.0}))))
     assert found[STRAND] == row[STRAND] == 0.025
     assert found[STIFFNESS] == pytest.approx(row[STIFFNESS], rel=0.2) and found[STIFFNESS] > 2.0 * now[STIFFNESS]
     pieces = found[OBSTACLE:].reshape(-1, 2)
@@ -254,4 +255,4 @@ def test_what_is_on_the_reel_needs_a_diameter() -> None:
     reel = {key: x for key, x in scene["cable"]["sections"][0].items() if key != "diameter"}
     scene["ends"]["end"]["payout"]["reel"] = [reel]
     with pytest.raises(SceneError, match=r"ends\.end\.payout\.reel\[0\]\.diameter"):
-        build(hybrid.validate_scene(scene))
+        build(one_line(hybrid.validate_scene(scene)))

@@ -20,6 +20,7 @@ from hybrid.model.bodies import body_model
 from hybrid.model.build import build
 from hybrid.model.lines_contact import Touching
 from hybrid.scene.bodies import FreeBody
+from hybrid.scene.read import one_line
 from hybrid.simulation.self_watch import diameters, least_bending
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.network_solver import NetworkSolver
@@ -77,12 +78,12 @@ def throw(
     for r, v in zip(shapes, speeds, strict=True):
         r = r if turn is None else r @ turn.T
         s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
-        model = build(hybrid.validate_scene({
+        model = build(one_line(hybrid.validate_scene({
             "environment": {"gravity": 1e-15}, "cable": {"sections": [section(float(s[-1]), width)]},
             "contact": {"self": True}, "ends": {"start": "free", "end": "free"}, "model": kind,
             "mesh": {"nodes": s.tolist()}, "initial": {"kind": "points", "points": r.tolist()}, "dimension": 3,
             "time": {"duration": 1.0, "step": 0.1},
-        } | around))  # fmt: skip
+        } | around)))  # fmt: skip
         state = model.start.copy()
         state.v[:] = v if turn is None else v @ turn.T
         x = JoinedLine(

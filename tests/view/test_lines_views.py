@@ -22,7 +22,7 @@ from hybrid.cli.plan_tables import plan_rows
 from hybrid.cli.result_tables import show_equilibrium, show_motion
 from hybrid.errors import ResultError
 from hybrid.scene.read import as_scene
-from hybrid.scene.short_form import network_of
+from hybrid.scene.root import in_full
 from hybrid.store.records import Zone
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks, Text
@@ -221,7 +221,7 @@ def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None
     assert "None, beside limits that are broken." in text and "None were given." not in text
 
 
-@pytest.fixture(scope="module", params=[as_scene, network_of])
+@pytest.fixture(scope="module", params=[as_scene, in_full])
 def alone(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
     """A line without a name, and the same with one."""
     ends = {name: {"kind": "pinned", "position": [x, 0, 0]} for name, x in ENDS.items()}
@@ -264,7 +264,7 @@ def test_the_table_of_a_run_judges_each_line(path: Path, capsys: pytest.CaptureF
     assert "; max_tension of 1000 N BROKEN" in east and "BROKEN" not in north
 
 
-@pytest.mark.parametrize("form", [as_scene, network_of])
+@pytest.mark.parametrize("form", [as_scene, in_full])
 def test_zones_and_the_search_are_said_of_one_line_and_of_many(
     form: Callable[[Any], hybrid.Scene], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -19,6 +19,7 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, take_arcs
 from hybrid.kernels.state.state import no_sea
 from hybrid.outputs.probes import Observer
+from hybrid.scene.read import one_line
 from hybrid.simulation import zones_at_rest
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.old_checkpoints import zoning_of_today
@@ -411,8 +412,8 @@ def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.Mo
 def test_what_is_asked_along_the_line_is_a_share_of_the_rule(asked: str, share: int) -> None:
     """A quarter of it; a curvature error that is smaller stands."""
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [f"accuracy={{{asked}: 4%}}", "model=adaptive"])
-    assert shares_asked(scene, None) == {share: 0.01}
-    assert shares_asked(scene, 0.01)[CURVATURE] == 0.01 and shares_asked(scene, 0.03)[share] == 0.01
+    assert shares_asked(one_line(scene), None) == {share: 0.01}
+    assert shares_asked(one_line(scene), 0.01)[CURVATURE] == 0.01 and shares_asked(one_line(scene), 0.03)[share] == 0.01
 
 
 def test_zones_of_an_older_checkpoint() -> None:

@@ -19,6 +19,7 @@ from hybrid.kernels.mesh.zone_transfer import blank_transfer, transfer
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, no_sea
 from hybrid.model.resolution import wants_survey
+from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import compared_cells, usual_cells
 from hybrid.store.records import MeshHistory, ZoneHistory, node_bits
 from hybrid.store.records import Zone as ZoneRow
@@ -158,8 +159,8 @@ def test_no_pre_run_and_no_stricter_zones_where_cells_follow() -> None:
     """
     follows = hybrid.validate_scene(SCENE)
     stays = hybrid.validate_scene(SCENE | {"model": {"kind": "adaptive"}})
-    assert wants_survey(stays) and free_in(stays).zones
-    assert not wants_survey(follows) and not free_in(follows).zones and free_in(follows).mesh
+    assert wants_survey(one_line(stays)) and free_in(one_line(stays)).zones
+    assert not wants_survey(one_line(follows)) and not free_in(one_line(follows)).zones and free_in(follows).mesh
 
 
 # --- a bend that wanders through compressed line ---

@@ -27,7 +27,7 @@ import numpy as np
 
 from hybrid.scene.ends import Pinned
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.root import Scene
 from peers.adapters.ancf import Exudyn
 from peers.adapters.decks import CableDyn, MoorDyn
 from peers.adapters.interface import Peer, PeerFailed, PeerResult, PeerRun

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from hybrid.model.plan import output_times
-from hybrid.scene.read import parse_scene
+from hybrid.scene.read import one_line, parse_scene
 from peers.adapters import PEERS
 from peers.adapters.interface import PeerFailed, PeerRun, line_of
 
@@ -36,7 +36,7 @@ def main(folder: Path) -> None:
     task = json.loads((folder / "task.json").read_text(encoding="utf-8"))
     scene, peer_run = parse_scene(task["scene"]), PeerRun(**task["run"])
     with silence():
-        found = PEERS[peer_run.code].run(line_of(scene), peer_run, [0.0, *output_times(scene)])
+        found = PEERS[peer_run.code].run(line_of(scene), peer_run, [0.0, *output_times(one_line(scene))])
     if not all(np.isfinite(x).all() for x in found.values.values()):
         raise PeerFailed("its result is not finite")
     np.savez(folder / "values.npz", **found.values)  # type: ignore[arg-type]

@@ -14,8 +14,8 @@ from hybrid.model.sections import output_points
 from hybrid.scene.ends import Pinned
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.motion_checks import shortest_period
-from hybrid.scene.read import validate_scene
-from hybrid.scene.schema import Scene
+from hybrid.scene.read import one_line, validate_scene
+from hybrid.scene.root import Scene
 
 # Depth, m, of the upper end below the surface of the other code, for a scene without one: more than any heave.
 SUBMERGENCE = 50.0
@@ -107,7 +107,7 @@ class Line:
             "model": "catenary",
             "mesh": {"cells": elements},
         }
-        return np.asarray(build(validate_scene(data)).start.r) + self.shift
+        return np.asarray(build(one_line(validate_scene(data))).start.r) + self.shift
 
     def places(self, nodes: np.ndarray) -> np.ndarray:
         """Positions (ns, 3) at the output points, by a spline through nodes (n+1, 3) that are equally spaced."""
@@ -144,7 +144,7 @@ def line_of(scene: Scene) -> Line:
         scene.environment.gravity, fluid.density, (bed.z + up, bed.stiffness, bed.damping) if bed else None,
         (EndMotion(ends[0].motion, ends[0].position), EndMotion(ends[1].motion, ends[1].position)),
         min(shortest_period(scene.ends, scene.environment), scene.require_time().duration),
-        up, output_points(scene).s, scene,
+        up, output_points(one_line(scene)).s, scene,
     )  # fmt: skip
 
 

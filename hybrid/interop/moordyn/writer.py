@@ -25,7 +25,6 @@ from hybrid.interop.moordyn.bodies import body_row
 from hybrid.interop.moordyn.tables import NEAR
 from hybrid.scene.cable import Section
 from hybrid.scene.read import read_text
-from hybrid.scene.short_form import network_of, short_form
 
 Triple = tuple[float, float, float]
 NO_BED = 1e4  # m under the surface, where a scene has none
@@ -101,8 +100,8 @@ def deck_of(result: Computed) -> WrittenDeck:
     SceneError, with every complaint, if the scene has what MoorDyn has not.
     """
     scene, _ = read_text(result.scene_text)
-    form, lines = short_form(scene), result.lines or {"": result}
-    writer = _Writer(network_of(scene), {name: _shape(lines[called]) for name, called in form.names.items()})
+    form, lines = scene.form, result.lines or {"": result}
+    writer = _Writer(scene, {name: _shape(lines[called]) for name, called in form.names.items()})
     for name in scene.bodies:
         place, turned = (result[f"bodies/{name}/{key}"][0].tolist() for key in ("position", "rotation"))
         writer.add_body(name, place, turned)

@@ -1,4 +1,4 @@
-"""A scene of several lines, and what may contradict in it: between points, bodies and lines, and in each line alone."""
+"""What may contradict in a network: between points, bodies and lines, and in each line alone."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from dataclasses import replace
 from itertools import chain, combinations
 from typing import Any
 
-from pydantic import ValidationError, model_validator
+from pydantic import ValidationError
 
 from hybrid.scene.analysis import Equilibrium
-from hybrid.scene.base import Finding, Place, nearest, refuse
+from hybrid.scene.base import Finding, Place, nearest
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.checks import elevation_has_waves
 from hybrid.scene.combinations import holds_rod, refused, tables_of
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.motion_tables import TURNS, Motion, farthest, moving_key, shift, smaller
-from hybrid.scene.network import JoinedLine, NetworkTables
+from hybrid.scene.network import JoinedLine, Network
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import ClampedConnection, Fairlead, FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.quantities import of_several_lines
@@ -27,17 +27,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.scene.start_checks import SAME_LENGTH
 
 
-class Network(NetworkTables):
-    """Lines, the points where they end and meet, what acts on them, and what is asked."""
-
-    @model_validator(mode="after")
-    def _lines_join_points(self) -> Network:
-        for findings in system_findings(self):
-            refuse(findings)
-        return self
-
-
-def system_findings(system: NetworkTables) -> Iterator[Iterator[Finding]]:
+def findings_of(system: Network) -> Iterator[Iterator[Finding]]:
     """What contradicts in a system, in groups: of the first one with findings no later one makes sense."""
     yield _unknown_names(system)
     yield _refused_combinations(system)
@@ -54,11 +44,11 @@ def system_findings(system: NetworkTables) -> Iterator[Iterator[Finding]]:
     yield of_several_lines(system.output.quantities, system.lines, system.environment.seabed is not None)
 
 
-def _refused_combinations(system: NetworkTables) -> Iterator[Finding]:
+def _refused_combinations(system: Network) -> Iterator[Finding]:
     yield from dict.fromkeys(x for tables in tables_of(system) for x in refused(tables))
 
 
-def _unknown_names(system: NetworkTables) -> Iterator[Finding]:
+def _unknown_names(system: Network) -> Iterator[Finding]:
     for name, line in system.lines.items():
         for key in ("start", "end"):
             yield from _unknown(getattr(line, key), system.points, ("lines", name, key), "point")
@@ -77,7 +67,7 @@ def _unknown_names(system: NetworkTables) -> Iterator[Finding]:
             yield from _unknown(name, system.lines, ("output", key, name), "line")
 
 
-def _lonely_points(system: NetworkTables) -> Iterator[Finding]:
+def _lonely_points(system: Network) -> Iterator[Finding]:
     for name, point in system.points.items():
         if not system.lines_at(name):
             kind = "a free point" if isinstance(point, FreePoint) else "a point"
@@ -102,7 +92,7 @@ def _lonely_points(system: NetworkTables) -> Iterator[Finding]:
             yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
 
 
-def _guided_findings(system: NetworkTables, name: str) -> Iterator[Finding]:
+def _guided_findings(system: Network, name: str) -> Iterator[Finding]:
     """What is wrong with a guided point: one line is clamped there, in a direction of the world."""
     (line, end), *others = system.lines_at(name)
     if others:
@@ -119,7 +109,7 @@ def _guided_findings(system: NetworkTables, name: str) -> Iterator[Finding]:
         yield Finding((*at, key), expected, "leave it out")
 
 
-def floating_groups(system: NetworkTables) -> Iterator[Finding]:
+def floating_groups(system: Network) -> Iterator[Finding]:
     """Free points and bodies from which no way along lines leads to what is fixed: none of them has an equilibrium."""
     ways = [{x.start, x.end} for x in system.lines.values()]
     ways += [{p, f"body {x.body}"} for p, x in system.points.items() if isinstance(x, Fairlead)]
@@ -141,7 +131,7 @@ def floating_groups(system: NetworkTables) -> Iterator[Finding]:
             yield Finding(("bodies", name), expected, "let one of its lines end at a fixed point", "nothing holds it")
 
 
-def _start_findings(system: NetworkTables) -> Iterator[Finding]:
+def _start_findings(system: Network) -> Iterator[Finding]:
     """Lines of which some start in equilibrium and others do not, and a velocity that points do not have."""
     placed = [name for name, line in system.lines.items() if not isinstance(line.initial, Equilibrium)]
     for name, line in system.lines.items() if placed else ():
@@ -154,7 +144,7 @@ def _start_findings(system: NetworkTables) -> Iterator[Finding]:
             yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
 
 
-def _touching_findings(system: NetworkTables) -> Iterator[Finding]:
+def _touching_findings(system: Network) -> Iterator[Finding]:
     """Lines that touch others have a diameter, and there are others."""
     if system.contact is not None and len(system.lines) == 1:
         expected = "nothing, because there is one line; whether it touches itself is asked by lines.NAME.contact"
@@ -166,7 +156,7 @@ def _touching_findings(system: NetworkTables) -> Iterator[Finding]:
                 yield Finding(("lines", name, "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
 
 
-def _body_findings(system: NetworkTables, name: str) -> Iterator[Finding]:
+def _body_findings(system: Network, name: str) -> Iterator[Finding]:
     """What is wrong with the motion of a body, or with what is given to act on it."""
     body, still = system.bodies[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
     if isinstance(body, FreeBody):
@@ -186,7 +176,7 @@ def _body_findings(system: NetworkTables, name: str) -> Iterator[Finding]:
     yield from _load_findings(system, ends, line, ("bodies", name))
 
 
-def _moment_findings(system: NetworkTables, name: str) -> Iterator[Finding]:
+def _moment_findings(system: Network, name: str) -> Iterator[Finding]:
     """What is wrong with the moment on a free point."""
     point, still = system.points[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
     if isinstance(point, FreePoint) and point.moment is not None:
@@ -194,7 +184,7 @@ def _moment_findings(system: NetworkTables, name: str) -> Iterator[Finding]:
         yield from _load_findings(system, ends, system.lines[line], ("points", name))
 
 
-def _load_findings(system: NetworkTables, ends: Ends | None, line: JoinedLine, at: Place) -> Iterator[Finding]:
+def _load_findings(system: Network, ends: Ends | None, line: JoinedLine, at: Place) -> Iterator[Finding]:
     """What is wrong with motions and loads of ends that stand for what is at another place of the system."""
     tables = {"ends": ends, "time": system.time, "cable": line.cable, "environment": system.environment}
     for found in motion_findings(tables):
@@ -202,7 +192,7 @@ def _load_findings(system: NetworkTables, ends: Ends | None, line: JoinedLine, a
         yield Finding(where, found.expected, found.fix, found.given)
 
 
-def _line_findings(system: NetworkTables, name: str) -> Iterator[Finding]:
+def _line_findings(system: Network, name: str) -> Iterator[Finding]:
     """What is wrong with a line and its points, each under its own key of the system."""
     wrong: dict[Finding, None] = {}  # each once
     for carrying in ((), *((key,) for key in system.carried(name))):
@@ -221,7 +211,7 @@ def _line_findings(system: NetworkTables, name: str) -> Iterator[Finding]:
     yield from (_of_system(system, name, found) for found in wrong)
 
 
-def _in_a_plane(system: NetworkTables) -> Iterator[Finding]:
+def _in_a_plane(system: Network) -> Iterator[Finding]:
     """What leaves the plane of all lines."""
     scenes = {name: system.scene_of(name, system.carried(name)) for name in system.lines if system.dimension == 2}
     tables = [(x.environment, x.ends, x.initial) for x in scenes.values()]
@@ -233,7 +223,7 @@ def _in_a_plane(system: NetworkTables) -> Iterator[Finding]:
     yield from found
 
 
-def _of_system(system: NetworkTables, name: str, found: Finding) -> Finding:
+def _of_system(system: Network, name: str, found: Finding) -> Finding:
     line, at = system.lines[name], found.at
     if at[:1] == ("obstacles",):  # which are those of all lines
         carried = len(at) > 1 and at[1] in system.shaped
@@ -281,7 +271,7 @@ def _unknown(name: str, known: Mapping[str, Any], at: Place, what: str) -> Itera
 # --- how the ends of lines are connected ---------------------------------------------------------
 
 
-def connection_findings(system: NetworkTables) -> Iterator[Finding]:
+def connection_findings(system: Network) -> Iterator[Finding]:
     """What is wrong with the connections of a system of lines."""
     for name in system.lines:
         for key in ("start", "end"):
@@ -303,7 +293,7 @@ def connection_findings(system: NetworkTables) -> Iterator[Finding]:
             yield from _rigid_point_findings(system, name)
 
 
-def _clamp_findings(system: NetworkTables, name: str, key: str, held: ClampedConnection) -> Iterator[Finding]:
+def _clamp_findings(system: Network, name: str, key: str, held: ClampedConnection) -> Iterator[Finding]:
     line, point = system.lines[name], getattr(system.lines[name], key)
     at = ("lines", name, "connections", key)
     stays = system.is_held(point) or isinstance(system.points[point], GuidedPoint)
@@ -314,7 +304,7 @@ def _clamp_findings(system: NetworkTables, name: str, key: str, held: ClampedCon
         yield Finding((*at, "tangent"), "the direction of the line at this end", "add `tangent: [0, 0, 1]`", "nothing")
 
 
-def _rigid_point_findings(system: NetworkTables, name: str) -> Iterator[Finding]:
+def _rigid_point_findings(system: Network, name: str) -> Iterator[Finding]:
     """What is wrong with lines that are clamped to a free point."""
     here, point = system.clamped_at(name), system.points[name]
     if not here:
@@ -344,7 +334,7 @@ def _rigid_point_findings(system: NetworkTables, name: str) -> Iterator[Finding]
 # --- how far points that are held may be from each other -----------------------------------------
 
 
-def travel_findings(system: NetworkTables) -> Iterator[Finding]:
+def travel_findings(system: Network) -> Iterator[Finding]:
     """Points that are, or move, farther from another than all lines between them are long, at the utmost strain."""
     # what is broken reaches anywhere
     duration = system.time.duration if system.time is not None and not system.may_break else 0.0
@@ -373,14 +363,14 @@ def travel_findings(system: NetworkTables) -> Iterator[Finding]:
         return
 
 
-def _motion(system: NetworkTables, name: str) -> Motion | None:
+def _motion(system: Network, name: str) -> Motion | None:
     """The motion of a fixed point, if tables move it."""
     point = system.points[name]
     motion = point.motion if isinstance(point, FixedPoint) else None
     return motion if motion is not None and moving_key(motion) else None
 
 
-def _beside(system: NetworkTables, a: str, b: str) -> bool:
+def _beside(system: Network, a: str, b: str) -> bool:
     """Whether a point is on a body that moves as is known, whose motion is not followed here."""
     bodies = [system.body_of(x) for x in (a, b)]
     return any(isinstance(x, FixedBody) and x.motion is not None for x in bodies)
@@ -390,7 +380,7 @@ def _beside(system: NetworkTables, a: str, b: str) -> bool:
 Neighbours = Mapping[str, list[tuple[str, float, tuple[str, ...]]]]
 
 
-def _neighbours(system: NetworkTables) -> Neighbours:
+def _neighbours(system: Network) -> Neighbours:
     """Points beside each point, along a line or on the same free body."""
     beside: dict[str, list[tuple[str, float, tuple[str, ...]]]] = {name: [] for name in system.points}
     for key, line in system.lines.items():
