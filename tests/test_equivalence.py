@@ -94,58 +94,6 @@ def test_a_turned_scene_gives_the_turned_answer(model, turn):
         assert_alike(hybrid.run(released(model)), hybrid.run(released(model, rotate)), MOVING, rotate)
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_a_mirrored_scene_gives_the_mirrored_answer(model):
-    """A mirror turns the sense of twist: torsion and the second and third intrinsic strain change sign."""
-    mirror = np.diag([1.0, -1.0, 1.0])
-    mirrored = [dict(SECTIONS[0]), SECTIONS[1]]
-    k1, k2, k3 = SECTIONS[0]["intrinsic_curvature"]
-    # material axes: a1 is mirrored to a1, a2 = d x a1 to minus the mirrored a2
-    mirrored[0]["intrinsic_curvature"] = [-k1, k2, -k3]
-    for solve, make, tolerance in ((hybrid.static, scene, STATIC), (hybrid.run, released, MOVING)):
-        a, b = solve(make(model)), solve(make(model, mirror, mirrored))
-        assert_alike(a, b, tolerance, mirror)
-        if model == "rod":
-            assert np.abs(a.torque + b.torque).max() < 100 * tolerance * np.abs(a.torque).max()
-
-
-def hanging(model, swapped=False, motion=True):
-    """A sagging line between two points, one of them clamped and one moving; or the same told from the other end."""
-    first = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0.1, -0.4]}
-    last = {"kind": "pinned", "position": [1.2, 0.3, 0.2]}
-    if motion:
-        last["motion"] = {
-            "heave": {"amplitude": 0.1, "period": 2.5},
-            "sway": {"amplitude": 0.05, "period": 3.1},
-            "ramp": 2.0,
-        }
-    sections = [{k: v for k, v in s.items() if k != "intrinsic_curvature"} for s in SECTIONS]
-    sections[0]["bending_stiffness"] = 0.05
-    zones = {
-        "rod": [("rod", 2.0, 40)],
-        "catenary": [("catenary", 2.0, 40)],
-        "hybrid": [("rod", 0.5, 10), ("catenary", 1.5, 30)],
-    }[model]
-    if swapped:
-        first["tangent"] = [-x for x in first["tangent"]]
-        first, last = last, first
-        sections, zones = sections[::-1], zones[::-1]
-    return hybrid.validate_scene(
-        {
-            "environment": {"gravity": 9.81, "fluid": {"density": 1000.0, "current": [0.2, 0.3, 0.0]}},
-            "cable": {"sections": sections}, "ends": {"start": first, "end": last}, "initial": {"kind": "equilibrium"},
-            "model": {"kind": "zones", "zones": [{kind: length, "cells": n} for kind, length, n in zones]},
-            "time": {"duration": 1.0, "step": 0.01}, "output": {"every": 0.2, "points": 40},
-        }
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_swapped_ends(model):
-    assert_alike(hybrid.static(hanging(model)), hybrid.static(hanging(model, swapped=True)), STATIC, flip=True)
-    assert_alike(hybrid.run(hanging(model)), hybrid.run(hanging(model, swapped=True)), MOVING, flip=True)
-
-
 @pytest.mark.parametrize(
     ("whole", "split"),
     [

@@ -10,7 +10,7 @@ import hybrid
 from hybrid.designs.motions import PART, TANGENT, Motions, Peaks
 from hybrid.designs.numbers import scene_with
 from hybrid.designs.wanted import over_time, peaks, smoothed
-from tests.designs.test_in_motion import G, W, as_lines, heaved, on_the_bed
+from tests.designs.test_in_motion import G, W, heaved, on_the_bed
 
 MASS, AMPLITUDE = "cable.sections[0].mass", "ends.start.motion.heave.amplitude"
 TOP = {"quantity": "tension", "at": "start", "over": "max"}
@@ -174,19 +174,6 @@ def test_slopes_of_a_motion_are_those_of_central_differences():
         more, less = motions.runs_of(x + d).runs[""].values, motions.runs_of(x - d).runs[""].values
         np.testing.assert_allclose(slopes[:, i], (more - less) / (2.0 * d[i]), rtol=(1e-3, 5e-2)[i])
     assert motions.count == 1 + 2 * TANGENT + 4
-
-
-@pytest.mark.needs("simpleeval")
-def test_written_as_a_system_it_is_the_same():
-    """A line that hangs from a point that is heaved, with a body below: of several lines."""
-    system = as_lines(heaved())
-    found = hybrid.design(
-        system, unknowns={"m": {"key": "lines.a.sections[0].mass", "low": 1, "high": 20}},
-        targets={"top": TOP | {"line": "a", "value": 3500.0}},
-    )  # fmt: skip
-    assert found.numbers["m"] == pytest.approx(brentq(lambda m: by_hand(m) - 3500.0, 1.0, 20.0), rel=3e-3)
-    assert found.kept[0].result == "max a/tension@start in motion" and found.runs <= 10
-    assert found.ways == {"": "tangents along the steps"}
 
 
 REFUSED = [

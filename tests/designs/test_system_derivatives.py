@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
-import yaml
-from typer.testing import CliRunner
 
 import hybrid
-from hybrid.cli.commands import app
 from hybrid.designs.numbers import with_number
 from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene
@@ -95,22 +90,6 @@ def test_what_is_refused():
     for key, words in (("points.top.drag_area", "a little more, and less"), ("lines.east.mesh.cells", "is computed")):
         with pytest.raises(hybrid.SceneError, match=words):
             hybrid.sensitivity(plain, ["east/tension@end"], [key])
-
-
-@pytest.mark.long
-def test_the_command(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mooring.yaml").write_text(yaml.safe_dump(moored(HELD)))
-    asked = ["sensitivity", "mooring.yaml", "--of", "east/tension@end", "--json"]
-    told = CliRunner().invoke(app, asked)
-    assert told.exit_code == 0, told.output
-    rows = [x for x in map(json.loads, told.output.splitlines()) if "elasticity" in x]
-    assert {x["by"].split(".")[1] for x in rows} == {"east", "north", "south"}
-    assert all(x["derivative"] == 0.0 for x in rows if "east" not in x["by"])
-    seek = ["seek", "mooring.yaml", "--target", "east/tension@end=22000", "--by", "lines.east.sections[0].length"]
-    told = CliRunner().invoke(app, [*seek, "-o", "new.yaml"])
-    assert told.exit_code == 0, told.output
-    assert as_scene(tmp_path / "new.yaml").lines["east"].cable.length < 185.0
 
 
 def test_a_named_quantity_of_a_line_is_a_result():

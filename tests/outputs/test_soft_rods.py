@@ -100,33 +100,6 @@ def test_steps_and_outputs_have_the_same(name: str) -> None:
     np.testing.assert_allclose(envelope, outputs, rtol=1e-6, atol=1e-9 * outputs.max())
 
 
-SAME = ("curvature", "envelope/curvature_max")
-
-
-def stepped(scene: dict[str, Any], again: bool) -> hybrid.Result:
-    """From outside; again: steps while stiffness is under way are taken back and computed again."""
-    with hybrid.Simulation(scene) as sim:
-        while sim.t < 11.99:
-            if again and 2.9 < sim.t < 4.2:
-                saved = sim.save()
-                sim.step()
-                sim.restore(saved)
-            sim.step()
-        return sim.result()
-
-
-@pytest.mark.long
-def test_stepped_from_outside_and_as_a_system_it_is_the_same() -> None:
-    """Steps that are taken back leave every bit; times of steps differ by a bit or two from those of a run."""
-    scene = slack(**LINES["60 m, level"], model=MOVES)
-    whole, plain, again = hybrid.run(scene), stepped(scene, False), stepped(scene, True)
-    one = hybrid.run(as_network(scene)).lines["cable"]
-    for name in SAME:
-        np.testing.assert_array_equal(again[name][:], plain[name][:])
-        np.testing.assert_allclose(plain[name][:], whole[name][:], rtol=1e-9, atol=1e-12)
-        np.testing.assert_allclose(one[name][:], whole[name][:], rtol=1e-6, atol=1e-9)
-
-
 LEFT: dict[str, dict[str, Any]] = {
     "tables of moment": {"moment_curvature": [[0, 0], [0.1, 1.0], [0.3, 2.4]], "bending_stiffness": None},
     "intrinsic curvature": {"intrinsic_curvature": [0, 0.001, 0], "torsional_stiffness": 8.0},

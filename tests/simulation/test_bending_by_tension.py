@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from math import cos, sin, sqrt
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import resumed
 from test_moment_tables import ANGLE
 from test_moment_tables import taut as with_law
 
@@ -69,11 +67,6 @@ def test_a_pull_that_falls_leads_to_the_rest_under_it_and_its_energy_is_booked()
         print(f"step {step} s: {booked:.3f} J of tension that changes the stiffness, {left[-1]:.4f} J left over")
         assert booked < -50.0  # stored energy falls with the stiffness
     assert left[1] < 1e-2 * abs(booked) and left[1] < 0.6 * left[0]
-
-
-@pytest.mark.long  # 1.1 s
-def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    resumed(falling(0.02, 2.0), tmp_path, 1.0)
 
 
 def heaved(grows: float) -> dict[str, Any]:

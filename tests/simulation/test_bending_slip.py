@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import resumed
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
@@ -193,19 +191,6 @@ def test_energy_is_kept_or_booked() -> None:
             assert (lost <= 1e-12).all() and lost.sum() < -1.0
         print(f"energy that no work accounts for, over the largest kinetic energy: {off}")
         assert off[0] < 1e-3 and off[1] < 0.35 * off[0]
-
-
-def test_a_cable_goes_on_bit_for_bit_and_is_stepped_from_outside(tmp_path: Path) -> None:
-    scene = swung(8e-3)
-    whole = resumed(scene, tmp_path, 0.48)
-    with hybrid.Simulation(scene, tmp_path / "stepped.h5") as simulation:
-        simulation.advance(0.48)
-        kept = simulation.save()
-        simulation.advance(0.8)
-        simulation.restore(kept)
-        simulation.advance(1.0)
-    stepped = hybrid.open(tmp_path / "stepped.h5")
-    assert np.abs(stepped.position - whole.position).max() < 1e-9
 
 
 @pytest.mark.parametrize(

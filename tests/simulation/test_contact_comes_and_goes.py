@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from bits import Stopping, differences, went_on
 from test_self_contact_default import WIDTH, led_through
-from test_system_contact import RUBS, system
 
 import hybrid
 import hybrid.solve.self_contact
@@ -79,14 +78,6 @@ def test_where_it_is_asked_for_a_failure_names_it() -> None:
         hybrid.ComputationError, match=r"contact of the line with itself is computed, s = .*self: false"
     ):
         hybrid.run(hybrid.validate_scene(led_through(contact={"self": True})))
-
-
-@pytest.mark.usefixtures("no_room")
-def test_of_a_system_likewise() -> None:
-    result = hybrid.run(system(contact={"friction": RUBS["friction"]}), progress=False)
-    assert result.status == "complete" and GIVEN_UP in kinds(result.lines["hose"])
-    with pytest.raises(hybrid.ComputationError, match=r"touches itself there, and contact: \{self: false\}"):
-        hybrid.run(system(), progress=False)
 
 
 # --- steps that collapse ------------------------------------------------------------------------------------

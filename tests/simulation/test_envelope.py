@@ -101,23 +101,6 @@ def test_zones_that_change_leave_it_on_the_finest_mesh_and_above_all_outputs() -
     assert envelope["tension_min"].min() <= lowest + 0.01 * abs(lowest)
 
 
-@pytest.mark.parametrize("settings", [("output={every: 0.5}",), ADAPTIVE])
-def test_a_simulation_that_takes_steps_back_has_the_same(settings: tuple[str, ...]) -> None:
-    asked = scene(*settings, "time.duration=2")
-    found = []
-    for twice in (False, True):
-        with hybrid.Simulation(asked) as simulation:
-            for t in (0.5, 1.0, 1.5, 2.0):
-                if twice:
-                    saved = simulation.save()
-                    simulation.advance(t)
-                    simulation.restore(saved)
-                simulation.advance(t)
-            found.append(simulation.result())
-    for name in found[0]["envelope"]:
-        assert found[0][f"envelope/{name}"].tobytes() == found[1][f"envelope/{name}"].tobytes(), name
-
-
 LIMITS = (
     "cable.sections[0].min_bend_radius=5", "cable.sections[1].max_tension=1000", "cable.sections[0].min_tension=0",
     "output={every: 2}",

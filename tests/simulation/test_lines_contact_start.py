@@ -74,31 +74,6 @@ def test_taut_catenaries_touch_as_if_asked() -> None:
     assert same(found, hybrid.run(tables | {"contact": {}})) < 1e-9
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("until", [0.2, 0.5])
-def test_a_run_goes_on_to_the_bit_from_before_and_after_contact_began(begun: Any, until: float, tmp_path: Path) -> None:
-    hybrid.run(unasked(until), tmp_path / "half.h5")
-    resumed = hybrid.resume(tmp_path / "half.h5", until=0.8)
-    assert same(begun, resumed) == 0.0
-    assert kinds(resumed).count(BEGINS) == 1
-
-
-def test_stepped_back_to_before_contact_began_it_begins_again(begun: Any) -> None:
-    with hybrid.Simulation(unasked()) as run:
-        run.advance(0.2)
-        saved = run.save()
-        run.advance(0.5)
-        run.restore(saved)
-        run.advance(0.5)
-        touching = run.save()
-        run.advance(0.8)
-        run.restore(touching)
-        run.advance(0.8)
-        result = run.result()
-    assert same(begun, result) < 1e-9
-    assert kinds(result).count(BEGINS) == 1
-
-
 def test_where_contact_is_off_or_an_accuracy_is_asked_lines_pass_and_that_is_said() -> None:
     assert BEGINS not in kinds(off := hybrid.run(unasked(contact=NOT_ASKED)))
     assert PASSAGE in kinds(off)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bits import Stopping, differences, went_on
+from bits import Stopping
 
 import hybrid
 from hybrid.scene.read import one_line, scene_text
@@ -96,15 +96,6 @@ def test_a_file_is_relative_to_its_scene(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text(text.replace("value: [0.0, 0.0, 1.0]", "file: f.csv"))
     found = hybrid.load_scene(tmp_path / "a.yaml").ends.end.loads[0]
     assert found.at(0.6) == pytest.approx((0.5, 0.0, -0.5))
-
-
-@pytest.mark.long  # 0.8 s
-def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch) -> None:
-    made = scene({"file": table(tmp_path / "f.csv")}, time={"duration": 2.0, "tolerance": 1e-4})
-    stopping = Stopping(monkeypatch)
-    hybrid.run(made, tmp_path / "whole.h5", progress=stopping).close()
-    assert went_on(made, tmp_path / "parts.h5", stopping, [stopping.heard // 3, stopping.heard // 3]) == 2
-    assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
 
 
 def test_a_file_that_has_changed_is_not_resumed(tmp_path: Path, monkeypatch) -> None:

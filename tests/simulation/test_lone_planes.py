@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from test_lone_lines import BALL, SPANS, scene
-from test_plane import deep_beam, planes, storm, swinging
+from test_plane import storm, swinging
 from test_system_contact import HOSE
 
 import hybrid
@@ -100,24 +100,6 @@ def test_only_what_is_joined_to_nothing_is_computed_in_a_plane(flat: list[list[i
     assert flat[-1] == [1]  # an end of line b sways across
     hybrid.run(tables | {"bodies": BALL["bodies"]})
     assert flat[-1] == []
-
-
-def test_who_asks_for_two_dimensions_has_the_equilibrium_in_the_plane() -> None:
-    """A strut, soft across the plane: as of a cable, with the event that it does not hold in space."""
-    tables = deep_beam(0.0, dimension=2).model_dump(exclude_none=True)
-    tables["ends"]["end"] = {"kind": "free", "force": [-0.03, 0.0, 0.0]}
-    tables["initial"] = {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, 0]}
-    network = hybrid.static(as_network(tables))
-    assert len(planes(network)) == 1 and "within the plane alone" in planes(network)[0]
-    assert np.abs(network.lines["cable"].position[0, :, 1:]).max() < 1e-9
-
-
-def test_what_topples_leaves_its_plane_and_stays_where_two_dimensions_are_asked() -> None:
-    for dimension, farthest in ((None, 0.02), (2, 0.0)):
-        tables = deep_beam(1.05) if dimension is None else deep_beam(1.05, dimension=2)
-        result = hybrid.run(as_network(tables.model_dump(exclude_none=True)))
-        across = np.abs(result.lines["cable"].position[..., 1]).max()
-        assert len(planes(result)) == 1 and (across > farthest if farthest else across == 0.0)
 
 
 @pytest.mark.long

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from math import cos, radians, sin
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import resumed
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -208,11 +206,6 @@ def test_energy_is_kept_in_motion(tau: float) -> None:
         assert (np.diff(lost) <= 1e-9).all() and (lost[-1] < -0.1 or not tau)
     print(f"energy that no work accounts for, over the largest kinetic energy: {off}")
     assert off[0] < 1e-2 and off[1] < 0.35 * off[0]
-
-
-@pytest.mark.long
-def test_a_swinging_cable_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    resumed(swung(8e-3), tmp_path, 0.5)
 
 
 @pytest.mark.parametrize("model", ["adaptive", {"kind": "adaptive", "curvature_error": 0.05}], ids=["zones", "cells"])

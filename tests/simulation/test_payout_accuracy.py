@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -94,18 +93,6 @@ def test_payout_that_begins_late_is_not_stepped_over() -> None:
     rate = result["payout/rate"][-1]
     assert rate == pytest.approx(1.0, abs=1e-9)
     assert result["reaction_end"][-1, 2] == pytest.approx(2.0 * G * result["payout/length"][-1], rel=1e-6)
-
-
-@pytest.mark.parametrize("clamp", [False, True])
-def test_such_steps_are_resumed_bit_for_bit(tmp_path: Path, clamp: bool) -> None:
-    """From 7 s on, where the ramp of the surge ends, and so a step."""
-    scene = clamped(sagging("rod", 2e6, 2e4)) if clamp else sagging()
-    scene["ends"]["end"]["payout"]["longest"] = 115.0
-    whole = hybrid.run(follows(1e-4, scene, 11.0))
-    hybrid.run(follows(1e-4, scene, 7.0), output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=11.0)
-    for name in ("position", "tension", "reaction_end", "work/zones", "work/scheme", "steps/dt"):
-        assert np.array_equal(whole[name], resumed[name]), name
 
 
 def test_such_steps_are_taken_from_outside() -> None:

@@ -230,17 +230,3 @@ def test_loads_that_stay_change_nothing(tmp_path: Path, name: str) -> None:
     assert np.abs(again["position"] - whole["position"]).max() < most
     pull = np.linalg.norm(whole[f"reaction_{winch}"], axis=1).mean()
     assert np.abs(again[f"reaction_{winch}"] - whole[f"reaction_{winch}"]).max() < 5e-3 * pull
-
-
-@pytest.mark.long
-def test_a_changed_run_is_resumed_bit_for_bit(tmp_path: Path) -> None:
-    scene = in_water(sagging("rod", 2e6, 2e4))
-    scene["ends"]["end"]["payout"]["longest"] = 110.0
-    hybrid.run(scene | {"time": {"duration": 4.0, "step": 0.05}}, output=tmp_path / "a.h5")
-    other = ["environment.fluid.current=[0.8, 0, 0]"]
-    whole = hybrid.resume(tmp_path / "a.h5", tmp_path / "b.h5", until=9.0, settings=other)
-    hybrid.resume(tmp_path / "a.h5", tmp_path / "c.h5", until=6.0, settings=other)
-    resumed = hybrid.resume(tmp_path / "c.h5", until=9.0)
-    for x in ("position", "tension", "reaction_end", "work/end", "work/zones", "work/drag"):
-        assert np.array_equal(whole[x], resumed[x]), x
-    assert np.abs(whole["position"][-1] - whole["position"][8]).max() > 0.5

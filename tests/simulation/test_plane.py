@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences, resumed, went_on
+from bits import resumed
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
@@ -431,16 +431,6 @@ def test_a_line_that_has_buckled_comes_back_to_its_plane(monkeypatch: pytest.Mon
     assert force.max() < 1e-4 * np.linalg.norm(space.reaction_end, axis=1).max()
     assert there[-1] > 0.01  # and buckles again, by centimetres, as what was 1e-7 of the length has grown
     assert abs(across[-1] / there[-1] - 1.0) < 0.05
-
-
-@pytest.mark.slow
-def test_a_run_that_comes_back_is_resumed_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From before it leaves its plane, from space, and from the plane again."""
-    scene = storm(333.0)
-    hybrid.run(scene, tmp_path / "unbroken.h5").close()
-    stopping = Stopping(monkeypatch)
-    assert went_on(scene, tmp_path / "run.h5", stopping, [2000, 1000]) == 2
-    assert differences(tmp_path / "unbroken.h5", tmp_path / "run.h5") == []
 
 
 def _never_back(attach):

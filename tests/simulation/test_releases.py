@@ -97,10 +97,8 @@ def test_an_end_is_let_go_by_its_force(controlled: bool) -> None:
 
 
 CASES = {
-    "time": (pinned(motion=HEAVE, release_at={"time": 0.55}), {}),
     "tension": (pinned(motion=HEAVE, release_at={"tension": 150.0}), {}),
     "clamp, adaptive": (CLAMP | {"release_at": {"time": 0.55}}, {"model": "adaptive"}),
-    "clamp, controlled": (CLAMP | {"release_at": {"time": 0.55}}, {"time": {"duration": 1.5, "tolerance": 1e-4}}),
     "errors": (pinned(release_at={"time": 0.5}), {"output": {"every": 0.1, "errors": True}}),
 }  # fmt: skip
 

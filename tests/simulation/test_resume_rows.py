@@ -137,7 +137,9 @@ def test_into_another_file(made: Callable[[str], Path], tmp_path: Path, monkeypa
     Stopping(monkeypatch)
     for file in made("rods").iterdir():
         shutil.copy(file, tmp_path)
+    before = (tmp_path / "run.h5").read_bytes()
     hybrid.resume(tmp_path / "run.h5", tmp_path / "other.h5").close()
+    assert (tmp_path / "run.h5").read_bytes() == before
     assert differences(tmp_path / "whole.h5", tmp_path / "other.h5") == []
     assert len(rows(tmp_path)) == 3
 

@@ -14,7 +14,7 @@ import hybrid
 import hybrid.simulation.network_run
 import hybrid.simulation.run_record
 from hybrid.errors import SceneError
-from hybrid.simulation import line_result, network_run, progress
+from hybrid.simulation import line_result, network_run
 from hybrid.store.recorder import BaseRecorder
 
 ROD = {
@@ -236,53 +236,6 @@ def test_outputs_and_buffers_do_not_shape_the_motion(monkeypatch: pytest.MonkeyP
     for name, x in fields(few).items():
         if "rotation" not in name and not name.endswith("work/scheme"):  # which counts from output to output
             assert np.array_equal(mine[name][::4], x), name
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("automatic", [False, True])
-def test_a_run_that_stops_between_outputs_goes_on_bit_for_bit(
-    automatic: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its outputs within the next step are made of that before it, too."""
-    scene = moored(0.03, 0.08, 0.9)
-    if automatic:
-        scene["time"] = {"duration": 0.9}
-        scene["accuracy"] = {"tension": "5%"}
-    monkeypatch.setattr(hybrid.simulation.network_run, "ROWS", 1)
-    monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 1)
-    monkeypatch.setattr(progress, "REPORT_EVERY", -1.0)
-    whole, path, heard = tmp_path / "whole.h5", tmp_path / "run.h5", 0
-    hybrid.run(scene, whole).close()
-
-    def stop(x: Any) -> None:
-        nonlocal heard
-        heard += 1
-        if heard in (5, 13, 16):
-            raise KeyboardInterrupt
-
-    for k in range(4):
-        try:
-            (hybrid.resume(path, progress=stop) if k else hybrid.run(scene, path, progress=stop)).close()
-            break
-        except KeyboardInterrupt:
-            pass
-    assert k == 3 or automatic
-    with hybrid.open(whole) as one, hybrid.open(path) as other:
-        assert_same(one, other)
-
-
-@pytest.mark.long
-def test_what_is_stepped_from_outside_and_taken_back_has_the_same_outputs() -> None:
-    """Steps end between outputs; each is computed twice."""
-    scene, times = moored(0.03, 0.08, 0.9), [*(0.03 * np.arange(1, 30)), 0.9]  # to the bit the ends of its steps
-    with hybrid.Simulation(scene) as simulation:
-        for t in times:
-            saved = simulation.save()
-            simulation.advance(t)
-            simulation.restore(saved)
-            simulation.advance(t)
-        result = simulation.result()
-    assert_same(hybrid.run(scene), result)
 
 
 def test_a_load_that_jumps_on_an_output_counts_in_it() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences, went_on
+from bits import Stopping
 
 import hybrid
 import hybrid.model.build
@@ -83,15 +83,6 @@ def test_contact_that_begins_by_itself_is_told(led: hybrid.Result) -> None:
         scene = hybrid.validate_scene(led_through(**more))
         lines = " ".join(" ".join(plan_rows(scene, hybrid.plan(scene))).split())
         assert ("whatever its ends do; its steps take 2 to 20 times as long" in lines) == told
-
-
-@pytest.mark.slow
-def test_it_resumes_bit_for_bit_before_contact_begins_and_in_it(
-    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stopping = Stopping(monkeypatch)
-    assert went_on(hybrid.validate_scene(led_through()), tmp_path / "run.h5", stopping, [20, 110]) == 2
-    assert differences(whole, tmp_path / "run.h5") == []
 
 
 @pytest.mark.long

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import exp
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import resumed
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
@@ -165,14 +163,6 @@ def test_soil_beside_a_line_resists_and_breaks_out() -> None:
     scale = float(np.abs(expected).max())
     print(f"{np.abs(force + expected)[late].max() / scale:.1e} of {scale:.0f} N; behind it {force[-300:].min():.0f} N")
     np.testing.assert_allclose(force[late], -np.array(expected)[late], atol=1e-2 * scale)
-
-
-@pytest.mark.long
-def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    friction = {"axial": 0.4, "lateral": 0.5, "residual": [0.2, 0.3], "breakout": 0.05}
-    bed = {"soil": SOIL, "friction": friction}
-    motion = {"heave": HEAVE, "surge": {"amplitude": 0.1, "period": 3.0}}
-    resumed(pressed(bed, 8.0, 0.02, motion), tmp_path, 5.0)
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import resumed
 
 import hybrid
 
@@ -59,11 +57,6 @@ def test_zones_that_move_feel_the_soil_that_rods_feel(dimension: int) -> None:
     assert lost[1] == pytest.approx(lost[0], rel=0.05)
 
 
-@pytest.mark.long
-def test_zones_that_move_go_on_bit_for_bit(tmp_path: Path) -> None:
-    resumed(laid(ADAPTIVE), tmp_path, 9.0)
-
-
 def test_cells_that_follow_the_curvature_feel_the_same_soil() -> None:
     """Against equal cells of half the length: tension at the top, and what soil has taken."""
     motion = {"heave": {"amplitude": 0.6, "period": 8.0}, "travel": {"by": [-6.0, 0.0, 2.0], "over": 12.0}, "ramp": 4.0}
@@ -110,8 +103,3 @@ def test_what_lies_still_remembers_the_same_while_line_is_paid_out(side: str) ->
     from_anchor = found.s if side == "end" else found.s[::-1]
     there = found.contact[:, (from_anchor > 5.0) & (from_anchor < 15.0)]
     assert there[0].min() > 500.0 and np.abs(there - there[0]).max() < 1e-3 * there[0].max()
-
-
-@pytest.mark.long
-def test_a_winch_over_soil_goes_on_bit_for_bit(tmp_path: Path) -> None:
-    resumed(reeled(80, 0.02), tmp_path, 9.0)

@@ -7,18 +7,15 @@ theta' = (T - theta)/tau, strain = s(theta; highest theta) + (T - theta)/(a + b 
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import resumed
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
-from test_axial_law import assert_cut_is_whole, bar, two_lines
+from test_axial_law import assert_cut_is_whole, bar
 
 import hybrid
-from tests.inside import OnlyLine
 
 OWC = [[0, 0], [0.01, 1000], [0.02, 1900], [0.03, 3000], [0.05, 5000]]
 TAU, A, B = 3.0, 4e5, 20.0
@@ -152,48 +149,6 @@ SECTION = {
 
 def test_a_rope_that_is_cut_is_the_same_rope() -> None:
     assert_cut_is_whole(SECTION, heave=0.6)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("system", [False, True], ids=["one", "several"])
-def test_a_rope_goes_on_bit_for_bit(tmp_path: Path, system: bool) -> None:
-    scene = two_lines(SECTION, True, heave=0.6) if system else swing("exponential", 0.01)
-    resumed(scene, tmp_path, 0.5 * scene["time"]["duration"])
-
-
-@pytest.mark.parametrize("model", ["adaptive", {"kind": "adaptive", "curvature_error": 0.1}], ids=["zones", "cells"])
-def test_highest_tensions_go_along_where_zones_move(model: Any) -> None:
-    """Of a rope that averages over an age they stay, on whatever cells, those that it had at rest."""
-    tables = {"curve": [[0, 0], [0.01, 1600], [0.03, 4800], [0.2, 3.2e4]], "working": "linear", "k1": 0.5}
-    law = {
-        "syrope": tables | {"highest_tension": 200.0},
-        "dynamic_stiffness": {"constant": 9e5, "relaxation_time": 1e9},
-    }
-    section = {"length": 60, "diameter": 0.03, "mass": 1.5, "bending_stiffness": 60, "drag": {"normal": 1.2}} | law
-    heave = {"heave": {"amplitude": 1.5, "period": 3}, "ramp": 1}
-    scene = {
-        "environment": {"fluid": {"density": 1025, "surface": 0}}, "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, -40], "tangent": [0, 0, 1]},
-            "end": {"kind": "pinned", "position": [30, 0, -3], "motion": heave},
-        },
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 20},
-        "time": {"duration": 2.0, "step": 0.02}, "output": {"every": 0.1},
-    }  # fmt: skip
-
-    def peaks(simulation: hybrid.Simulation) -> tuple[Any, Any]:
-        run = OnlyLine(simulation)
-        s = run.model.line.s
-        return 0.5 * (s[1:] + s[:-1]), run.state.peak.copy()
-
-    with hybrid.Simulation(hybrid.validate_scene(scene)) as simulation:
-        s, first = peaks(simulation)
-        simulation.advance(2.0)
-        then, last = peaks(simulation)
-    assert np.array_equal(s, then) == (model == "adaptive")  # kinds change, and cells stay
-    inside = (then >= s[0]) & (then <= s[-1])  # beyond, np.interp goes on level
-    assert np.abs(last - np.interp(then, s, first))[inside].max() < 0.02 * first.max()
-    assert first.min() == 200.0 and first.max() > 1.5 * 200.0
 
 
 @pytest.mark.parametrize(

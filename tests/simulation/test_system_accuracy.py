@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.accuracy import error_control
-from hybrid.accuracy.finer_result import NOT_KEPT, Replacement
-from hybrid.accuracy.refinement import Verdict
 from hybrid.errors import ComputationError
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.analysis import RodModel
@@ -162,37 +159,6 @@ def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> 
     found = hybrid.run(scene)
     assert all(x["met"] is None and x["error"] is None for x in verdicts(found.lines["tow"]).values())
     assert {"no error figure"} <= {e.kind for e in found.events}
-
-
-@pytest.mark.long
-def test_an_accuracy_too_high_is_missed_and_says_so() -> None:
-    scene = bridle(accuracy={"position": "0.0001 mm"}, time={"duration": 1.0, "step": 0.1})
-    found = hybrid.run(scene)
-    assert verdicts(found.lines["west"])["position"]["met"] is False
-    texts = [e.text for e in found.events if e.kind == "accuracy missed"]
-    assert any(text.startswith("line west: position") and "time.step" in text for text in texts)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("how", ["no better", "failed"])
-def test_a_finer_run_that_is_no_better_is_not_kept(how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The lines are one result: that before the finer one stays, in its file, with errors that know of the finer one."""
-    scene, path = bridle(accuracy={"position": "0.01 mm"}), tmp_path / "run.h5"
-    del scene["time"]
-    with hybrid.static(scene) as both:
-        assert both.attributes["effort_runs"] > 3  # a finer result follows the first; the pre-run does not count
-        cells = {name: int(line.attributes["cells"]) for name, line in both.lines.items()}
-    if how == "failed":
-        monkeypatch.setattr(Replacement, "finer", fails)
-    else:
-        monkeypatch.setattr(error_control, "is_no_better", lambda *_: Verdict(2.0, 1.0, 0.0, 0.0, "no use"))
-    with hybrid.static(scene, path) as found:
-        for name, line in found.lines.items():
-            assert int(line.attributes["cells"]) < cells[name]
-            assert line["errors/total/position"].max() > 0.0
-        (text,) = [e.text for e in found.events if e.kind == NOT_KEPT]
-        assert how in text and text.endswith("the result is the one before")
-    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
 
 
 @pytest.mark.long

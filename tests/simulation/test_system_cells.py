@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from bits import Stopping, differences, went_on
-from test_system_zones import ROPE, SEA, mooring, stepped_again
+from test_system_zones import ROPE, SEA, mooring
 
 import hybrid
 from hybrid.simulation.cell_changes import CellChanges
@@ -78,26 +77,6 @@ def test_against_rods(three: hybrid.Result) -> None:
         assert np.abs(line.curvature - fine.curvature).max() < SHARE * fine.curvature.max(), name
         assert np.abs(line.position - fine.position).max() < 1e-3 * 60.0, name
         assert np.abs(line.tension - fine.tension).max() < 0.01 * fine.tension.max(), name
-
-
-@pytest.mark.long
-def test_a_stopped_run_goes_on_bit_for_bit(
-    three: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert went_on(followed(), tmp_path / "run.h5", Stopping(monkeypatch), [70]) == 1
-    assert three.file is not None and differences(three.file, tmp_path / "run.h5") == []
-
-
-@pytest.mark.long
-def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
-    """Bit for bit, also where each is computed twice across changes of cells."""
-    times = 0.02 * np.arange(5, 100, 5)
-    result = stepped_again(followed(), times)
-    for name, line in result.lines.items():
-        run, n = three.lines[name], len(times) + 1
-        assert np.array_equal(line.position, run.position[:n]) and np.array_equal(line.tension, run.tension[:n])
-        assert cells(line) == cells(run)[:n]
-    assert max(len({*cells(line)}) for line in result.lines.values()) > 1
 
 
 @pytest.mark.long

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.solve.self_contact import SelfContact
 
 WIDTH, RUBS = 0.02, {"self": True, "friction": 0.3}
 HOSE = {
@@ -79,6 +78,29 @@ def test_what_is_not_computed_is_refused(more: dict[str, Any], says: str) -> Non
         hybrid.validate_scene(system(**more))
 
 
+@pytest.mark.parametrize(
+    ("more", "on", "why"),
+    [
+        ({}, True, "whatever its ends do"),
+        ({"contact": {"self": False}}, False, "contact.self: false"),
+        ({"model": "catenary"}, False, "catenaries that stay"),
+        ({"start": "a", "end": "b"}, False, "of a loop"),
+        ({"start": "a", "end": "b", "break_at": {"time": 1.0}}, True, "whatever its ends do"),
+        ({"start": "a", "end": "weak"}, True, "whatever its ends do"),
+    ],
+)
+def test_the_plan_says_which_lines_have_it(more: dict[str, Any], on: bool, why: str) -> None:
+    """A line that cannot reach itself lies nearly straight between points that nothing moves."""
+    scene = system(contact={})
+    line = scene["lines"]["hose"] | more
+    places = {"a": {"position": [0, 0, 0]}, "b": {"position": [3.99, 0, 0]}}
+    places["weak"] = places["b"] | {"break_at": {"tension": 1e3}}
+    scene["points"] |= {name: x for name, x in places.items() if name in (line["start"], line["end"])}
+    plan = hybrid.plan(scene | {"lines": scene["lines"] | {"other": line}}).lines["other"]
+    (entry,) = (x for x in plan.contents if x.what == "contact of the line with itself")
+    assert entry.on is on and why in entry.why
+
+
 def test_an_equilibrium_within_itself_is_refused() -> None:
     """A weight pulls the legs of a line straight, 0.8 diameters apart."""
     thin = HOSE | {"bending_stiffness": 0.02}
@@ -90,17 +112,6 @@ def test_an_equilibrium_within_itself_is_refused() -> None:
         hybrid.static(scene)
     with pytest.raises(hybrid.SceneError, match=r"lines\.hose\.contact[\s\S]*shape in which the line is apart"):
         hybrid.run(scene, progress=False)
-
-
-def test_steps_that_contact_cuts_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As of one cable, with the number of tries, in the result of the line."""
-    monkeypatch.setattr(SelfContact, "given_up", property(lambda _: 3))
-    scene = system()
-    scene["time"] = TIME | {"duration": 0.04}
-    result = hybrid.run(scene, progress=False)
-    (told,) = (x for x in result.lines["hose"].events if x.kind == "steps cut")
-    assert told.value == 3.0 and "3 tries" in told.text
-    assert any(x.kind == "steps cut" and "line hose" in x.text for x in result.events)
 
 
 # --- beside a body -------------------------------------------------------------------------------------

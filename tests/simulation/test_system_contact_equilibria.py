@@ -58,25 +58,6 @@ def stays(scene: dict[str, Any], static: hybrid.Result, name: str) -> None:
 
 
 @pytest.mark.long
-def test_lines_rest_as_one_alone_does() -> None:
-    """Each with its zones, contact and forces; the other beside it changes nothing."""
-    alone, scene = hybrid.static(beside_each_other(0.0)).lines["line 0"], beside_each_other(0.0, 3.0)
-    system = hybrid.static(scene)
-    assert alone["energy/self_contact"][0] > 0.0 and {z.kind for z in alone.zones[0]} == {"rod", "catenary"}
-    for k, line in enumerate(system.lines.values()):
-        assert np.abs(line.position - np.array([0, 3.0 * k, 0]) - alone.position).max() < 1e-9
-        assert line.zones[0] == alone.zones[0]
-        for name in ("energy/self_contact", "self_contact", "tension", "reaction_start"):
-            here, there = line[name], alone[name]
-            assert np.abs(here - there).max() <= 1e-6 * np.abs(there).max() > 0.0, name
-        told = {e.kind: e.text for e in line.events}
-        assert "stability not judged" not in told  # one stiffness with contact judges it
-        assert "touches itself" in told["static friction neglected"] and "line touches itself" in told
-    assert system.attributes["static_residual"] < 1e-9
-    stays(scene, system, "line 1")
-
-
-@pytest.mark.long
 def test_a_line_that_a_body_presses_against_itself() -> None:
     scene = at_a_body()
     result = hybrid.static(scene)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences, went_on
+from bits import differences
 
 import hybrid
 from hybrid.errors import SceneError
@@ -162,17 +162,6 @@ def test_a_mooring_of_a_body_breaks() -> None:
         arm = result["points/starboard/position"][-1] - result["bodies/float/position"][-1]
         assert np.linalg.norm(arm) == pytest.approx(np.hypot(0.3, 0.2), abs=1e-9)
         assert [x.t for x in result.events if x.kind == "end released"] == [0.5, 0.8]
-
-
-@pytest.mark.long
-def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Stopped before the break, between two breaks and after both."""
-    points = {"left": {"break_at": {"time": 0.8}}}
-    made: Any = scene({"b": {"break_at": {"time": 0.5}}}, points, time={"duration": 1.0, "step": 0.01})
-    stopping, whole, path = Stopping(monkeypatch), tmp_path / "whole.h5", tmp_path / "run.h5"
-    hybrid.run(made, whole, progress=stopping).close()
-    assert went_on(made, path, stopping, [40, 20, 30]) == 3
-    assert differences(whole, path) == []
 
 
 @pytest.mark.long

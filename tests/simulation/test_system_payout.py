@@ -13,11 +13,10 @@ from test_payout import clamped, sagging
 from test_payout_zones import touching
 
 import hybrid
-from hybrid.errors import ComputationError, Outcome, SceneError
+from hybrid.errors import SceneError
 from tests.combinations.pairs import as_network, scene_of
 
 G = 9.81
-WINCH = {"winch": {"tension": 2200.0, "inertia": 200.0, "damping": 100.0, "ramp": 4.0}, "longest": 130.0}
 
 
 def cable(clamp: bool = False, **more: Any) -> dict[str, Any]:
@@ -167,29 +166,6 @@ def test_a_winch_on_a_free_body_weighs_what_hangs_there_less_its_inertia(sign: f
 
 
 # --- with errors, and what is refused ---------------------------------------------------------------
-
-
-def test_errors_of_fixed_steps_are_estimated() -> None:
-    """Within 0.5 to 4 of the true one; a line that has too few cells for a coarser run is compared with a finer one."""
-    scene = as_network(cable(EA=2e6)) | {"time": {"duration": 6.0, "step": 0.1}}
-    found = hybrid.run(scene | {"output": {"every": 0.5, "errors": True}}).lines["cable"]
-    scene["lines"]["cable"]["mesh"], scene["time"]["step"] = {"cells": 160}, 0.025
-    true = np.linalg.norm(hybrid.run(scene).lines["cable"].position - found.position, axis=2).max()
-    assert 0.5 * true < found["errors/total/position"].max() < 4.0 * true
-    few = as_network(cable(model="rod", EA=2e6, EI=2e4, clamp=True)) | {"output": {"every": 0.5, "errors": True}}
-    few["lines"]["cable"]["mesh"] = {"cells": 16}
-    compared = hybrid.run(few)
-    assert np.isfinite(compared.lines["cable"]["errors/total/position"][:]).all()
-    assert any("line cable: finer cells" in x.text for x in compared.events if x.kind == "error uncertain")
-
-
-def test_a_winch_without_more_line_says_so() -> None:
-    scene = as_network(cable(EA=2e6))
-    payout = WINCH | {"winch": WINCH["winch"] | {"tension": 1500.0}, "longest": 101.0}
-    scene["lines"]["cable"]["connections"]["end"]["payout"] = payout
-    with pytest.raises(ComputationError) as stopped:
-        hybrid.run(scene | {"time": {"duration": 20.0, "step": 0.05}})
-    assert stopped.value.outcome == Outcome.WINCH_AT_END and "line cable" in str(stopped.value)
 
 
 def test_what_is_wrong_is_said_of_the_line() -> None:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences, went_on
 from scipy.optimize import brentq
 
 import hybrid
@@ -59,23 +57,6 @@ def test_a_straight_line_that_nothing_holds_begins_where_its_first_point_is(more
     fallen = result.lines["one"]["position"][-1] - result.lines["one"]["position"][0]
     np.testing.assert_allclose(result.lines["one"]["position"][0, 0], [0.5, 0, 1])
     np.testing.assert_allclose(fallen, np.tile([0, 0, -0.5 * GRAVITY * 0.2**2], (len(fallen), 1)), rtol=1e-6, atol=1e-9)
-
-
-@pytest.mark.long
-def test_a_run_from_such_a_start_goes_on_bit_for_bit_and_steps_from_outside(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stopping = Stopping(monkeypatch)
-    scene: Any = between_springs(**{"lines.upper.model": "adaptive", "output.exact": True, "time.duration": 0.2})
-    whole, part = tmp_path / "whole.h5", tmp_path / "part.h5"
-    hybrid.run(scene, whole, progress=stopping)
-    assert went_on(scene, part, stopping, [stopping.heard // 2]) == 1
-    assert differences(whole, part) == []
-    with hybrid.Simulation(scene) as stepped:
-        for t in np.arange(1, 11) * 0.02:
-            stepped.advance(float(t))
-    found, asked = stepped.result(), hybrid.open(whole)
-    assert np.abs(found["points/weight/position"] - asked["points/weight/position"]).max() < 1e-12
 
 
 @pytest.mark.parametrize(

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences, went_on
+from bits import Stopping
 
 import hybrid
 import hybrid.simulation.run_record
 from hybrid.errors import ResultError, SceneError
-from tests.combinations.pairs import as_network, scene_of
 
 WAVES = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 5.0}
 SEA = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0, "waves": WAVES}}
@@ -109,25 +108,6 @@ def stopping(monkeypatch: pytest.MonkeyPatch) -> Stopping:
     return Stopping(monkeypatch)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("name", SCENES)
-def test_a_stopped_run_goes_on_bit_for_bit(name: str, tmp_path: Path, stopping: Stopping) -> None:
-    scene, whole, path = SCENES[name], tmp_path / "whole.h5", tmp_path / "run.h5"
-    hybrid.run(scene, whole, progress=stopping).close()
-    steps = stopping.heard
-    for k, stop in enumerate([steps // 3, steps // 5, 2, -1]):
-        stopping.left = stop
-        try:
-            (hybrid.resume(path, progress=stopping) if k else hybrid.run(scene, path, progress=stopping)).close()
-            break
-        except KeyboardInterrupt:
-            with hybrid.open(path) as part:
-                assert part.status == "interrupted" and len(part.times) == len(next(iter(part.lines.values())).times)
-    assert k == 3
-    assert differences(whole, path) == []
-    assert {x.suffix for x in tmp_path.iterdir()} == {".h5"}, "something is left behind"
-
-
 def test_rotations_go_on_beyond_half_a_turn(tmp_path: Path) -> None:
     """The yaw of a body that is turned, through 180 deg and across a resume, is that of its motion."""
     turns = {"yaw": {"amplitude": 20.0, "period": 2.0}, "ramp": 1.0}
@@ -182,28 +162,3 @@ def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping, mo
     hybrid.run(mooring(), path, progress=look).close()
     ((status, outputs, of_lines),) = seen
     assert status == "running" and 40 <= outputs < 101 and of_lines == 3 * [outputs]
-
-
-@pytest.mark.long  # 0.9 s
-def test_twist_beside_ends_goes_by_the_cells_of_each_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lengths of cells blend, and outputs that wait are looked at together: by those of the last, twist was off."""
-    scene: Any = as_network(scene_of("cells that follow", "torque of tension"))
-    stopping = Stopping(monkeypatch)
-    hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
-    assert went_on(scene, tmp_path / "run.h5", stopping, [7, 8]) == 2
-    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
-
-
-@pytest.mark.long  # 0.9 s
-def test_slack_bends_at_a_winch_are_those_of_the_cells_of_each_output(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The event named the cell at the winch as long as it was when outputs were looked at: 1.9 m for 1.1 m."""
-    cable = scene_of("payout")
-    cable["ends"]["end"]["payout"] = {"rate": 2.0, "ramp": 0.1}
-    scene: Any = as_network(cable)
-    stopping = Stopping(monkeypatch)
-    whole = hybrid.run(scene, tmp_path / "whole.h5", progress=stopping)
-    assert [x.kind for x in whole.lines["cable"].events] == ["unresolved slack bend"]
-    assert went_on(scene, tmp_path / "run.h5", stopping, [7, 8]) == 2
-    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []

@@ -149,12 +149,6 @@ def test_a_file_is_what_memory_is(tmp_path: Path, moved: hybrid.Result) -> None:
         hybrid.resume(target)
 
 
-def test_the_limit_of_a_section_is_judged_by_every_step(moved: hybrid.Result) -> None:
-    hose = moved.lines["hose"]
-    broken = [e for e in hose.events if e.kind == "tension above limit"]
-    assert bool(broken) == (hose.envelope["tension_max"].max() > 3000)
-
-
 def test_chains_on_the_seabed_bear_what_they_weigh() -> None:
     """A float on two chains: what the anchors and the bed bear is the weight less the lift of the float, to 1e-6."""
     chain = {"length": 190, "mass": 20.0, "diameter": 0.05, "axial_stiffness": 1e7}

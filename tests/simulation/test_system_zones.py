@@ -162,14 +162,6 @@ def test_against_rods(three: hybrid.Result) -> None:
     assert np.abs(there - here).max() < 0.002 * 60.0
 
 
-@pytest.mark.slow
-def test_a_stopped_run_goes_on_bit_for_bit(
-    three: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert went_on(mooring(), tmp_path / "run.h5", Stopping(monkeypatch), [70, 60]) == 2
-    assert three.file is not None and differences(three.file, tmp_path / "run.h5") == []
-
-
 def test_a_line_breaks_while_zones_move() -> None:
     scene = mooring(time={"duration": 1.5, "step": 0.02})
     scene["lines"]["north"]["break_at"] = {"time": 0.8}
@@ -183,31 +175,6 @@ def test_what_is_not_computed_is_refused() -> None:
     with pytest.raises(SceneError) as refused:
         hybrid.run(given)
     assert "connections" in refused.value.complaints[0].where
-
-
-def stepped_again(scene: dict[str, Any], times: np.ndarray) -> hybrid.Result:
-    """A scene stepped from outside to these times (s), six of which are gone back over and computed twice each time."""
-    with hybrid.Simulation(scene) as simulation:
-        saved = simulation.save()
-        for k, t in enumerate(times):
-            simulation.advance(float(t))
-            if k % 6 == 5:
-                simulation.restore(saved)
-                for again in times[k - 5 : k + 1]:
-                    simulation.advance(float(again))
-                saved = simulation.save()
-        return simulation.result()
-
-
-@pytest.mark.long
-def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
-    """Bit for bit, also where each is computed twice, and several again, across changes of zones."""
-    result = stepped_again(mooring(), 0.02 * np.arange(5, 130, 5))  # to the bit the ends of its steps
-    for name, line in result.lines.items():
-        run = three.lines[name]
-        assert np.array_equal(line.position, run.position[:26]) and np.array_equal(line.tension, run.tension[:26])
-        assert [*line.zones] == [*run.zones][:26] and len(changes(line)) > 2
-        assert line["work/zones"][-1] == run["work/zones"][25]
 
 
 def test_an_equilibrium_has_zones_too() -> None:

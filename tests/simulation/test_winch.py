@@ -154,22 +154,6 @@ def test_the_end_of_the_reel_stops_the_run() -> None:
     found.value.snapshot.unlink()
 
 
-def test_save_and_restore_take_the_winch_back() -> None:
-    with hybrid.Simulation(vertical(duration=20.0, damping=50.0)) as sim:
-        for _ in range(20):
-            sim.step()
-        saved, found = sim.save(), []
-        for _ in range(2):
-            for _ in range(120):
-                sim.step()
-            found.append((sim.length, sim.forces().end[2], len(sim.state.s)))
-            sim.restore(saved)
-        assert found[0] == found[1]
-        assert found[0][2] > 21
-        with pytest.raises(ValueError, match="winch"):
-            sim.set_payout(0.1)
-
-
 @pytest.mark.parametrize(
     ("payout", "where"),
     [

@@ -122,29 +122,6 @@ def armoured(scene: dict[str, Any], model: str = "") -> dict[str, Any]:
     return scene
 
 
-@pytest.mark.parametrize("model", ["zones", "rod", "adaptive"])
-def test_a_line_twisted_by_turns_is_the_cable(model: str, tmp_path: Path) -> None:
-    """In either direction, with fractions of a turn, about clamps that roll; resumed to the bit."""
-    kind = {"rod": "rod", "zones": zoned(ZONES), "adaptive": {"kind": "adaptive", "force_rod": [[16, 20]]}}[model]
-    mesh = {} if model == "zones" else {"mesh": {"cells": CELLS}}
-    scene = one(model=kind, **mesh)
-    scene["ends"]["end"]["turns"] = 2.3
-    system = several({"line": line("a", "b", ZONES, {"start": START, "end": END | {"turns": 2.3}}) | mesh})
-    system["lines"]["line"]["model"] = kind
-    cable = hybrid.run(scene)
-    assert np.abs(cable["torque"][0]).max() > 2.0 * np.pi * 2.0 * GJ / LENGTH
-    with hybrid.run(system, tmp_path / "whole.h5") as result:
-        mine = result.lines["line"]
-        apart = np.abs(mine["position"] - cable["position"]).max(axis=(1, 2))
-        assert apart[0] < 1e-9 * LENGTH and apart.max() < 20 * TOLERANCE * LENGTH
-        assert mine["torque"] == pytest.approx(cable["torque"], rel=1e-5, abs=1e-5)
-        assert mine["turns/link"] == pytest.approx(cable["turns/link"], abs=1e-6)
-    hybrid.run(system | {"time": COMMON["time"] | {"duration": 1.5}}, tmp_path / "part.h5").close()
-    with hybrid.open(tmp_path / "whole.h5") as whole, hybrid.resume(tmp_path / "part.h5", until=3.0) as more:
-        for name in ("position", "torque", "turns/link"):
-            assert np.array_equal(whole.lines["line"][name], more.lines["line"][name]), name
-
-
 def test_turns_the_other_way_and_on_a_body() -> None:
     """Two taut lines to a body that is held: GJ 2 pi n / L in each, whichever end says it."""
     scene = on_a_body([0, 0, 0])

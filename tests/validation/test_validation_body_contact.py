@@ -237,15 +237,6 @@ def test_where_the_origin_of_a_body_is_changes_nothing(fallen: Any) -> None:
         np.testing.assert_allclose(a["obstacles/ball/moment"], b["obstacles/ball/moment"], atol=0.02 * most)
 
 
-@pytest.mark.long
-def test_a_run_that_goes_on_has_the_same_bits(tmp_path: Path, fallen: Any) -> None:
-    hybrid.run(pushed() | {"time": {"duration": 0.25, "step": 0.005}}, tmp_path / "a.h5")
-    result = hybrid.resume(tmp_path / "a.h5", until=0.5)
-    for side, x in fallen.lines.items():
-        assert np.array_equal(result.lines[side].position, x.position)
-    assert np.array_equal(result["bodies/ball/position"], fallen["bodies/ball/position"])
-
-
 @pytest.mark.parametrize("kind", ["sphere", "cylinder", "box"])
 def test_a_very_heavy_body_is_an_obstacle(kind: str) -> None:
     """Of a cylinder across the lines, too, whose axis its body turns there, and of a box that is turned in its body."""
@@ -359,17 +350,6 @@ def test_lines_that_end_at_another_body_run_either_way_and_as_catenaries() -> No
         np.testing.assert_allclose(back[f"bodies/{body}/position"], place, atol=1e-9)
         np.testing.assert_allclose(soft[f"bodies/{body}/position"], place, atol=1e-5)
     np.testing.assert_allclose(back.lines["left"].position[:, ::-1], result.lines["left"].position, atol=1e-9)
-
-
-def test_a_run_from_outside_is_the_run_and_goes_back(fallen: Any) -> None:
-    with hybrid.Simulation(pushed()) as run:
-        run.advance(0.1)
-        saved = run.save()
-        for _ in range(2):
-            run.advance(0.2)
-            places = np.array(run.line("left").position)[::4]
-            np.testing.assert_allclose(places, fallen.lines["left"].position[4], atol=1e-10)
-            run.restore(saved)
 
 
 def test_a_line_ignores_the_body_that_it_is_fixed_to_until_it_has_left_it() -> None:

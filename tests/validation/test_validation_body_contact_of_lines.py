@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from copy import deepcopy
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -81,27 +80,6 @@ def test_a_turned_scene_moves_the_same(fallen: Any) -> None:
     np.testing.assert_allclose(result["bodies/ball/position"], fallen["bodies/ball/position"] @ turn.T, atol=1e-7)
     for side, x in fallen.lines.items():
         np.testing.assert_allclose(result.lines[side].position, x.position @ turn.T, atol=1e-7)
-
-
-@pytest.mark.long
-def test_a_run_that_goes_on_has_the_same_bits(tmp_path: Path, fallen: Any) -> None:
-    hybrid.run(crossed() | {"time": {"duration": 0.25, "step": 0.005}}, tmp_path / "a.h5")
-    result = hybrid.resume(tmp_path / "a.h5", until=0.3)
-    for side, x in fallen.lines.items():
-        for name in ("position", "self_contact"):
-            assert np.array_equal(result.lines[side][name], x[name])
-    assert np.array_equal(result["bodies/ball/position"], fallen["bodies/ball/position"])
-
-
-def test_a_run_from_outside_is_the_run_and_goes_back(fallen: Any) -> None:
-    with hybrid.Simulation(crossed()) as run:
-        run.advance(0.2)
-        saved = run.save()
-        for _ in range(2):
-            run.advance(0.3)
-            places = np.array(run.line("left").position)[::4]
-            np.testing.assert_allclose(places, fallen.lines["left"].position[-1], atol=1e-9)
-            run.restore(saved)
 
 
 def test_a_very_heavy_body_is_an_obstacle() -> None:

@@ -130,18 +130,6 @@ def test_what_lines_do_to_each_other_is_booked(moved: Any) -> None:
     assert max(np.abs(x["work/scheme"]).max() for x in (upper, lower)) < 2e-3 * put_in
 
 
-@pytest.mark.long
-def test_it_resumes_bit_for_bit(moved: Any, tmp_path: Path) -> None:
-    hybrid.run(lowered(0.8), tmp_path / "half.h5")
-    more = hybrid.resume(tmp_path / "half.h5", until=1.6)
-    for name, line in moved.lines.items():
-        for field in ("position", "tension", "self_contact", "energy/self_contact", "work/friction"):
-            np.testing.assert_array_equal(more.lines[name][field], line[field])
-    assert [e.t for e in more.events if e.kind == "lines touch"] == [
-        e.t for e in moved.events if e.kind == "lines touch"
-    ]
-
-
 def test_a_scene_turned_and_mirrored_has_that_result(moved: Any) -> None:
     c, s = np.cos(0.7), np.sin(0.7)
     M = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, 1.0]])
@@ -260,14 +248,6 @@ def test_halves_of_a_line_touch_each_other_as_it_touches_itself(hose: Any) -> No
     energy = one["energy/self_contact"] + two["energy/self_contact"]
     np.testing.assert_allclose(energy, hose["energy/self_contact"], atol=1e-4 * energy.max())
     assert one["work/friction"][-1] + two["work/friction"][-1] == pytest.approx(hose["work/friction"][-1], rel=0.1)
-
-
-def test_a_line_beside_others_touches_itself_as_alone(hose: Any) -> None:
-    """The hose and its tail, which meets it at a point: they are neighbours there, and nowhere near each other."""
-    tables = system() | {"contact": {"between": [["hose", "tail"]], "friction": 0.2}}
-    beside = hybrid.run(tables, progress=False).lines["hose"]
-    for name in ("position", "tension", "self_contact", "work/friction"):
-        np.testing.assert_allclose(beside[name], hose[name], atol=1e-9 * np.abs(hose[name]).max())
 
 
 # --- lines that pass through each other -------------------------------------------------------------------------

@@ -309,15 +309,6 @@ def turned(tables: Tables, M: Any) -> Tables:
     return found
 
 
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_a_rotated_and_a_mirrored_scene_have_such_results(met: Any, mirrored: bool) -> None:
-    c, s = np.cos(0.7), np.sin(0.7)
-    M = np.diag([1.0, -1.0, 1.0]) if mirrored else np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    other = ran(turned(falling(True), M))
-    np.testing.assert_allclose(other.position, met.position @ M.T, atol=1e-7)
-    np.testing.assert_allclose(other["obstacles/pipe/force"], met["obstacles/pipe/force"] @ M.T, atol=2e-3)
-
-
 # --- several lines, checkpoints, from outside -------------------------------------------------------------
 
 
@@ -362,17 +353,6 @@ def test_a_smooth_obstacle_does_no_work_of_friction() -> None:
     assert -0.1 * done < result["work/scheme"].min() <= result["work/scheme"].max() < 1e-3 * done
 
 
-@pytest.mark.long
-def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(aside: Any, tmp_path: Any) -> None:
-    half = pushed()
-    half["time"] = {"duration": 0.5, "step": 0.005}
-    hybrid.run(hybrid.validate_scene(half), tmp_path / "half.h5")
-    whole = hybrid.resume(tmp_path / "half.h5", until=0.8)
-    np.testing.assert_array_equal(whole.position, aside.position)
-    np.testing.assert_array_equal(whole["work/obstacles"], aside["work/obstacles"])
-    np.testing.assert_array_equal(whole["obstacles/bar/moment"], aside["obstacles/bar/moment"])
-
-
 def as_system(tables: Tables) -> Tables:
     """The same as a system of one line."""
     found = deepcopy(tables)
@@ -383,13 +363,6 @@ def as_system(tables: Tables) -> Tables:
     }
     found["lines"] = {"rope": line | cable | {"start": "a", "end": "b"}}
     return found
-
-
-def test_a_system_of_one_line_is_that_line(aside: Any) -> None:
-    rope = hybrid.run(as_system(pushed())).lines["rope"]
-    np.testing.assert_allclose(rope.position, aside.position, atol=1e-7)
-    np.testing.assert_allclose(rope["obstacles/bar/force"], aside["obstacles/bar/force"], atol=1e-3)
-    np.testing.assert_allclose(rope["work/obstacles"], aside["work/obstacles"], atol=1e-5)
 
 
 def from_outside() -> Tables:

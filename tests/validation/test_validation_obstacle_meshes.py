@@ -18,7 +18,6 @@ from hybrid.view.obstacles import closed_way, obstacles_at, outlines, rings, sur
 from hybrid.view.projections import view_named
 from tests.meshes import box, prism, sphere, text_stl
 from tests.validation.obstacle_scenes import DRUM, Tables, capstan, half_turn, over_pipe
-from tests.validation.test_validation_moving_obstacles import as_system
 from tests.validation.test_validation_obstacle_shapes_combined import by
 from tests.validation.test_validation_obstacles import falling
 
@@ -92,14 +91,6 @@ def test_a_rotated_scene_has_a_rotated_result(laid: Any, folder: Path) -> None:
     M = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_allclose(other.position, laid.position @ M.T, atol=1e-9 * 12.0)
     np.testing.assert_allclose(other.tension, laid.tension, atol=1e-7 * laid.tension.max())
-
-
-def test_a_system_of_one_line_is_that_line(laid: Any, folder: Path) -> None:
-    tables = over(folder)
-    system = as_system(tables)
-    system["points"]["b"] |= {"motion": tables["ends"]["end"]["motion"]}
-    rope = hybrid.run(system).lines["rope"]
-    np.testing.assert_allclose(rope.position, laid.position, atol=1e-6)
 
 
 def test_zones_that_move_have_the_answer_of_rods(laid: Any, folder: Path) -> None:

@@ -64,22 +64,6 @@ def test_what_a_moving_shape_does_is_booked(aside: Any) -> None:
     assert -0.1 * done < result["work/scheme"].min() <= result["work/scheme"].max() < 1e-3 * done
 
 
-def test_a_system_of_one_line_is_that_line(aside: Any) -> None:
-    result, kind = aside
-    rope = hybrid.run(as_system(by(kind))).lines["rope"]
-    np.testing.assert_allclose(rope.position, result.position, atol=1e-6)
-    np.testing.assert_allclose(rope["work/obstacles"], result["work/obstacles"], atol=1e-4)
-
-
-@pytest.mark.long
-def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(aside: Any, tmp_path: Path) -> None:
-    result, kind = aside
-    hybrid.run(by(kind, time={"duration": 0.5, "step": 0.005}), tmp_path / "half.h5").close()
-    with hybrid.resume(tmp_path / "half.h5", until=0.8) as whole:
-        np.testing.assert_array_equal(whole.position, result.position)
-        np.testing.assert_array_equal(whole["obstacles/bar/moment"], result["obstacles/bar/moment"])
-
-
 def test_a_shape_that_is_set_from_outside_moves_as_by_a_motion(aside: Any) -> None:
     result, kind = aside
     tables = by(kind)

@@ -120,32 +120,6 @@ def test_energy_over_a_pipe_is_booked(laid: Any) -> None:
     assert laid["work/friction"][-1] < 0.0
 
 
-@pytest.mark.long
-def test_a_rotated_scene_has_a_rotated_result(laid: Any) -> None:
-    c, s = np.cos(0.7), np.sin(0.7)
-    M = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    tables = over_pipe()
-    for end in tables["ends"].values():
-        end["position"] = (M @ end["position"]).tolist()
-    travel = tables["ends"]["end"]["motion"]["travel"]
-    travel["by"] = (M @ travel["by"]).tolist()
-    for key in ("at", "axis"):
-        tables["obstacles"]["pipe"][key] = (M @ tables["obstacles"]["pipe"][key]).tolist()
-    other = ran(tables)
-    np.testing.assert_allclose(other.position, laid.position @ M.T, atol=1e-9 * 12.0)
-    np.testing.assert_allclose(other.tension, laid.tension, atol=1e-7 * laid.tension.max())
-
-
-@pytest.mark.long
-def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(laid: Any, tmp_path: Any) -> None:
-    half = over_pipe()
-    half["time"] = {"duration": 1.0, "step": 0.02}
-    hybrid.run(hybrid.validate_scene(half), tmp_path / "half.h5")
-    whole = hybrid.resume(tmp_path / "half.h5", until=2.0)
-    np.testing.assert_array_equal(whole.position, laid.position)
-    np.testing.assert_array_equal(whole.tension, laid.tension)
-
-
 # --- blows, and what is said ---------------------------------------------------------------------------
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 
 import hybrid
 import hybrid.simulation.network_run
-from tests.simulation.bits import Stopping, differences
 from tests.validation.test_validation_body_contact import on_two_lines
 from tests.validation.test_validation_lines_contact import AREA, DENSITY, RADIUS, crossing, force_between
 
@@ -97,22 +95,6 @@ def test_what_a_paid_rope_does_to_another_is_booked(whole: hybrid.Result) -> Non
     assert max(np.abs(x["work/zones"]).max() for x in (upper, lower)) < 5e-3 * winch
     assert float(upper["work/friction"][-1] + lower["work/friction"][-1]) < 0.0
     np.testing.assert_allclose(upper["energy/self_contact"], lower["energy/self_contact"], atol=1e-12)
-
-
-@pytest.mark.long
-def test_a_stopped_run_goes_on_bit_for_bit(
-    whole: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Stopped before and in contact, between nodes that enter."""
-    stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
-    for k, stop in enumerate([45, 35, 60, -1]):
-        stopping.left = stop
-        try:
-            (hybrid.resume(path, progress=stopping) if k else hybrid.run(in_and_out(), path, progress=stopping)).close()
-        except KeyboardInterrupt:
-            continue
-        break
-    assert k == 3 and whole.file is not None and differences(whole.file, path) == []
 
 
 def test_first_in_the_scene_or_last_it_is_the_same(whole: hybrid.Result) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -216,17 +215,6 @@ def chute(request: pytest.FixtureRequest) -> Any:
     return scene, hybrid.run(scene), request.param
 
 
-NAMES = ("position", "tension", "reaction_end", "payout/power", "obstacles/drum/moment", "work/end", "work/friction",
-         "work/contact", "work/obstacles", "work/zones")  # fmt: skip
-
-
-def test_a_system_of_one_line_is_the_cable(chute: Any) -> None:
-    scene, one, _ = chute
-    two = hybrid.run(as_network(scene)).lines["cable"]
-    for name in ("position", "tension", "reaction_end", "obstacles/drum/moment", "work/end", "work/obstacles"):
-        assert np.abs(two[name] - one[name]).max() < 1e-6 * np.abs(one[name]).max(), name
-
-
 def test_a_scene_turned_and_mirrored_has_the_same_answer(chute: Any) -> None:
     scene, one, _ = chute
     M = turned_and_mirrored()
@@ -241,38 +229,6 @@ def test_a_winch_at_the_start_is_the_mirror_image(chute: Any) -> None:
     np.testing.assert_allclose(pull(two, "start"), pull(one), rtol=1e-6)
     for name, other in (("work/friction",) * 2, ("work/obstacles",) * 2, ("work/end", "work/start")):
         assert np.abs(two[other] - one[name]).max() < 1e-6 * np.abs(one["work/end"]).max(), name
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("several", [False, True])
-def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(chute: Any, tmp_path: Path, several: bool) -> None:
-    scene, one, _ = chute
-    if several:
-        scene = as_network(scene)
-        one = hybrid.run(scene)
-    hybrid.run(scene | {"time": {"duration": 1.0, "step": 0.01}}, tmp_path / "half.h5")
-    two = hybrid.resume(tmp_path / "half.h5", until=2.0)
-    if several:
-        one, two = one.lines["cable"], two.lines["cable"]
-    for name in NAMES:
-        assert np.array_equal(one[name], two[name]), name
-
-
-@pytest.mark.long
-def test_steps_are_taken_back_bit_for_bit(chute: Any) -> None:
-    """From outside, every step of the first second twice: nodes enter in some of them."""
-    scene, one, _ = chute
-    with hybrid.Simulation(scene) as simulation:
-        while simulation.t < 1.0 - 1e-9:
-            saved = simulation.save()
-            simulation.step()
-            simulation.restore(saved)
-            simulation.step()
-        simulation.advance(2.0)
-        drum, result = simulation.obstacle("drum"), simulation.result()
-    for name in NAMES:
-        assert np.array_equal(result[name], one[name]), name
-    np.testing.assert_allclose(drum.moment, one["obstacles/drum/moment"][-1], atol=1e-9)
 
 
 @pytest.mark.parametrize("several", [False, True])

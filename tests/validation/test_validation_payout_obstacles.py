@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,7 @@ from hybrid.kernels.state.obstacle_rows import OBSTACLE, PIECE_END, STIFFNESS, S
 from hybrid.model.build import build
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.scene.read import one_line
-from hybrid.simulation.payout_nodes import NodeChanges
-from tests.combinations.pairs import as_network, seen_by, turned_and_mirrored
+from tests.combinations.pairs import seen_by, turned_and_mirrored
 from tests.problems import tables_with
 from tests.validation.obstacle_scenes import over_pipe, paid_over_drum
 
@@ -127,13 +125,6 @@ def chute() -> Any:
     return scene, hybrid.run(scene)
 
 
-def test_a_system_of_one_line_is_the_cable(chute: Any) -> None:
-    scene, one = chute
-    two = hybrid.run(as_network(scene)).lines["cable"]
-    for name in ("position", "tension", "reaction_end", "payout/power", "work/end", "work/friction", "work/zones"):
-        assert np.abs(two[name] - one[name]).max() < 1e-7 * np.abs(one[name]).max(), name
-
-
 def test_a_scene_turned_and_mirrored_has_the_same_answer(chute: Any) -> None:
     scene, one = chute
     M = turned_and_mirrored()
@@ -150,22 +141,6 @@ def test_a_winch_at_the_start_is_the_mirror_image(chute: Any) -> None:
     np.testing.assert_allclose(pull(two, "start"), pull(one), rtol=1e-6)
     for name, other in (("work/friction", "work/friction"), ("work/end", "work/start")):
         assert np.abs(two[other] - one[name]).max() < 1e-6 * np.abs(one[name]).max()
-
-
-def test_a_run_goes_on_from_a_checkpoint_bit_for_bit(chute: Any, tmp_path: Path) -> None:
-    scene, one = chute
-    hybrid.run(scene | {"time": {"duration": 1.0, "step": 0.01}}, tmp_path / "half.h5")
-    two = hybrid.resume(tmp_path / "half.h5", until=2.0)
-    for name in ("position", "tension", "reaction_end", "work/friction", "work/contact", "work/end", "work/zones"):
-        assert np.array_equal(one[name], two[name]), name
-
-
-def test_nodes_enter_as_by_python(chute: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, one = chute
-    monkeypatch.setattr(NodeChanges, "may_change", lambda *_: False)
-    two = hybrid.run(scene)
-    for name in (x for x in one.names if x != "steps/cpu" and one[x].dtype.kind == "f"):
-        assert np.array_equal(one[name], two[name], equal_nan=True), name
 
 
 # --- equilibria over a pipe -----------------------------------------------------------------------

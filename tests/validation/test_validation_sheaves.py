@@ -5,7 +5,6 @@ Two ropes over one sheave by a closed form, what is kept in free flight, equival
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ import pytest
 
 import hybrid
 from hybrid.kernels.state.obstacle_rows import SPIN
-from tests.combinations.pairs import as_network
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND
 from tests.validation.test_validation_moving_obstacles import ran, weights
 from tests.validation.thrown_lines import WIDTH, straight, throw
@@ -64,18 +62,6 @@ def test_legs_that_touch_turn_a_sheave(pulled: Any) -> None:
     assert np.abs(pulled["work/scheme"]).max() < 0.01 * pulled["work/applied"][-1]
 
 
-def test_it_is_the_same_as_a_system_of_one_line() -> None:
-    tables = crossed_legs(0.02)
-    tables["time"]["duration"] = 0.4
-    cable = ran(tables)
-    line = hybrid.run(as_network(tables)).lines["cable"]
-    assert cable["self_contact"].max() > 10.0 and np.abs(cable["obstacles/drum/rotation"]).max() > 0.05
-    np.testing.assert_allclose(line.position, cable.position, atol=1e-9)
-    np.testing.assert_allclose(line["obstacles/drum/rotation"], cable["obstacles/drum/rotation"], atol=1e-9)
-    np.testing.assert_allclose(line["self_contact"], cable["self_contact"], atol=1e-6)
-    assert line.steps.iterations.sum() == cable.steps.iterations.sum()
-
-
 @pytest.mark.long
 def test_a_very_heavy_sheave_is_a_drum_that_stands() -> None:
     tables = crossed_legs(1e12)
@@ -88,25 +74,6 @@ def test_a_very_heavy_sheave_is_a_drum_that_stands() -> None:
     light = ran(crossed_legs(0.02))
     print(f"\niterations: over a drum {still.steps.iterations.sum()}, a sheave {light.steps.iterations.sum()}")
     assert light.steps.iterations.sum() < 1.05 * still.steps.iterations.sum()  # derivatives are as exact
-
-
-@pytest.mark.long
-def test_it_goes_on_and_is_taken_back_bit_for_bit(pulled: Any, tmp_path: Path) -> None:
-    half = crossed_legs(0.02, held=False)
-    half["time"]["duration"] = 0.4
-    hybrid.run(hybrid.validate_scene(half), tmp_path / "half.h5")
-    whole = hybrid.resume(tmp_path / "half.h5", until=0.5)
-    for name in ("position", "self_contact", "obstacles/drum/rotation"):
-        np.testing.assert_array_equal(whole[name], pulled[name])
-    with hybrid.Simulation(crossed_legs(0.02, held=False)) as run:
-        run.advance(0.3)
-        for _ in range(3):
-            saved = run.save()
-            run.step()
-            run.restore(saved)
-            run.step()
-        run.advance(0.5)
-        np.testing.assert_array_equal(run.result().position[-1], pulled.position[-1])
 
 
 # --- two ropes over one sheave --------------------------------------------------------------------------
@@ -170,15 +137,6 @@ def test_ropes_that_lie_against_each_other_turn_it_the_same(rolled: Any) -> None
     beside = hybrid.run(two_ropes(0.99 * STRAND, contact={"friction": 0.2}))
     assert all(x["self_contact"].max() > 0.0 for x in beside.lines.values())
     np.testing.assert_allclose(accelerations(beside), accelerations(rolled), rtol=2e-3)
-
-
-@pytest.mark.long
-def test_ropes_over_a_sheave_go_on_bit_for_bit(rolled: Any, tmp_path: Path) -> None:
-    hybrid.run(two_ropes() | {"time": {"duration": 0.8, "step": 0.002}}, tmp_path / "half.h5")
-    whole = hybrid.resume(tmp_path / "half.h5", until=0.9)
-    for name, line in rolled.lines.items():
-        np.testing.assert_array_equal(whole.lines[name].position, line.position)
-        np.testing.assert_array_equal(whole.lines[name]["obstacles/drum/rotation"], line["obstacles/drum/rotation"])
 
 
 # --- free flight ----------------------------------------------------------------------------------------

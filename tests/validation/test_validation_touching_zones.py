@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,12 @@ import pytest
 import hybrid
 import hybrid.simulation.network_run
 from tests.combinations.pairs import scene_of
-from tests.simulation.bits import Stopping, differences
 from tests.validation.test_validation_body_contact import RADIUS, STRAND, on_two_lines, pushed
 from tests.validation.test_validation_lines_contact import RADIUS as ROPE
 from tests.validation.test_validation_lines_contact import crossing, force_between, lowered
 from tests.validation.test_validation_obstacle_zones import MOVING as FINE_MOVING
 from tests.validation.test_validation_obstacle_zones import apart, fixed
-from tests.validation.test_validation_obstacles_accuracy import MOVES, PIPE, as_system
+from tests.validation.test_validation_obstacles_accuracy import MOVES, PIPE
 
 Tables = dict[str, Any]
 TOLERANCE = 2e-3  # of the length of a line
@@ -119,21 +117,6 @@ def test_what_lines_do_to_each_other_is_booked_through_changes_of_zones(whole: h
     assert 0.0 < max(np.abs(x["work/zones"]).max() for x in (upper, lower)) < 0.01 * put_in
 
 
-@pytest.mark.slow
-def test_a_stopped_run_goes_on_bit_for_bit(
-    down: Tables, whole: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
-    for k, stop in enumerate([95, 30, -1]):  # beside each other, in contact
-        stopping.left = stop
-        try:
-            (hybrid.resume(path, progress=stopping) if k else hybrid.run(down, path, progress=stopping)).close()
-        except KeyboardInterrupt:
-            continue
-        break
-    assert k == 2 and whole.file is not None and differences(whole.file, path) == []
-
-
 # --- bodies --------------------------------------------------------------------------------------------
 
 
@@ -177,11 +160,6 @@ def test_a_line_on_a_pipe_that_moves_is_rod_there(heaving: Any) -> None:
     assert apart(heaving, rods) < 12.0 * 1e-3 < apart(catenary, rods)
     grips = np.abs(np.array(heaving["obstacles/pipe/force"]) - np.array(rods["obstacles/pipe/force"]))
     assert grips.max() < 0.02 * np.abs(rods["obstacles/pipe/force"]).max()
-
-
-def test_as_a_system_of_one_line(heaving: Any) -> None:
-    system = hybrid.run(as_system(fixed(MOVES, FINE_MOVING))).lines["one"]
-    assert apart(system, heaving) < 1e-4
 
 
 @pytest.mark.long

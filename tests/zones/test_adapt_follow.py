@@ -158,18 +158,6 @@ def test_what_changes_of_cells_put_in_is_booked(following: hybrid.Result) -> Non
     assert np.abs(scheme - rod["work/scheme"]).max() < 0.02 * size
 
 
-def test_a_run_whose_cells_follow_is_continued_to_the_last_bit(tmp_path: Path) -> None:
-    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*TOUCHDOWN, "time.duration=6", "output.every=0.5"])
-    whole = hybrid.run(scene)
-    short = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*TOUCHDOWN, "time.duration=3", "output.every=0.5"])
-    hybrid.run(short, tmp_path / "r.h5").close()
-    more = hybrid.resume(tmp_path / "r.h5", until=6.0)
-    for name in ("position", "tension", "curvature", "work/zones"):
-        np.testing.assert_array_equal(more[name], whole[name], err_msg=name)
-    for mine, its in zip(more.mesh, whole.mesh, strict=True):
-        np.testing.assert_array_equal(mine.s, its.s)
-
-
 @pytest.mark.parametrize("friction", ["", "environment.seabed.friction=0.4"])
 @pytest.mark.long  # a kernel of its own: 4 s
 def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monkeypatch: pytest.MonkeyPatch) -> None:
