@@ -148,17 +148,13 @@ class _Probe(Case):
             begun = clock.process_time()  # the first state is made once, however many steps there are
             self.seen = [Seen(begun, run.steps, run.t)]
             for stop in run.stops():
-                run.go_to(stop, self._stop_if_used_up)
+                run.go_to(stop)
         except KeyboardInterrupt:
             pass
         except LineFailed as failed:
             raise run.failed(failed) from None
         self.seen.append(Seen(clock.process_time(), run.steps, run.t))
         return run, begun - begin, run.steps * _cost_of_a_step(self.seen)
-
-    def _stop_if_used_up(self) -> None:
-        if self._is_used_up():
-            raise KeyboardInterrupt
 
 
 def _measured(scene: Scene, found: NetworkPlan) -> NetworkPlan:

@@ -48,6 +48,7 @@ from hybrid.simulation.restart import LoadChange, changes_text, with_own_contact
 from hybrid.simulation.restore import is_cut_off, kept_resolution
 from hybrid.simulation.result_checks import damped_vibrations
 from hybrid.simulation.run_file import AnyRecorder, Asked
+from hybrid.simulation.run_of_lines import Heard
 from hybrid.simulation.run_sample import (
     ALL,
     COMPARED,
@@ -268,12 +269,12 @@ class Case:
         assert target is not None and isinstance(recorder, Recorder)
         recorder.amended = self.wants_errors
         with recorder, self._said():
-            self._compute(run, self._result_interrupted)
+            self._compute(run)
         return self._compared(run, target, clock.process_time() - begin, self._take_late_file(recorder, first))
 
-    def _compute(self, run: NetworkRun, interrupted: Callable[[], bool]) -> None:
+    def _compute(self, run: NetworkRun) -> None:
         """Compute a run to its end."""
-        run.record_motion(self.progress, interrupted)
+        run.record_motion()
 
     def _compared(self, run: NetworkRun, target: Target, cpu: float, late: LateFile | None) -> Samples:
         """What is to be compared of a complete result; late: it has no file yet."""
@@ -393,7 +394,7 @@ class Case:
                     line.recorder = RowsRecorder(rows_path(self.beside_result, key), FORCE_COLUMNS)
         try:
             with self._said():
-                self._compute(run, self._comparison_interrupted)
+                self._compute(run)
         finally:
             for line in run.lines:
                 line.recorder.close("", "")
@@ -465,6 +466,8 @@ class Case:
     def _network_run(self, resolution: NetworkResolution, target: Target | None, recording: Recording) -> NetworkRun:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
         recording = recording._replace(planes=True, asked=Asked(self.scene, self.changes), parts=self.parts)
+        interrupted = self._comparison_interrupted if target is None else self._result_interrupted
+        recording = recording._replace(heard=Heard(self.progress, interrupted))
         if recording.points is None:
             recording = recording._replace(points=self.points)
         with self._said():
@@ -535,7 +538,7 @@ class CaseAtRest(Case):
         """Equilibria are found one after the other."""
         return nullcontext(samples)
 
-    def _compute(self, run: NetworkRun, interrupted: Callable[[], bool]) -> None:
+    def _compute(self, run: NetworkRun) -> None:
         run.record_equilibrium()
 
     def _compared(self, run: NetworkRun, target: Target, cpu: float, late: LateFile | None) -> Samples:

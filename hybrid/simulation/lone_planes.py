@@ -28,7 +28,7 @@ from hybrid.model.network import NetworkModel
 from hybrid.model.plane import in_space, leaves_plane, planar, untwist
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.parts import Part
-from hybrid.simulation.run_of_lines import RunOfLines, change_lines
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import on_nodes, scaled, seed
 from hybrid.store.named_arrays import matched
@@ -309,7 +309,7 @@ class LonePlanes(Part):
             plane = next(each for each in known if each is not None)
             if line.plane is not plane or bool(line.bits & PLANAR) != (x.plane is not None):
                 changes[k] = partial(_as_computed, plane=plane, flat=x.plane is not None)
-        change_lines(self._run, changes)
+        self._run.change_lines(changes)
 
     def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Steps are made by another solver, with lines as of `fit_lines`."""

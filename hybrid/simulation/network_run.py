@@ -14,7 +14,7 @@ import numpy as np
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
-from hybrid.kernels.state.state import Floats, Moves, Work
+from hybrid.kernels.state.state import Floats, Line, Moves, Work
 from hybrid.model.build import Model
 from hybrid.model.ends import table_of_loads
 from hybrid.model.failure import Weakness
@@ -27,7 +27,6 @@ from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.failure import write_snapshot
 from hybrid.simulation.line_result import WAITING
 from hybrid.simulation.parts import EVERY_STEP
-from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import other_program, refused, require_same
 from hybrid.simulation.run_checkpoint import (
     content,
@@ -36,7 +35,6 @@ from hybrid.simulation.run_checkpoint import (
 from hybrid.simulation.run_contact import (
     refuse_within_itself,
 )
-from hybrid.simulation.run_of_lines import change_loads_of_lines
 from hybrid.simulation.run_record import RecordedRun
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, named
 from hybrid.solve.joined import LineFailed, NetworkState, NetworkTaken
@@ -93,7 +91,7 @@ class NetworkRun(RecordedRun):
         zones that move (zones.criteria); kept: whether it writes checkpoints.
         """
         self.system, self.model, self.state, self.found = first.system, first.model, first.state, first.found
-        self.scenes, self.resolution, self.changed = first.scenes, first.model.resolution, first.changed
+        self.scenes, self.resolution = first.scenes, first.model.resolution
         self.loop, self.times, self._begins = loop, loop.outputs[1:].tolist(), not first.resumed
         self.target, self.criterion, self.kept, self.moves = target, criterion, kept, bool(self.times)
         self.end = self.times[-1] if self.times else 0.0
@@ -150,37 +148,35 @@ class NetworkRun(RecordedRun):
         except LineFailed as failed:
             raise self.failed(failed) from None
 
-    def record_motion(self, reporter: ProgressReporter, interrupted: Callable[[], bool]) -> None:
-        """Compute the motion and record it; KeyboardInterrupt after `interrupted`, with the file complete till then."""
+    def record_motion(self) -> None:
+        """Compute the motion and record it; KeyboardInterrupt: a part ends it, with the file complete till then."""
         try:
             if self._begins:
                 self.begin_motion()
 
-            def report(finished: bool = False) -> None:
-                zones, iterations = self.model.models[0].zones, int(self.loop.counts.iterations)
-                reporter(self.t, self.steps, iterations, zones, finished, self.touches)
-
-            def look() -> None:
-                report()
-                self.keep()
-                if interrupted():
-                    raise KeyboardInterrupt
-
-            for change in self.changes[self.changed :]:
-                for stop in self.stops(change.t):
-                    self.go_to(stop, look)
-                change_loads_of_lines(self, change.scene)
-                self.changed += 1
+            for t in sorted({t for part in self.parts for t in part.phases}):
+                for stop in self.stops(t):
+                    self.go_to(stop)
+                for part in self.parts:
+                    if t in part.phases:
+                        part.begin_phase(t)
                 self.keep()
             for stop in self.stops():
-                self.go_to(stop, look)
-            report(finished=True)
+                self.go_to(stop)
+            self._pause(finished=True)
             self.finish()
         except LineFailed as failed:
             raise self.failed(failed) from None
         except KeyboardInterrupt:
             self.finish("interrupted", f"stopped from outside at t = {self.t:.6g} s")
             raise
+
+    def _pause(self, finished: bool = False) -> None:
+        """What is due about ten times a second; finished: at the end."""
+        if not finished:
+            self.keep()
+        for at_pause in self.parts.at_pause:
+            at_pause(finished)
 
     def start_from(self, bodies: Floats) -> None:
         """Take the added mass of members of bodies that were at rest (B, STATE) when the motion began."""
@@ -300,19 +296,19 @@ class NetworkRun(RecordedRun):
             steps += [x for x in grown if x < end]
         return apart([*outputs, *steps, last, *self._breaks], self.t, self.resolution.one.step)
 
-    def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
-        """Steps to `stop` (s), with what is due there; look: called there, and about ten times a second."""
+    def go_to(self, stop: float) -> None:
+        """Steps to `stop` (s), with what is due there."""
         while (due := self.parts.due) < stop - SAME_STOP * self.resolution.one.step:
-            self._go_to(due, look)
+            self._go_to(due)
             self.write_log()
             for part in self.parts:
                 if part.due == due:
                     part.at_due()
-        self._go_to(stop, look)
+        self._go_to(stop)
         for begin in self.parts.at_stop:
             begin()
 
-    def _go_to(self, stop: float, look: Callable[[], None]) -> None:
+    def _go_to(self, stop: float) -> None:
         """The same, with nothing due on the way."""
         loop, step = self.loop, self.resolution.one.step
         for begin in self.parts.begin_leg if loop.controlled else ():
@@ -322,7 +318,7 @@ class NetworkRun(RecordedRun):
         self.leg = steps[:2]
         loop.begin_leg(stop, *steps)
         if self.t < stop:
-            self._step_on(stop, look)
+            self._step_on(stop)
 
     def step_to(self, stop: float) -> None:
         """As `go_to`, to a stop (s) that is none of `stops`: straight, where nothing has a say in compiled steps.
@@ -347,7 +343,7 @@ class NetworkRun(RecordedRun):
             self.leg, self._between, self._fitted = (self.leg[0], int(loop.counts.leg_part)), True, fitted
         else:
             self._fitted = None
-            self._step_on(stop, lambda: None, code)
+            self._step_on(stop, code)
 
     @property
     def _steps_differ(self) -> bool:
@@ -374,7 +370,7 @@ class NetworkRun(RecordedRun):
         self.state, self.other = self.loop.states
         return code
 
-    def _step_on(self, stop: float, look: Callable[[], None], code: int | None = None) -> None:
+    def _step_on(self, stop: float, code: int | None = None) -> None:
         """Steps up to `stop` (s); code: with which compiled ones have come back, None: they are still to begin."""
         loop, step, arrived = self.loop, self.resolution.one.step, False
         while not arrived:
@@ -403,8 +399,8 @@ class NetworkRun(RecordedRun):
                 self._between = arrived or loop.counts.phase == b.BEGIN_STEP
                 if code == b.PAUSED:
                     loop.set_quota(LOOK if loop.counts.asks else ROWS)
-                if code == b.PAUSED or arrived:
-                    look()
+                if (code == b.PAUSED or arrived) and not self.stepped_outside:
+                    self._pause()
             code = None
 
     def _attach(self) -> None:
@@ -573,6 +569,16 @@ class NetworkRun(RecordedRun):
         self.solver.bodies[:], self.solver.body_work[:] = bodies, work
         self.renew_other()
         self.evaluate_forces(after)
+
+    def change_lines(self, changes: Mapping[int, Callable[[Line], Line]]) -> None:
+        """These lines, by number, are changed so on the same cells; the solver has still to follow."""
+        models = [*self.model.models]
+        for k, change in changes.items():
+            models[k] = replace(models[k], line=change(models[k].line))
+            self.lines[k].follow(models[k])
+            for part in self.parts:
+                part.change_line(k, change)
+        self.model = replace(self.model, models=tuple(models))
 
     def go_on_changed(self, numbers: Iterable[int], after: str) -> None:
         """Another solver, for lines of these numbers that have changed, and that share contact with those.

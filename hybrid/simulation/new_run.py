@@ -30,7 +30,7 @@ from hybrid.simulation.run_checkpoint import kept_changes
 from hybrid.simulation.run_contact import RunContact
 from hybrid.simulation.run_failures import Cuts, Failures
 from hybrid.simulation.run_file import Asked, RunFile
-from hybrid.simulation.run_of_lines import WatchedLines, loaded_as, with_loads_of
+from hybrid.simulation.run_of_lines import Heard, LoadChanges, ProgressOfRun, WatchedLines, loaded_as, with_loads_of
 from hybrid.simulation.run_quantities import Rotations, RunQuantities
 from hybrid.simulation.run_zones import RunZones
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
@@ -56,7 +56,7 @@ class Recording(NamedTuple):
     which they lie; start: the first state, if it is known; points: of outputs of lines by name, None: those of
     their scenes; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself
     where lines come near themselves, else that is only noticed; asked: what the network was made of, by whose names it
-    gets its file; parts: of the user's own, of which the run has copies.
+    gets its file; parts: of the user's own, of which the run has copies; heard: who hears of a motion, and may end it.
     """
 
     mode: WriteMode = AT_ONCE
@@ -71,6 +71,7 @@ class Recording(NamedTuple):
     touches: bool = True
     asked: Asked | None = None
     parts: Sequence[RunPart] = ()
+    heard: Heard | None = None
 
 
 ALONE = Recording()
@@ -175,7 +176,15 @@ def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording
     if recording.parts and moves:
         called = {} if recording.asked is None else recording.asked.scene.form.names
         parts.append(OwnParts(me, recording.parts, [called.get(name, name) for name in named], payout))
-    parts += [WatchedLines(me), contact, Cuts(me, contact, run.target is None), Failures(me)]
+    if recording.heard is not None and moves:
+        parts.append(ProgressOfRun(me, recording.heard))
+    parts += [
+        LoadChanges(me, run.changes, first.changed),
+        WatchedLines(me),
+        contact,
+        Cuts(me, contact, run.target is None),
+        Failures(me),
+    ]
     parts += [VibrationsOfLines(vibrations, run.loop.clock)]
     run.parts = Parts([*parts, run.quantities, run.rotations, FloatingWatch(me, moves)])
 
@@ -225,10 +234,10 @@ def run_system(
     name: of the pass; resolution, recording, criterion, changes: as of `new_run`.
     """
     mode = recording.mode._replace(before=recording.mode.before or {})  # it can be resumed
-    recording = recording._replace(mode=mode, planes=True)
+    recording = recording._replace(mode=mode, planes=True, heard=Heard(reporter, interrupted))
     run = new_run(system, target, text, True, resolution, recording, criterion, changes)
     reporter.begin(name, run.resolution.one)
-    run.record_motion(reporter, interrupted)
+    run.record_motion()
     return run
 
 

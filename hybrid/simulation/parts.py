@@ -5,7 +5,7 @@ A run owns arrays and compiled steps, and knows what else there is to a run by t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from math import inf
 from typing import Any
@@ -26,6 +26,7 @@ from hybrid.zones.plan import Change
 
 # What is asked of several parts is asked in this order.
 ORDER = (
+    "loads",  # what acts from some time on is known to all that follows
     "planes",  # a line goes on in space, or in its plane, before anything changes its cells
     "lines",  # what makes going on senseless ends the run before more is changed
     "contact",  # begins and ends on the cells on which lines were seen to be near
@@ -38,6 +39,7 @@ ORDER = (
     "quantities",  # from here on parts only look
     "rotations",
     "floating",
+    "progress",  # a run that is to be interrupted has been recorded so far
 )
 EVERY_STEP = 1 << 40  # beside the bits of Counts.notices: of every step that Python has a part in
 
@@ -168,6 +170,14 @@ class Part:
         return []
 
     @property
+    def phases(self) -> Sequence[float]:
+        """Times (s) still to come from which on other loads and motions hold, and so other stops."""
+        return ()
+
+    def begin_phase(self, t: float) -> None:
+        """The run has come to one of these times."""
+
+    @property
     def due(self) -> float:
         """When it is to be asked next (s), between two steps."""
         return inf
@@ -177,6 +187,12 @@ class Part:
 
     def at_stop(self) -> None:
         """Steps have come to a stop, or are to begin."""
+
+    def at_pause(self, finished: bool) -> None:
+        """About ten times a second between two steps, and at stops; finished: nothing is left to do.
+
+        KeyboardInterrupt: the run ends here.  Steps from outside do not ask.
+        """
 
     # --- what is recorded -----------------------------------------------------------------------------
 
@@ -238,7 +254,7 @@ class Parts:
             [(x.wants, verb) for x in parts for verb in _having([x], name)] for name in ("note_step", "after_step")
         )
         self.attached_to, self.gather = _having(parts, "attached_to"), _having(parts, "gather")
-        self.note_forces = _having(parts, "note_forces")
+        self.note_forces, self.at_pause = _having(parts, "note_forces"), _having(parts, "at_pause")
         self.begins = sorted({t for x in parts for t in x.begins})  # s
 
     def __iter__(self) -> Iterator[Part]:

@@ -36,7 +36,6 @@ class KeptRun(RunOfLines, Protocol):
     criterion: UserCriterion | None
     leg: tuple[float, int]
     cpu: float  # s
-    changed: int  # how many changes of loads have been made
 
     @property
     def interval(self) -> float: ...
@@ -57,7 +56,7 @@ def checkpoint(run: KeptRun) -> dict[str, Any]:
         "interval": run.interval, "worked": run.loop.worked[1, :, :SPRING],
         "leg": [*run.leg], "cpu": run.cpu, "bodies": run.state.bodies, "body_work": run.solver.body_work[:, :SPRING],
         "lines": lines, "rest": run.rest, "control": run.loop.control(), "cuts": run.loop.cuts(),
-        "changes": run.changed, **WITHOUT,
+        **WITHOUT,
     }  # fmt: skip
     for part in run.parts:
         found |= part.checkpoint()
@@ -103,7 +102,7 @@ def _of_today(run: KeptRun, saved: Mapping[str, Any]) -> dict[str, Any]:
 
     It took the added mass of members as at the first guess.
     """
-    older: dict[str, Any] = {"rest": run.rest, "control": [], "cuts": run.loop.cuts(), "changes": 0, "interval": 0.0}
+    older: dict[str, Any] = {"rest": run.rest, "control": [], "cuts": run.loop.cuts(), "interval": 0.0}
     older |= {"rho": run.system.require_time().rho_inf, "worked": run.loop.worked[1, :, :SPRING]}
     older |= {"bodies": run.state.bodies, "body_work": run.solver.body_work[:, :SPRING], **WITHOUT}
     found = older | dict(saved)

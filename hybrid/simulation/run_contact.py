@@ -26,7 +26,7 @@ from hybrid.simulation.contact_equilibrium import contact_of, crossings, energy_
 from hybrid.simulation.lines_contact import PASSED, LinesWatch, pair_text, shared_of
 from hybrid.simulation.old_checkpoints import of_line
 from hybrid.simulation.parts import Part
-from hybrid.simulation.run_of_lines import RunOfLines, change_lines
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.self_watch import deepest_text, diameters
 from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.network_solver import NetworkSolver
@@ -275,8 +275,8 @@ class RunContact(Part):
         """Lines touch themselves, or no longer; the solver has still to follow."""
         run = self._run
         frictions = {k: run.lines[k].scene.contact.friction for k in numbers}
-        change_lines(
-            run, {k: partial(touching, friction=x) if touch else touching_no_more for k, x in frictions.items()}
+        run.change_lines(
+            {k: partial(touching, friction=x) if touch else touching_no_more for k, x in frictions.items()}
         )
 
     # --- lines with each other ------------------------------------------------------------------------
@@ -337,7 +337,7 @@ class RunContact(Part):
         changes = {}
         for k in {*now, *(before.lines if before is not None else ())}:
             changes[k] = partial(change, scene=run.model.scenes[run.model.names[k]], touches=k in now)
-        change_lines(run, changes)
+        run.change_lines(changes)
         run.model = replace(run.model, touching=among)
         self._note_partners()
 

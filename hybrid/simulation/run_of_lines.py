@@ -5,9 +5,9 @@ A part names this and no run, so that the run stands above all of its parts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 from hybrid.kernels.junctions.bodies import DONE, SPRING
 from hybrid.kernels.state.report import SELF_CONTACT
@@ -21,6 +21,8 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import Sink
 from hybrid.simulation.line_result import LineResult, LineStep
 from hybrid.simulation.parts import Part, Parts
+from hybrid.simulation.progress import ProgressReporter
+from hybrid.simulation.restart import LoadChange
 from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
@@ -73,6 +75,9 @@ class RunOfLines(Protocol):
     def last_rho(self) -> float: ...
 
     @property
+    def touches(self) -> bool: ...
+
+    @property
     def asks_quantities(self) -> bool: ...
 
     def adopt_cells(self, number: int, model: Model, work: Work) -> None: ...
@@ -91,6 +96,8 @@ class RunOfLines(Protocol):
 
     def renew_solver(self, after: str) -> None: ...
 
+    def change_lines(self, changes: Mapping[int, Callable[[Line], Line]]) -> None: ...
+
     def go_on_changed(self, numbers: Iterable[int], after: str) -> None: ...
 
     def go_on_as_attached(self, after: str) -> None: ...
@@ -100,15 +107,11 @@ class RunOfLines(Protocol):
     def output_due(self) -> None: ...
 
 
-def change_lines(run: RunOfLines, changes: Mapping[int, Callable[[Line], Line]]) -> None:
-    """Give a run models with these lines changed, by number; its solver has still to follow."""
-    models = [*run.model.models]
-    for k, change in changes.items():
-        models[k] = replace(models[k], line=change(models[k].line))
-        run.lines[k].follow(models[k])
-        for part in run.parts:
-            part.change_line(k, change)
-    run.model = replace(run.model, models=tuple(models))
+class Heard(NamedTuple):
+    """Who hears of a run, and whether it is to end."""
+
+    reporter: ProgressReporter
+    interrupted: Callable[[], bool]
 
 
 class WatchedLines(Part):
@@ -183,24 +186,64 @@ def _line_as(name: str, now: Model, later: Model, system: Network, t: float) -> 
     return replace(later, line=line)
 
 
-def change_loads_of_lines(run: RunOfLines, system: Network) -> None:
-    """Other loads, and other motions of points and bodies, from now on; lines stay what they are and where they are."""
-    run.ends_of_now()
-    for line in run.lines:
-        line.write_down()
-    run.gather_events()  # in the order in which they happen
-    run.system, run.model = system, loaded_as(run.model, system, run.t, [x.fit_models for x in run.parts])
-    run.loaded = run.t  # loads that end now, or would have ended before, act no more
-    run.start_from(run.rest)
-    for line, model in zip(run.lines, run.model.models, strict=True):
-        line.follow(model)
-    for part in run.parts:
-        part.change_loads()
-    done = run.solver.body_work[:, DONE:SPRING].copy()
-    run.make_solver()
-    run.solver.body_work[:, DONE:SPRING] = done
-    run.renew_other()
-    run.restart_steps()
-    others = "other loads act, or points and bodies move otherwise"
-    text = f"from t = {run.t:.6g} s on {others}, as `hybrid resume` was asked to"
-    run.note("loads change", text)
+class LoadChanges(Part):
+    """Other loads, and other motions of points and bodies, from some times on."""
+
+    name = "loads"
+
+    def __init__(self, run: RunOfLines, changes: Sequence[LoadChange[Network]], made: int) -> None:
+        """changes: in their order; made: how many of them already hold."""
+        self._run, self._changes, self._made = run, changes, made
+
+    @property
+    def phases(self) -> Sequence[float]:
+        """When the others begin to hold (s)."""
+        return [x.t for x in self._changes[self._made :]]
+
+    def begin_phase(self, t: float) -> None:
+        """The next one holds from now on: lines stay what they are and where they are."""
+        run, system = self._run, self._changes[self._made].scene
+        run.ends_of_now()
+        for line in run.lines:
+            line.write_down()
+        run.gather_events()  # in the order in which they happen
+        run.system, run.model = system, loaded_as(run.model, system, run.t, [x.fit_models for x in run.parts])
+        run.loaded = run.t  # loads that end now, or would have ended before, act no more
+        run.start_from(run.rest)
+        for line, model in zip(run.lines, run.model.models, strict=True):
+            line.follow(model)
+        for part in run.parts:
+            part.change_loads()
+        done = run.solver.body_work[:, DONE:SPRING].copy()
+        run.make_solver()
+        run.solver.body_work[:, DONE:SPRING] = done
+        run.renew_other()
+        run.restart_steps()
+        others = "other loads act, or points and bodies move otherwise"
+        run.note("loads change", f"from t = {run.t:.6g} s on {others}, as `hybrid resume` was asked to")
+        self._made += 1
+
+    def checkpoint(self) -> dict[str, Any]:
+        """How many hold."""
+        return {"changes": self._made}
+
+    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """In files of an earlier program none did."""
+        return {"changes": saved.get("changes", 0)}
+
+
+class ProgressOfRun(Part):
+    """Who listens hears how far a run is, and may end it."""
+
+    name = "progress"
+
+    def __init__(self, run: RunOfLines, heard: Heard) -> None:
+        self._run, self._heard = run, heard
+
+    def at_pause(self, finished: bool) -> None:
+        """Report; KeyboardInterrupt: the run is to end."""
+        run, heard = self._run, self._heard
+        iterations = int(run.loop.counts.iterations)
+        heard.reporter(run.t, run.steps, iterations, run.model.models[0].zones, finished, run.touches)
+        if not finished and heard.interrupted():
+            raise KeyboardInterrupt
