@@ -39,7 +39,7 @@ from hybrid.kernels.step.step_law import REFUSED
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.joined import JoinedLine, NetworkState, NetworkTaken
 from hybrid.solve.line_jobs import LineJobs
-from hybrid.solve.line_solver import BALANCED, BALANCING, MOST_ITERATIONS
+from hybrid.solve.line_solver import BALANCED, BALANCING, CLOSER, MOST_ITERATIONS
 from hybrid.solve.self_contact import SelfContact, left_over
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING
@@ -50,9 +50,6 @@ from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
 NEUTRAL = 1e-6
 # Of the longest line: arm by which moments on bodies are compared with forces, at least.
 LEAST_ARM = 0.01
-# Where lines touch Newton goes on once unless this many times the residual balances, too: a ball on lines that lie on
-# others was 3e-7 m away from where it rests.
-CLOSER = 100.0
 NO_BODIES: Floats = np.zeros((0, NUMBERS))
 
 
