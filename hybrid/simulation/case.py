@@ -414,7 +414,9 @@ class Case:
         held: dict[str, Any] = {}
         if judged and self._judges(name):
             held = {x.name: y for x, y in line.envelope.fixed()}
-            held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t) | run.quantities.ranges_of(name)
+            held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t) | run.file.quantities.ranges_of(
+                name
+            )
         return RunSample(
             resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
             resolution.every, rows=rows, forces=found.steps,

@@ -173,8 +173,6 @@ class NetworkRun(RecordedRun):
 
     def _pause(self, finished: bool = False) -> None:
         """What is due about ten times a second; finished: at the end."""
-        if not finished:
-            self.keep()
         for at_pause in self.parts.at_pause:
             at_pause(finished)
 
@@ -213,7 +211,7 @@ class NetworkRun(RecordedRun):
     @property
     def asks_quantities(self) -> bool:
         """Whether quantities by name are among the outputs, which are found of one mesh at a time."""
-        return bool(self.quantities.fields)
+        return bool(self.file.quantities.fields)
 
     def adopt_cells(self, number: int, model: Model, work: Work) -> None:
         """Go on with other cells of a line, which steps have changed to."""

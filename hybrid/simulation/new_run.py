@@ -31,7 +31,7 @@ from hybrid.simulation.run_contact import RunContact
 from hybrid.simulation.run_failures import Cuts, Failures
 from hybrid.simulation.run_file import Asked, RunFile
 from hybrid.simulation.run_of_lines import Heard, LoadChanges, ProgressOfRun, WatchedLines, loaded_as, with_loads_of
-from hybrid.simulation.run_quantities import Rotations, RunQuantities
+from hybrid.simulation.run_record import RunRecorder
 from hybrid.simulation.run_zones import RunZones
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
 from hybrid.simulation.zones_at_rest import Start, managers_for, start_at_rest, zones_as_placed
@@ -160,17 +160,15 @@ def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording
 
         payout = RunPayout(me)
         parts.append(payout)
-    run.rotations = Rotations(system, run.model)
-    run.file = RunFile(me, text, recording)
+    run.file = RunFile(me, system, named, text, recording)
     _add_lines(run, first, recording, payout.lines if payout is not None else {})
     contact = RunContact(me, recording.touches, run.target is not None)
     if recording.planes and moves:
         parts.append(LonePlanes(me, run.loop.counts, system.dimension == 2))
     shaken = zip(named.items(), run.resolution.lines.values(), strict=True)
     vibrations = {name: VibrationSteps(scene, x) for (name, scene), x in shaken}
-    run.quantities = RunQuantities(system, run.file.of_quantities(named))
     if moves:
-        run.quantities.keep_ranges(run.lines)
+        run.file.quantities.keep_ranges(run.lines)
     if first.managers and moves:
         parts.append(RunZones(me, first.managers, payout))
     if recording.parts and moves:
@@ -185,8 +183,8 @@ def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording
         Cuts(me, contact, run.target is None),
         Failures(me),
     ]
-    parts += [VibrationsOfLines(vibrations, run.loop.clock)]
-    run.parts = Parts([*parts, run.quantities, run.rotations, FloatingWatch(me, moves)])
+    parts += [VibrationsOfLines(vibrations, run.loop.clock), run.file.quantities, run.file.rotations]
+    run.parts = Parts([*parts, RunRecorder(me), FloatingWatch(me, moves)])
 
 
 def _add_lines(run: NetworkRun, first: First, recording: Recording, paid: Mapping[int, PayingOut]) -> None:

@@ -38,6 +38,7 @@ ORDER = (
     "vibrations",  # bounds the steps to come, whatever has changed
     "quantities",  # from here on parts only look
     "rotations",
+    "recorder",  # outputs are kept before a part that looks at them may end the run
     "floating",
     "progress",  # a run that is to be interrupted has been recorded so far
 )
@@ -202,8 +203,8 @@ class Part:
     def gather(self) -> None:
         """Events are about to be written, in the order in which they happened."""
 
-    def log(self, rows: Floats) -> None:
-        """Steps have been made, (n, L, 3): s; N, at start and end of each line."""
+    def log(self, rows: Floats, cpu: Floats) -> None:
+        """Steps have been made: rows (n, L, ..) as of kernels.state.books, and processor times (n,) s."""
 
     def at_output(self, seen: Sampled) -> None:
         """Outputs have been recorded.  LineFailed: the run ends here."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError
 from hybrid.kernels.machine.cache import cache_folder
+from hybrid.scene.network import Network
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import LineScene
@@ -64,8 +65,6 @@ class FiledRun(RunOfLines, Protocol):
     target: Target | None
     times: Sequence[float]
     changes: Sequence[LoadChange[Any]]
-    rotations: Rotations
-    quantities: RunQuantities
     recorder: AnyRecorder
 
     @property
@@ -78,13 +77,18 @@ class RunFile:
     That of a line without a name is the result of the line alone, in the words of its scene.
     """
 
-    def __init__(self, run: FiledRun, text: Text, asks: Filing) -> None:
-        """text: the scene, as the file has it."""
+    def __init__(
+        self, run: FiledRun, system: Network, scenes: Mapping[str, LineScene], text: Text, asks: Filing
+    ) -> None:
+        """system: with the loads of its start; scenes: of its lines by name; text: the scene, as the file has it."""
         scene = asks.asked.scene if asks.asked is not None else None
         self._run, self._text, self._asks = run, text, asks
         self._form = ShortForm((), {}) if scene is None else scene.form
         # The scene of the only line, if it has no name.
         self._alone: LineScene | None = scene.asked_lines.get("") if scene is not None else None
+        # What is recorded beside the lines, by name.
+        self.quantities = RunQuantities(system, scenes if self._alone is None else {})
+        self.rotations = Rotations(system, run.model)
 
     @property
     def _length(self) -> float:
@@ -106,10 +110,6 @@ class RunFile:
     def scene_of(self, scene: LineScene) -> LineScene:
         """The scene by which a line is recorded."""
         return scene if self._alone is None else self._alone
-
-    def of_quantities(self, scenes: Mapping[str, LineScene]) -> Mapping[str, LineScene]:
-        """Of these scenes of lines, those whose quantities by name are recorded beside the lines."""
-        return scenes if self._alone is None else {}
 
     def line_rows(
         self, line: LineResult, found: LinesAtRest | None, outputs: int, manager: DomainManager | None
@@ -166,8 +166,8 @@ class RunFile:
             attributes[PENDING] = pending
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
-        fields = [*fields_of(run.system), *fields_of_pairs(run.model), *run.quantities.fields]
-        fixed = [*run.quantities.limits, *run.quantities.ranges, *places_of_elevation(gauges_of(system))]
+        fields = [*fields_of(run.system), *fields_of_pairs(run.model), *self.quantities.fields]
+        fixed = [*self.quantities.limits, *self.quantities.ranges, *places_of_elevation(gauges_of(system))]
         header = Header(np.zeros(1), fields, (), attributes, self._texts, fixed)
         return self._recorder(header, {name: x for name, x in rows.items() if isinstance(x, Rows)})
 
@@ -187,10 +187,10 @@ class RunFile:
         if run.target is None or self._alone is not None:
             return
         values = values_of(run.system, run.model, seen)
-        run.rotations.go_on(values)
+        self.rotations.go_on(values)
         values |= values_of_pairs(run.model, run.solver.shared, seen.lines)
         by_name = {line.name: x for line, x in zip(run.lines, seen.lines, strict=True)}
-        values |= run.quantities.values(by_name, {line.name: line for line in run.lines})
+        values |= self.quantities.values(by_name, {line.name: line for line in run.lines})
         run.recorder.save_batch(seen.t, values, [("lines", 0.0, 0.0)])
 
     # --- events and errors ----------------------------------------------------------------------
@@ -227,5 +227,5 @@ class RunFile:
         """Close all; status, message: of the run."""
         run = self._run
         self.gather()
-        run.recorder.replace(run.quantities.range_values())
+        run.recorder.replace(self.quantities.range_values())
         run.recorder.close(status, message)

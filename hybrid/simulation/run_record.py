@@ -12,16 +12,16 @@ import numpy as np
 
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT
+from hybrid.kernels.state.state import Floats
 from hybrid.model.network import NetworkModel, NetworkResolution
 from hybrid.scene.network import Network
 from hybrid.simulation.events import Sink
-from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
-from hybrid.simulation.parts import Parts
+from hybrid.simulation.line_result import LineResult
+from hybrid.simulation.parts import Part, Parts
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_checkpoint import files_of
 from hybrid.simulation.run_file import AnyRecorder, RunFile
 from hybrid.simulation.run_points import Sampled
-from hybrid.simulation.run_quantities import Rotations, RunQuantities
 from hybrid.solve.joined import LineFailed
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.store.array_contents import Target
@@ -45,8 +45,6 @@ class RecordedRun:
     lines: list[LineResult]
     recorder: AnyRecorder
     parts: Parts
-    quantities: RunQuantities
-    rotations: Rotations
     changes: Sequence[LoadChange[Network]] = ()  # of loads
     cpu = 0.0  # s, of the processor, in earlier parts of the run
     read_every = READ_EVERY
@@ -141,7 +139,7 @@ class RecordedRun:
         for line in self.lines:
             line.write_down()
             line.write_envelope(self.t)
-        self.recorder.replace(self.quantities.range_values())
+        self.recorder.replace(self.file.quantities.range_values())
         self.gather_events()
         made = monotonic() - begin
         if new:
@@ -173,11 +171,8 @@ class RecordedRun:
         self.loop.counts.samples = 0
         states = [line.sampled(count) for line in self.lines]
         seen = Sampled(states, self.loop.body_samples[:count])
-        self.file.save(seen)
-        for look in self.parts.at_output:
-            look(seen)
-        for line, x in zip(self.lines, states, strict=True):
-            line.output(x)
+        for at_output in self.parts.at_output:
+            at_output(seen)
 
     def _close(self, status: str, message: str) -> None:
         """Close all, with the events of the lines in the result of the points too."""
@@ -211,9 +206,7 @@ class RecordedRun:
         cpu = np.linspace(self._logged, now, len(rows) + 1)[1:]
         self._logged = now
         for log in self.parts.log:
-            log(rows[:, :, FORCE_COLUMNS])
-        for k, line in enumerate(self.lines):
-            line.log(np.column_stack([rows[:, k], cpu]))
+            log(rows, cpu)
 
     def finish(self, status: str = "complete", message: str = "") -> None:
         """Write what waits, and close the file."""
@@ -232,3 +225,28 @@ class RecordedRun:
     def touches(self) -> bool:
         """Whether contact of a line with itself is computed."""
         return any(model.line.bits & SELF_CONTACT for model in self.model.models)
+
+
+class RunRecorder(Part):
+    """What records the outputs and the steps of a run."""
+
+    name = "recorder"
+
+    def __init__(self, run: RecordedRun) -> None:
+        self._run = run
+
+    def at_output(self, seen: Sampled) -> None:
+        """Those of points, bodies and pairs, and of lines."""
+        self._run.file.save(seen)
+        for line, x in zip(self._run.lines, seen.lines, strict=True):
+            line.output(x)
+
+    def log(self, rows: Floats, cpu: Floats) -> None:
+        """Steps of each line."""
+        for k, line in enumerate(self._run.lines):
+            line.log(np.column_stack([rows[:, k], cpu]))
+
+    def at_pause(self, finished: bool) -> None:
+        """Keep a checkpoint where one is due; the last is kept where the file is closed."""
+        if not finished:
+            self._run.keep()

@@ -71,7 +71,7 @@ def commit(run: NetworkRun) -> None:
         for line in run.lines:
             line.write_down()
             line.write_envelope(run.t)
-        run.recorder.replace(run.quantities.range_values())
+        run.recorder.replace(run.file.quantities.range_values())
     run.gather_events()
     if due:
         run.recorder.flush(monotonic() - begin)

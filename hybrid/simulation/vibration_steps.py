@@ -15,6 +15,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import Resolution, start_vibrations
 from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import LineScene
+from hybrid.simulation.line_result import FORCE_COLUMNS
 from hybrid.simulation.parts import Part
 from hybrid.store.named_arrays import matched
 
@@ -135,10 +136,10 @@ class VibrationsOfLines(Part):
             x.begin(self._clock)
         self._bound()
 
-    def log(self, rows: Floats) -> None:
-        """Remember the forces (n, L, 3) at the ends of lines in steps, as of `VibrationSteps`."""
+    def log(self, rows: Floats, cpu: Floats) -> None:
+        """Remember the forces at the ends of lines in steps, as of `VibrationSteps`."""
         for k, x in enumerate(self._lines.values()):
-            x.log(rows[:, k])
+            x.log(rows[:, k, FORCE_COLUMNS])
 
     def at_due(self) -> None:
         """Longer steps, of lines that are looked at now, where little of the vibration shows."""
