@@ -16,11 +16,12 @@ import hybrid.kernels
 from hybrid.errors import Outcome
 from hybrid.model.build import build
 from hybrid.model.resolution import first_resolution
+from hybrid.scene.read import one_line
 from hybrid.simulation.diagnostics import Diagnostics
 from hybrid.simulation.events import EventLog
 
 SECTION = {"length": 10.0, "mass": 1.0, "bending_stiffness": 2.0, "axial_stiffness": 1e5}
-SCENE = scene(SECTION, pinned(), pinned(9.5, 0, 0), model="rod", mesh={"cells": 10})
+SCENE = one_line(scene(SECTION, pinned(), pinned(9.5, 0, 0), model="rod", mesh={"cells": 10}))
 MODEL = build(SCENE, first_resolution(SCENE))
 
 

@@ -15,7 +15,7 @@ import hybrid.simulation.network_run
 import hybrid.simulation.run_record
 from hybrid.errors import SceneError
 from hybrid.simulation import line_result, network_run
-from hybrid.store.recorder import BaseRecorder
+from hybrid.store.recorder import Rows
 
 ROD = {
     "length": 10.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0,
@@ -96,13 +96,13 @@ def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatc
     settings = ["time.duration=30", "output.criteria=true"]
     scene = hybrid.load_scene(Path(__file__).parents[2] / "examples" / "touchdown.yaml", settings)
     batches: list[int] = []
-    save = BaseRecorder.save_batch
+    save = Rows.save_batch
 
-    def counted(self: BaseRecorder, times: np.ndarray, *more: Any) -> None:
+    def counted(self: Rows, times: np.ndarray, *more: Any) -> None:
         batches.append(times.size)
         save(self, times, *more)
 
-    monkeypatch.setattr(BaseRecorder, "save_batch", counted)
+    monkeypatch.setattr(Rows, "save_batch", counted)
     many = hybrid.run(scene)
     assert max(batches) > 20  # while lengths or bending are on their way, outputs do not wait
     monkeypatch.setattr(line_result, "WAITING", 1)
