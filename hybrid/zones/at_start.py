@@ -29,12 +29,15 @@ from hybrid.zones.plan import Allowed, Times
 
 # Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps;
 # and of a line that moves to and fro so many periods, lest what is let go comes back, up to so many ramp times.
-HOLD, LEAST_STEPS_HELD = 0.25, 20
-PERIODS_HELD, MOST_HELD = 2.0, 10.0
+HOLD = 0.25
+LEAST_STEPS_HELD = 20
+PERIODS_HELD = 2.0
+MOST_HELD = 10.0
 # Part of a period over which the way of a contact edge is foreseen: from the middle of its way to where it turns round.
 STRAIGHT = 0.25
 # Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
-SLOWEST, FASTEST = 2.0, 10
+SLOWEST = 2.0
+FASTEST = 10
 # Ramp times of bending stiffness within which a cell that is taken in must have become rod.
 AHEAD = 2.0
 # Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
@@ -133,7 +136,6 @@ def _given(scene: LineScene, model: Model, pace: float) -> np.ndarray:
     assert model.layout is not None
     if model.payout is None:
         return given_zones(scene, model.layout)
-
     paid = model.payout
     return rods_at_winch(scene, paid, model, paid.count(paid.first), pace, fastest(paid.law))
 

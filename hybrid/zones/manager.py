@@ -34,10 +34,8 @@ BUFFER = 2.0
 REVIEWS = 4  # without a cell above threshold, per ramp time
 FAST_RAMP = 16.0  # factor by which stiffness is ramped up faster where tension is lost
 RETURN_WINDOW = 4.0  # hold times: a catenary that lasts less costs more than its two switches save
-LOST_TENSION, WEIGHTLESS = (
-    0.3,
-    1e-3,
-)  # remaining part of a lost tension; tension floor over scale, no weight
+LOST_TENSION = 0.3  # remaining part of a tension, from which on it is being lost
+WEIGHTLESS = 1e-3  # tension floor over tension scale, below which a cable counts as one without weight
 LONGEST_WAIT = 8.0  # hold times that a rod is kept below threshold, where earlier ones were released too soon
 SHORTEST = 2  # cells that make a zone
 

@@ -19,6 +19,7 @@ from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_sta
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
+from hybrid.scene.read import one_line
 from hybrid.zones.change import transfer_to
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Allowed, Times
@@ -39,7 +40,7 @@ def cable(length: float = 10.0, *, start: Any = None, end: Any = None, **more: A
     pieces = [section | x for x in more.pop("sections", ({},))]
     what = scene(section, start or pinned(), end or free(), gravity=GRAVITY, **tables).model_dump(exclude_none=True)
     what["cable"] = {"sections": [x | more for x in pieces]} | ({"attachments": attachments} if attachments else {})
-    return material(Scene.model_validate(what))
+    return material(one_line(Scene.model_validate(what)))
 
 
 def layout(base: Sequence[float] | Floats, parts: int | Sequence[int], rod: Sequence[bool] | str) -> Layout:

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from adapt_cases import along, cable, even, on, state_on, still
+from problems import pinned, scene
 
+from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, TORSION
+from hybrid.kernels.mesh.cell_errors import CURVATURE
+from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.state.state import no_sea
+from hybrid.model.build import build
 from hybrid.model.layout import Layout
+from hybrid.model.resolution import first_resolution
+from hybrid.scene.read import one_line
+from hybrid.scene.schema import AdaptiveModel
+from hybrid.simulation.zones_at_rest import managers_for
 from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Change, Times
+from hybrid.zones.plan import Allowed, Change, Rules, Times, planned
 
 HOLD = 2.0  # s
 
@@ -111,6 +120,122 @@ def test_only_catenaries_that_are_far_above_a_threshold_reject_a_step() -> None:
     found = manager("RCCCCCCCCC", [0, 0, -1, 0, 0, 0, 0, 0, 0, 0])
     found.ratios[BEND, :4] = 1e3  # a rod, a catenary, one that is given as catenary, a catenary
     assert np.unique(found.base_of_cell[found.cells_to_reject]).tolist() == [1, 3]
+
+
+def test_only_cells_above_the_limit_at_which_they_let_go_may_help_a_step_that_failed_beside_them() -> None:
+    """A bend at 0.3 (it lets go at 0.25) beside the cell that failed or in it, and not two cells away."""
+    found = manager("CCCCCCCCCC")
+    found.ratios[BEND, 4], found.ratios[BEND, 7] = 0.3, 0.2
+    for base, near in ((3, [4]), (4, [4]), (5, [4]), (6, []), (7, [])):
+        cells = found.cells_near_threshold(int(np.flatnonzero(found.base_of_cell == base)[0]))
+        assert np.unique(found.base_of_cell[cells]).tolist() == near, base
+
+
+def test_rods_are_two_lengths_of_bending_wider_than_what_asks() -> None:
+    """Twice sqrt(EI/T), or (EI/w)^(1/3) where that is shorter; two cells where results must show a bend at a joint."""
+    found = manager("CCCCCCCCCC")
+    line = on(found.cable, found.layout)
+    assert found.rules(state_on(line, along(), tension=50.0)).buffer == pytest.approx(2.0 * np.sqrt(2.0 / 50.0))
+    assert found.rules(state_on(line, along(), tension=2.0)).buffer == pytest.approx(2.0 * (2.0 / 10.0) ** (1.0 / 3.0))
+    allowed = Allowed(0.01, asked={CURVATURE: 0.05})
+    found = DomainManager(cable(), even(10, "C" * 10), np.zeros(10, int), 1.0, allowed, Times(HOLD))
+    assert (found.rules(state_on(line, along(), tension=50.0)).buffer >= 1.0).all()
+
+
+def test_a_rod_on_its_way_out_comes_back_above_half_of_what_makes_a_rod() -> None:
+    ratios, rod = np.zeros((len(CRITERIA), 10)), np.ones(10, bool)
+    ratios[BEND] = np.where(np.arange(10) < 5, 0.55, 0.45)
+    rules = Rules(np.zeros(10), 2, HOLD)
+    stays, _ = planned(ratios, rod, np.full(10, -100.0), 0.0, np.arange(11.0), rules, leaving=rod)
+    assert stays.tolist() == [True] * 5 + [False] * 5
+
+
+def test_the_user_speaks_for_catenaries_that_may_be_rods() -> None:
+    for rod, given, loudest in (("C" * 10, 0, 3.0), ("R" * 10, 0, 0.0), ("C" * 10, -1, 0.0)):
+        zones = np.full(10, given)
+        found = DomainManager(
+            cable(), even(10, rod), zones, 1.0, Allowed(0.01), Times(HOLD), lambda nodes: np.full(nodes.s.size, 3.0)
+        )
+        line = on(found.cable, found.layout)
+        found.ask_user(line, state_on(line, along(), tension=1e6), 0.0)
+        assert found.loudest == loudest
+
+
+def test_a_joint_is_passed_where_a_rod_grows_and_not_where_one_appears() -> None:
+    found = manager("RRCCCCCCCC")
+    for new, place in (("RRRCCCCCCC", 2.0), ("RRCCCRRCCC", None)):
+        rod = np.array([x == "R" for x in new])
+        change = Change(rod, tuple(found._reasons(found.layout.rod, rod)), np.zeros(10, bool), np.zeros(10, bool))
+        assert found.joint_passed(change) == place
+
+
+def test_lines_stay_rod_at_clamps_to_what_turns() -> None:
+    short = scene({"length": 10.0, "mass": 1.0, "bending_stiffness": 1.0}, pinned(), pinned(9.0, 0, 0), cells=10)
+    what = one_line(short).model_copy(update={"model": AdaptiveModel(kind="adaptive")})
+    built, seats = build(what), np.zeros((1, 2, TURNS + 1))
+    seats[0, 1, TURNS] = 1.0
+    resolution = SimpleNamespace(lines={"a": first_resolution(what)})
+    network: Any = SimpleNamespace(names=("a",), models=(built,), resolution=resolution, seats=seats)
+    assert managers_for({"a": what}, network, None)[0].given.tolist() == [0] * 9 + [1]
+
+
+# --- reviews ------------------------------------------------------------------------------------------
+
+
+def review_of(found: DomainManager, t: float = 0.0, tension: float = 1e6) -> Change | None:
+    """A review at t (s) of the ratios that it has, under an even tension (N)."""
+    return found.review(t, state_on(on(found.cable, found.layout), along(), tension))
+
+
+def test_zones_that_are_held_let_no_rod_go_and_what_is_given_as_catenary_becomes_none() -> None:
+    for held in (True, False):
+        found = manager("RRRRCCCCCC", [0] * 7 + [-1] * 3)
+        found.held, found.calm_since[:] = held, -100.0
+        found.ratios[BEND, 8] = 2.0
+        change = review_of(found)
+        assert change is None or not change.rod[7:].any()
+        assert found.leaving.any() == (not held)
+
+
+def test_rods_go_when_they_have_no_stiffness_left_and_the_next_review_is_when_one_may_have_gone() -> None:
+    found = manager("RRRRCCCCCC", ramp=1.0)
+    found.calm_since[:] = -100.0
+    found.leaving[:4], found.grown[:4] = True, 0.1
+    assert review_of(found) is None and found.next_review == pytest.approx(0.1)
+    found.grown[:4], found.calm_since[:] = 0.0, -100.0
+    change = review_of(found)
+    assert change is not None and not change.rod.any()
+
+
+def test_without_anything_to_do_there_are_four_reviews_in_a_ramp_time() -> None:
+    """A little earlier, lest round-off puts one off by a step; compiled ones likewise."""
+    for compiled in (False, True):
+        found = reviewed("C" * 10, np.zeros((len(CRITERIA), 10)), False, 1.0, compiled)
+        assert 0.25 * HOLD * (1.0 - 1e-6) < found.next_review < 0.25 * HOLD
+
+
+def test_rods_are_urgent_where_a_line_is_slack_and_not_where_it_bends() -> None:
+    found = manager("CCCCCCCCCC")
+    found.ratios[SLACK, 2], found.ratios[BEND, 7] = 1.5, 1.5
+    change = review_of(found)
+    assert change is not None and change.rod[[2, 7]].all()
+    assert change.urgent[2] and not change.urgent[7]
+
+
+@pytest.mark.parametrize(
+    ("before", "weightless", "urgent"), [(86.0, True, True), (84.0, True, False), (86.0, False, False)]
+)
+def test_rods_are_urgent_where_a_line_without_weight_loses_tension(
+    before: float, weightless: bool, urgent: bool
+) -> None:
+    """From `before` (N) a ramp time ago to 50 now: 14 in a ramp time are less than 0.3 of that, 16 are not."""
+    floor = float(manager("C" * 10).floor.max())  # N, of 10 N/m: without weight where it is below 1e-3 of the scale
+    scale = 1e3 * floor * (1.01 if weightless else 0.99)
+    found = DomainManager(cable(), even(10, "C" * 10), np.zeros(10, int), scale, Allowed(0.01), Times(HOLD))
+    found.zones.past[:], found.zones.counts.known, found.age = before, 1, HOLD
+    found.ratios[BEND, 7] = 1.5
+    change = review_of(found, tension=50.0)
+    assert change is not None and change.urgent[7] == urgent
 
 
 # --- compiled reviews ---------------------------------------------------------------------------------
