@@ -89,8 +89,12 @@ assert pytest.main(["-q", "-n", "0", "-p", "no:cacheprovider", {walk!r}]) == 0, 
 """
 
 
-# Read for two kinds of numbers each, which takes little: bits and truths, numbers of cells and kinds of them.
-TWICE = {"hybrid.kernels.mesh.fill_line.fill_element", "hybrid.kernels.reel.payout_nodes.move_row"}
+# Read for two kinds of arguments each, which takes little: bits and truths, numbers of cells and kinds of them, jobs of
+# changes of cells and of nodes.
+TWICE = {
+    "hybrid.kernels.mesh.fill_line.fill_element", "hybrid.kernels.reel.payout_nodes.move_row",
+    "hybrid.kernels.mesh.cell_changes.begin_anew",
+}  # fmt: skip
 
 
 @pytest.mark.slow  # minutes: the kernels of the copy are compiled

@@ -584,6 +584,6 @@ class RunKinds:
         line, model, ends = run.lines[number], run.model.models[number], self._solver.lines[number].ends
         both, around = (first.lines[number], second.lines[number]), line.around(self._solver.work[number])
         kinds = LineKinds(model, switching, both, around, ends)
-        self._solver.take_line(number, kinds.model.line)
+        self._solver.set_line(number, kinds.model.line)
         switching.model = kinds.model
         return kinds

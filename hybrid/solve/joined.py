@@ -52,20 +52,17 @@ class NetworkState(NamedTuple):
 
 @dataclass(frozen=True)
 class NetworkTaken:
-    """How a solution went: outcome, Newton iterations, predicted next correction, line and cell or node where it was
-    worst, the largest residual force at a node or point (N), the local error of a step (m), the largest of a line over
-    what is allowed of it: a step of more than REFUSED (step.step_law) is in no books, and is to be repeated; and its
-    spectral radius at infinity."""
+    """How a solution of several lines went."""
 
     outcome: Outcome
-    iterations: int
-    correction: float
-    line: int
-    where: int
-    residual: float
-    error: float = 0.0
-    ratio: float = 0.0
-    rho: float = 0.0
+    iterations: int  # of Newton's method
+    correction: float  # the next one, as it is predicted
+    line: int  # where it was worst; -1: a point or body
+    where: int  # its cell or node
+    residual: float  # N, largest residual force at a node or point
+    error: float = 0.0  # m, local error of a step
+    ratio: float = 0.0  # largest over what is allowed of a line; above REFUSED (step.step_law) it is in no books
+    rho: float = 0.0  # spectral radius at infinity of the step
 
 
 class LineFailed(ComputationError):

@@ -229,7 +229,7 @@ class LineJobs:
         self._group()
         return self._bind_turns()
 
-    def take_line(self, number: int, line: Line) -> None:
+    def set_line(self, number: int, line: Line) -> None:
         """A line is in other arrays from now on."""
         self.lines = tuple(x._replace(line=line) if k == number else x for k, x in enumerate(self.lines))
         self.bind_line(number, line=line)

@@ -65,11 +65,12 @@ class NetworkSolver(LineJobs):
         self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES,
         contacts: Sequence[SelfContact | None] = (), shared: SharedContact | None = None, tolerance: float = TOLERANCE,
     ) -> None:  # fmt: skip
-        """points: how many free points there are; bodies: (B, NUMBERS), what they are, read at every step; contacts: of
+        """Make tables of lines; each point and body must be at an end of some line.
 
+        points: how many free points there are; bodies: (B, NUMBERS), what they are, read at every step; contacts: of
         lines that touch themselves, in the order of the lines, None: of one that does not; empty: none does.  shared:
         contact of lines that may touch each other, which have none of their own; tolerance: of Newton's method in
-        steps.  Each point and body must be at an end of some line.
+        steps.
         """
         super().__init__(lines, bodies, contacts, shared)
         self.tolerance, self.net, self.body_work = tolerance, np.zeros((points, 3)), np.zeros((len(bodies), WORK))
@@ -160,8 +161,10 @@ class NetworkSolver(LineJobs):
         return bool(self._rides.size) and bool(self._pressed["found"].any())
 
     def pressed_bodies(self, states: NetworkState, cv: float = 0.0) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
-        """What lines that touch bodies do to them in states at rest: rows (n, TOUCHED) of nodes, how that changes as
-        each body moves (S, 36), what it is (S, 6), and the numbers of these bodies (S,).  cv: 1/s, of the damping.
+        """What lines that touch bodies do to them in states at rest.
+
+        Rows (n, TOUCHED) of nodes, how that changes as each body moves (S, 36), what it is (S, 6), and the numbers of
+        these bodies (S,).  cv: 1/s, of the damping.
         """
         self.evaluate_forces(states, 0.0)
         if cv:
@@ -182,9 +185,10 @@ class NetworkSolver(LineJobs):
         return self._largest(*self.unbalanced(states, self.anchor)) if self.in_contact() else residual
 
     def unbalanced(self, states: NetworkState, ca: float) -> tuple[list[float], Floats, Floats]:
-        """What does not balance, with contact, in states that have just been evaluated: the largest force (N) at a node
+        """What does not balance, with contact, in states that have just been evaluated.
 
-        of each line, forces (P, 3) N on points, forces and moments (B, 6) N, N m on bodies.  ca: as of them.
+        The largest force (N) at a node of each line, forces (P, 3) N on points, forces and moments (B, 6) N, N m on
+        bodies.  ca: as of them.
         """
         points = len(self.net)
         inside, net = [float(work.report[RESIDUAL]) for work in self.work], self.net.copy()
@@ -383,9 +387,10 @@ class NetworkSolver(LineJobs):
     # --- equilibrium --------------------------------------------------------------------------------
 
     def compliance(self, states: NetworkState, ca: float) -> Floats | None:
-        """How points and bodies give way to forces on them: (n, n) m/N, rad/N, .., of the points (3 each), then of the
-        bodies (3 of the origin, 3 of the rotation), of an equilibrium, from the factors of its lines.  Friction is
-        left out.  ca: 1/s2, of springs of that times the mass.  None: the system is singular.
+        """How points and bodies of an equilibrium give way to forces on them; None: the system is singular.
+
+        (n, n) m/N, rad/N, .., of the points (3 each), then of the bodies (3 of the origin, 3 of the rotation), from the
+        factors of its lines.  Friction is left out.  ca: 1/s2, of springs of that times the mass.
         """
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             work.u[:] = 0.0
@@ -437,9 +442,9 @@ class NetworkSolver(LineJobs):
         return taken.outcome == Outcome.OK
 
     def newton_round(self, states: NetworkState) -> NetworkTaken:
-        """Static Newton from states at rest, which it overwrites; springs of `anchor` times their mass hold nodes and
+        """Static Newton from states at rest, which it overwrites.
 
-        bodies where they are, so that what is found balances with these.
+        Springs of `anchor` times their mass hold nodes and bodies where they are: what is found balances with these.
         """
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             work.u[:], state.soil[:] = 0.0, 0.0

@@ -33,13 +33,12 @@ LENGTHS = "tiny_steps", "cut_by_gain", "cut_by_turn", "cut_by_newton", "cut_by_e
 
 
 class Tried(NamedTuple):
-    """How a try ended: outcome, Newton iterations, predicted next correction (relative), and the cell or node where it
-    was worst."""
+    """How a try ended."""
 
     outcome: Outcome
-    iterations: int
-    correction: float
-    where: int
+    iterations: int  # of Newton's method
+    correction: float  # the next one, as it is predicted, relative
+    where: int  # cell or node where it was worst
 
 
 def batch_of_rows(

@@ -58,17 +58,15 @@ POWERS = (
 
 @dataclass(frozen=True)
 class Taken:
-    """How one step went: outcome, Newton iterations, predicted next correction (relative), the cell or node where
-    it was worst, the largest force out of balance before the last correction (N), the local error (m), and the spectral
-    radius at infinity of the step."""
+    """How one step went."""
 
     outcome: Outcome
-    iterations: int
-    correction: float
-    where: int
-    residual: float
-    error: float = 0.0
-    rho: float = 0.0
+    iterations: int  # of Newton's method
+    correction: float  # the next one, as it is predicted, relative
+    where: int  # cell or node where it was worst
+    residual: float  # N, largest force out of balance before the last correction
+    error: float = 0.0  # m, local error
+    rho: float = 0.0  # spectral radius at infinity
 
 
 def static_friction_travel(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:

@@ -103,8 +103,10 @@ def chord_between(old, new, c, x, dt):
 
 @inner
 def frame_between(before, R, w0, w1, x, dt):
-    """Frame at the part x of a step of dt from `before` to R, which turn with w0 and w1 (1/s, inertial): the rotation
-    vector from `before` on is a cubic with the rates that these give it, as chords are."""
+    """Frame at the part x of a step of dt from `before` to R, which turn with w0 and w1 (1/s, inertial).
+
+    The rotation vector from `before` on is a cubic with the rates that these give it, as chords are.
+    """
     turn = log_rotation(relative_rotation(before, R))
     g, _ = jacobian_functions(dot(turn, turn))
     rate = mat_vec(inverse_left_jacobian(turn, g), vec_mat(w1, before))
@@ -231,9 +233,9 @@ def holds_twist(line, k):
 
 @inner
 def sample_end_twist(line, old, new, imposed, x, k_before, twist, row):
-    """Turn the rods at ends that hold the twist so that the twist of their last elements lies on the parabola through
-    the step before, as tensions do.
+    """Turn the rods at ends that hold the twist.
 
+    The twist of their last elements lies on the parabola through the step before then, as tensions do.
     That of frames which are interpolated one by one is off by next to nothing, times GJ over half a cell.
     twist: of these elements before the last step, and before the step before; k_before: as k of `parabola`.
     """
@@ -278,9 +280,10 @@ def sample_head(sea, books, x, dt, k, t, row):
 
 @inner
 def sample_state(line, sea, old, new, books, where, row):
-    """The state at a time within the last step as a row; where: that time (s), the part of the step before it, the
+    """The state at a time within the last step as a row, with the sea of that time.
 
-    length of the step (s), and that of the step before as a part of it, as k of `parabola`.  The sea is that of the time.
+    where: that time (s), the part of the step before it, the length of the step (s), and that of the step before as a
+    part of it, as k of `parabola`.
     """
     t, x, dt, k = where
     sample_nodes(old, new, x, dt, row)
