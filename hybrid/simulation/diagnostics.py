@@ -14,7 +14,6 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.bending_slip import EACH, STIFFENING
 from hybrid.kernels.laws.obstacles import (
     bend_radii,
     cells_met,
@@ -34,10 +33,9 @@ from hybrid.kernels.state.report import (
     PLANAR,
     SEABED,
     SELF_CONTACT,
-    SOIL,
     TWIST_NODE,
 )
-from hybrid.kernels.state.state import Batch, Floats, Line, Sea, State, ends_in, state_in
+from hybrid.kernels.state.state import Batch, Floats, Line, Sea, State
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model
 from hybrid.model.initial_shape import HUNG
@@ -46,10 +44,13 @@ from hybrid.model.plane import as_kept
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.scene.plane import OUT
+from hybrid.simulation import scheme_watch
 from hybrid.simulation.contact_watch import Knot, note_departures, note_knot, sheaves_of
 from hybrid.simulation.events import EventLog
+from hybrid.simulation.failure import borne_strain, most_stretched
 from hybrid.simulation.hockling_watch import LOOP, Loops, note_hockling, note_loops
 from hybrid.simulation.mesh_survey import ASKEW, hidden_layer, layer_text
+from hybrid.simulation.scheme_watch import PRESSED, SchemeWatch, Stop
 from hybrid.simulation.slack_bends import (
     TURNS,
     Bounds,
@@ -79,44 +80,20 @@ NEGATIVE, TURNS_A_LITTLE = 0.01, 0.3
 NOTHING = 1e-6  # of the tension scale: of a line without tension there is no part
 # Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
 SUNK = 0.01
-# Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
-# noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
-GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
-# The first moments of a run, in which next to nothing has been put in: less than this part of all that is put in by its
-# end.  What was created then is held against this part, as hardly anything is a part of nothing.
-FIRST_MOMENTS = 0.1
-# Energy below this part of tension scale times length is what Newton's tolerance leaves over many steps.
-NEWTON_LEAVES = 1e-7
-# Numerical dissipation, as a part of the same energy: beyond this the step was too long for the motion.
-LOSS_NOTED = 0.5
-# A rod is pressed when it carries more than this part of EI/L^2: a quarter of pi^2 is the least that any rod buckles
-# under, and what Newton leaves of no tension at all is far below.
-PRESSED = 1e-3
 # A rod of an equilibrium is in compression by more than this part of its largest force, or of the tension of its scene.
 COMPRESSED = 1e-4
-# What an oscillation is wrong by after one period, as a part of it, beyond which a step is said to be too long
-# (docs/theory.md, 8): 8 steps a period with rho_inf = 1, 14 with 0.5, 24 with 0.
-COARSE = 0.35
-# Of the length, and of the largest tension: what Newton's tolerance changes them by is no motion.
-HARDLY_MOVED = 1e-7
 # A bend at a clamp that falls by more than this part to the next node is a boundary layer.
 LAYER = 0.5
 # A jump of tension within a step, as a part of the largest that anything in the scene can ask for.
 SNAP = 3.0
 # A turn of one end against the other (rad) whose torque is worth a word where no rod carries it.
 TURNED = 0.01
-# A line whose kinetic energy is below this part of its elastic energy is at rest for the test of stability.
-AT_REST = 1e-4
-# More bending than this part of the elastic energy is no symmetry that something could break.
-BENT = 1e-3
-# Inertia above this part of the load is a motion that has begun.
-LET_GO = 0.01
 NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED = (
-    "_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off", "_gain", "_loss", "_rested",
-    "_left_out", "_jump", "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section", "_kink",
-    "_weight", "_lay", "_knot", "_bent", "_created", "_negative",
+    "_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off",
+    "_left_out", "_jump", "_loop", "_writhe", "_writhes", "_section", "_kink",
+    "_weight", "_lay", "_knot", "_bent", "_negative",
 )  # fmt: skip
 # What checkpoints of 0.6 files may lack of it: what was not watched then.
 UNWATCHED: dict[str, Any] = {
@@ -124,7 +101,7 @@ UNWATCHED: dict[str, Any] = {
     "_writhe": np.nan,
     "_writhes": LOOP,
     "_bent": 0.0,
-    "_created": [0.0, 0.0, 0.0, 0.0],
+    "_created": [*scheme_watch.NONE_CREATED],
     "_section": False,
     "_kink": KINK,
     "_negative": NEGATIVE,
@@ -135,8 +112,6 @@ UNWATCHED: dict[str, Any] = {
     "_lay": np.zeros((0, 2)),
     "_knot": [*Knot()],
 }
-
-Stop = tuple[Outcome, int] | None
 
 
 class Watched(Protocol):
@@ -161,28 +136,6 @@ class Watched(Protocol):
     def books(self) -> Books: ...
 
 
-def borne_strain(model: Model) -> Floats:
-    """Strain (N,) that each cell bears; infinite where it does not stretch."""
-    s = model.line.s
-    return np.asarray(model.cable.max_strain[model.cable.piece(0.5 * (s[:-1] + s[1:]))])
-
-
-def most_stretched(model: Model, state: State) -> int:
-    """The cell that is stretched or compressed most, of what it bears."""
-    return int(np.argmax(np.abs(np.linalg.norm(state.e, axis=1) / model.line.h - 1.0) / borne_strain(model)))
-
-
-def stretch_text(model: Model, state: State) -> str:
-    """How far the cable is stretched or compressed (a negative strain), and how far it may be."""
-    cell = most_stretched(model, state)
-    strain, borne = np.linalg.norm(state.e[cell]) / model.line.h[cell] - 1.0, borne_strain(model)[cell]
-    text = f"a strain of {100.0 * strain:.3g} % under {state.T[cell]:.4g} N, where max_strain is {100.0 * borne:.3g} %"
-    apart, length = float(np.linalg.norm(state.r[-1] - state.r[0])), float(model.line.h.sum())
-    if strain < 0.0 or apart <= length:
-        return text
-    return f"{text}; its ends are {apart:.6g} m apart, and it is {length:.6g} m long: too short for where they are"
-
-
 class Diagnostics:
     """What is watched in one run or one static solve."""
 
@@ -194,14 +147,9 @@ class Diagnostics:
         self._sunk = SUNK * model.length
         self._within, self._round, self._between = 1.0, False, False
         self._off = OFF * model.length
-        self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
-        self._stiffens = bool(model.line.slip_law.size and model.line.slip_law[:, STIFFENING::EACH].any())
-        self._rested = self._left_out = self._section = self._weight = False
+        self._left_out = self._section = self._weight = False
         self._jump = SNAP * model.tension_scale  # N
-        self._put_in = self._potential = self._alive = 0.0  # J
-        self._created = [
-            *UNWATCHED["_created"]
-        ]  # most energy beyond what may be (J), put in till then (J), t (s), s (m)
+        self.of_scheme = SchemeWatch(model, events)
         self._kink, self._negative = KINK, NEGATIVE
         self._knot, self._lay = [*Knot()], np.full((len(sheaves_of(model.sea.values)), 2), np.nan)
         self._loop, (self._writhe, self._writhes, self._bent) = UNWATCHED["_loop"], Loops()
@@ -216,7 +164,8 @@ class Diagnostics:
     def checkpoint(self, books: Books) -> dict[str, Any]:
         """What has been noted so far, and what `finish` will judge by."""
         clock, count = books.clock, books.counts
-        return {name: getattr(self, name) for name in REMEMBERED} | {
+        known = {name: getattr(self, name) for name in REMEMBERED}
+        return known | {name: getattr(self.of_scheme, name) for name in scheme_watch.REMEMBERED} | {
             "pulls": [float(clock.least_peak), float(clock.largest_peak)], "_rho": float(clock.rho),
             "_moved": float(clock.moved), "_steps": int(count.measured),
             "worst": books.worst[: min(int(count.measured), b.WORST)].copy(), "placed": books.placed,
@@ -228,6 +177,7 @@ class Diagnostics:
         r: (N+1, 3) m, where nodes are now.  Returns where base nodes were at the start, (n, 3) m.
         """
         vars(self).update({name: saved[name] for name in REMEMBERED})
+        vars(self.of_scheme).update({name: saved[name] for name in scheme_watch.REMEMBERED})
         placed, worst, steps = saved["placed"], saved["worst"], saved["_steps"]
         if placed.shape not in (NOWHERE.shape, (books.base.size, 3)) or worst.shape != (min(steps, b.WORST), 4):
             raise ValueError("places of another line")
@@ -424,29 +374,9 @@ class Diagnostics:
         return stop
 
     def finish(self, books: Books) -> None:
-        """After the last step: whether the scheme has created energy, and steps were too long for the motion.
-
-        Of a x cos(w t) a step changes the acceleration by a w^3 dt; periods are too long by (beta - 1/6) (w dt)^2, with
-        beta = 1/(1 + rho)^2 of generalized-alpha.
-        """
-        self.created_energy()
-        clock = books.clock
-        low, high, moved = float(clock.least_peak), float(clock.largest_peak), float(clock.moved)
-        steps, rho, worst = int(books.counts.measured), float(books.clock.rho), books.worst.tolist()
-        hardly = moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
-        if hardly or not steps or not moved > 0.0:
-            return
-        once, several = worst[0], worst[min(steps, b.WORST) - 1]
-        left, t, dt, s = once if once[0] > moved or steps <= b.WORST**2 else several
-        turn = (left / moved) ** (1.0 / 3.0)  # w dt
-        wrong = 2.0 * np.pi * (1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * turn * turn
-        if wrong > COARSE:
-            text = (
-                f"about {2.0 * np.pi / turn:.2g} steps to a period here, where the line moves by {moved:.2g} m: "
-                f"an oscillation is off by some {100 * min(wrong, 1.0):.0f} % after a period; "
-                f"a time.step of {dt * np.sqrt(0.1 * COARSE / wrong):.1g} s would do"
-            )
-            self.events.event(t, s, s, "coarse step", text)
+        """After the last step: whether the scheme has created energy, and steps were too long for the motion."""
+        self.of_scheme.finish()
+        self.of_scheme.note_coarse_steps(self._model.length, books)
 
     def torque(self, t: float, turn: float, torque: float) -> None:
         """A torque that zones which move do not carry, because a catenary lies between the ends."""
@@ -481,8 +411,8 @@ class Diagnostics:
         self.mesh(seen)
         self.loops(seen.batch.t, values, seen.grid.s)
         self.contacts(self._model.line.s, seen.batch)
-        self.rest(seen.batch, values)
-        return self.energy(seen.batch, values)
+        self.of_scheme.judge_rest(self._model, seen.batch, values)
+        return self.of_scheme.judge(self._model, seen.batch, values)
 
     def joined_outputs(
         self, seen: JoinedObservation, values: Mapping[str, Floats], lines: Sequence[tuple[Model, Output]]
@@ -495,18 +425,18 @@ class Diagnostics:
             self.follow(_with_line(*lines[k]))
             one = seen.one(k)
             self.mesh(one)
-            self.rest(one.batch, {name: x[k : k + 1] for name, x in values.items()})
+            self.of_scheme.judge_rest(self._model, one.batch, {name: x[k : k + 1] for name, x in values.items()})
         self.loops(seen.batch.t, values, seen.points)
         for _, output in lines:
             self.contacts(output.line.s, output.batch)
-        return self.energy(seen.batch, values, lines)
+        return self.of_scheme.judge(self._model, seen.batch, values, [output for _, output in lines])
 
     @property
     def _bounds(self) -> Bounds:
         model = self._model
         return Bounds(
             self._fold, self._off, self._kink, self._negative, self._sunk, self._bend <= UNRESOLVED,
-            np.inf if self._rested else PRESSED, model.length, tuple(model.attached),
+            np.inf if self.of_scheme.rested else PRESSED, model.length, tuple(model.attached),
             None if self._weight else model.cable,
         )  # fmt: skip
 
@@ -747,96 +677,6 @@ class Diagnostics:
             text = f"tension {tension:.3g} N in a catenary zone at s = {s:g} m: {follows}"
             self.note(t, cell, "slack", text)
             self._slack = min(10.0 * tension, 10.0 * self._slack)
-
-    def energy(self, batch: Batch, values: Mapping[str, Floats], lines: Sequence[tuple[Model, Output]] = ()) -> Stop:
-        """Energy that the time scheme creates or dissipates, held against all that was put in.
-
-        What touches the bed and obstacles in steps that are too long bounces higher than it fell.  That counts as
-        created where contact has given more than it has taken: damping takes, and only soil gives back what it had.
-        So does what a stiffness that grows with tension has given: it has no potential.
-        lines: of each output a model of its cable and what it is, where they differ.
-        """
-        scheme, potential = values["work/scheme"], values["energy/potential"]
-        given = values.get("work/contact", 0.0 * scheme)  # by contact
-        bounced = np.maximum(given, 0.0) if not self._model.line.bits & SOIL else 0.0
-        grown = np.maximum(values["work/hysteresis"], 0.0) if self._stiffens else 0.0
-        gained = scheme + bounced + grown
-        alive = sum((values[x] for x in values if x.startswith("energy/")), -potential)
-        if batch.t[0] == 0.0:
-            self._potential, self._alive = float(potential[0]), float(alive[0])
-        put_in = np.abs(batch.work).sum(axis=1) - bounced - grown + np.abs(potential - self._potential) + self._alive
-        put_in = np.maximum.accumulate(np.append(self._put_in, put_in))[1:]
-        self._put_in = float(put_in[-1])
-        floor = NEWTON_LEAVES * self._model.tension_scale * self._model.length
-        # all that can be worth a word; most batches have none
-        noted = (gained > self._gain * put_in + floor) | (-scheme > self._loss * put_in + floor)
-        for k in np.flatnonzero(noted & (batch.t > 0.0)).tolist():
-            if lines:
-                self.follow(_with_line(*lines[k]))
-            v = lines[k][1].batch.v[0] if lines else batch.v[k]
-            fastest = int(np.argmax(np.abs(v).sum(axis=1)))
-            if gained[k] > GAIN_STOPS * put_in[k] + floor:
-                return Outcome.GAINS_ENERGY, fastest
-            if gained[k] > max(self._gain * put_in[k] + floor, self._created[0]):
-                where = float(self._model.line.s[fastest])
-                self._created = [float(gained[k]), float(put_in[k]), float(batch.t[k]), where]
-            if -scheme[k] > self._loss * put_in[k] + floor:
-                text = f"the time scheme has dissipated {-scheme[k]:.3g} J, {_percent(-scheme[k], put_in[k])} of the"
-                text += " energy put in: motion is faster than the step; make time.step smaller"
-                self.note(float(batch.t[k]), fastest, "numerical dissipation", text)
-                self._loss *= 1.3
-        return None
-
-    def created_energy(self) -> None:
-        """The most energy that the scheme has created, where it is much of what was put in, at the end of a run.
-
-        What was put in till then counts as FIRST_MOMENTS of all at least.
-        """
-        gained, put_in, t, s = self._created
-        put_in = max(put_in, FIRST_MOMENTS * self._put_in)
-        if gained > 0.0 and gained > self._gain * put_in:
-            part = _percent(gained, put_in)
-            what = "with stiffness by tension and contact" if self._stiffens else "with contact"
-            text = f"the time scheme, {what}, has created {gained:.3g} J, {part} of the energy put in"
-            self.events.event(t, s, s, "gains energy", f"{text}: {Outcome.GAINS_ENERGY.remedy}")
-
-    def rest(self, batch: Batch, values: Mapping[str, Floats]) -> None:
-        """A rod at rest, or nearly, in a shape that is not stable: its stiffness is negative for some displacement."""
-        model, line = self._model, self._model.line
-        rod = line.spin == 1
-        if self._rested or not rod.any():
-            return
-        elastic = sum(values[f"energy/{x}"] for x in ("stretch", "bending", "torsion"))
-        kb = (batch.kb if batch.kb.size else line.kb[None])[:, line.element == 1, :2]
-        bending = (kb * line.hn[line.element == 1, None]).min(axis=(1, 2), initial=np.inf)
-        least = np.where(np.isfinite(bending), PRESSED * bending / model.length, 0.0)  # J
-        twisted, lowest_ = values["energy/torsion"] > least, batch.T[:, rod].min(axis=1)
-        pressed = (lowest_ * model.length < -least) | twisted
-        calm = (values["energy/kinetic"] <= AT_REST * elastic) | ~batch.v.any(axis=(1, 2))
-        # what is let go has no velocity yet, but is no longer at rest
-        calm &= twisted | (float(line.mass.sum()) * np.abs(batch.vd).max(axis=(1, 2)) <= LET_GO * -lowest_)
-        # a line that is bent and whose ends move follows them, and snaps where it must; contact is not judged
-        moves = np.abs(batch.v[:, [0, -1]]).max(axis=(1, 2)) > 0.0
-        calm &= ~(moves & (values["energy/bending"] > BENT * elastic))
-        if "energy/self_contact" in values:
-            calm &= values["energy/self_contact"] == 0.0
-        for k in np.flatnonzero(pressed & calm):
-            ends, state = ends_in(batch, int(k)), state_in(batch, int(k), line)
-            if not is_stable(line, model.sea.values, ends, state, model.length, model.tension_scale):
-                text = "the rod rests where it would buckle: only its perfect symmetry keeps it there"
-                text += "; give it a small bow"
-                # a bent one may be on its way, and has no symmetry that is known
-                if values["energy/bending"][int(k)] > least[min(int(k), least.size - 1)]:
-                    text = "the rod is almost at rest in a shape that is not stable (its stiffness against some "
-                    text += "displacement is negative): it is leaving it, or nothing in the scene disturbs it there"
-                self.note(float(batch.t[k]), int(np.argmin(state.T)), "unstable", text)
-                self._rested = True
-                return
-
-
-def _percent(part: float, whole: float) -> str:
-    """A part of an energy in words."""
-    return f"{100.0 * part / (whole or 1.0):.0f} %"
 
 
 def _with_line(model: Model, output: Output) -> Model:

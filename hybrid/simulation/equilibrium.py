@@ -35,7 +35,7 @@ from hybrid.scene.network_checks import floating_groups
 from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.contact_equilibrium import letting_touch, settle, with_contact
-from hybrid.simulation.diagnostics import borne_strain
+from hybrid.simulation.failure import borne_strain
 from hybrid.simulation.run_start import named
 from hybrid.solve.flaws import ON_BED, behind_obstacles, passed_obstacles, rubs_on
 from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, joined_ends

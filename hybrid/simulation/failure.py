@@ -12,10 +12,9 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.state.books import Clock, Counts
-from hybrid.kernels.state.state import State
+from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.ends import DrivenEnd, contradictions
-from hybrid.simulation.diagnostics import stretch_text
 from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.solve.run import Tried
 from hybrid.solve.self_contact import SelfContact
@@ -28,6 +27,28 @@ if TYPE_CHECKING:
 MOST_PASSED, SHORTER = 4.0, 16.0
 # Where energy is created.
 FASTEST = "the fastest point is at this place"
+
+
+def borne_strain(model: Model) -> Floats:
+    """Strain (N,) that each cell bears; infinite where it does not stretch."""
+    s = model.line.s
+    return np.asarray(model.cable.max_strain[model.cable.piece(0.5 * (s[:-1] + s[1:]))])
+
+
+def most_stretched(model: Model, state: State) -> int:
+    """The cell that is stretched or compressed most, of what it bears."""
+    return int(np.argmax(np.abs(np.linalg.norm(state.e, axis=1) / model.line.h - 1.0) / borne_strain(model)))
+
+
+def stretch_text(model: Model, state: State) -> str:
+    """How far the cable is stretched or compressed (a negative strain), and how far it may be."""
+    cell = most_stretched(model, state)
+    strain, borne = np.linalg.norm(state.e[cell]) / model.line.h[cell] - 1.0, borne_strain(model)[cell]
+    text = f"a strain of {100.0 * strain:.3g} % under {state.T[cell]:.4g} N, where max_strain is {100.0 * borne:.3g} %"
+    apart, length = float(np.linalg.norm(state.r[-1] - state.r[0])), float(model.line.h.sum())
+    if strain < 0.0 or apart <= length:
+        return text
+    return f"{text}; its ends are {apart:.6g} m apart, and it is {length:.6g} m long: too short for where they are"
 
 
 def winch_text(paying: PayingOut) -> str:

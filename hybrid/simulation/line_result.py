@@ -42,10 +42,10 @@ from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
+from hybrid.simulation.diagnostics import Diagnostics, Stop
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
-from hybrid.simulation.failure import FASTEST
+from hybrid.simulation.failure import FASTEST, borne_strain, stretch_text
 from hybrid.simulation.line_of_run import Around, HasPlane
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.run_sample import COMPARED
@@ -567,7 +567,7 @@ class LineResult:
         if status == "complete" and self._moves and not isinstance(self.recorder, ComparisonRecorder):
             self.diagnostics.finish(self.books)
         elif status == "failed":
-            self.diagnostics.created_energy()
+            self.diagnostics.of_scheme.finish()
         values = self.envelope.values(self.model.nodes, self.books.extremes, t)
         self.recorder.replace(values)
         self.envelope.note_broken(values, self.recorder.recorded(), self.events.event)

@@ -12,8 +12,8 @@ import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
-from hybrid.simulation.diagnostics import FIRST_MOMENTS, GAIN_NOTED, Diagnostics
 from hybrid.simulation.events import EventLog
+from hybrid.simulation.scheme_watch import FIRST_MOMENTS, GAIN_NOTED, SchemeWatch
 
 MODEL = build(
     one_line(hybrid.validate_scene(
@@ -32,11 +32,11 @@ def watched(gained: list[float], work: list[float], strain: float = 0.0, batches
     Outputs follow each other by a second; strain: J, energy that is there from the start.
     """
     log = EventLog()
-    watch, stop, t = Diagnostics(MODEL, log), None, np.arange(float(len(gained)))
+    watch, stop, t = SchemeWatch(MODEL, log), None, np.arange(float(len(gained)))
     for k, part in enumerate(np.array_split(np.arange(t.size), batches)):
         if k:  # as a run that is resumed
             before = watch
-            watch = Diagnostics(MODEL, log)
+            watch = SchemeWatch(MODEL, log)
             for name in ("_created", "_put_in", "_potential", "_alive", "_gain", "_loss"):
                 setattr(watch, name, getattr(before, name))
         batch = SimpleNamespace(t=t[part], work=np.array(work)[part, None], v=np.zeros((part.size, 11, 3)))
@@ -44,8 +44,8 @@ def watched(gained: list[float], work: list[float], strain: float = 0.0, batches
             "work/scheme": np.array(gained)[part], "energy/potential": np.zeros(part.size),
             "energy/stretch": np.full(part.size, strain),
         }  # fmt: skip
-        stop = stop or watch.energy(batch, values)  # type: ignore[arg-type]
-    watch.created_energy()
+        stop = stop or watch.judge(MODEL, batch, values)  # type: ignore[arg-type]
+    watch.finish()
     return [(x[0], x[3], x[4]) for x in log.waiting()], stop
 
 
