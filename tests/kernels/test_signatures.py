@@ -122,3 +122,19 @@ def test_a_rule_of_numba_that_is_kept_is_the_one_it_finds(called: Any) -> None:
             except NumbaError:
                 answers.append("refused")
         assert len(set(answers)) == 1, answers
+
+
+@pytest.mark.long
+def test_functions_of_users_are_compiled_as_ever() -> None:
+    """Generators, and functions of Python's objects: of those numba asks more than of kernels."""
+    assert compiler.compile_entry  # imported, it has changed how numba reads functions
+
+    def squares(n):  # type: ignore[no-untyped-def]
+        for k in range(n):
+            yield k * k
+
+    def count(text):  # type: ignore[no-untyped-def]
+        return {text: len(text)} if text else None
+
+    assert list(numba.njit(squares)(4)) == [0, 1, 4, 9]
+    assert numba.jit(forceobj=True, looplift=False)(count)("line") == {"line": 4}
