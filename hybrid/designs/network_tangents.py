@@ -400,7 +400,7 @@ def refuse_system(run: NetworkRun) -> None:
             "lines touch each other": (found is not None and found.settled) or run.solver.shared is not None,
             "zones move": any(x.manager is not None for x in run.lines),
             "line is paid out": any(x.paying is not None for x in run.lines),
-            "connections may break": bool(weaknesses(run.system)),
+            "connections may break": bool(weaknesses(run.network)),
             "a line is clamped to what turns with it": bool(model.seats[:, :, TURNS].any()),
             "a body has a shape": bool(model.rides.size),
             "a body has members": bool((run.solver.bodies[:, PIECES] > 0.0).any()),

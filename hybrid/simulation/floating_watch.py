@@ -66,7 +66,7 @@ class FloatingWatch(Part):
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """That has been said.  ValueError: it has names that the run does not have."""
-        dry, under, overlaps, system = saved["dry"], saved["under"], saved["overlaps"], self._run.system
+        dry, under, overlaps, system = saved["dry"], saved["under"], saved["overlaps"], self._run.network
         if not (isinstance(dry, list) and set(dry) <= set(system.bodies)):
             raise ValueError("dry: names of bodies were expected")
         if not (isinstance(overlaps, list) and all(isinstance(x, str) for x in overlaps)):
@@ -88,7 +88,7 @@ class FloatingWatch(Part):
 
     def _note_dry_bodies(self, seen: Sampled) -> None:
         """An event where a body that counts as submerged has risen out of the water."""
-        system = self._run.system
+        system = self._run.network
         fluid = system.environment.fluid
         if fluid is None or fluid.surface is None:
             return
@@ -107,7 +107,7 @@ class FloatingWatch(Part):
 
     def _note_pulled_under(self, seen: Sampled) -> None:
         """An event where a point that floats by itself is wholly below the surface, and where it is much deeper."""
-        system, model = self._run.system, self._run.model
+        system, model = self._run.network, self._run.model
         fluid = system.environment.fluid
         if fluid is None or fluid.surface is None:
             return

@@ -56,7 +56,7 @@ LOOK = 16
 class First(NamedTuple):
     """What a run begins with: the network as it is loaded then, and its first state."""
 
-    system: Network
+    network: Network
     model: NetworkModel
     state: NetworkState  # blank, where it is that of a checkpoint
     found: LinesAtRest | None  # the equilibrium from which it starts
@@ -90,7 +90,7 @@ class NetworkRun(RecordedRun):
         loop: its steps, with outputs to its end; target: None: it is only to be compared with; criterion: one more for
         zones that move (zones.criteria); kept: whether it writes checkpoints.
         """
-        self.system, self.model, self.state, self.found = first.system, first.model, first.state, first.found
+        self.network, self.model, self.state, self.found = first.network, first.model, first.state, first.found
         self.scenes, self.resolution = first.scenes, first.model.resolution
         self.loop, self.times, self._begins = loop, loop.outputs[1:].tolist(), not first.resumed
         self.target, self.criterion, self.kept, self.moves = target, criterion, kept, bool(self.times)
@@ -114,7 +114,7 @@ class NetworkRun(RecordedRun):
             with refused(source):
                 restore(self, point.state)
                 near = SAME_STOP * self.resolution.one.step
-                if not point.t - near <= self.t <= self.system.require_time().duration + near:
+                if not point.t - near <= self.t <= self.network.require_time().duration + near:
                     raise ValueError(f"t = {self.t:g} s after an output at {point.t:g} s")
             self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
             self.other, self._between = self.state.copy(), True
@@ -237,7 +237,7 @@ class NetworkRun(RecordedRun):
 
     def begin_motion(self) -> None:
         """Make the start ready for steps, and record it."""
-        time = self.system.require_time()
+        time = self.network.require_time()
         if self.found is None:
             begin_as_placed(self.model, self.scenes, self.state, [line.events for line in self.lines])
         for part in self.parts:
@@ -245,7 +245,7 @@ class NetworkRun(RecordedRun):
         self.make_solver()
         for part in self.parts:
             part.balance()
-        for point, text in blended_of_lines(self.system):
+        for point, text in blended_of_lines(self.network):
             if text:
                 self.noted.event(0.0, *self.file.place(point), "motion blended in", text)
         for kind, text in self.notes:
@@ -253,7 +253,7 @@ class NetworkRun(RecordedRun):
         self.balance()
         for part in self.parts:
             part.begin()
-        if self.system.environment.waves is not None:
+        if self.network.environment.waves is not None:
             text = "waves act on lines and points, not on the body, which has no members"
             for body in (x for x in self.model.bodies if x.members is None):
                 self.note("waves on body neglected", f"body {body.name}: {text}")
@@ -286,7 +286,7 @@ class NetworkRun(RecordedRun):
         given = [*(m.ends.breaks for m in self.model.models), self.model.breaks]
         self._jumps = sorted({x for each in given for x in each if x < end})
         self._breaks = sorted({*self._jumps, *(x for part in self.parts for x in part.breaks if x < end)})
-        outputs = [x for x in self.times if x < end] if self.system.output.exact else []
+        outputs = [x for x in self.times if x < end] if self.network.output.exact else []
         last = self.times[-1] if until is None else until
         steps = [x for x in self.resolution.one.ends if x < end]
         if self.loop.controlled:
@@ -311,7 +311,7 @@ class NetworkRun(RecordedRun):
         loop, step = self.loop, self.resolution.one.step
         for begin in self.parts.begin_leg if loop.controlled else ():
             begin()
-        even = self.system.output.exact or bool(self.resolution.one.ends) or not falls_on(stop, self._breaks, step)
+        even = self.network.output.exact or bool(self.resolution.one.ends) or not falls_on(stop, self._breaks, step)
         steps = equal_steps(self.leg, self.t, stop, step, even)
         self.leg = steps[:2]
         loop.begin_leg(stop, *steps)
@@ -347,7 +347,7 @@ class NetworkRun(RecordedRun):
     def _steps_differ(self) -> bool:
         """Whether steps are not all the same, so that each stop has a say in their lengths."""
         one = self.resolution.one
-        return bool(self.loop.controlled or self.parts.begins or self.system.output.exact or one.ends)
+        return bool(self.loop.controlled or self.parts.begins or self.network.output.exact or one.ends)
 
     def _fitting(self) -> tuple[object, ...]:
         """What compiled steps are attached to: where it is the same, and they have come to a stop, they go on."""
@@ -487,7 +487,7 @@ class NetworkRun(RecordedRun):
             for model in self.model.models:
                 model.ends.set_loads(self.t)
             self.restart_steps()
-        if self.system.output.exact or self.resolution.one.ends or falls_on(stop, self._breaks, step):
+        if self.network.output.exact or self.resolution.one.ends or falls_on(stop, self._breaks, step):
             self.leg = (stop, 0)
 
     def output_due(self) -> None:

@@ -146,7 +146,7 @@ def _steps(first: First, moves: bool, end: float) -> NetworkSteps:
     if end < times[-1]:
         times = [*(t for t in times if t < end), end]
     follow = (one.step, one.shortest) if one.local is not None else (0.0, 0.0)
-    return NetworkSteps(first.system.require_time().rho_inf, [0.0, *times], *follow, turn)
+    return NetworkSteps(first.network.require_time().rho_inf, [0.0, *times], *follow, turn)
 
 
 def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording: Recording) -> None:

@@ -66,7 +66,7 @@ def checkpoint(run: KeptRun) -> dict[str, Any]:
 def restore(run: KeptRun, saved: Mapping[str, Any]) -> None:
     """Go on as `checkpoint` has written, with a run that was made for it.  ValueError: that cannot be."""
     if is_of_cable(saved):
-        saved = as_of_line(saved, run.lines[0].name, run.model.models[0], weaknesses(run.system))
+        saved = as_of_line(saved, run.lines[0].name, run.model.models[0], weaknesses(run.network))
     given, saved = saved, _of_today(run, saved)
     joined = [part.restore_joints(saved) for part in reversed(run.parts)]
     if any([*(part.restore_cells(saved) for part in reversed(run.parts)), *joined]):
@@ -103,7 +103,7 @@ def _of_today(run: KeptRun, saved: Mapping[str, Any]) -> dict[str, Any]:
     It took the added mass of members as at the first guess.
     """
     older: dict[str, Any] = {"rest": run.rest, "control": [], "cuts": run.loop.cuts(), "interval": 0.0}
-    older |= {"rho": run.system.require_time().rho_inf, "worked": run.loop.worked[1, :, :SPRING]}
+    older |= {"rho": run.network.require_time().rho_inf, "worked": run.loop.worked[1, :, :SPRING]}
     older |= {"bodies": run.state.bodies, "body_work": run.solver.body_work[:, :SPRING], **WITHOUT}
     found = older | dict(saved)
     for part in run.parts:

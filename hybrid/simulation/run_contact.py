@@ -145,7 +145,7 @@ class RunContact(Part):
         if not self._watches:
             return
         run = self._run
-        self.watch = LinesWatch(run.system, run.model, self._passed, run.loop.clock, self._let_pass)
+        self.watch = LinesWatch(run.network, run.model, self._passed, run.loop.clock, self._let_pass)
         if self.watch.is_needed:
             run.loop.watch(*self.watch.attach(run.solver.line_tables))
         else:
@@ -160,8 +160,8 @@ class RunContact(Part):
         run = self._run
         if self.watch is not None and self.watch.is_needed:
             run.solver.look_at(run.state)
-            self._passed |= self.watch.begin(run.system)
-        for a, c in crossings(run.system, run.model, run.found.state) if run.found is not None else ():
+            self._passed |= self.watch.begin(run.network)
+        for a, c in crossings(run.network, run.model, run.found.state) if run.found is not None else ():
             one, two = run.model.names[a], run.model.names[c]
             text = (
                 f"lines {one} and {two} cross on the way from their first shapes to this equilibrium: no contact "
@@ -193,7 +193,7 @@ class RunContact(Part):
     def checkpoint(self) -> dict[str, Any]:
         """Which lines touch because they have come near, what has been said, and where lines stick."""
         run = self._run
-        among = run.model.touching if run.system.contact is None else None
+        among = run.model.touching if run.network.contact is None else None
         found: dict[str, Any] = {"between": [list(x) for x in among.pairs] if among is not None else []}
         said = {"passed": self._passed, "met": self._met, "let_pass": self._let_pass}
         found |= {name: sorted(list(x) for x in pairs) for name, pairs in said.items()}
@@ -326,7 +326,7 @@ class RunContact(Part):
     def _touch_each_other(self, pairs: Iterable[Pair]) -> None:
         """Models of which these lines touch each other, two each, and no others; the solver has to follow."""
         run = self._run
-        before, among = run.model.touching, touching_among(run.system, run.model.scenes, pairs)
+        before, among = run.model.touching, touching_among(run.network, run.model.scenes, pairs)
         now = among.lines if among is not None else ()
 
         def change(line: Line, scene: LineScene, touches: bool) -> Line:
@@ -382,7 +382,7 @@ class RunContact(Part):
 
         A line that touches itself beside others stands there twice.
         """
-        if self.shared is None or self._run.system.contact is not None:
+        if self.shared is None or self._run.network.contact is not None:
             return set()
         return {(min(a, c), max(a, c)) for (a, _), (c, _) in self.shared.points_between()}
 
@@ -434,7 +434,7 @@ def _may_begin(run: RunOfLines, pair: Pair) -> bool:
 
     Ends that are held, or moved, are joined to one thing where they would touch each other.
     """
-    among = touching_among(run.system, run.model.scenes, [pair])
+    among = touching_among(run.network, run.model.scenes, [pair])
     assert among is not None
     model = replace(run.model, touching=among)
     energy, shared = energy_between(model, run.solver.lines, run.solver.bodies.copy(), run.state)

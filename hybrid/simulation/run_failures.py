@@ -52,7 +52,7 @@ class Failures(Part):
 
     def __init__(self, run: RunOfLines) -> None:
         self._run = run
-        self.all = weaknesses(run.system)
+        self.all = weaknesses(run.network)
         self.broken: list[int] = []  # numbers in `all`, in the order in which they broke
 
     @property

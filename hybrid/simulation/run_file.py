@@ -154,7 +154,7 @@ class RunFile:
             return recorder
         if run.target is None:
             return ComparisonRecorder()
-        system, models = run.system, run.model.models
+        system, models = run.network, run.model.models
         attributes: dict[str, str | float | int] = {
             "title": system.title, "cells": run.model.cells, "lines": len(models),
             "length": sum(x.length for x in models),
@@ -166,7 +166,7 @@ class RunFile:
             attributes[PENDING] = pending
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
-        fields = [*fields_of(run.system), *fields_of_pairs(run.model), *self.quantities.fields]
+        fields = [*fields_of(run.network), *fields_of_pairs(run.model), *self.quantities.fields]
         fixed = [*self.quantities.limits, *self.quantities.ranges, *places_of_elevation(gauges_of(system))]
         header = Header(np.zeros(1), fields, (), attributes, self._texts, fixed)
         return self._recorder(header, {name: x for name, x in rows.items() if isinstance(x, Rows)})
@@ -186,7 +186,7 @@ class RunFile:
         run = self._run
         if run.target is None or self._alone is not None:
             return
-        values = values_of(run.system, run.model, seen)
+        values = values_of(run.network, run.model, seen)
         self.rotations.go_on(values)
         values |= values_of_pairs(run.model, run.solver.shared, seen.lines)
         by_name = {line.name: x for line, x in zip(run.lines, seen.lines, strict=True)}
@@ -220,7 +220,7 @@ class RunFile:
         arrays = {line.name: {"s": line.model.line.s, **x._asdict()} for line, x in lines}
         if self._alone is not None:
             return {"scene": made(self._text), **next(iter(arrays.values()))}
-        found: dict[str, Any] = {"scene": scene_text(self._run.system), "bodies": state.bodies}
+        found: dict[str, Any] = {"scene": scene_text(self._run.network), "bodies": state.bodies}
         return found | {f"{line}/{name}": x for line, of_line in arrays.items() for name, x in of_line.items()}
 
     def close(self, status: str, message: str) -> None:

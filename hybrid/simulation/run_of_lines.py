@@ -35,7 +35,7 @@ from hybrid.zones.change import on_layout
 class RunOfLines(Protocol):
     """A run between two steps; what is writable here, parts change, and the solver follows (`make_solver`)."""
 
-    system: Network
+    network: Network
     model: NetworkModel
     state: NetworkState
     other: NetworkState  # after the next step
@@ -207,7 +207,7 @@ class LoadChanges(Part):
         for line in run.lines:
             line.write_down()
         run.gather_events()  # in the order in which they happen
-        run.system, run.model = system, loaded_as(run.model, system, run.t, [x.fit_models for x in run.parts])
+        run.network, run.model = system, loaded_as(run.model, system, run.t, [x.fit_models for x in run.parts])
         run.loaded = run.t  # loads that end now, or would have ended before, act no more
         run.start_from(run.rest)
         for line, model in zip(run.lines, run.model.models, strict=True):

@@ -35,7 +35,7 @@ READ_EVERY = 0.01  # s of the wall, after which the time of the processor is rea
 class RecordedRun:
     """A run as its file grows: where it is, its lines, and what is written of them."""
 
-    system: Network
+    network: Network
     model: NetworkModel
     resolution: NetworkResolution
     loop: NetworkSteps
@@ -95,12 +95,12 @@ class RecordedRun:
     @property
     def turned(self) -> bool:
         """Whether moments are given at points."""
-        return any(getattr(point, "moment", None) is not None for point in self.system.points.values())
+        return any(getattr(point, "moment", None) is not None for point in self.network.points.values())
 
     @property
     def files(self) -> dict[str, str]:
         """Digests of the files of motions and loads, by path, of all that holds at some time."""
-        found = files_of(self.system)
+        found = files_of(self.network)
         for x in self.changes:
             found |= files_of(x.scene)
         return found
