@@ -50,6 +50,11 @@ def _always(room: dict[str, Any]) -> Callable[[Sequence[int]], dict[str, Any]]:
     return lambda _: room
 
 
+def _torques_of(twists: Sequence[bool]) -> Callable[[Sequence[int]], dict[str, Any] | None]:
+    """Room of the border of torques, which lines through whose zones they pass have."""
+    return lambda lines: {} if any(twists[k] for k in lines) else None
+
+
 class LineJobs:
     """Jobs of the lines of a system: of all, of those that are solved together, and of each by itself."""
 
@@ -151,7 +156,9 @@ class LineJobs:
             "near": self._near, "alone": self._alone, "asked": self._asked, "rides": self._rides, "phase": self._phase,
             "marks": np.zeros(nodes if len(borders) > 1 else 0, np.int64),
         }  # fmt: skip
-        return Rooms(whole, rows, {name: _always(x) for name, x in borders.items()} | {"torques": self._torques_of})
+        return Rooms(
+            whole, rows, {name: _always(x) for name, x in borders.items()} | {"torques": _torques_of(self._twists)}
+        )
 
     def bind_line(self, number: int, **values: Any) -> None:
         """Put values in their places in the jobs of a line."""
@@ -239,12 +246,9 @@ class LineJobs:
         """Torques pass through catenary zones of lines, or do no more, from now on."""
         twists = [bool(x.line.torsion.size) for x in self.lines]
         if twists != self._twists:
-            self._twists = twists
+            self._twists[:] = twists  # which the border reads
             for jobs in self._groups:
                 jobs.set_borders()
-
-    def _torques_of(self, lines: Sequence[int]) -> dict[str, Any] | None:
-        return {} if any(self._twists[k] for k in lines) else None
 
     def adopt_cells(self, number: int, line: Line, sea: Sea, work: Work, books: Books) -> None:
         """A line is in other arrays from now on, of which its jobs know."""
