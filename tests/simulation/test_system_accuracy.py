@@ -143,7 +143,7 @@ def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> 
     sample = Case.sample
 
     def without_rods(self: Case, *x: Any, **more: Any) -> Any:
-        if isinstance(self.network.lines["tow"].model, RodModel):
+        if isinstance(self.scene.lines["tow"].model, RodModel):
             fails()
         return sample(self, *x, **more)
 
