@@ -73,7 +73,7 @@ class Passes:
             return
         target, kept = self.target, False
         assert not isinstance(target, MemoryTarget)
-        case.beside_result = target if isinstance(target, Path) and case.moves else None
+        case.beside_result = target if isinstance(target, Path) else None
         try:
             self._write(self._to_the_end(resolution, target))
         except KeyboardInterrupt:

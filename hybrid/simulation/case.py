@@ -98,7 +98,7 @@ class Case:
     """
 
     moves = True
-    beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
+    beside_result: Path | None = None  # the file of the result, beside which finer ones and outputs to compare with are
     late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
     late_finer: LateFile | None = None  # of a finer one, which may take its place
     _results = 0  # that were begun
@@ -386,7 +386,7 @@ class Case:
         looked = {name: x._replace(s=s[name]) if name in s else x for name, x in self.points.items()}
         recording = Recording(points=looked, until=until, touches=self.touches_itself)
         run = self._network_run(resolution, None, recording)
-        if points is None and self.beside_result is not None:
+        if points is None and self.moves and self.beside_result is not None:
             for line in run.lines:
                 numbers = (len(run.times) + 1) * sum(math.prod(field.shape) for field in line.observer.fields)
                 if numbers > MOST_IN_MEMORY:
@@ -532,7 +532,7 @@ class CaseAtRest(Case):
         """Compute the result into a file, or memory; what is to be compared of it.  before: nobody goes on with it."""
         begin, pending = clock.process_time(), ERROR_ESTIMATE if self.wants_errors else ""
         recording = Recording(WriteMode(late=True), pending=pending)
-        return self._move(self._network_run(resolution, target, recording), begin, first=True)
+        return self._move(self._network_run(resolution, target, recording), begin, self._takes_its_place(target))
 
     def beside(
         self, samples: Sequence[Callable[[], Samples]]

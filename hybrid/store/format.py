@@ -242,14 +242,16 @@ def attach_scales(data: h5d.DatasetID, dims: Sequence[str], scales: Sequence[h5d
         h5ds.attach_scale(data, scale, k)
 
 
+TEXT = h5py.string_dtype()
+_KIND_OF_TEXT, SCALAR = h5t.py_create(TEXT, logical=True), h5s.create(h5s.SCALAR)
+
+
 def annotate(data: h5py.Dataset | h5d.DatasetID, unit: str, description: str, frame: str = "") -> None:
     """Write what a new dataset is as attributes; "units" and "long_name" are what netCDF programs look for."""
     texts = {"units": unit, "description": description, "long_name": description} | ({"frame": frame} if frame else {})
     to = data if isinstance(data, h5d.DatasetID) else data.id
-    dtype, space = h5py.string_dtype(), h5s.create(h5s.SCALAR)
-    kind = h5t.py_create(dtype, logical=True)
     for name, text in texts.items():
-        h5a.create(to, name.encode(), kind, space).write(np.array(text, dtype=dtype))
+        h5a.create(to, name.encode(), _KIND_OF_TEXT, SCALAR).write(np.array(text, dtype=TEXT))
 
 
 def check_column(file: h5py.Group, group: str, field: Field) -> None:

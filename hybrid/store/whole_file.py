@@ -24,18 +24,18 @@ from weakref import WeakSet
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5ds, h5g, h5p, h5s, h5t
+from h5py import h5a, h5d, h5ds, h5o, h5p, h5s, h5t
 
-from hybrid.store.array_contents import ArrayContents, ArrayDataset
+from hybrid.store.array_contents import ArrayContents
 from hybrid.store.checkpoint import SLOTS, create_slots, write_before, write_slot
 from hybrid.store.copying import GROUP, TOGETHER
 from hybrid.store.format import (
     BLOCK,
     FORMAT_VERSION,
+    SCALAR,
     STATUS_WIDTHS,
     annotate,
     attach_scales,
-    attributes_of_format,
     chunk_rows,
     fixed_text,
     made,
@@ -149,20 +149,21 @@ def groups_of(contents: ArrayContents) -> Iterator[tuple[str, ArrayContents]]:
 
 def new_file(contents: ArrayContents, restart: Restart | None, layout: Layout) -> h5py.File:
     """A file in memory of a result, with the rows that it has; restart: None: nobody can go on with it."""
-    begin, parts = b"", [part for _, part in groups_of(contents)]
-    if len(parts) <= MOST_KEPT:
-        shape = tuple(_shape_of(group, part) for group, part in groups_of(contents))
+    begin, bare, few = b"", Bare(layout.outputs), len(contents.parts) < MOST_KEPT
+    if few:
+        shape = tuple((group, _shape_of(part)) for group, part in groups_of(contents))
         whole = ("whole", shape, layout.outputs, restart is not None)
         begin = kept(whole, lambda: _template(contents, restart is not None, layout), layout.templates)
     file = in_memory(begin)
     for k, (group, part) in enumerate(groups_of(contents), 1):
-        _fill(file, group, part, {} if begin else _create(file, group, part, layout.outputs))
+        _fill(file, group, part, {} if few else bare.create(file, group, part))
         if k % TOGETHER == 0:
             file.flush()
+    bare.close()
     if contents.parts:
         file[GROUP].attrs["order"] = list(contents.parts)
     if restart is not None:
-        if not begin:
+        if not few:
             create_slots(file)
         slots = [file[name] for name in SLOTS] if restart.checkpoints else []
         for number, data in restart.checkpoints.items():
@@ -171,56 +172,86 @@ def new_file(contents: ArrayContents, restart: Restart | None, layout: Layout) -
     return file
 
 
-def _shape_of(group: str, part: ArrayContents) -> Hashable:
-    """What the datasets of a result in a file depend on."""
+def _shape_of(part: ArrayContents) -> Hashable:
+    """What the datasets of a result depend on."""
     of_rows = ((x.field, x.dims, x.values.shape[x.grows :], x.grows) for x in part.data.values())
-    return group, tuple(of_rows), tuple(part.groups)
+    return tuple(of_rows), tuple(part.groups)
 
 
 def _template(contents: ArrayContents, resumable: bool, layout: Layout) -> bytes:
-    with in_memory() as file:
-        for group, part in groups_of(contents):
-            _create(file, group, part, layout.outputs)
-        if resumable:
-            create_slots(file)
-        file.flush()
-        return bytes(file.id.get_file_image())
+    file, bare = in_memory(), Bare(layout.outputs)
+    for group, part in groups_of(contents):
+        bare.create(file, group, part)
+    bare.close()
+    if resumable:
+        create_slots(file)
+    return image_of(file)
 
 
-def _create(file: h5py.File, group: str, part: ArrayContents, outputs: int | None) -> dict[str, h5d.DatasetID]:
-    """The datasets of a result in a new file, and the attributes that all results have; columns that grow are empty."""
-    root = file.require_group(group) if group else file
-    for name, value in attributes_of_format().items():
-        root.attrs[name] = value
-    for name in part.groups:
-        root.require_group(name)
-    datasets = dict[str, h5d.DatasetID]()  # to find them anew by their names takes a third of the time
-    for name, x in sorted(part.data.items(), key=lambda item: item[1].dims != (item[0],)):  # scales first
-        datasets[name] = data = _dataset(root.id, name, x, outputs)
-        if x.dims == (name,):
-            h5ds.set_scale(data, (name.rpartition("/")[2] if x.grows else name).encode())
-            h5ds.set_label(data, 0, name.encode())
+class Bare:
+    """Datasets of results without values: those of lines that are alike are made once, and copied.
+
+    A copy has no dimension scales, which HDF5 would not translate; they are attached where they stand.
+    """
+
+    def __init__(self, outputs: int | None) -> None:
+        """outputs: as of `Layout`."""
+        self._outputs, self._made = outputs, dict[Hashable, h5py.File]()
+
+    def create(self, file: h5py.File, group: str, part: ArrayContents) -> dict[str, h5d.DatasetID]:
+        """The datasets of a result in a file, by name; columns that grow are empty."""
+        if group:
+            shape = _shape_of(part)
+            if shape not in self._made:
+                self._made[shape] = in_memory()
+                self._datasets(self._made[shape], part)
+            h5o.copy(self._made[shape].id, b".", file.id, group.rstrip("/").encode(), None, _links())
+            root = file[group].id
+            found = {name: h5d.open(root, name.encode()) for name in part.data}
         else:
-            attach_scales(data, x.dims, [datasets[dim] for dim in x.dims])
-    return datasets
+            found = self._datasets(file, part)
+        for name, x in part.data.items():
+            if x.dims != (name,):
+                attach_scales(found[name], x.dims, [found[dim] for dim in x.dims])
+        return found
+
+    def close(self) -> None:
+        """Keep nothing any more."""
+        for file in self._made.values():
+            file.id.close()
+
+    def _datasets(self, root: h5py.File, part: ArrayContents) -> dict[str, h5d.DatasetID]:
+        """All of them, by HDF5's own interface: h5py takes four times as long."""
+        for name in part.groups:
+            root.require_group(name)
+        found = dict[str, h5d.DatasetID]()
+        for name, x in part.data.items():
+            shape, dtype, chunk, most = x.values.shape, x.values.dtype, (), None
+            if x.grows:
+                if dtype.kind == "S":
+                    dtype = h5py.string_dtype("utf-8", dtype.itemsize)
+                shape = (0, *shape[1:])
+                size = int(dtype.itemsize * np.prod(shape[1:], dtype=int))
+                few = self._outputs if x.dims[0] in ("t", "zones/t") else None
+                chunk = (max(1, min(chunk_rows(size), BLOCK, few or BLOCK)), *shape[1:])
+                most = (h5s.UNLIMITED, *shape[1:])
+            kind = NUMBERS.get(x.field.dtype) or h5t.py_create(dtype, logical=True)
+            space = h5s.create_simple(shape, most) if shape else SCALAR
+            found[name] = data = h5d.create(root.id, name.encode(), kind, space, _creation(chunk), _links())
+            annotate(data, x.field.unit, x.field.description, x.field.frame)
+            if x.dims == (name,):
+                h5ds.set_scale(data, (name.rpartition("/")[2] if x.grows else name).encode())
+                h5ds.set_label(data, 0, name.encode())
+        return found
 
 
-def _dataset(root: h5g.GroupID, name: str, x: ArrayDataset, outputs: int | None) -> h5d.DatasetID:
-    """One of them, by HDF5's own interface: h5py takes four times as long."""
-    shape, dtype, how, most = x.values.shape, x.values.dtype, h5p.create(h5p.DATASET_CREATE), None
-    if x.grows:
-        if dtype.kind == "S":
-            dtype = h5py.string_dtype("utf-8", dtype.itemsize)
-        shape = (0, *shape[1:])
-        size = int(dtype.itemsize * np.prod(shape[1:], dtype=int))
-        few = outputs if x.dims[0] in ("t", "zones/t") else None
-        how.set_chunk((max(1, min(chunk_rows(size), BLOCK, few or BLOCK)), *shape[1:]))
-        most = (h5s.UNLIMITED, *shape[1:])
-    kind = NUMBERS.get(x.field.dtype) or h5t.py_create(dtype, logical=True)
-    space = h5s.create_simple(shape, most) if shape else h5s.create(h5s.SCALAR)
-    data = h5d.create(root, name.encode(), kind, space, how, _links())
-    annotate(data, x.field.unit, x.field.description, x.field.frame)
-    return data
+@cache
+def _creation(chunk: tuple[int, ...]) -> h5p.PropDCID:
+    """How a dataset is made of such chunks, or of none."""
+    creation = h5p.create(h5p.DATASET_CREATE)
+    if chunk:
+        creation.set_chunk(chunk)
+    return creation
 
 
 @cache
@@ -246,16 +277,14 @@ def _fill(file: h5py.File, group: str, part: ArrayContents, known: Mapping[str, 
 
 
 def write_attributes(root: h5py.Group, attributes: Mapping[str, Any]) -> None:
-    """Attributes besides those of all results, by HDF5's own interface: h5py takes five times as long."""
-    text, scalar, always = h5py.string_dtype(), h5s.create(h5s.SCALAR), attributes_of_format()
+    """Attributes of a result, by HDF5's own interface: h5py takes five times as long."""
+    text = h5py.string_dtype()
     for name, value in attributes.items():
-        if name in always:
-            continue
         if name in STATUS_WIDTHS:
             array = fixed_text(value, h5py.string_dtype("utf-8", STATUS_WIDTHS[name]))
         else:
             array = np.array(value, text if isinstance(value, str) else None)
-        h5a.create(root.id, name.encode(), h5t.py_create(array.dtype, logical=True), scalar).write(array)
+        h5a.create(root.id, name.encode(), h5t.py_create(array.dtype, logical=True), SCALAR).write(array)
 
 
 # Templates of result files: a file with all its datasets and no values, which a new result begins as.
