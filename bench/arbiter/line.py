@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.read import one_line
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import (
     CatenaryModel,
@@ -21,6 +22,7 @@ from hybrid.scene.schema import (
     End,
     Environment,
     Guided,
+    LineScene,
     Pinned,
     RodModel,
     RodZone,
@@ -135,8 +137,9 @@ def refuse(where: str, value: object, expected: str, fix: str) -> SceneError:
     return SceneError([Complaint(where=where, value=str(value), expected=expected, fix=fix)])
 
 
-def line_of(scene: Scene) -> Line:
+def line_of(asked: Scene) -> Line:
     """The line of a scene; SceneError for what the arbiter cannot do."""
+    scene = one_line(asked)
     _only_what_is_known(scene)
     length = math.fsum(section.length for section in scene.cable.sections)
     pieces: list[Piece] = []
@@ -159,7 +162,7 @@ def line_of(scene: Scene) -> Line:
     return Line(tuple(merged), _hold(scene.ends.start, merged[0]), _hold(scene.ends.end, merged[-1]), length, scene)
 
 
-def _only_what_is_known(scene: Scene) -> None:
+def _only_what_is_known(scene: LineScene) -> None:
     """SceneError for what the arbiter would otherwise leave out in silence."""
     fluid, ends, sections = scene.environment.fluid, scene.ends, scene.cable.sections
     current = None if fluid is None else fluid.current
@@ -185,7 +188,7 @@ def _only_what_is_known(scene: Scene) -> None:
         raise refuse("scene", ", ".join(unknown), "a scene without them: the arbiter knows none", "take hybrid itself")
 
 
-def _zones(scene: Scene, length: float) -> list[tuple[bool, Array]]:
+def _zones(scene: LineScene, length: float) -> list[tuple[bool, Array]]:
     """(is it a rod, nodes (n,)) per zone, section boundaries among the nodes."""
     model, mesh = scene.model, scene.mesh
     total, grading = (None, None) if mesh is None else (mesh.cells, mesh.ratio)

@@ -68,7 +68,7 @@ def with_model_errors(case: Comparable, runs: Samples, costs: list[float]) -> Sa
     finely = NetworkResolution({name: _in_steps_of(x) for name, x in runs.items()})
     changes, finely, ends = as_rods(network, finely, {name: runs[name] for name in names}, case.points)
     try:
-        with case.instead(case.scene.with_lines({case.names[name]: x for name, x in changes.items()})):
+        with case.instead(case.scene.with_lines(changes)):
             rods = case.sample(finely)
     except (ComputationError, SceneError) as error:
         text = f"with rods in place of them: {str(error).splitlines()[0]}; `model: rod`, or a finer mesh, tells why"

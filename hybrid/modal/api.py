@@ -374,7 +374,7 @@ def _meetings(asked: Scene, found: list[Mode]) -> Iterator[str]:
 
 def excitations(asked: Scene) -> list[tuple[str, float]]:
     """What moves in a scene with a period: key and period, s."""
-    out = [(where, x.period) for where, x in _harmonics(asked, "")]
+    out = [(where, x.period) for where, x in _harmonics(asked.written, "")]
     fluid = asked.environment.fluid
     if fluid is not None and fluid.waves is not None:
         out.append(("environment.fluid.waves", fluid.waves.main_period))

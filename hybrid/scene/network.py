@@ -259,8 +259,8 @@ class Network(SceneTables):
         return self.with_lines({name: {"initial": without_friction(x.initial)} for name, x in self.lines.items()})
 
     def with_lines(self, changes: Mapping[str, Mapping[str, Any]]) -> Self:
-        """The same with other tables, or other `sections`, of lines by name."""
-        lines = {name: x.model_copy(update=dict(changes.get(name, {}))) for name, x in self.lines.items()}
+        """The same with other tables, or other `sections`, of lines by name; KeyError: there is no such line."""
+        lines = self.lines | {name: self.lines[name].model_copy(update=dict(x)) for name, x in changes.items()}
         return self.model_copy(update={"lines": lines}) if changes else self
 
     def searched(self) -> Self:

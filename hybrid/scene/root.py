@@ -21,7 +21,7 @@ from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.network import Network
 from hybrid.scene.network_checks import findings_of
 from hybrid.scene.schema import LineScene, SceneTables, standard_schema
-from hybrid.scene.short_form import ShortForm, changes_cable, line_of, network_tables, short_form
+from hybrid.scene.short_form import ShortForm, line_of, network_tables, short_form, tables_of_cable
 
 
 def names_lines(data: Any) -> bool:
@@ -94,9 +94,9 @@ class Scene(Network):
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """The same with other tables, in the form in which it was written or as a network."""
-        if self._short and changes_cable(update or {}):
-            return self.model_validate(self.asked_scene("").model_copy(update=update))
-        return super().model_copy(update=update, deep=deep)
+        cable = tables_of_cable(update or {}) if self._short else {}
+        made = super().model_copy(update={k: x for k, x in (update or {}).items() if k not in cable}, deep=deep)
+        return self.model_validate(made.asked_scene("").model_copy(update=cable)) if cable else made
 
     @classmethod
     def model_json_schema(cls, *args: Any, **kwargs: Any) -> dict[str, Any]:

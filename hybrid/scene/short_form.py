@@ -149,10 +149,10 @@ def line_of(network: Network) -> LineScene:
     return LineScene.model_construct(**tables, output=Output.model_construct(**kept))
 
 
-def changes_cable(update: Mapping[str, Any]) -> bool:
-    """Whether changes of a scene are of tables that a cable has, and a network has not, or of another kind."""
-    kinds = {key: type(update[key]) in (Output, Contact) for key in ("output", "contact") if key in update}
-    return any(kinds.values()) or bool({"cable", "ends", "model", *OF_LINE} - {"contact"} & {*update})
+def tables_of_cable(update: Mapping[str, Any]) -> dict[str, Any]:
+    """Of changed tables those that a cable has, and a network has not, or of another kind."""
+    own = {"cable", "ends", "model", *OF_LINE} - {"contact"}
+    return {key: x for key, x in update.items() if key in own or type(x) in (Output, Contact)}
 
 
 def short_form(scene: LineScene) -> ShortForm:

@@ -9,6 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
+from hybrid.scene.analysis import CatenaryModel
 from hybrid.scene.base import Finding
 from hybrid.scene.points import FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.read import as_scene, read_text, scene_text
@@ -135,3 +136,15 @@ def test_a_free_point_where_lines_meet_says_where_it_is_first() -> None:
     more = {"lines.second": second, "points.far": {"position": [20.0, 0.0, 0.0]}}
     with pytest.raises(SceneError, match="the lines that meet here"):
         as_scene(tables_with(tables, more))
+
+
+def test_tables_of_both_forms_change_together() -> None:
+    """Of a cable in Python code of 1.0, and what is kept of its network: an unknown line is no change in silence."""
+    made = scene()
+    changed = made.model_copy(
+        update={"model": CatenaryModel(), "output": made.output.model_copy(update={"exact": True})}
+    )
+    assert changed.model.kind == "catenary" and changed.lines[LINE].model == changed.model and changed.output.exact
+    assert changed.asked_lines.keys() == {""} and hybrid.parse_scene(scene_text(changed)) == changed
+    with pytest.raises(KeyError):
+        made.with_lines({"": {"model": CatenaryModel()}})

@@ -24,7 +24,7 @@ class OneLine:
 
     moves = True
     names: ClassVar[dict[str, str]] = {LINE: ""}
-    network = SimpleNamespace(lines={LINE: SimpleNamespace(sections=())})  # which cannot bend
+    scene = SimpleNamespace(lines={LINE: SimpleNamespace(sections=())})  # which cannot bend
 
     def __init__(
         self, asked: RequestedAccuracy | None, free: Free, sample: Made, result: Made,

@@ -14,6 +14,7 @@ from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.model_costs import with_model
 from hybrid.model.resolution import Reach, Resolution, first_resolution, for_motion, requested_accuracy
 from hybrid.scene.read import as_scene, one_line, parse_scene, scene_text
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_sample import RunSample
 
 LENGTH, DIAMETER = 100.0, 0.04
@@ -54,8 +55,8 @@ def run(moved: float, curvature: float = 0.1, tension: float = 200.0, outputs: i
     return RunSample(Resolution(1.0, 0.1, 1e-3, 1e-3), values, 100, 100, 0.1)
 
 
-def sizes(asking: hybrid.Scene, found: RunSample) -> dict[str, float]:
-    asked = requested_accuracy(one_line(asking))
+def sizes(asking: hybrid.Scene | LineScene, found: RunSample) -> dict[str, float]:
+    asked = requested_accuracy(asking if isinstance(asking, LineScene) else one_line(asking))
     assert asked is not None
     return {x.name if x.limit is None else x.limit.limit: x.size for x in bounds_of(asked, found)}
 
