@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.fill_line import Cable, blank_kinds_job, blank_line_job, fill_kinds
-from hybrid.kernels.mesh.zone_criteria import NodeKinds, blank_kinds
+from hybrid.kernels.mesh.zone_criteria import HINGE, NodeKinds, blank_kinds
 from hybrid.kernels.state.state import NO_MOVED, NO_PLANE, Floats, Line
 from hybrid.model.line import cable_on, inertia_of_zones, on_base, put_points
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR, Material
@@ -153,4 +153,5 @@ class LineOnBase:
             least=LEAST_TENSION * scale,
         )  # fmt: skip
         fill_kinds(self._kinds_job.numbers)
+        kinds.node[[0, -1]] = np.where(self._material.hinges[:2, 0] > 0.0, HINGE, kinds.node[[0, -1]])
         return kinds

@@ -24,7 +24,6 @@ from hybrid.kernels.laws.element import NO_SPRING
 from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH, Cable, blank_line_job, fill_line
-from hybrid.kernels.mesh.zone_criteria import HINGE, LOAD
 from hybrid.kernels.state.report import (
     AXIAL_LAW,
     BENDING_LAW,
@@ -127,8 +126,7 @@ def cable_on(material: Material, base: Floats, bits: int, inertia: int) -> Cable
     """A material on base cells (n+1,) m; bits: forces that are on; inertia: as of `made_of`."""
     of, place = material.piece(0.5 * (base[:-1] + base[1:])), material.point_nodes(base)
     load, turns = np.zeros(base.size, np.int8), np.zeros(base.size, np.int8)
-    load[place], turns[material.swivel_nodes(base)] = LOAD, 1
-    load[[0, -1]] = np.where(material.hinges[:2, 0] > 0.0, HINGE, load[[0, -1]])
+    load[place], turns[material.swivel_nodes(base)] = 1, 1
     points = np.zeros((len(OF_POINTS), base.size))
     cable = Cable(
         made=made_of(material, inertia)[of], EI=material.mean_bending[of], w=np.abs(material.submerged_weight[of]),

@@ -109,9 +109,7 @@ class CellChanges(Remesh):
         )
         self._match = Room(Packed(blank_joined), most), Room(Packed(blank_single), most)
         self._twist, self._clamps, self._held = np.zeros(base), np.zeros((2, 2, 3)), np.zeros(2, bool)
-        self._follows = bool(switching.zones.clock.share > 0.0)
-        self.alone &= self._follows
-        self._shifts, self._places = np.array([not self._follows]), np.zeros(MOST_PLACES, np.int64)
+        self._shifts, self._places = np.zeros(1, bool), np.zeros(MOST_PLACES, np.int64)
 
     @staticmethod
     def _key(owner: OneOfMany) -> tuple[Any, ...]:
@@ -126,7 +124,8 @@ class CellChanges(Remesh):
     @staticmethod
     def may_change(run: OfRun, number: int, switching: ZoneSwitching) -> bool:
         """Whether cells of a line can change so in a run whose solver is attached."""
-        if any(x.paying is not None for x in run.lines) or not by_itself(run, number):
+        paid = any(x.paying is not None for x in run.lines)
+        if not switching.zones.clock.share > 0.0 or paid or not by_itself(run, number):
             return False
         model = run.model.models[number]
         plain = carries_all(model, switching) and not model.line.bits & REMEMBERS
@@ -251,7 +250,7 @@ class CellChanges(Remesh):
     def _model_of(self, line: Line, sea: Sea) -> Model:
         model, zones = self._owner.model, self._zones_on(self.side, self.cells)
         assert model.layout is not None
-        layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy() if self._follows else None)
+        layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy())
         model = replace(model, line=line, layout=layout, zones=layout.zones, sea=model.sea.with_values(sea))
         self._switching.set_model(model, zones)
         return model
@@ -262,13 +261,11 @@ class CellChanges(Remesh):
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
         switching, manager, t = self._switching, self._switching.manager, self._owner.t
         switching.zones.next_rod[:] = change.rod
-        if self._follows:
-            z.plan_next(switching.table.numbers)
+        z.plan_next(switching.table.numbers)
         for k, clamp in enumerate(switching.clamps(self._owner.model.ends.at(t))):
             self._held[k] = clamp is not None
             if clamp is not None:
                 self._clamps[k] = clamp
-        self._work_on(self.cells).X[:] = 0.0  # kept factors of an unknown that is no more are read as zeros
         booked = self.change(lambda: manager.adopt_rods(change.rod, change, t))
         manager.take(manager.layout._replace(rod=change.rod.copy()), self._zones_on(self.side, self.cells))
         switching.limit_steps(self._owner.clock)

@@ -472,7 +472,7 @@ class LineResult:
                 now = self.manager.largest_ratios(self.observer.grid.s)
                 self._ratios.append(np.repeat(now[None], len(batch.t), axis=0))
         full = sum(len(x.t) for x in self._waiting) >= WAITING or self._aside.full
-        full |= self.cells is not None and self.cells.alone and bool(self._waiting)  # which change, and these with them
+        full |= self.cells is not None and bool(self._waiting)  # which change, and these with them
         if full or not self._moves:
             self.write_down()
 

@@ -105,11 +105,6 @@ class _LineZones:
         self.paid: PaidZones | None = None  # of a line that is paid out
         self.cells: CellChanges | None = None  # what changes its cells without Python
 
-    @property
-    def follows(self) -> bool:
-        """Whether cells follow the curvature."""
-        return self.switching.zones.clock.share > 0.0
-
     def follow(self, run: RunOfLines, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
         self.counts.phase, self.clock.now, self.clock.try_end = phase, t, end
@@ -183,8 +178,8 @@ class RunZones(Part):
             loop.counts.asks |= b.ASK_STEPS
         if any(x.observer.writes_criteria for x in mine):
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_STEPS
-        for x in self.lines:  # where cells follow; else arrays are made when kinds change for the first time
-            self._change_by_itself(x, x.follows and not loop.counts.asks & b.ASK_BEFORE)
+        for x in self.lines:
+            self._change_by_itself(x, not loop.counts.asks & b.ASK_BEFORE)
         loop.change_cells([x.cells.job if x.cells is not None else None for x in self.lines])
 
     def _change_by_itself(self, x: _LineZones, may: bool) -> None:
@@ -238,7 +233,7 @@ class RunZones(Part):
     @property
     def remeshes(self) -> bool:
         """Whether cells of a line follow the curvature: its nodes come and go."""
-        return any(x.follows for x in self.lines)
+        return any(x.switching.zones.clock.share > 0.0 for x in self.lines)
 
     @property
     def longest(self) -> float:
@@ -353,10 +348,9 @@ class RunZones(Part):
     def _change(self, changes: Sequence[tuple[_LineZones, Change]]) -> None:
         """Carry out changes of lines, in their arrays where that can be."""
         run = self._run
-        attached = run.solver.turns is not None and run.solver.turns is run.loop.turns
         for x, change in changes:
-            run.lines[x.number].write_down()
-            self._change_by_itself(x, not x.follows and attached and not run.loop.counts.asks & b.ASK_BEFORE)
+            if x.cells is not None and not x.cells.fits_zones(x.switching):  # another solver has the line now
+                x.cells = run.lines[x.number].cells = None
             if x.cells is not None:
                 booked = x.cells.change() if change.same else x.cells.change_zones(change)
                 x.cells.sync()
@@ -373,6 +367,7 @@ class RunZones(Part):
             self._kinds = RunKinds(run)
         self._kinds.begin()
         for x, change in changes:
+            run.lines[x.number].write_down()
             model, booked = self._kinds.change(x.number, x.switching, change)
             self._note(x, change, model, booked)
             run.lines[x.number].take_kinds(model)

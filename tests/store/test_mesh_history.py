@@ -8,7 +8,6 @@ import hybrid
 from hybrid.accuracy import api
 from hybrid.errors import ResultError
 from hybrid.simulation.case import Case
-from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.run_zones import RunKinds
 
@@ -74,7 +73,6 @@ def test_the_mesh_of_zones_that_move(monkeypatch, tmp_path):
     output = LineResult.output
     monkeypatch.setattr(LineResult, "output", shown)
     monkeypatch.setattr(api, "Case", Spy)
-    monkeypatch.setattr(CellChanges, "may_change", lambda *_: False)
     monkeypatch.setattr(RunKinds, "apply", lambda *_: False)  # outputs of other zones are recorded one by one
     result = hybrid.run(swinging("adaptive"), tmp_path / "run.h5")
     kinds = {tuple(mesh.kinds) for mesh in result.mesh}

@@ -16,7 +16,7 @@ from hybrid.kernels.laws.element import put_spring
 from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader, rows
-from hybrid.kernels.mesh.zone_criteria import SMOOTH, STEP, NodeKinds, blank_kinds
+from hybrid.kernels.mesh.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds, blank_kinds
 from hybrid.kernels.state.state import FIELDS, HALF, MEAN, POINT, ROD, SHARED, Field, Floats, Line, blank_line
 
 # Columns of a row.
@@ -176,7 +176,7 @@ class Cable(NamedTuple):
     w: Floats  # N/m, weight in water
     points: Floats  # (P, n+1) of bodies, as OF_POINTS has them
     blank: Floats  # (P,) of nodes without a body
-    load: NDArray[np.int8]  # (n+1,) LOAD where there is a point, HINGE at an end with a hinge that results know
+    load: NDArray[np.int8]  # (n+1,) 1 where there is one
     turns: NDArray[np.int8]  # (n+1,) 1 where there is a swivel
     held: NDArray[np.int8]  # (2, 2) whether an element sits at the ends of a rod, and resists twist
     springs: Floats  # (2,) N m/rad, angular springs between held tangents and a rod; infinite: rigid
@@ -273,7 +273,7 @@ def fill_kinds(table):
         kinds.node[i] = STEP if cable.EI[a] != cable.EI[b] else SMOOTH
         at_base = i == 0 or i == n or a != b
         if at_base and cable.load[b if i < n else b + 1]:
-            kinds.node[i] = cable.load[b if i < n else b + 1]
+            kinds.node[i] = LOAD
         kinds.floor[i] = max(job.floor_part * (kinds.EI[i] * kinds.w[i] ** 2) ** (1.0 / 3.0), job.least)
         if i < n:
             kinds.base_of_cell[i] = of[i]
