@@ -97,7 +97,7 @@ def test_a_file_keeps_the_interval_that_its_version_gave_it(
         ends = {"start": {"kind": "pinned", "position": (0, 0, 0)}, "end": {"kind": "pinned"} | moved}
         scene |= {"cable": {"sections": [section]}, "ends": ends, "model": "catenary", "mesh": {"cells": 4}}
         scene["initial"] = "equilibrium"
-    monkeypatch.setattr("hybrid.scene.root.PER_PERIOD", 1)
+    monkeypatch.setattr("hybrid.scene.schema.PER_PERIOD", 1)
     hybrid.run(scene, tmp_path / "old.h5").close()
     monkeypatch.undo()
     with hybrid.resume(tmp_path / "old.h5", until=5.0) as longer:

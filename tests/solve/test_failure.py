@@ -6,7 +6,7 @@ import yaml
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.scene.read import read_text, scene_text
+from hybrid.scene.read import one_line, read_text, scene_text
 from hybrid.solve.stepper import Stepper
 from tests.said import ONE, both_ways, line_of, said
 
@@ -240,7 +240,7 @@ def test_a_strut_that_is_pushed_beyond_what_it_bears_stops(tmp_path):
 
 @pytest.mark.parametrize("field", ["e", "v", "T", "a1"])
 def test_a_number_that_is_not_finite_is_found_at_once(field):
-    model = build(scene("rod"))
+    model = build(one_line(scene("rod")))
     stepper = Stepper(model.line, model.length, model.tension_scale, model.slack_floor)
     old = model.start.copy()
     getattr(old, field)[17] = np.nan

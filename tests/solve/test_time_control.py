@@ -16,6 +16,7 @@ from hybrid.kernels.step.generalized_alpha import before_fixed, radius_of_step, 
 from hybrid.kernels.step.step_control import end_of_try, halve, passes, take_past
 from hybrid.kernels.step.step_law import FIRST, LEAST, MOST, REFUSED, step_end
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 from hybrid.solve.stepper import Stepper
 
 DURATION = 2.0  # s
@@ -31,7 +32,7 @@ FAR = [1, 1, 1, *[1 / 16] * 16]
 def motion(model, rho, steps, carried=True):
     """Times, positions and tensions at the end of every step; steps: s; carried: whether the scheme is told of them."""
     what = scene(model, 0.01, rho)
-    made = build(what)
+    made = build(one_line(what))
     stepper = Stepper(made.line, made.length, made.tension_scale)
     old = at_rest(made).state.lines[0]
     stepper.consistent_accelerations(made.sea.at(0.0), made.ends.at(0.0), made.ends.acceleration(0.0, 1e-5), old)

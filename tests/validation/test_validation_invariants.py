@@ -9,6 +9,7 @@ import pytest
 from problems import build, motion, order, shaken_line, solid_angle, turned_by, turned_ring, twist_of, writhe
 
 import hybrid
+from hybrid.scene.read import one_line
 
 
 @pytest.mark.long
@@ -17,7 +18,7 @@ import hybrid
 def test_length_and_frames_over_many_steps(kind, damping, report):
     """10^4 steps of a cable shaken in three dimensions."""
     scene = shaken_line(kind, 0.01, 100.0, damping, 0.5)
-    spin = build(scene).line.spin == 1
+    spin = build(one_line(scene)).line.spin == 1
     longest = worst = 0.0
     steps = -1
     for _, state in motion(scene):
@@ -66,7 +67,7 @@ def test_link_is_twist_and_writhe(report):
     1e-7: Gauss's integral takes the arcsine of numbers near one, which keeps half the digits.
     """
     scene = turned_ring(40, 0.002)
-    model = build(scene)
+    model = build(one_line(scene))
 
     def lean(state, _model):
         s = model.line.s

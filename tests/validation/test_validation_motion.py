@@ -25,6 +25,7 @@ from problems import (
 )
 
 import hybrid
+from hybrid.scene.read import one_line
 
 CASES = {
     "broadside": (False, 3.0, X),
@@ -191,7 +192,7 @@ def test_whip_goes_through(cells, step, report):
 def flight(cells: int, step: float) -> tuple[hybrid.Result, np.ndarray, np.ndarray]:
     """A run of the flying spaghetti with its linear and angular momenta at every step."""
     scene = spaghetti(cells, step)
-    model = build(scene)
+    model = build(one_line(scene))
     result = hybrid.run(scene)
     pairs = []
     for r, v in zip(result.position, result.velocity, strict=True):

@@ -59,6 +59,7 @@ from problems_sea import (
 )
 
 import hybrid
+from hybrid.scene.read import one_line
 
 # --- statics ---------------------------------------------------------------------------------------
 
@@ -319,7 +320,7 @@ def test_heave_of_a_floating_body(added_mass, report):
 def test_body_rides_long_waves(period, report):
     scene, part = riding_body(period)
     result = hybrid.run(scene)
-    sea = build(scene).sea
+    sea = build(one_line(scene)).sea
     eta = np.array([sea.elevation(r[0], r[1], t)[0] for r, t in zip(result.position[:, 0], result.t, strict=True)])
     late = result.t > 5 * period
     off = np.abs(result.position[:, 0, 2] - eta)[late].max() / np.abs(eta[late]).max()

@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 
 def critical_torque(load: float, cells: int, torsional_stiffness: float) -> float:
     """Torque over 2 sqrt(EI T) at which the straight, evenly twisted rod buckles."""
-    model = build(twisted_taut_rod(load, cells, torsional_stiffness))
+    model = build(one_line(twisted_taut_rod(load, cells, torsional_stiffness)))
     taut = at_rest(model).state.lines[0]
 
     def stable(ratio: float) -> bool:
@@ -82,7 +82,7 @@ def critical_turn(cells: int) -> float:
 
     The clamped polygon is out of balance by a part h^2 next to the clamp, which is of the order of the result.
     """
-    model = build(ring(cells, 1.0))
+    model = build(one_line(ring(cells, 1.0)))
 
     def softest_but_rolling(turn: float) -> float:
         state = model.start.copy()
