@@ -21,6 +21,8 @@ from problems import (
 )
 from scipy.optimize import brentq
 
+from hybrid.scene.read import one_line
+
 
 def critical_torque(load: float, cells: int, torsional_stiffness: float) -> float:
     """Torque over 2 sqrt(EI T) at which the straight, evenly twisted rod buckles."""
