@@ -44,7 +44,7 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     collect = {"force": {"quantity": "end_force_end"}}
     asked = study_from({"scene": "scene.yaml", "vary": VARY, "combine": "zip", "collect": collect}, folder)
     cases = cases_of(asked)
-    file = _created(folder / "study.zarr", asked, cases, asked.collect, "", len(cases.rows))
+    file = _created(folder / "study.zarr", asked, cases, asked.collect, "", len(cases.rows), ())
     write_outcomes(file, 0, compute_batch(Job(cases.base, cases.keys, cases.rows, asked.collect, False)))
     return file.path
 
