@@ -242,12 +242,12 @@ def test_files_are_as_long_as_a_subject() -> None:
 
 # Rules of writing, and in how many places each is broken: only less.
 BROKEN = {
-    "docstring whose first line is no whole sentence": 20,
-    "name from the list of banned words": 103,
+    "docstring whose first line is no whole sentence": 9,
+    "name from the list of banned words": 95,
     "more than two constants in a line": 16,
-    "constructor above 40 lines": 4,
-    "function above 60 lines": 17,
-    "fmt: skip": 438,
+    "constructor above 40 lines": 3,
+    "function above 60 lines": 14,
+    "fmt: skip": 429,
 }
 # Words that do not say what a thing is or does; the second ones only where they are the whole name.
 BANNED = {"calm", "follow", "found", "haste", "its", "look", "looks", "loudest", "pace", "patience", "said",
