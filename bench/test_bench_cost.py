@@ -21,6 +21,7 @@ from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, eliminate_wide
 from hybrid.kernels.machine import compiler
 from hybrid.kernels.run.entry import assembly, block_rows
 from hybrid.model.build import build
+from hybrid.scene.read import one_line
 from hybrid.solve.stepper import Stepper
 
 pytestmark = pytest.mark.bench
@@ -40,7 +41,7 @@ def scene(zones, every=20.0, start="straight"):
 
 def moving(zones):
     """A stepper and a state in motion, for timing steps without a driver."""
-    model = build(scene(zones, start="equilibrium"))
+    model = build(one_line(scene(zones, start="equilibrium")))
     found = at_rest(model, np.inf)
     stepper = Stepper(model.line, model.length, model.tension_scale)
     state = found.state.lines[0].copy()

@@ -216,6 +216,32 @@ def test_files_do_not_name_each_other_in_a_circle() -> None:
     assert not {place: count for place, count in found.items() if count > CIRCLES.get(place, 0)}
 
 
+def put_off(file: Path) -> set[tuple[str, int]]:
+    """What a file imports within functions or for type checkers alone, with the line."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return {(name, line) for name, line in imports(file, for_types=True) if lines[line - 1].startswith(" ")}
+
+
+@cache
+def loaded_by(name: str) -> frozenset[str]:
+    """Files of the package that the import of one loads, by name."""
+    at_once = {other for other, _ in {*imports(NAMES[name], for_types=True)} - put_off(NAMES[name])}
+    first = {other for other in at_once if other in NAMES and other != name}
+    return frozenset({name}.union(*map(loaded_by, first)))
+
+
+def test_no_import_is_put_off_of_what_is_loaded_anyway() -> None:
+    """Within a function, or for type checkers alone where the room may be imported: that buys no time."""
+    found = []
+    for name, file in NAMES.items():
+        rooms = {room(file), *ALLOWED[room(file)]} if name != "hybrid" else ()
+        for other, line in put_off(file):
+            is_file = other in NAMES and NAMES[other].name != "__init__.py"
+            if is_file and room(NAMES[other]) in rooms and other in loaded_by(name):
+                found.append(f"{name}:{line} {other}")
+    assert not found
+
+
 # Where it is asked whether a scene has one line or several, and what is named after several, outside scene/: only less.
 FORKS, FILES_OF_SYSTEMS, CLASSES_OF_SYSTEMS = 0, 0, 0
 FORK = re.compile(r"isinstance\([^()]*,[^()]*\b(\w*Scene|Network)\b|\bline_names\b|\b(self|case|left)\.flat\b")

@@ -10,7 +10,7 @@ import time as clock
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from hybrid.model.model_costs import COST_STEP, NAMED, ModelChoice
 from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import NetworkPlan, Plan
 from hybrid.model.resolution import Resolution, requested_accuracy, wants_errors
+from hybrid.scene.network import Network
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
@@ -36,10 +37,6 @@ from hybrid.simulation.new_run import Recording
 from hybrid.simulation.run_sample import RunSample
 from hybrid.solve.joined import LineFailed
 from hybrid.store.stored_rows import ComparisonRecorder
-
-if TYPE_CHECKING:
-    from hybrid.scene.network import Network
-
 
 # s of processor time that the pre-run and the first steps of the result may take, and a pre-run that chooses the model.
 PRE_RUN, FIRST_STEPS, CHOICE = 0.2, 0.1, 1.0

@@ -17,10 +17,10 @@ import typer
 import typer.core
 
 import hybrid
-from hybrid.cli.console import OUTPUT, raise_lost_output
+from hybrid.cli.console import OUTPUT, Console, raise_lost_output
+from hybrid.errors import ComputationError, ResultError, ResultHeld, SceneError
 
 if TYPE_CHECKING:
-    from hybrid.cli.console import Console
     from hybrid.scene.root import Scene
     from hybrid.store.reader import Result
 
@@ -132,8 +132,6 @@ def hybrid_(
 @contextmanager
 def session(as_json: bool, quiet: bool) -> Iterator[Console]:
     """The console of one command; errors become words and exit codes."""
-    from hybrid.cli.console import Console
-
     console, code = Console(as_json, quiet), 0
     with _stops() as heard, _cache_warnings(console):
         try:
@@ -204,8 +202,6 @@ def _ran_out(error: BaseException) -> bool:
 
 def report_error(console: Console, error: BaseException) -> int:
     """Say what went wrong; gives the exit code."""
-    from hybrid.errors import ComputationError, ResultError, ResultHeld, SceneError
-
     match error:
         case SceneError():
             from hybrid.scene.read import located
@@ -254,8 +250,6 @@ def load(console: Console, path: Path, settings: list[str] | None) -> Scene:
 @contextmanager
 def opened_line(result: Path, line: str | None) -> Iterator[tuple[Result, Path]]:
     """A result, of several lines the one named or all, and the name of its file, by which others are called."""
-    from hybrid.errors import ResultError
-
     with hybrid.open(result) as whole:
         names = list(whole.lines)
         if line is None:

@@ -43,10 +43,10 @@ from hybrid.cli.app import (
     session,
     words,
 )  # fmt: skip
-from hybrid.cli.console import guard_output, raise_lost_output
+from hybrid.cli.console import Console, guard_output, raise_lost_output
+from hybrid.cli.progress_line import span, speed
 
 if TYPE_CHECKING:
-    from hybrid.cli.console import Console
     from hybrid.scene.root import Scene
     from hybrid.store.reader import Result
 
@@ -114,7 +114,6 @@ def static(
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
         asked = load(console, scene, settings)
-        from hybrid.cli.progress_line import span
         from hybrid.cli.result_tables import check_holding, show_equilibrium, show_holding
 
         check_holding(asked, stiffness, offsets, reach, heading)
@@ -277,7 +276,6 @@ def _ended(
     picture: Path | None,
 ) -> None:  # fmt: skip
     """Print the summary of a run that has ended; computed: s of it, by this command."""
-    from hybrid.cli.progress_line import span, speed
     from hybrid.cli.result_tables import show_motion
 
     _draw(result, picture)
@@ -320,15 +318,11 @@ def main(arguments: list[str] | None = None) -> None:
         code = program.main(arguments, prog_name="hybrid", standalone_mode=False, obj=arguments)
         raise_lost_output()
     except UsageError as error:
-        from hybrid.cli.console import Console
-
         command = error.ctx.command_path if error.ctx else "hybrid"
         Console("--json" in arguments, False).error(
             "usage", f"{error.format_message()}\n    try:      {command} --help"
         )
         code = REFUSED
     except OSError as error:
-        from hybrid.cli.console import Console
-
         code = report_error(Console("--json" in arguments, False), error)
     sys.exit(code)

@@ -20,12 +20,11 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import hybrid
 from hybrid.cli.progress_line import LINE_EVERY, ProgressLine, span
-from hybrid.errors import EXPECTED, is_of_the_run, weight_of_event
+from hybrid.errors import EXPECTED, ComputationError, SceneError, is_of_the_run, weight_of_event
 
 if TYPE_CHECKING:
     from rich.console import Console as RichConsole
 
-    from hybrid.errors import ComputationError, SceneError
     from hybrid.scene.root import Scene
     from hybrid.simulation.progress import Progress
     from hybrid.store.records import Event

@@ -12,15 +12,14 @@ from typing import TYPE_CHECKING, Any
 from hybrid.cli.progress_line import span
 from hybrid.kernels.state.report import FORCES
 from hybrid.model.lines_contact import OTHERS
-from hybrid.model.plan import parts, size_of_result
+from hybrid.model.plan import NetworkPlan, Plan, parts, size_of_result
 from hybrid.model.self_reach import WHERE_NEAR
 from hybrid.scene.analysis import PER_PERIOD
+from hybrid.scene.network import Network
+from hybrid.scene.root import Scene
 from hybrid.store.capacity import kink_torque
 
 if TYPE_CHECKING:
-    from hybrid.model.plan import NetworkPlan, Plan
-    from hybrid.scene.network import Network
-    from hybrid.scene.root import Scene
     from hybrid.simulation.run_quantities import Listed
 
 NAME, COLUMNS = 13, 80  # columns of names, and of the short form

@@ -11,10 +11,9 @@ import typer
 
 import hybrid
 from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, flag, load, session
-from hybrid.linear.response_results import ADDED, OF_LARGEST
+from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse, Response
 
 if TYPE_CHECKING:
-    from hybrid.linear.response_results import LineResponse, Response
     from hybrid.modal.api import Modes
 
 

@@ -27,10 +27,10 @@ from hybrid.cli.app import (
     window,
     words,
 )
+from hybrid.cli.console import Console
 from hybrid.errors import ResultError, command_for, optional_package
 
 if TYPE_CHECKING:
-    from hybrid.cli.console import Console
     from hybrid.modal.api import Modes
     from hybrid.store.reader import Result
 

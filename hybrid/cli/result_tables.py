@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import hybrid
-from hybrid.cli.console import Grid
+from hybrid.cli.console import Console, Grid
 from hybrid.cli.tables import (
     ends_rows,
     equilibrium_facts,
@@ -32,7 +32,6 @@ from hybrid.store.envelope import NOT_VERIFIED, TOUCH
 from hybrid.store.records import error_words
 
 if TYPE_CHECKING:
-    from hybrid.cli.console import Console
     from hybrid.store.reader import Result
 
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import time as clock
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 import hybrid
 from hybrid.cli.app import Json, Quiet, UsageError, app, flag, session
-
-if TYPE_CHECKING:
-    from hybrid.cli.console import Console
+from hybrid.cli.console import Console
+from hybrid.cli.progress_line import span
 
 # Reasons of failed cases that are printed, those of most cases first.
 REASONS_SHOWN = 5
@@ -85,7 +84,6 @@ def study(
 
 def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path | None) -> None:
     """Ranges of what was kept, reasons of what failed, and where it is."""
-    from hybrid.cli.progress_line import span
     from hybrid.store.study_file import DONE, FAILED, counts_of, unmet_accuracy
 
     counts = counts_of(found["status"].values)

@@ -90,7 +90,6 @@ def _write_scene(scene: Scene, folder: Path) -> list[Path]:
 
 
 def _yaml(data: Any) -> str:
-    import json
 
     return json.dumps(data, indent=1)  # JSON is YAML 1.2
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import plan
 from hybrid.model.resolution import model_is_free
 from hybrid.scene.read import located_in, read_text
+from hybrid.scene.root import Scene
 from hybrid.simulation.case import CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.store.array_contents import MemoryTarget
@@ -27,10 +28,6 @@ from hybrid.view.obstacles import rings
 from hybrid.view.projections import bed_heights, whole_zones
 from hybrid.view.scenery import box_and_planes
 from hybrid.view.summary import facts_of
-
-if TYPE_CHECKING:
-    from hybrid.scene.root import Scene
-
 
 # Points along a line in a picture: one for each cell, as far as a screen shows them apart.
 LEAST_POINTS, MOST_POINTS = 101, 401

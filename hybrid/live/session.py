@@ -15,6 +15,7 @@ from hybrid.live import pictures
 from hybrid.live.document import Document, Refused, Stamp, named_files, stamp_of
 from hybrid.live.new_scenes import example_text, examples, new_scene, questions
 from hybrid.live.workers import Run, Workers
+from hybrid.scene.read import text_of
 from hybrid.store.hdf5_file import is_held, is_result
 from hybrid.store.reader import Result, open_result
 
@@ -406,9 +407,6 @@ def session_of(path: Path | None, workers: Workers | None = None) -> Session:
 
     SceneError or ResultError where the file cannot be read.
     """
-    from hybrid.scene.read import text_of
-    from hybrid.store.reader import open_result
-
     if path is None:
         return Session(Document(""), None, workers)
     path = path.expanduser().absolute()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,6 @@ from hybrid.scene.bodies import FreeBody
 from hybrid.scene.network import Network, SomeScene
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, LinesContact
 from hybrid.scene.schema import LineScene
-
-if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.scene.network import Network
 
 
 @dataclass(frozen=True)

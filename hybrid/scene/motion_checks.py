@@ -10,6 +10,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+import numpy as np
+
 from hybrid.scene.analysis import Time
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.cable import Cable, Environment
@@ -430,8 +432,6 @@ def _unreadable(load: GivenLoad) -> Finding | None:
 
 def _missed(rows: Sequence[Row], step: float) -> float | None:
     """Time of a row that departs from a line between two steps by a large part of the range of the history."""
-    import numpy as np
-
     from hybrid.scene.motion_file import MISSED
 
     table = np.array(rows)

@@ -13,6 +13,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_type_hints
 
+import yaml
 from pydantic import TypeAdapter, ValidationError
 
 from hybrid.errors import Complaint, SceneError
@@ -195,7 +196,6 @@ def _from_data(data: Any) -> tuple[Scene, list[RenamedKey]]:
 
 def scene_text(scene: SceneTables) -> str:
     """The scene as YAML; `parse_scene` reads it back to an equal scene."""
-    import yaml
 
     class Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]  # of C where it was built
         pass

@@ -11,7 +11,7 @@ from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.depths import Depths
 from hybrid.scene.ends import Ends, Triple
 from hybrid.scene.sea import Seabed
-from hybrid.scene.stream_function import wavenumber
+from hybrid.scene.stream_function import FADED, steady_wave, wavenumber
 from hybrid.scene.waves import RecordedWaves, StreamFunctionWaves
 
 # Miche (1944): a wave of height H and length L breaks where H / L reaches 0.142 tanh(k depth).
@@ -104,7 +104,6 @@ def wave_is_steady(environment: Environment) -> Iterator[Finding]:
     sea = environment.waves
     if not isinstance(sea, StreamFunctionWaves) or environment.gravity == 0.0:
         return
-    from hybrid.scene.stream_function import FADED, steady_wave
 
     if sea.period > LONGEST_PERIOD:
         fix = "give a tide as environment.fluid.current; periods are in seconds"

@@ -11,7 +11,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,7 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sections import OutputPoints, output_points
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors, layer_errors
+from hybrid.scene.network import Network
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
@@ -77,10 +78,6 @@ from hybrid.store.stored_rows import ComparisonRecorder, RowsRecorder, StoredArr
 from hybrid.store.whole_file import LateFile
 from hybrid.store.writer import Recorder, WriteMode
 from hybrid.zones.criteria import UserCriterion, with_names
-
-if TYPE_CHECKING:
-    from hybrid.scene.network import Network
-
 
 # Of every step, what extremes of the end forces follow from.
 FORCES = ("t", "end_force_start", "end_force_end")

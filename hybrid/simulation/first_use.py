@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.machine.compile import entry, is_warm
 from hybrid.model.build import Model, build
 from hybrid.model.payout import payout_of
@@ -177,7 +178,6 @@ def payout_kernels() -> tuple[Any, ...]:
 
 
 def _compile_outputs(model: Model) -> None:
-    from hybrid.kernels.laws.obstacles import stored_energy
     from hybrid.kernels.watch.observed_outputs import observe_outputs
 
     observe_outputs(np.zeros((0, 0), np.int64))

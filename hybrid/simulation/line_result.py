@@ -10,6 +10,7 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
 from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.link import holds_twist
 from hybrid.kernels.march.zone_torque import answers_of
 from hybrid.kernels.mesh.zone_criteria import CRITERIA, twist_of_rods
@@ -62,7 +63,6 @@ from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.zones.manager import DomainManager
 
 if TYPE_CHECKING:
-    from hybrid.kernels.machine.binding import Table
     from hybrid.simulation.cell_changes import CellChanges
     from hybrid.simulation.payout import PayingOut
     from hybrid.simulation.payout_nodes import NodeChanges

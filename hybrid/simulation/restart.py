@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -16,21 +16,19 @@ from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.build import Model
 from hybrid.model.ends import EndConditions
 from hybrid.model.lines_contact import passing_each_other
+from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.sections import OutputPoints
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.base import dotted
 from hybrid.scene.read import as_scene, read_text, scene_text
+from hybrid.scene.root import Scene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.restore import kept_resolution, refused, restored_points
 from hybrid.store.checkpoint import read_before, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
-
-if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.model.network import NetworkResolution
-    from hybrid.scene.root import Scene
-    from hybrid.scene.schema import LineScene
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
 MAY_CHANGE = (
@@ -169,8 +167,6 @@ def _refuse_more_out(before: Any, after: Any, until: float) -> None:
 
 def _check(last: LoadChange[Any], changed: Any, resolution: NetworkResolution, begin: float, end: float) -> None:
     """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
-    from hybrid.model.network import build_system
-
     _check_what_changes(last, changed, begin, end)
     old = build_system(last.scene, resolution)
     new = build_system(changed, resolution, old)

@@ -15,15 +15,17 @@ from functools import cache
 from importlib.metadata import version
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.kernels.machine.cache import compiler_hash
 from hybrid.model.mesh import MOST_CELLS, Grading
+from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sections import OutputPoints
+from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.old_checkpoints import is_of_cable
 from hybrid.store.checkpoint import Checkpoint, read_checkpoint
@@ -31,10 +33,6 @@ from hybrid.store.hdf5_file import is_result, opened
 from hybrid.store.named_arrays import Tree, matched, pack
 from hybrid.store.reader import Result, open_result
 from hybrid.zones.criteria import UserCriterion
-
-if TYPE_CHECKING:  # its tables take long to make
-    from hybrid.model.network import NetworkResolution
-    from hybrid.scene.network import Network
 
 # Rooms that have a part in the numbers of a file.
 COMPUTES = ("accuracy", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store", "zones")
@@ -149,8 +147,6 @@ def resolution_from(tree: Any, scene: LineScene) -> Resolution:
 
 def kept_resolution(system: Network, source: Path) -> NetworkResolution:
     """How finely a result was computed that has a checkpoint.  ResultError: it is none of this system."""
-    from hybrid.model.network import NetworkResolution
-
     with opened(source) as file:
         tree = read_checkpoint(file).resolution
     first = NetworkResolution.first(system)

@@ -36,6 +36,7 @@ from hybrid.model.build import Model
 from hybrid.model.payout import whole_scene
 from hybrid.model.sections import NEAR, SECTION_LIMITS, limits_along, outer_diameter, weakest_bending
 from hybrid.outputs.probes import Observer
+from hybrid.scene.quantities import Quantity
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.envelope import Envelope
 from hybrid.store.capacity import CORNERS
@@ -44,7 +45,6 @@ from hybrid.store.format import Field, Header, Text
 from hybrid.store.recorder import Rows
 
 if TYPE_CHECKING:
-    from hybrid.scene.quantities import Quantity
     from hybrid.solve.lines_at_rest import LinesAtRest
 
 STEP_FIELDS = (

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -30,15 +30,12 @@ from hybrid.simulation.payout import Before, PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.joined import LineFailed, NetworkState
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.network_steps import NetworkSteps
 from hybrid.zones.at_start import rods_at_winch
 from hybrid.zones.change import ZoneSwitching, change_base
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Change, Reason
-
-if TYPE_CHECKING:
-    from hybrid.solve.network_solver import NetworkSolver
-    from hybrid.solve.network_steps import NetworkSteps
-
 
 # Nodes by which cells are merged before the one leaves at which they must be whole: merged then, where the reel still
 # brings lengths to their true ones, they kicked the pull by 0.14 % of its mean, a node before by 0.09 %.

@@ -42,6 +42,8 @@ from hybrid.simulation.line_of_run import Around
 from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.run import Tried
 from hybrid.store.named_arrays import matched
 from hybrid.zones.change import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, on_layout
@@ -49,10 +51,7 @@ from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Change
 
 if TYPE_CHECKING:
-    from hybrid.kernels.machine.binding import Table
     from hybrid.simulation.run_payout import PaidZones, RunPayout
-    from hybrid.solve.network_solver import NetworkSolver
-    from hybrid.solve.network_steps import NetworkSteps
 
 
 HELD = (

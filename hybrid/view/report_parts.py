@@ -7,6 +7,7 @@ import re
 from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
+from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
@@ -332,8 +333,6 @@ def settings_html(result: Result) -> str:
 
 def footer() -> str:
     """What the page is made with."""
-    from importlib.metadata import version
-
     return (
         f"Written by hybrid-cable {version('hybrid-cable')}. Pictures by plotly.js, MIT licence, which is part of this "
         "file; the page asks for nothing from the network."
