@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Self
 
-from pydantic import ModelWrapValidatorHandler as Handler
 from pydantic import (
     PrivateAttr,
     SerializationInfo,
@@ -14,6 +13,7 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
+from pydantic.functional_validators import ModelWrapValidatorHandler as Handler
 from pydantic.json_schema import models_json_schema
 
 from hybrid.scene.base import Finding, refuse
