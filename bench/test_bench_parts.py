@@ -23,6 +23,7 @@ WATER = {"density": 1025.0}
 WET = {"diameter": 0.02}
 WAVES = {"kind": "regular", "height": 0.2, "period": 4.0, "depth": 50.0}
 FLOAT = {"kind": "float", "at": 10.0, "mass": 0.1, "volume": 0.0002, "drag_area": 0.01}
+OUTPUT = {"every": 4.0, "errors": False}
 BED = {"z": -6.0, "stiffness": 1000.0, "damping": 50.0}
 # part -> changes of the section, of the environment, of the attachments
 PARTS = {
@@ -53,8 +54,8 @@ def scene(model="rod", section=None, around=None, attached=(), **tables):
             "initial": "equilibrium",
             "model": model,
             "mesh": {"cells": CELLS},
-            "time": {"duration": 1.2, "step": STEP},
-            "output": {"every": 1.2, "errors": False},
+            "time": {"duration": 4.0, "step": STEP},
+            "output": OUTPUT,
         }
         | tables
     )
@@ -63,14 +64,15 @@ def scene(model="rod", section=None, around=None, attached=(), **tables):
 class Line:
     """Whole runs of a line in motion, to be timed."""
 
-    def __init__(self, asked, dimension=3):
+    def __init__(self, asked, dimension=3, parts=()):
         self.scene, self.each, self.iterations = asked.model_copy(update={"dimension": dimension}), [], 0.0
+        self.parts = parts
 
     def time(self):
         """One run; seconds a step, from its first on."""
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(hybrid.solve.run, "CELL_STEPS", 10 * CELLS)  # the time is noted after every call
-            result = hybrid.run(self.scene)
+            result = hybrid.run(self.scene, parts=self.parts)
         with result:
             cpu = result.steps["cpu"]
             self.each.append((cpu[-1] - cpu[0]) / (len(cpu) - 1))
@@ -108,6 +110,32 @@ def test_what_each_part_costs():
             assert more < 0.6 * lines["bare"].per_cell / lines["bare"].iterations + 0.15, name
 
 
+class Asked(hybrid.RunPart):
+    """A user's own part that Python calls after every step."""
+
+    name = "asked"
+
+    def after_step(self, run):
+        pass
+
+
+class Reading(Asked):
+    """One that reads the tensions, too."""
+
+    name = "reading"
+
+    def after_step(self, run):
+        run.tension()
+
+
+def test_what_a_part_of_the_users_own_costs():
+    asked = scene("catenary", mesh={"cells": 20}, time={"duration": 40.0, "step": STEP}, output={"every": 40.0})
+    bare, called, reading = timed(Line(asked, 2), Line(asked, 2, [Asked()]), Line(asked, 2, [Reading()]))
+    steps = [1e6 * median(x.each) for x in (bare, called, reading)]
+    print("\ncatenary of 20 cells in a plane, us a step: {:.1f}; with a part {:.1f}, that reads {:.1f}".format(*steps))
+    assert steps[1] - steps[0] < 200.0
+
+
 def test_what_torsion_and_the_third_dimension_cost():
     """The same scenes in space and in their plane, with the watch on what would leave it."""
     wet, around, _ = PARTS["drag in a current"]
@@ -133,7 +161,9 @@ def test_what_torsion_and_the_third_dimension_cost():
 def test_what_is_absent_costs_nothing():
     """A scene with all tables named and nothing in them, and a bare one: the same bits, the same time within noise."""
     named = scene(
-        section={"damping": {"mass": 0.0, "stiffness": 0.0}}, around={"gravity": 9.81}, output={"criteria": False}
+        section={"damping": {"mass": 0.0, "stiffness": 0.0}},
+        around={"gravity": 9.81},
+        output=OUTPUT | {"criteria": False},
     )
     for dimension in (3, 2):
         bare, same, again = timed(Line(scene(), dimension), Line(named, dimension), Line(scene(), dimension))
