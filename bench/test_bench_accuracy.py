@@ -21,7 +21,7 @@ import pytest
 import hybrid
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE
 from hybrid.simulation.case import Case
 
 sys.path.insert(0, str(Path(__file__).parent.parent))

@@ -18,7 +18,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import HybridError
-from hybrid.store.code_checks import inside_of, rows_of
+from hybrid.store.capacity import inside_of, rows_of
 
 pytestmark = pytest.mark.bench
 PIPES = int(os.environ.get("HYBRID_PIPES", "200"))

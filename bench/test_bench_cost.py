@@ -46,21 +46,21 @@ def moving(zones):
     stepper = Stepper(model.line, model.length, model.tension_scale)
     state = found.state.lines[0].copy()
     state.v[:, 1] = 0.1 * np.sin(0.25 * np.pi * model.line.s)  # no turn at the guide, no speed at the pin
-    stepper.consistent_accelerations(model.sea.at(np.inf), model.ends.at(np.inf), np.zeros((2, 3)), state)
+    stepper.consistent_accelerations(model.sea.at_time(np.inf), model.ends.at_time(np.inf), np.zeros((2, 3)), state)
     return model, stepper, state
 
 
 def cost(zones):
     """Microseconds per cell and iteration, per step, and iterations per step, all included."""
     model, stepper, start = moving(zones)
-    ends, cells = model.ends.at(np.inf), model.cells
+    ends, cells = model.ends.at_time(np.inf), model.cells
     steps = max(2, 20_000 // cells)
     each, iterations = [], 0
     for _ in range(RUNS):
         old, new, iterations = start.copy(), start.copy(), 0
         begin = time.process_time()
         for _ in range(steps):
-            taken = stepper.step(model.sea.at(np.inf), ends, old, new, 0.01, 0.5, 0.01)
+            taken = stepper.step(model.sea.at_time(np.inf), ends, old, new, 0.01, 0.5, 0.01)
             iterations += taken.iterations
             old, new = new, old
         each.append(time.process_time() - begin)
@@ -100,7 +100,13 @@ def test_elimination_against_lapack():
     model, stepper, state = moving([("rod", 2.0, 1000)])
     rows = block_rows(model.line)
     assembly(
-        model.line, model.sea.at(np.inf), model.ends.at(np.inf), state, 200.0, 4e4, stepper.work._replace(rows=rows)
+        model.line,
+        model.sea.at_time(np.inf),
+        model.ends.at_time(np.inf),
+        state,
+        200.0,
+        4e4,
+        stepper.work._replace(rows=rows),
     )
     W, X, x = stepper.work.W, stepper.work.X, stepper.work.x
     blocks = rows.reshape(1001, SIZE, WIDTH)

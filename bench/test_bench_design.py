@@ -20,7 +20,7 @@ from scipy.stats import binomtest, norm, t
 import hybrid
 from hybrid.designs.design import Found
 from hybrid.kernels.state.state import Floats
-from hybrid.scene.design import DESIGN
+from hybrid.scene.study import DESIGN
 from tests.designs.test_in_motion import heaved
 
 pytestmark = pytest.mark.bench

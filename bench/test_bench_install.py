@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from hybrid.kernels.machine.code_file import SUFFIX
+from hybrid.kernels.machine.cache import SUFFIX
 
 pytestmark = pytest.mark.bench
 

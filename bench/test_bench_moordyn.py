@@ -86,7 +86,7 @@ def theirs(name: str, case: Case, scene: hybrid.Scene, factor: float) -> Vector:
 
     def motion(still: bool) -> Motion:
         def at(t: float) -> Vector:
-            here = [heave.at(0.0 if still else t)[0] if p.id == case.point else np.array(p.place) for p in coupled]
+            here = [heave.at_time(0.0 if still else t)[0] if p.id == case.point else np.array(p.place) for p in coupled]
             return np.concatenate(here)
 
         return at

@@ -94,7 +94,7 @@ def theirs(
 
     def motion(still: bool) -> Any:
         def at(t: float) -> Vector:
-            up = heave.at(0.0 if still else t)[0]
+            up = heave.at_time(0.0 if still else t)[0]
             here = [np.concatenate([np.array(body.place) + up, np.radians(body.angles)]) for body in bodies]
             return np.concatenate([*here, *(np.array(point.place) + up for point in coupled), np.zeros(0)])
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import hybrid
-import hybrid.solve.run
+import hybrid.solve.network_steps
 
 pytestmark = pytest.mark.bench
 CELLS, ROUNDS, STEP = 200, 9, 0.02
@@ -71,7 +71,7 @@ class Line:
     def time(self):
         """One run; seconds a step, from its first on."""
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(hybrid.solve.run, "CELL_STEPS", 10 * CELLS)  # the time is noted after every call
+            patch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 10 * CELLS)  # the time is noted after every call
             result = hybrid.run(self.scene, parts=self.parts)
         with result:
             cpu = result.steps["cpu"]

@@ -1,4 +1,4 @@
-"""What a step of rods, catenaries and zones that move costs on one mesh, over rods, against hybrid/model/model_costs.py.
+"""What a step of rods, catenaries and zones that move costs on one mesh, over rods, against hybrid/model/plan.py.
 
     pytest bench/test_bench_prices.py -m bench -n 0 -s
 
@@ -18,7 +18,7 @@ import pytest
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.model.model_costs import step_time
+from hybrid.model.plan import step_time
 from hybrid.scene.read import one_line
 
 pytestmark = pytest.mark.bench

@@ -25,9 +25,8 @@ from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.step.step import States
 from hybrid.kernels.watch import observed_outputs
-from hybrid.model.build import build
-from hybrid.model.plane import planar, untwist
-from hybrid.outputs import output_grid
+from hybrid.model.build import build, planar, untwist
+from hybrid.outputs import observed_states as output_grid
 from hybrid.scene.read import one_line
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stability import seed
@@ -163,7 +162,7 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
         was = np.zeros_like(now)
         begin = time.process_time()
         for k in range(1, steps + 1):
-            sea, ends, old, new, was, now = model.sea.at(0.1 * k), model.ends.at(0.1 * k), new, old, now, was
+            sea, ends, old, new, was, now = model.sea.at_time(0.1 * k), model.ends.at_time(0.1 * k), new, old, now, was
             task = entry.step_task(0.1, 0.1 * (k > 1), 0.5, stepper.limits, 0.5)
             outcome, iterations, *_ = entry.step(task, line, sea, ends, States(old, new, was, now), stepper.work)
             assert outcome == hybrid.Outcome.OK
@@ -172,7 +171,7 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
 
     scenes = of_duration(4.0), of_duration(12.0)
     model = build(one_line(scenes[1]))
-    sea, ends = model.sea.at(0.0), model.ends.at(0.0)
+    sea, ends = model.sea.at_time(0.0), model.ends.at_time(0.0)
     start = at_rest(model).state.lines[0]
     assert model.plane is not None
     line = planar(model.line, model.plane)
@@ -205,10 +204,10 @@ def test_cost_of_an_output(tmp_path: Path) -> None:
 
 def test_before_the_first_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Scene, model, equilibrium, file and first output of `hybrid.run` in a warm process; and all that is not steps."""
-    from hybrid.simulation.network_run import NetworkRun
+    from hybrid.simulation.run import Run
 
     begin, before = 0.0, list[float]()
-    monkeypatch.setattr(NetworkRun, "go_to", lambda self, *_: before.append(time.process_time() - begin))
+    monkeypatch.setattr(Run, "go_to", lambda self, *_: before.append(time.process_time() - begin))
 
     def run(model: str) -> None:
         nonlocal begin

@@ -16,8 +16,14 @@ import pytest
 
 import hybrid
 from hybrid.model.sea import components
-from hybrid.scene.spectra import JonswapWaves, OchiHubbleWaves, PiersonMoskowitzWaves, SumOfWaves, TorsethaugenWaves
-from hybrid.scene.stream_function import steady_wave
+from hybrid.scene.wave_theory import (
+    JonswapWaves,
+    OchiHubbleWaves,
+    PiersonMoskowitzWaves,
+    SumOfWaves,
+    TorsethaugenWaves,
+    steady_wave,
+)
 
 pytestmark = pytest.mark.bench
 REALISATIONS, DURATION, STEP, PLACE = 1000, 1800.0, 0.5, (37.0, -12.0)

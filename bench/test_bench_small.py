@@ -53,7 +53,7 @@ def test_small_notebook_cell():
 
 def test_small_motion():
     motion = EndMotion(Motion(heave=Harmonic(amplitude=2.0, period=8.0), ramp=16.0), (0.0, 0.0, 0.0))
-    each = min(timeit.repeat(lambda: motion.at(20.0), number=1000, repeat=5)) / 1000
+    each = min(timeit.repeat(lambda: motion.at_time(20.0), number=1000, repeat=5)) / 1000
     print(f"\nposition of an end that heaves: {1e6 * each:.1f} us")
     assert each < 16e-6
 

@@ -116,13 +116,13 @@ def test_no_equilibrium_of_a_cable_is_folded_in_silence(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen = list[tuple[Model, State]]()
-    judge = Diagnostics.found_by
+    judge = Diagnostics.note_at_rest
 
     def keep(self: Diagnostics, pushed: bool, slack: int, state: State) -> None:
         seen.append((self._model, state))
         judge(self, pushed, slack, state)
 
-    monkeypatch.setattr(Diagnostics, "found_by", keep)
+    monkeypatch.setattr(Diagnostics, "note_at_rest", keep)
     count, silent, refused, cpu = Counter[str](), list[str](), Counter[str](), list[float]()
     noted = list[str]()
     for seed in range(SCENES):

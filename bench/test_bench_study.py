@@ -19,9 +19,8 @@ import pytest
 import hybrid
 from hybrid.scene.study import study_from
 from hybrid.studies.cases import cases_of, scene_of
-from hybrid.studies.collect import usual
 from hybrid.studies.dispatch import StudyRunning
-from hybrid.studies.workers import Job, compute_batch
+from hybrid.studies.workers import Job, compute_batch, usual
 
 pytestmark = pytest.mark.bench
 

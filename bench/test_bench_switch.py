@@ -20,7 +20,7 @@ import hybrid
 from hybrid.errors import ZONE_EVENTS
 from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.simulation.line_result import LineResult
-from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.run import Run
 from hybrid.simulation.run_zones import RunZones
 from hybrid.zones import at_start
 from hybrid.zones.manager import DomainManager
@@ -107,7 +107,7 @@ def test_switch_of_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     outputs, changed = list[float](), 0
     hybrid.run(four_lines())  # the first compiles
     monkeypatch.setattr(RunZones, "after_step", without_outputs)
-    monkeypatch.setattr(NetworkRun, "_attach", timed(NetworkRun._attach, attaching, process_time))
+    monkeypatch.setattr(Run, "_attach", timed(Run._attach, attaching, process_time))
     monkeypatch.setattr(LineResult, "write_down", timed(LineResult.write_down, written, process_time))
     for _ in range(ROUNDS):
         result = hybrid.run(four_lines())

@@ -127,7 +127,7 @@ def test_a_program_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path
 
 def test_other_programs_are_of_level_a(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("moordyn")
-    monkeypatch.setattr("hybrid.studies.levels.MODELS", ("rod",))
+    monkeypatch.setattr("hybrid.studies.tradeoff.MODELS", ("rod",))
     found = trade.trade_levels(scene(), tmp_path)
     theirs = [row for row in found.rows if row.model.startswith("MoorDyn")]
     assert len(theirs) == 3 and all(row.level == "A" and row.worst and row.cpu for row in theirs)

@@ -16,7 +16,7 @@ from peers.moordyn_deck import march, options
 from peers.moordyn_touchdown import silence
 
 import hybrid
-from hybrid.interop.moordyn import options as taken
+from hybrid.interop.moordyn import rows as taken
 
 moordyn: Any = import_module("moordyn") if find_spec("moordyn") else None
 pytestmark = pytest.mark.skipif(moordyn is None, reason="MoorDyn is not installed")

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
-    from hybrid.modal.api import modes
-    from hybrid.modal.response import response
+    from hybrid.modal.api import modes, response
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.read import load_scene as load_system  # noqa: F401  # deprecated
     from hybrid.scene.root import Scene
@@ -40,15 +39,14 @@ if TYPE_CHECKING:
     from hybrid.store.reader import Result
     from hybrid.store.reader import open_result as open
     from hybrid.store.study_file import open_study
-    from hybrid.studies.levels import trade_levels
     from hybrid.studies.study import case_of as study_case
     from hybrid.studies.study import study
-    from hybrid.studies.tradeoff import trade
+    from hybrid.studies.tradeoff import trade, trade_levels
     from hybrid.view.comparison import write_comparison as compare
+    from hybrid.view.notebook import plot_space
     from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape, plot_zone_map, plot_zones
     from hybrid.view.quantities import plot_summary as plot
     from hybrid.view.report import write_report as report
-    from hybrid.view.space import plot_space
     from hybrid.zones.criteria import NodeState
 
 _HOME = {
@@ -82,11 +80,11 @@ _HOME = {
     "plot_energy": ("hybrid.view.quantities", "plot_energy"),
     "plot_quantity": ("hybrid.view.quantities", "plot_quantity"),
     "plot_shape": ("hybrid.view.quantities", "plot_shape"),
-    "plot_space": ("hybrid.view.space", "plot_space"),
+    "plot_space": ("hybrid.view.notebook", "plot_space"),
     "plot_zone_map": ("hybrid.view.quantities", "plot_zone_map"),
     "plot_zones": ("hybrid.view.quantities", "plot_zones"),
     "report": ("hybrid.view.report", "write_report"),
-    "response": ("hybrid.modal.response", "response"),
+    "response": ("hybrid.modal.api", "response"),
     "resume": ("hybrid.accuracy.api", "resume"),
     "run": ("hybrid.accuracy.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
@@ -99,7 +97,7 @@ _HOME = {
     "study_case": ("hybrid.studies.study", "case_of"),
     "open_study": ("hybrid.store.study_file", "open_study"),
     "trade": ("hybrid.studies.tradeoff", "trade"),
-    "trade_levels": ("hybrid.studies.levels", "trade_levels"),
+    "trade_levels": ("hybrid.studies.tradeoff", "trade_levels"),
     "validate_scene": ("hybrid.scene.read", "validate_scene"),
 }
 

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from hybrid.kernels.machine import cache  # noqa: E402
-from hybrid.kernels.machine.code_file import SUFFIX  # noqa: E402
+from hybrid.kernels.machine.cache import SUFFIX  # noqa: E402
 
 SUSPENSION = ROOT / "examples" / "02_suspension.yaml"
 

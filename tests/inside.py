@@ -11,7 +11,7 @@ from hybrid.model.build import Model
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.run_zones import RunZones
-from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.contact import SelfContact
 
 
 class OnlyLine:

@@ -40,9 +40,8 @@ from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, State
 from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
-from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest
-from hybrid.solve.stepper import Stepper
+from hybrid.solve.stepper import JoinedLine, NetworkState, Stepper
 
 Floats = NDArray[np.float64]
 Kick = Callable[[State, Model], None]
@@ -118,7 +117,7 @@ def order(errors: Sequence[float]) -> Floats:
 def at_rest(model: Model, t: float = 0.0, start: State | None = None) -> LinesAtRest:
     """The equilibrium in space of a line by itself."""
     scale, first = model.tension_scale, model.start if start is None else start
-    x = JoinedLine(model.line, model.sea.at(t), model.ends.at(t), model.length, scale, 1e-6 * scale, (-1, -1))
+    x = JoinedLine(model.line, model.sea.at_time(t), model.ends.at_time(t), model.length, scale, 1e-6 * scale, (-1, -1))
     return lines_at_rest(Group([x]), [("the first shape", NetworkState([first]))])
 
 
@@ -138,7 +137,7 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
     if kick:
         kick(old, model)
     stepper.consistent_accelerations(
-        model.sea.at(0.0), model.ends.at(0.0), np.zeros((2, 3)), old
+        model.sea.at_time(0.0), model.ends.at_time(0.0), np.zeros((2, 3)), old
     )  # held ends start from rest
     new = old.copy()
     yield 0.0, old
@@ -146,8 +145,8 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
     for k in range(1, steps + 1):
         t = k * time.duration / steps
         taken = stepper.step(
-            model.sea.at(t),
-            model.ends.at(t),
+            model.sea.at_time(t),
+            model.ends.at_time(t),
             old,
             new,
             time.duration / steps,
@@ -184,7 +183,7 @@ def stiffness(model: Model, ends: Ends, state: State) -> Floats:
     """
     line, n = model.line._replace(bits=model.line.bits & ~PLANAR), model.line.s.size
     rows = block_rows(line)
-    assembly(line, model.sea.at(0.0), ends, state, 0.0, 0.0, workspace(n - 1)._replace(rows=rows))
+    assembly(line, model.sea.at_time(0.0), ends, state, 0.0, 0.0, workspace(n - 1)._replace(rows=rows))
     J = np.zeros((SIZE * n, SIZE * (n + 5)))
     for i, row in enumerate(rows.reshape(n, SIZE, WIDTH)):
         J[SIZE * i : SIZE * (i + 1), SIZE * i : SIZE * (i + 4)] = row[:, : 4 * SIZE]
@@ -218,7 +217,7 @@ def twist_uniformly(model: Model, state: State, angle: float) -> Ends:
     line, d = model.line, state.e / np.linalg.norm(state.e, axis=1)[:, None]
     part = angle * 0.5 * (line.s[1:] + line.s[:-1]) / model.length
     state.a1[:] = state.a1 * np.cos(part)[:, None] + np.cross(d, state.a1) * np.sin(part)[:, None]
-    ends = model.ends.at(0.0)
+    ends = model.ends.at_time(0.0)
     a1, a2, t = ends.frame[1].reshape(3, 3).T
     turned = np.cos(angle) * a1 + np.sin(angle) * a2
     frame = ends.frame.copy()

@@ -20,7 +20,7 @@ from scipy.optimize import brentq, root
 import hybrid
 from hybrid import Scene
 from hybrid.kernels.laws.seabed import contact
-from hybrid.scene.stream_function import wavenumber
+from hybrid.scene.wave_theory import wavenumber
 
 Floats = NDArray[np.float64]
 Table = dict[str, Any]

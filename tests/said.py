@@ -10,7 +10,7 @@ import yaml
 
 import hybrid
 from hybrid.scene.read import scene_text
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE
 from tests.combinations.pairs import as_network
 
 # Whether the scene is said as a network.

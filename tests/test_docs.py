@@ -17,9 +17,8 @@ from ruamel.yaml import YAML
 import hybrid
 from hybrid.cli.commands import app, main
 from hybrid.designs.problem import scenes_of
-from hybrid.scene.design import DESIGN
 from hybrid.scene.read import as_scene, read_text
-from hybrid.scene.study import study_from
+from hybrid.scene.study import DESIGN, study_from
 from hybrid.studies.cases import cases_of
 
 ROOT = Path(__file__).parents[1]
@@ -175,7 +174,7 @@ def test_pages_of_evidence_are_short_and_name_their_commands() -> None:
 
 
 def test_cited_files_exist() -> None:
-    """Paths in backticks or code, such as `hybrid/kernels/laws/loads.py`."""
+    """Paths in backticks or code, such as `hybrid/kernels/laws/water.py`."""
     for page in PAGES:
         text = re.sub(r"^```diff\n.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
         for name in re.findall(r"\b((?:hybrid|tests|docs|examples)/[\w/]+\.(?:py|md|yaml|png))", text):

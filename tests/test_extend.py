@@ -92,7 +92,7 @@ assert pytest.main(["-q", "-n", "0", "-p", "no:cacheprovider", {walk!r}]) == 0, 
 # Read for two kinds of arguments each, which takes little: bits and truths, numbers of cells and kinds of them, jobs of
 # changes of cells and of nodes.
 TWICE = {
-    "hybrid.kernels.mesh.fill_line.fill_element", "hybrid.kernels.reel.payout_nodes.move_row",
+    "hybrid.kernels.mesh.remesh.fill_element", "hybrid.kernels.reel.payout_nodes.move_row",
     "hybrid.kernels.mesh.cell_changes.begin_anew",
 }  # fmt: skip
 

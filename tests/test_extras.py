@@ -15,8 +15,8 @@ import hybrid
 from hybrid.cli.app import session
 from hybrid.cli.commands import main
 from hybrid.errors import ResultError, command_for
+from hybrid.scene.motion import read_dataset
 from hybrid.scene.motion_file import RecordRefused
-from hybrid.scene.rao_file import read_dataset
 from hybrid.statistics.fatigue import rainflow_cycles
 from hybrid.studies.cases import evaluated
 

@@ -11,7 +11,7 @@ import pytest
 from compile_kernels import BY_TABLE
 
 from hybrid.kernels.machine.compile import entry
-from hybrid.kernels.machine.source_digest import Called, _of_function
+from hybrid.kernels.machine.kept_code import Called, _of_function
 
 CONFTEST = runpy.run_path(str(Path(__file__).parents[1] / "conftest.py"))
 TESTS = CONFTEST["TESTS"]

@@ -19,7 +19,7 @@ from test_report_browser import browser  # noqa: F401  # a fixture
 
 import hybrid
 from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, Outcome
-from hybrid.model.model_costs import CHOSEN
+from hybrid.model.plan import CHOSEN
 from hybrid.scene.checks import CHECKS
 
 ROOT = Path(__file__).parents[1]

@@ -104,7 +104,7 @@ class Hold:
             held = frame(np.array(table.tangent), None if table.normal is None else np.array(table.normal))
         if self.motion is None:
             return Target(position, np.zeros(3), held, np.zeros(3))
-        return Target(*self.motion.at(t))
+        return Target(*self.motion.at_time(t))
 
     def force(self, t: float) -> Array:
         return _loads(self.table, "force", t)
@@ -129,7 +129,7 @@ def _loads(table: End, what: str, t: float) -> Array:
     total = np.zeros(3)
     for load in table.loads:
         if load.what == what and (load.until is None or t <= load.until * (1.0 + 1.0e-12)):
-            total += load.at(t)
+            total += load.at_time(t)
     return total
 
 

@@ -13,12 +13,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybrid.accuracy.finer_result import beside
 from hybrid.accuracy.model_choice import CHOSEN, chosen_and_surveyed, rods_instead_of_slack
 from hybrid.accuracy.passes import Passes, emptied
+from hybrid.accuracy.refinement import beside
 from hybrid.errors import ComputationError, ResultError, SceneError
-from hybrid.model.model_costs import with_models
 from hybrid.model.network import NetworkResolution
+from hybrid.model.plan import with_models
 from hybrid.model.resolution import model_is_free
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import missing_time
@@ -27,7 +27,7 @@ from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.own_parts import RunPart, checked_parts, require_parts
 from hybrid.simulation.progress import Listener, ProgressReporter, announce_compiling, interrupts, listener_of
 from hybrid.simulation.restart import remaining
-from hybrid.store.array_contents import MemoryTarget, Target
+from hybrid.store.format import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target, locked
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.zones.criteria import UserCriterion

@@ -18,19 +18,18 @@ from typing import Any, Protocol
 import numpy as np
 
 from hybrid.accuracy.error_order import COARSER
-from hybrid.accuracy.finer_result import NOT_KEPT, is_no_better, not_kept_text
 from hybrid.accuracy.line_errors import LineErrors
-from hybrid.accuracy.model_errors import Comparable, goes_by_cells, with_model_errors
-from hybrid.accuracy.refinement import COSTLY_ACCURACY, costly
+from hybrid.accuracy.model_choice import Comparable, goes_by_cells, with_model_errors
+from hybrid.accuracy.refinement import COSTLY_ACCURACY, NOT_KEPT, costly, is_no_better, not_kept_text
 from hybrid.accuracy.run_forecast import Budget
 from hybrid.errors import ComputationError
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.restore import resolution_from, resolution_tree
+from hybrid.simulation.restart import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import RunSample, Samples, restored_notes
-from hybrid.store.named_arrays import Tree, matched
+from hybrid.store.integrity import Tree, matched
 
 Beside = AbstractContextManager[Sequence[Callable[[], Samples]]]
 
@@ -62,14 +61,14 @@ class ErrorController:
     """Chooses mesh, step and zones of one run after the other until the accuracy that is asked is met.
 
     lines: what is known of the errors of each, by name.  case: computes runs to compare with; result: computes the
-    result, and raises ComputationError; settle: lets a finer result take the place of that before it, or drops it.
+    result, and raises ComputationError; decide: lets a finer result take the place of that before it, or drops it.
     Its `checkpoint` is in the file of every result, so that what was cut off continues with `proceed`.
     """
 
     lines: Mapping[str, LineErrors]
     case: Compares
     result: Callable[[NetworkResolution], Samples]
-    settle: Callable[[bool], None] = lambda kept: None
+    decide: Callable[[bool], None] = lambda kept: None
     budget: Budget | None = None  # of all results; None: there is no limit
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
     first: NetworkResolution | None = None  # that the runs to compare with are for; the result may be finer
@@ -154,7 +153,7 @@ class ErrorController:
             self._compare(self.first or _finely(result))
         finer = self._halved(_finely(result))
         if not self._is_compared and any(x.is_too_coarse for x in self.lines.values()) and self._allows(result, finer):
-            self.settle(True)  # it may be beside the one before
+            self.decide(True)  # it may be beside the one before
             for line in self.lines.values():
                 line.halve()
             self.first = self.next = finer
@@ -164,7 +163,7 @@ class ErrorController:
             self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own), "budget": []}
         self.standing, self.next = result, None
         judged = self._estimated(result, {})
-        self.settle(True)  # it may be beside one of another model
+        self.decide(True)  # it may be beside one of another model
         if judged:
             self._judge(result, judged, stricter=False)
         return None
@@ -254,18 +253,18 @@ class ErrorController:
             raise
         asked = {n: x.asked for n, x in self.lines.items() if x.asked is not None}
         if not asked or self.next is not None:
-            self._take_finer(result)
+            self._use_finer(result)
             return
         finer = {n: x.judged(x.irregular) for n, x in self.lines.items() if x.estimate is not None}
         found = is_no_better(asked, before, finer)
         if found is None:
-            self._take_finer(result)
+            self._use_finer(result)
             return
         for name, line in self.lines.items():
             if name in before and name in finer:
                 line.keep(before[name], finer[name])
         self.notes.append((NOT_KEPT, not_kept_text(next(iter(result.values())), found)))
-        self.settle(False)
+        self.decide(False)
 
     def _estimated(self, result: Samples, before: Mapping[str, Any], anew: bool = False) -> list[str]:
         """Take over a result; names of the lines whose errors are known with it.
@@ -288,8 +287,8 @@ class ErrorController:
         """Whether lines touch themselves in a result, and did not where they could not, in runs to compare with."""
         return any(x.touches and name not in self._touching for name, x in result.items())
 
-    def _take_finer(self, result: Samples) -> None:
-        self.settle(True)
+    def _use_finer(self, result: Samples) -> None:
+        self.decide(True)
         self.standing, self.compared = result, None
 
     # --- runs to compare with -------------------------------------------------------------------
@@ -330,7 +329,7 @@ class ErrorController:
         found = with_model_errors(self.case, result, self.runs)
         for name, line in self.lines.items():
             if line.estimate is not None and found[name] is not result[name]:
-                line.takes_model_errors(found[name])
+                line.use_model_errors(found[name])
 
     def _in_shorter_steps(self) -> Samples | None:
         """The first of the runs to compare with in steps as short as those of the result; None: it fails."""

@@ -21,6 +21,7 @@ from hybrid.accuracy.error_order import (
     MOST_ORDER,
     ORDERS,
     RUBBING_ORDERS,
+    Between,
     Block,
     Errors,
     Falls,
@@ -42,7 +43,6 @@ from hybrid.accuracy.error_order import (
     times_foretold,
     with_neighbours,
 )
-from hybrid.accuracy.snap_scatter import Between
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_sample import (
     END_FORCES,
@@ -56,7 +56,7 @@ from hybrid.simulation.run_sample import (
     restored_outputs,
     restored_sample,
 )
-from hybrid.store.named_arrays import Tree, matched
+from hybrid.store.integrity import Tree, matched
 
 # Errors by mesh and time step add with their signs, as in the difference of two runs that they follow from; the sum is
 # this much larger, and this part of it is that of their sizes.  docs/evidence/accuracy.md has what it was worth.
@@ -108,7 +108,7 @@ class Estimate:
 
         None: it failed, or nothing moves.  from_rest: it begins from an equilibrium, or is one.  rubs: on obstacles.
         """
-        self._take(result)
+        self._include(result)
         self.shares_mixed = set[str]()
         both = [name for name in result.values if name in coarse.values]
         self._from_rest, self._rubs = from_rest, rubs
@@ -232,7 +232,7 @@ class Estimate:
             del self._coarse, self._of_steps
         return self.by_step, self.by_mesh
 
-    def _take(self, result: RunSample) -> None:
+    def _include(self, result: RunSample) -> None:
         """Take over a result."""
         self.run, self._errors = result, None
         self._ratios: list[tuple[RunSample, RunSample, float]] = []  # `usual_ratio` of runs compared from here on
@@ -279,7 +279,7 @@ class Estimate:
         """A finer run has become the result."""
         by_step, by_mesh = self._keep()
         before = self.run
-        self._take(result)
+        self._include(result)
         self.start = start_change(result, before), self.start[0]
         finer, shorter = result.cells / before.cells, self._shorter(result, before)
         other_zones = result.resolution.zones != before.resolution.zones

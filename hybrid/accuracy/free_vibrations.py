@@ -24,8 +24,7 @@ from hybrid.kernels.junctions.bodies import DAMPING, FRAME, V
 from hybrid.kernels.state.report import BENDING_SLIP, BODIES, DRAG, SOIL
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.eigen import BELOW, lowest_modes
-from hybrid.linear.excitation import frequencies_of
-from hybrid.linear.loaded_line import LoadedLine
+from hybrid.linear.loaded_line import LoadedLine, frequencies_of
 from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_at_rest, sparse_rows
 from hybrid.linear.touching import Rest, rest_of
 from hybrid.model.network import NetworkResolution
@@ -315,8 +314,8 @@ class Vibrations:
                 continue
             rates = np.zeros((t.size, 2, 6))
             for each, now in zip(rates, t.tolist(), strict=True):
-                each[:, 3:], each[:, :3] = model.ends.at(now).spin, model.ends.velocity
-            model.ends.at(np.inf)
+                each[:, 3:], each[:, :3] = model.ends.at_time(now).spin, model.ends.velocity
+            model.ends.at_time(np.inf)
             inside = np.einsum("tkc,kcm->tm", rates, drive) * waves
             total += inside[-1] + 1j * w * (weights @ inside[:-1])
             if quiet >= duration:

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from hybrid.accuracy.error_estimate import NOTHING, Estimate
-from hybrid.accuracy.error_order import COARSER, Errors
+from hybrid.accuracy.error_order import COARSER, Errors, errors_between, finer_between, snap_excess
 from hybrid.accuracy.error_statistics import (
     LARGEST,
     STATISTICS,
+    ExtremeErrors,
     StatisticEstimate,
     estimates,
     irregular_notes,
@@ -26,21 +27,18 @@ from hybrid.accuracy.error_statistics import (
     snaps,
     statistics_of,
 )
-from hybrid.accuracy.extreme_errors import ExtremeErrors
-from hybrid.accuracy.finer_result import Judged
 from hybrid.accuracy.refinement import (
     MOST_OF_MODEL,
     RAW,
     Free,
+    Judged,
     Verdict,
     missed,
     not_converged,
     refined,
 )
-from hybrid.accuracy.snap_scatter import errors_between, finer_between, snap_excess
 from hybrid.errors import ComputationError, Outcome
-from hybrid.model.model_costs import NAMED, WORDS, ModelChoice
-from hybrid.model.plan import output_times
+from hybrid.model.plan import NAMED, WORDS, ModelChoice, output_times
 from hybrid.model.resolution import (
     IRREGULAR_REFINEMENTS,
     MOST_REFINEMENTS,
@@ -58,7 +56,7 @@ from hybrid.simulation.run_sample import (
     restored_notes,
     restored_sample,
 )
-from hybrid.store.named_arrays import Tree, matched
+from hybrid.store.integrity import Tree, matched
 from hybrid.store.stored_rows import MissingRows
 
 # A finer run whose error is more than this part of that before it tells that more will not help: zones that change a
@@ -303,7 +301,7 @@ class LineErrors:
         """Whether zones of a finer result may leave out less than those of the one before."""
         return self.estimate is not None and finer.zones < self.estimate.run.resolution.zones
 
-    def takes_model_errors(self, run: RunSample) -> None:
+    def use_model_errors(self, run: RunSample) -> None:
         """Take what leaving bending out changes from a run, in place of what is known."""
         assert self.estimate is not None
         self.estimate.set_model_errors(run)

@@ -22,9 +22,8 @@ from hybrid.kernels.state.state import State
 from hybrid.model import plan as tables
 from hybrid.model.build import Model, build
 from hybrid.model.contents import with_accuracy
-from hybrid.model.model_costs import COST_STEP, NAMED, ModelChoice
 from hybrid.model.network import NetworkResolution
-from hybrid.model.plan import NetworkPlan, Plan
+from hybrid.model.plan import COST_STEP, NAMED, ModelChoice, NetworkPlan, Plan
 from hybrid.model.resolution import Resolution, requested_accuracy, wants_errors
 from hybrid.scene.network import Network
 from hybrid.scene.read import SceneLike, as_scene
@@ -32,10 +31,10 @@ from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import kernels_of
-from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.new_run import Recording
+from hybrid.simulation.run import Run
 from hybrid.simulation.run_sample import RunSample
-from hybrid.solve.joined import LineFailed
+from hybrid.solve.stepper import LineFailed
 from hybrid.store.stored_rows import ComparisonRecorder
 
 # s of processor time that the pre-run and the first steps of the result may take, and a pre-run that chooses the model.
@@ -102,7 +101,7 @@ class _Probe(Case):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene, None)
-        self.run: NetworkRun | None = None  # the last
+        self.run: Run | None = None  # the last
         self.at_rest: dict[str, tuple[Model, State]] = {}  # where lines begin, if that is an equilibrium
         self._end = np.inf
         self._most_steps = np.inf
@@ -124,12 +123,12 @@ class _Probe(Case):
         """Processor time, s, and steps for what follows."""
         self._end, self._most_steps = clock.process_time() + seconds, steps
 
-    def _network_run(self, *args: Any, **kwargs: Any) -> NetworkRun:
+    def _network_run(self, *args: Any, **kwargs: Any) -> Run:
         self.run = super()._network_run(*args, **kwargs)
         self.seen, self.iterations = [Seen(clock.process_time(), 0, 0.0)], []
         return self.run
 
-    def first_steps(self, resolution: NetworkResolution) -> tuple[NetworkRun, float, float]:
+    def first_steps(self, resolution: NetworkResolution) -> tuple[Run, float, float]:
         """A result after its first steps; s of processor time before them, and of so many without what is done
         once."""
         begin = begun = clock.process_time()
@@ -225,16 +224,14 @@ def _dearer(plans: Iterable[Plan]) -> float:
     return (COST_STEP + CELL * mean) / (COST_STEP + CELL * first)
 
 
-def _later(case: _Probe, run: NetworkRun) -> float:
+def _later(case: _Probe, run: Run) -> float:
     """How much dearer a step is than the first ones, once loads and motions that grow from nothing have grown."""
     if len(run.lines) == 1 or run.t >= min(_grown(case.scene), case.scene.require_time().duration):
         return 1.0
     return max(1.0, LATER / max(float(np.mean(case.iterations)), 1.0))
 
 
-def _steps(
-    found: NetworkPlan, resolution: Resolution, run: NetworkRun, coarse: NetworkRun | None, seen: Sequence[Seen]
-) -> float:
+def _steps(found: NetworkPlan, resolution: Resolution, run: Run, coarse: Run | None, seen: Sequence[Seen]) -> float:
     """Steps of the result, which has come as far as its run.
 
     coarse: of the mesh pre-run, whose steps, longer by one factor, show how many each part of the motion asks for.

@@ -266,6 +266,6 @@ def opened_line(result: Path, line: str | None) -> Iterator[tuple[Result, Path]]
 
 def picture_beside(target: Path, plot: bool) -> Path | None:
     """Where a picture beside a result goes, checked before the work; None: none is asked for."""
-    from hybrid.view.save import PICTURES, check_target
+    from hybrid.view.figure import PICTURES, check_target
 
     return check_target(target.with_suffix(".png"), PICTURES) if plot else None

@@ -18,11 +18,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-import hybrid.cli.design_command  # registers its command
-import hybrid.cli.response_command
 import hybrid.cli.result_commands
-import hybrid.cli.statistics_command
-import hybrid.cli.study_command
+import hybrid.cli.statistics_commands
+import hybrid.cli.study_commands  # registers its command
 from hybrid.cli.app import (
     REFUSED,
     Drawn,
@@ -43,8 +41,7 @@ from hybrid.cli.app import (
     session,
     words,
 )  # fmt: skip
-from hybrid.cli.console import Console, guard_output, raise_lost_output
-from hybrid.cli.progress_line import span, speed
+from hybrid.cli.console import Console, guard_output, raise_lost_output, span, speed
 
 if TYPE_CHECKING:
     from hybrid.scene.root import Scene
@@ -215,7 +212,7 @@ def trade(
 
 
 def _trade_levels(console: Any, scene: Any, folder: Path, repeat: int, command: str) -> None:
-    """The three levels of studies.levels, as a table and a sentence for each."""
+    """The three levels of studies.tradeoff, as a table and a sentence for each."""
     from hybrid.cli.tables import level_table
 
     with console.study() as listener:
@@ -293,7 +290,7 @@ def _ended(
 def _draw(result: Result, picture: Path | None) -> None:
     """Draw a result; picture: where to, None: nowhere."""
     if picture is not None:
-        from hybrid.view.save import import_matplotlib
+        from hybrid.view.figure import import_matplotlib
 
         import_matplotlib()
         hybrid.plot(result, picture)

@@ -9,11 +9,10 @@ from math import isfinite
 from textwrap import shorten, wrap
 from typing import TYPE_CHECKING, Any
 
-from hybrid.cli.progress_line import span
+from hybrid.cli.console import span
 from hybrid.kernels.state.report import FORCES
-from hybrid.model.lines_contact import OTHERS
+from hybrid.model.contents import OTHERS, WHERE_NEAR
 from hybrid.model.plan import NetworkPlan, Plan, parts, size_of_result
-from hybrid.model.self_reach import WHERE_NEAR
 from hybrid.scene.analysis import PER_PERIOD
 from hybrid.scene.network import Network
 from hybrid.scene.root import Scene

@@ -67,7 +67,7 @@ def plot(
     if zones and film:
         raise typer.BadParameter("--zones and --animate are two pictures: ask for one at a time")
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
-        from hybrid.view.save import import_matplotlib, save_figure
+        from hybrid.view.figure import import_matplotlib, save_figure
 
         import_matplotlib()
         if film:

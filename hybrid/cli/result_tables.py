@@ -70,7 +70,7 @@ def show_equilibrium(console: Console, result: Result) -> dict[str, Any]:
 
 def _facts_of_lines(result: Result) -> dict[str, Any]:
     """What each line has reached, and whether that is accurate; of many the worst come first."""
-    from hybrid.view.along import worst_first
+    from hybrid.view.curves import worst_first
 
     each = dict(result.each_line())
     names = [*each] if len(each) <= MOST_LISTED else worst_first(result)

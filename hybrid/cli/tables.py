@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hybrid.interop.moordyn import ImportedDeck
     from hybrid.store.reader import Result
     from hybrid.store.tradeoff_table import Row, TradeTable
-    from hybrid.studies.levels import LevelTable
+    from hybrid.studies.tradeoff import LevelTable
 
 
 def equilibrium_facts(result: Result) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
     from hybrid.store.envelope import largest_contact
     from hybrid.store.records import not_converged_in
     from hybrid.store.verdicts import section_limits
-    from hybrid.view.along import worst
+    from hybrid.view.curves import worst
 
     found: dict[str, Any] = {}
     for key, low in (("tension_max", False), ("tension_min", True)):
@@ -318,7 +318,7 @@ def level_table(table: LevelTable) -> Any:
     """What each level costs with every model."""
     from rich.table import Table
 
-    from hybrid.studies.levels import percent, status_of
+    from hybrid.studies.tradeoff import percent, status_of
 
     out = Table(box=None, pad_edge=False, header_style="bold")
     out.add_column("level, model", no_wrap=True)

@@ -10,21 +10,31 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.designs.component_ports import NOTHING, inputs_of, outputs_of, refuse_ports
-from hybrid.designs.edges import refuse_edges
-from hybrid.designs.equilibria import FINER, AnyScene, Equilibria, Point
-from hybrid.designs.identify import Apart, Estimate, fit
-from hybrid.designs.measured import Measurements, measurements, quantity_of
-from hybrid.designs.motions import IN_MOTION
+from hybrid.designs.case_results import FINER, IN_MOTION, AnyScene, Equilibria, Point
+from hybrid.designs.identify import Apart, Estimate, Measurements, fit, measurements, quantity_of
+from hybrid.designs.in_motion import refuse_edges
 from hybrid.designs.nearest import Space
 from hybrid.designs.numbers import scene_with, text_of_found
 from hybrid.designs.optimum import AT_BOUND, SETTLED, Optimum, Price, is_active, optimum, reached
-from hybrid.designs.problem import Constraint, Problem, as_asked, begun, problem_of, refused_result, scenes_of, space_of
+from hybrid.designs.problem import (
+    NOTHING,
+    Constraint,
+    Problem,
+    as_asked,
+    begun,
+    inputs_of,
+    outputs_of,
+    problem_of,
+    refuse_ports,
+    refused_result,
+    scenes_of,
+    space_of,
+)
 from hybrid.errors import ComputationError, Outcome, SceneError, optional_package
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
-from hybrid.scene.design import DESIGN, Design
 from hybrid.scene.read import SceneLike, TaskFile
+from hybrid.scene.study import DESIGN, Design
 
 if TYPE_CHECKING:
     from hybrid.designs.openmdao_component import DesignComponent

@@ -1,4 +1,13 @@
-"""One line at rest: what its equations leave over when its scene changes, and its results beside the equilibrium."""
+"""One line at rest: its residuals, its results, and their gradients.
+
+One line at rest: what its equations leave over when its scene changes, and its results beside the equilibrium.
+
+Gradients of results of a line at rest by its unknowns q.
+
+From them one transposed solve has the derivative of a result g by all numbers:  dg/dp = λ·∂R/∂p  with  Aᵀλ = ∂g/∂q
+(theory.md, 22).  A result depends on the unknowns near its place, or near the ends of the line.  Only these are moved,
+each by itself; that no other one counts is tried with all of the others at once.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +18,8 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from hybrid.designs.wanted import Wanted
 from hybrid.errors import Complaint, SceneError
@@ -18,15 +29,13 @@ from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.run.entry import assembly, workspace_of
 from hybrid.kernels.state.report import FRICTION, MOMENT_A, NET_A, PLANAR, WAVES
 from hybrid.kernels.state.state import FIELDS, Batch, Ends, Floats, Line, Sea, State, batch_of_one, slip_size
-from hybrid.linear.matrices import ANCHOR, rotation
-from hybrid.linear.memory import load_layers
+from hybrid.linear.matrices import ANCHOR, load_layers, rotation
 from hybrid.model.build import Model
 from hybrid.model.sections import jump_points, output_points
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.line_result import WANTED, observer_of
-from hybrid.solve.joined import JoinedLine
-from hybrid.solve.stepper import POWERS
+from hybrid.solve.stepper import POWERS, JoinedLine
 
 # How far a state is moved to differentiate its results: a part of chords, and of the largest tension.
 ALONG = 1e-5
@@ -98,7 +107,7 @@ class LineAtRest:
         """
         self.model, self.state, self.wanted, self._free = model, state, tuple(wanted), list(free)
         self._frames = frames
-        self.here = Beside(scene, model, self._ends(model, frames), model.sea.at(np.inf))
+        self.here = Beside(scene, model, self._ends(model, frames), model.sea.at_time(np.inf))
         self._at = [x.at for x in wanted if x.at is not None]
         self._nodes = any(x.over for x in wanted) or not self._at
         self._observer, self._peak_of = self._observed(self.here), dict[Wanted, Peak]()
@@ -112,7 +121,7 @@ class LineAtRest:
 
     def _ends(self, model: Model, frames: Frames) -> Ends:
         """The ends of a line, those at free points and bodies joined to these."""
-        ends = model.ends.at(np.inf)
+        ends = model.ends.at_time(np.inf)
         held, frame = ends.held.copy(), ends.frame.copy()
         held[self._free] = JOINED
         for k, x in frames.items():
@@ -150,7 +159,7 @@ class LineAtRest:
         if slip_size(model.line) != slip_size(self.model.line):
             raise ValueError("layers that slip")
         ends = self.here.ends if model.ends is self.model.ends and not frames else self._ends(model, frames)
-        sea = self.here.sea if model.sea is self.model.sea else model.sea.at(np.inf)
+        sea = self.here.sea if model.sea is self.model.sea else model.sea.at_time(np.inf)
         return Beside(scene, model, ends, sea)
 
     # --- results ----------------------------------------------------------------------------------
@@ -489,3 +498,89 @@ def anywhere(state: State, size: int) -> Floats:
     out = np.random.default_rng(1).uniform(0.5, 1.0, (1, len(state.r), size)) * scale
     out[:, 1::2] *= -1.0  # else nodes would go along with their neighbours
     return np.asarray(out)
+
+
+# Nodes to either side of a place on which a result there may depend, tried in turn; then it is all of the line.
+REACHES = (2, 5)
+# What the others may change of a result, as a part of the most that one unknown changes by a movement as large.
+OUTSIDE = 1e-8
+
+
+class Gradients:
+    """Of all results of a line: by its unknowns, and by turns of its ends."""
+
+    def __init__(self, line: LineAtRest, turning: Sequence[int] = ()) -> None:
+        """turning: ends whose frames turn with what they are joined to."""
+        self._line, self._turning = line, list(turning)
+        self._every = np.ones((line.model.line.s.size, SIZE), bool)
+        self._every[0, 0] = self._every[-1, -1] = False  # there is no cell before the first node, nor behind the last
+
+    def pay_for(self, numbers: int) -> bool:
+        """Whether so many numbers are more than the unknowns that are moved, each of which costs what a number does."""
+        turned = 3 * len(self._turning)
+        fewest = int(np.count_nonzero(self._near(REACHES[0]))) + turned
+        return numbers > fewest and numbers > int(np.count_nonzero(self._moved)) + turned
+
+    @cached_property
+    def by_unknowns(self) -> Floats:
+        """(W, N+1, 5) per m of positions, per N of tensions, per rad of spins."""
+        out = np.zeros((len(self._line.wanted), *self._every.shape))
+        out[:, self._moved] = self._line.by_state(_each(self._moved)).T
+        return out
+
+    @cached_property
+    def by_turns(self) -> Floats:
+        """(W, 2, 3) per rad, by turns of the ends."""
+        out = np.zeros((len(self._line.wanted), 2, 3))
+        for k in self._turning:
+            turns = np.zeros((3, 2, 3))
+            turns[:, k] = np.eye(3)
+            out[:, k] = self._line.by_state(np.zeros((3, *self._every.shape)), turns).T
+        return out
+
+    def _near(self, reach: int) -> np.ndarray:
+        """Which unknowns (N+1, 5) are within a number of nodes of the places of results."""
+        near = np.zeros(len(self._every), bool)
+        for i in self._line.near():
+            near[max(i - reach - 1, 0) : i + reach + 1] = True
+        return np.asarray(self._every & near[:, None])
+
+    @cached_property
+    def _moved(self) -> np.ndarray:
+        """Which unknowns (N+1, 5) are moved."""
+        return next((x for x in map(self._near, REACHES) if self._suffices(x)), self._every)
+
+    def _suffices(self, moved: np.ndarray) -> bool:
+        """Whether results depend on these unknowns and on no other one."""
+        line, others, q = self._line, self._every & ~moved, _each(moved)
+        most = np.abs(line.by_state(q) * steps_along(line.state, q)[:, None]).max(axis=0)
+        far = anywhere(line.state, SIZE) * others
+        change = np.abs(line.by_state(far)[0] * steps_along(line.state, far)[0])
+        return bool((change <= OUTSIDE * most).all())
+
+
+def _each(moved: np.ndarray) -> Floats:
+    """(D, N+1, 5) movements of one unknown each."""
+    q = np.zeros((int(np.count_nonzero(moved)), *moved.shape))
+    q[(np.arange(len(q)), *np.nonzero(moved))] = 1.0
+    return q
+
+
+# Solves with the matrix of an equilibrium and its transpose, to rounding of the matrix.
+
+
+class Factors:
+    """Factors of a sparse matrix.
+
+    Each solve is corrected once by what it leaves: rows in N beside rows in m and N m would else lose three digits of
+    what hardly answers.
+    """
+
+    def __init__(self, matrix: sparse.csc_array) -> None:
+        self._matrix, self._factors = matrix, splu(matrix)
+
+    def solve(self, right: Floats, transposed: bool = False) -> Floats:
+        """x (n, P) of A x = right, or of its transpose."""
+        matrix, kind = (self._matrix.T, "T") if transposed else (self._matrix, "N")
+        x = self._factors.solve(right, kind)
+        return np.asarray(x + self._factors.solve(right - matrix @ x, kind))

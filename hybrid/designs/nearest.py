@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from hybrid.designs.equilibria import Equilibria, Point
+from hybrid.designs.case_results import Equilibria, Point
 from hybrid.designs.numbers import number_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats

@@ -1,9 +1,25 @@
-"""An equilibrium, and what its results answer to numbers of the scene.
+"""An equilibrium of lines, and what its results answer to numbers of the scene.
+
+Free bodies, and points that lines are clamped to, at rest: what their equations leave over when their scene changes.
+
+Of a body that lines pull at with forces f at arms a, and with moments m where they are clamped,
+
+    R = (F + sum f,  M + sum (a x f + m)),
+
+a change of the scene changes its own F and M (weight, water, loads), the arms, and the forces and moments of the same
+shapes of the lines.  What lines leave over at their ends comes through the place of the ends (linear.matrices).
+
+Contact of lines with each other in an equilibrium: its stiffness, and what its forces answer to numbers of a scene.
+
+Contact has an energy, whose second derivative by the places of the nodes belongs to the matrix.  Diameters, bending
+stiffness and lengths change the forces of the same shapes; sample points stay as many as they are.
+
+An equilibrium, and what its results answer to numbers of the scene.
 
 At an equilibrium R(q; p) = 0, so that  A dq/dp = dR/dp  with the matrix A of the modes (theory.md, 20): one solve for
-each number, in place of two equilibria, or for each result where numbers are many (designs.gradients).  dR/dp is the
+each number, in place of two equilibria, or for each result where numbers are many (designs.line_at_rest).  dR/dp is the
 change of the block rows of the same state between two networks.  Lines that meet at free points move with them, and
-those at bodies turn with these (designs.bodies_at_rest).  A cable is the network of one line.
+those at bodies turn with these (designs.network_at_rest).  A cable is the network of one line.
 """
 
 from __future__ import annotations
@@ -19,21 +35,32 @@ import numpy as np
 from scipy import sparse
 
 from hybrid.accuracy.api import first_at_rest
-from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
-from hybrid.designs.contact_at_rest import ContactAtRest
-from hybrid.designs.gradients import Factors, Gradients
-from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, moment_on_body
+from hybrid.designs.line_at_rest import (
+    LEFT_OUT,
+    NO_FRAMES,
+    Beside,
+    Factors,
+    Frames,
+    Gradients,
+    LineAtRest,
+    moment_on_body,
+)
 from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, number_in, with_number
 from hybrid.designs.wanted import Wanted, parse_wanted
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
-from hybrid.kernels.state.obstacle_rows import ROLLED
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V
+from hybrid.kernels.junctions.joined_lines import TURNS
+from hybrid.kernels.state.report import RADIUS, ROLLED
+from hybrid.kernels.state.state import Floats, Line
+from hybrid.linear.loaded_line import stiffness_by_water
 from hybrid.linear.matrices import linear_network
-from hybrid.model.bodies import BodyModel
+from hybrid.linear.touching import stiffness_between
+from hybrid.model.bodies import BodyModel, loads_of
 from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, nearby_clamped, same_nodes, seats_know_no_shape, shaped_anew
-from hybrid.model.network import NetworkModel, with_surfaces
+from hybrid.model.network import NetworkModel, bodies_of, with_surfaces
+from hybrid.model.sections import merged_sections, tension_scale
 from hybrid.scene.analysis import Output
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FreeBody, RigidBody
@@ -43,10 +70,208 @@ from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
+from hybrid.simulation.lines_contact import strand_in
 from hybrid.simulation.new_run import static_system
-from hybrid.solve.joined import NetworkState
+from hybrid.solve.contact import TouchingLine
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stepper import NetworkState
+
+
+class BodiesAtRest:
+    """What turns by the moments of its lines, in the equilibrium of a scene."""
+
+    def __init__(self, solver: NetworkSolver, states: NetworkState, model: NetworkModel) -> None:
+        """solver: of the lines in their equilibrium, whose numbers of bodies are those there."""
+        self._solver, self._states, self._model = solver, states, model
+        self.count, self._points = len(solver.bodies), len(solver.net)
+        self._numbers = solver.bodies.copy()
+
+    def axes(self, b: int) -> Floats:
+        """Axes (3, 3) of a body, as columns."""
+        return np.asarray(self._states.bodies[b, FRAME:V].reshape(3, 3))
+
+    def body_at(self, l: int, k: int) -> int:
+        """The body at end k of line l; -1: there is none."""
+        return max(int(self._solver.joints[l, k]) - self._points, -1)
+
+    def turns(self, l: int) -> list[int]:
+        """Ends of line l whose frames turn with a body."""
+        return [k for k in (0, 1) if self.body_at(l, k) >= 0 and self._solver.lines[l].seats[k, TURNS] != 0.0]
+
+    def frames(self, l: int, seats: Floats) -> Frames:
+        """Frames of the ends of line l that turn with bodies, with seats (2, SEAT) in these."""
+        return {k: (self.axes(self.body_at(l, k)) @ seats[k, :TURNS].reshape(3, 3)).ravel() for k in self.turns(l)}
+
+    def arms(self, l: int, fairleads: Floats) -> Floats:
+        """(2, 3) m from the origin of the body to each end of line l, inertial, with fairleads (2, 3) on it."""
+        bodies = [self.body_at(l, k) for k in (0, 1)]
+        return np.stack([self.axes(b) @ x if b >= 0 else np.zeros(3) for b, x in zip(bodies, fairleads, strict=True)])
+
+    def loads_besides_lines(self, model: NetworkModel) -> Floats:
+        """(B, 6) N, N m, on the bodies but for their lines, as a model has them where they are.
+
+        ValueError: the model has other members.
+        """
+        numbers = model.body_numbers(np.inf)
+        if numbers.shape != self._numbers.shape or not np.array_equal(numbers[:, PIECES], self._numbers[:, PIECES]):
+            raise ValueError("other pieces of members")
+        model.update_water(np.inf, self._states.bodies, 0.0, numbers)
+        self._solver.bodies[:] = numbers
+        try:
+            self._solver.evaluate_forces(self._states, 0.0)
+            return np.asarray(self._solver.body_work[:, OWN : OWN + 6].copy())
+        finally:
+            self._solver.bodies[:] = self._numbers
+
+    def pressed(self, lines: Sequence[Beside]) -> Floats:
+        """(B, 6) N, N m, of lines that touch bodies on these, of the same shapes, with the numbers of other scenes.
+
+        What bodies carry is brought to where they are in the seas of the lines.
+        """
+        out = np.zeros((self.count, 6))
+        if self._solver.meets:
+            both = zip(self._solver.lines, lines, strict=True)
+            of = [x._replace(line=smooth(y.model.line), sea=y.sea) for x, y in both]
+            solver = NetworkSolver(of, self._points, self._numbers)
+            _, _, wrench, carriers = solver.pressed_bodies(self._states)
+            out[carriers] = wrench
+        return out
+
+    def stiffness_besides(self, stiffness: sparse.csc_array) -> sparse.csc_array:
+        """Stiffness (q, q) of bodies, the last of q, that the matrix of the network leaves out.
+
+        Water around members that is another where they go, and a spring against turns that nothing holds, as Newton's
+        method has it.
+        """
+        first = stiffness.shape[0] - 6 * self.count
+        blocks = [sparse.csc_array((first, first))]
+        diagonal, x = np.abs(stiffness.diagonal()[first:].reshape(-1, 6)), self._solver.lines[0]
+        for b in range(self.count):
+            block = self._by_water(b)
+            stiffest = float(diagonal[b, 3:].max())
+            if (mine := np.flatnonzero(x.rides == b)).size:  # what touches it may roll
+                stiffest = max(stiffest, float(diagonal[b, :3].max() * x.sea.obstacles[mine, RADIUS].max() ** 2))
+            block[3:, 3:] += SOFTEST * (stiffest or 1.0) * np.eye(3)
+            blocks.append(sparse.csc_array(block))
+        return sparse.csc_array(sparse.block_diag(blocks, format="csc"))
+
+    def _by_water(self, b: int) -> Floats:
+        """(6, 6) stiffness of the water around the members of a body; zeros: it has none."""
+        members = self._model.bodies[b].members if b < len(self._model.bodies) else None
+        return np.zeros((6, 6)) if members is None else stiffness_by_water(self._solver, self._states, b, members)
+
+
+def smooth(line: Line) -> Line:
+    """A line without what does not act at rest, or depends on the way there."""
+    return line._replace(bits=line.bits & ~LEFT_OUT)
+
+
+def with_bodies(model: NetworkModel, system: Network) -> NetworkModel:
+    """The model with the bodies of a changed scene, and moments on its points; its lines stay as they are."""
+    free = system.free_bodies
+    held = [[system.points[x] for x in (line.start, line.end)] for line in system.lines.values()]
+    places = [
+        [x.place if isinstance(x, Fairlead) and x.body in free else (0.0, 0.0, 0.0) for x in pair] for pair in held
+    ]
+    moments = tuple(loads_of(system.moments_on(x)) for x in system.rigid)
+    return replace(model, bodies=bodies_of(system), fairleads=np.array(places), moments=moments)
+
+
+# Part of their diameters by which lines are thicker, and thinner, to tell whether they have only begun to touch.
+BEGUN = 0.01
+
+
+# How many times as many sample points tell what their spacing does to derivatives, and by how much more than the change
+# these may be off: of hoses over wires, 16 show 0.8 of what is left, 4 a third (tests/designs/test_touching_lines.py).
+FINER = {16: 1.5, 4: 4.0}
+
+
+class ContactAtRest:
+    """Of the lines of a solver that touch in states at rest."""
+
+    def __init__(
+        self, solver: NetworkSolver, states: NetworkState, names: Sequence[str], lines: Sequence[Beside]
+    ) -> None:
+        """lines: those of the equilibrium.  SceneError: a line touches itself alone, or something at its very end."""
+        if any(x.counts.points for x, of in solver.contacts_at(states) if len(of) == 1) or solver.shared is None:
+            raise _refused("contact of a line with itself", "no line touches itself")
+        self._solver, self._states, self._shared = solver, states, solver.shared
+        self._here = [lines[k] for k in self._shared.lines]
+        self._nodes = np.array([x.line.s.size for x in solver.lines])
+        begins = np.concatenate([[0], np.cumsum(self._nodes)[:-1]])
+        self._node_of = np.concatenate([begins[k] + np.arange(self._nodes[k]) for k in self._shared.lines])
+        self._ends = np.concatenate([begins, np.cumsum(self._nodes) - 1])
+        self.stiffness = self._stiffness()
+        bends = np.concatenate([x.line.element for x in solver.lines])
+        self._kinks = not bends[np.unique(self.stiffness.nonzero()[0] // SIZE)].all()
+        self.begins = self._begun(names)
+
+    def _stiffness(self) -> sparse.csr_array:
+        """(unknowns of all lines) N/m, of contact as it was looked at last."""
+        found = stiffness_between(self._shared.contact, self._node_of, SIZE * int(self._nodes.sum()))
+        if np.isin(found.nonzero()[0] // SIZE, self._ends).any():
+            raise _refused("contact at an end of a line", "what touches does so away from the ends of lines")
+        return found
+
+    def finer(self) -> tuple[sparse.csr_array, float] | None:
+        """The stiffness with more sample points, and by how much more than what it changes derivatives may be off.
+
+        Between sample points a line lies as in hollows, and does not slide as it would.  None: that is not known, as of
+        a line without bending stiffness, whose kink lies as in hollows between its nodes too.
+        """
+        if self._kinks:
+            return None
+        for finer, off in FINER.items():
+            self._solver.contacts_at(self._states, finer)
+            if not self._shared.contact.counts.overflow:
+                return self._stiffness(), off
+        return None
+
+    def forces(self, lines: Sequence[Beside]) -> Floats:
+        """(unknowns of all lines,) N, of the same shapes, on nodes of lines with other numbers."""
+        now = [lines[k] for k in self._shared.lines]
+        if all(x.model is y.model for x, y in zip(now, self._here, strict=True)):
+            return self._pushes()
+        self._shared.put([_strand(x) for x in now])
+        try:
+            return self._pushes()
+        finally:
+            self._shared.put([_strand(x) for x in self._here])
+
+    def _pushes(self) -> Floats:
+        self._solver.contacts_at(self._states)
+        out = np.zeros((int(self._nodes.sum()), SIZE))
+        out[self._node_of, 1:4] = np.concatenate([*self._shared.forces().values()])
+        return out.ravel()
+
+    def _begun(self, names: Sequence[str]) -> list[tuple[str, str]]:
+        """Lines that would not touch if they were a little thinner, or would if they were a little thicker."""
+        thick, thin = (self._touching(1.0 + part) for part in (BEGUN, -BEGUN))
+        self._touching(1.0)
+        return [(names[a], names[b]) for a, b in sorted(thick - thin)]
+
+    def _touching(self, wider: float) -> set[tuple[int, int]]:
+        strands = [_strand(x) for x in self._here]
+        self._shared.put([x._replace(width=wider * x.width) for x in strands])
+        self._solver.contacts_at(self._states)
+        self._shared.put(strands)
+        return {(min(a, b), max(a, b)) for (a, _), (b, _) in self._shared.points_between()}
+
+
+def _strand(x: Beside) -> TouchingLine:
+    """What contact takes of a line, whose tension scale is that of its scene."""
+    strand = strand_in(x.model)
+    if strand.bending.all():
+        return strand
+    sections, fastest = merged_sections(x.scene.cable.sections), float(np.linalg.norm(x.sea.current, axis=1).max())
+    scale = tension_scale(x.scene, sections, bool(x.model.line.spin.any()), fastest)
+    return strand._replace(tension_scale=scale)
+
+
+def _refused(given: str, expected: str) -> SceneError:
+    return SceneError([Complaint("lines", given, f"an equilibrium in which {expected}", "a shape that is apart")])
+
 
 # Tables of a scene on which every line hangs; numbers of a free body on which none does.
 OF_ALL = ("environment", "obstacles", "output")
@@ -85,7 +310,7 @@ class NetworkAtRest(OfScene):
         refuse_use(self.scene.written, "derivatives", given="hybrid sensitivity")
         finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
         resolution = replace(resolution, lines=finely)
-        with self._form.said():
+        with self._form.in_words():
             run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
         assert run.found is not None
         self._system, self._names, self._outputs = system, run.model.names, dict[str, Output]()
@@ -364,7 +589,7 @@ class NetworkAtRest(OfScene):
     def _on_surfaces(self, system: Network, lines: Sequence[Beside], bodies: Sequence[BodyModel]) -> list[Beside]:
         """Lines of a changed scene on obstacles as hard as all of it asks for, with bodies that carry some at rest."""
         models = with_surfaces(system, [x.model for x in lines], bodies)
-        out = [x._replace(model=model, sea=model.sea.at(np.inf)) for x, model in zip(lines, models, strict=True)]
+        out = [x._replace(model=model, sea=model.sea.at_time(np.inf)) for x, model in zip(lines, models, strict=True)]
         self._bodies.pressed(out)
         return [
             x if x is line.here and _as_hard(x, new) else new

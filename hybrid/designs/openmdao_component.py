@@ -9,9 +9,8 @@ import numpy as np
 from openmdao.api import AnalysisError, ExplicitComponent
 from openmdao.utils.units import valid_units
 
-from hybrid.designs.component_ports import MINIMISED, NOTHING, Input, Output
-from hybrid.designs.equilibria import Point
-from hybrid.designs.problem import Objective, Problem
+from hybrid.designs.case_results import Point
+from hybrid.designs.problem import MINIMISED, NOTHING, Input, Objective, Output, Problem
 from hybrid.errors import ComputationError, SceneError
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import lsq_linear, minimize
 from scipy.stats import qmc
 
-from hybrid.designs.equilibria import Point
+from hybrid.designs.case_results import Point
 from hybrid.designs.nearest import STEP, Rows, nearest
 from hybrid.designs.problem import Constraint, Objective, Problem, Within
 from hybrid.errors import ComputationError, SceneError

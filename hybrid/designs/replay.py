@@ -14,7 +14,7 @@ from hybrid.accuracy.api import run
 from hybrid.errors import PUSHED, ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import places_of
-from hybrid.model.lines_contact import passing_each_other
+from hybrid.model.contents import passing_each_other
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.resolution import Resolution, accuracy_of
 from hybrid.model.sections import NEAR
@@ -23,8 +23,8 @@ from hybrid.scene.read import read_text, scene_text
 from hybrid.scene.root import Scene
 from hybrid.simulation.new_run import Recording, run_system
 from hybrid.simulation.progress import ProgressReporter
-from hybrid.simulation.restore import kept_resolution
-from hybrid.store.array_contents import MemoryTarget
+from hybrid.simulation.restart import kept_resolution
+from hybrid.store.format import MemoryTarget
 from hybrid.store.reader import Result, open_result, written_result
 
 # Tolerance of Newton's method in steps: until its corrections no longer shrink.  At a kink of contact steps that are
@@ -112,7 +112,7 @@ def replay(
     SceneError, ComputationError: as of `hybrid.run`.
     """
     network, target = with_outputs(scene, course, more, each_step, finer), MemoryTarget()
-    with course.scene.form.said():
+    with course.scene.form.in_words():
         run_system(
             network, target, scene_text(network), ProgressReporter(None, scene.require_time().duration), lambda: False,
             resolution=NetworkResolution(course.resolutions(finer), course.tolerance), recording=Recording(begun=begun),

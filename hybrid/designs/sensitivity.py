@@ -9,16 +9,15 @@ from typing import Any, NamedTuple, overload
 
 import numpy as np
 
-from hybrid.designs.edges import WAY as BY_CELLS
-from hybrid.designs.edges import by_cells, is_edge
-from hybrid.designs.in_motion import in_motion
+from hybrid.designs.in_motion import WAY as BY_CELLS
+from hybrid.designs.in_motion import by_cells, in_motion, is_edge
 from hybrid.designs.network_at_rest import NO_PLACES, NetworkAtRest, Places
 from hybrid.designs.numbers import number_of, refuse_computing
 from hybrid.errors import ComputationError, Outcome
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
-from hybrid.studies.sensitivity import Influence
-from hybrid.studies.sensitivity import sensitivity as of_study
+from hybrid.studies.cases import Influence
+from hybrid.studies.cases import sensitivity as of_study
 
 # Error by that on half the cells, for results of second order; a fifth more, as of modes.  Part of one on a bed
 # that is never said to be known: 60 to 120 cells of a leg are off by 0.5 to 1.7 %.
@@ -54,7 +53,7 @@ def sensitivity(scene: str | Path, of: str) -> list[Influence]: ...
 def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bool = False) -> Any:
     """Derivatives of results of an equilibrium, or of a motion, by numbers of the scene.
 
-    Without `by`, what each variable of a study does to the result `of` (`hybrid.studies.sensitivity`).
+    Without `by`, what each variable of a study does to the result `of` (`hybrid.studies.cases`).
 
     of: results such as `tension@0` (at s, m), `max curvature`, `position.z@125`, `reaction_end.x`; of named lines
     `east/tension@end`, `max hose/curvature`.  by: keys of numbers such as `cable.sections[0].length`.  Friction of the

@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.stats import pearsonr
 
-from hybrid.designs.edges import refuse_edges
-from hybrid.designs.in_motion import in_motion
+from hybrid.designs.in_motion import in_motion, refuse_edges
 from hybrid.designs.numbers import AnyScene
 from hybrid.designs.sensitivity import at_rest
 from hybrid.errors import Complaint, ResultError, SceneError
@@ -28,9 +27,8 @@ from hybrid.scene.study import Kept
 from hybrid.store.hdf5_file import locked
 from hybrid.store.records import ALIASES
 from hybrid.store.study_file import StudyFile
-from hybrid.studies.cases import digest_of, scene_of
-from hybrid.studies.collect import names_of
-from hybrid.studies.sensitivity import DESIGNS, StudyResult, result_of, sensitivity
+from hybrid.studies.cases import DESIGNS, StudyResult, digest_of, result_of, scene_of, sensitivity
+from hybrid.studies.workers import names_of
 
 # Part of the variance that the line through the mean has to explain: a tenth is left to curves and interactions.
 LINEAR = 0.9

@@ -1,10 +1,19 @@
-"""One line of a linear network in the sea: what excites it, its linear drag, and its motion at every frequency."""
+"""One line of a linear network in the sea.
+
+What excites a line about its equilibrium, by frequency: waves that pass, and motions of its ends.
+
+Everything is  Re(X exp(-i w t)),  so that velocities are -i w X and accelerations -w^2 X.
+
+One line of a linear network in the sea: what excites it, its linear drag, and its motion at every frequency.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 from scipy import sparse
@@ -12,12 +21,10 @@ from scipy import sparse
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, OWN, PLACE, V
 from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
-from hybrid.kernels.laws.hinge_layer import FADED
-from hybrid.kernels.laws.members import ALONG, CM, CN, CT, MIDDLE, PIECE, PUSH, WATER, WET
-from hybrid.kernels.state.report import BODIES, DRAG, WAVES
-from hybrid.kernels.state.state import Floats, Line, Sea
-from hybrid.linear.drag import axes_across, linear_law, of_cylinders, phases_of
-from hybrid.linear.excitation import SAME, Excitation, current_at, excitations_of, half_cells, water_of_wave
+from hybrid.kernels.laws.closed_forms import FADED
+from hybrid.kernels.laws.water import ALONG, CM, CN, CT, MIDDLE, PIECE, PUSH, WATER, WET, wave_kinematics
+from hybrid.kernels.state.report import BODIES, DRAG, FLOW, SURFACE, WAVES
+from hybrid.kernels.state.state import LANES, RIDES, Floats, Line, Sea, State
 from hybrid.linear.matrices import (
     ANCHOR,
     SHIFT,
@@ -29,11 +36,191 @@ from hybrid.linear.matrices import (
     rows_at_rest,
     sparse_rows,
 )
-from hybrid.linear.response_results import LineResponse
+from hybrid.linear.response_results import LineResponse, axes_across, linear_law, of_cylinders, phases_of
 from hybrid.model.bodies import Members
 from hybrid.model.build import Model
-from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.scene.combinations import RESPONSE_TO_MOTION
 from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stepper import JoinedLine, NetworkState
+
+# The block rows of a line at rest in a sea.
+RowsOf = Callable[[Sea], Floats]
+# Amplitude, m, of the wave by which loads are differentiated, as a part of its length.
+SMALL_WAVE = 1e-6
+# Frequencies that agree within this part are one.
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Loads on a line at one frequency, 1/s, complex amplitudes.
+
+    forces: (N+1, 3) N, of the waves but for drag; water: (N+1, 3) m/s, its velocity at the nodes; shifts: (2, 3) m and
+    turns: (2, 3) rad of the ends.
+    """
+
+    omega: float
+    forces: Floats
+    water: Floats
+    shifts: Floats
+    turns: Floats
+
+
+def frequencies_of(models: tuple[Model, ...], waves: Iterable[Floats] = ()) -> Floats:
+    """All frequencies (F,) 1/s that excite lines, increasing; waves: (K, 6) that excite bodies."""
+    found = [np.zeros(0), *(x[:, 1] for x in waves)]
+    for model in models:
+        if model.line.bits & WAVES or _follows(model):
+            found.append(model.sea.values.waves[:, 1])
+        found.append(model.ends.moves().harmonics[:, 3])
+    every = np.unique(np.concatenate(found))
+    if not every.size:
+        return every
+    return np.asarray(every[np.concatenate([[True], np.diff(every) > SAME * every[1:]])])
+
+
+def _follows(model: Model) -> bool:
+    return bool(model.ends.moves().follows.any())
+
+
+def refuse_motions(models: tuple[Model, ...], names: tuple[str, ...]) -> None:
+    """SceneError for ends whose motion is no sum of harmonics."""
+    for model, name in zip(models, names, strict=True):
+        moves = model.ends.moves()
+        what = ""
+        if (moves.file[:, 1] > moves.file[:, 0]).any():
+            what = "a motion from a file"
+        elif moves.velocity.any() or moves.travel[:, 4].any():
+            what = "an end that travels"
+        if what:
+            raise RESPONSE_TO_MOTION.error(f"motion of {name}", what)
+
+
+def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_of: RowsOf) -> list[Excitation]:
+    """Loads on a line (in space) about its equilibrium, at each of the frequencies.
+
+    rows_of(sea): fills and gives the block rows of the state in that sea.
+    """
+    moves, sea = model.ends.moves(), model.sea.values
+    still: Floats | None = None  # forces and velocities without waves, which are those of any wave of no height
+    waves = sea.waves if line.bits & WAVES or _follows(model) else sea.waves[:0]
+    count, out = line.s.size, []
+    there = SmallSea(sea, count)
+    for omega in omegas:
+        forces, water = np.zeros((count, 3), complex), np.zeros((count, 3), complex)
+        shifts, turns = np.zeros((2, 3), complex), np.zeros((2, 3), complex)
+        for wave in waves[np.abs(waves[:, 1] - omega) <= SAME * omega]:
+            size = wave[0] * np.exp(1j * wave[4])
+            if line.bits & WAVES:
+                if still is None:
+                    still = _in_sea(there.still(), state, rows_of)
+                by_wave, speed = _of_wave(there, state, wave, rows_of, still)
+                forces, water = forces + size * by_wave, water + size * speed
+            for k in (0, 1):
+                if moves.follows[k]:
+                    place = moves.position[k]
+                    shifts[k, 2] += size * np.exp(1j * (wave[2] * place[0] + wave[3] * place[1]))
+        for k, axis, amplitude, _, phase in moves.harmonics[np.abs(moves.harmonics[:, 3] - omega) <= SAME * omega]:
+            size, end = 1j * amplitude * np.exp(-1j * phase), int(k)
+            if axis < 3:
+                shifts[end, int(axis)] += size
+                continue
+            turn = size * np.eye(3)[int(axis) - 3]
+            turns[end] += turn
+            if moves.fairlead[end, RIDES]:
+                arm = moves.frame[end].reshape(3, 3) @ moves.fairlead[end, 1:4]
+                shifts[end] += np.cross(turn, arm)
+        out.append(Excitation(float(omega), forces, water, shifts, turns))
+    return out
+
+
+def _of_wave(there: SmallSea, state: State, wave: Floats, rows_of: RowsOf, still: Floats) -> tuple[Floats, Floats]:
+    """Forces (N+1, 3) N but drag, and velocities (N+1, 3) m/s of the water, by a unit wave.
+
+    Of amplitude 1 m and phase 0; still: both (N+1, 6) without waves.
+    """
+    both = _amplitudes([still, *(_in_sea(sea, state, rows_of) for sea in there.waves(wave))], wave)
+    return both[:, :3], both[:, 3:]
+
+
+def _in_sea(there: Sea, state: State, rows_of: RowsOf) -> Floats:
+    """Forces (N) but drag on nodes, and velocities of the water (m/s) there, (N+1, 6)."""
+    wave_kinematics(there, state.r, np.zeros_like(state.r))
+    forces = -rows_of(there).reshape(-1, SIZE, WIDTH)[:, 1:4, -1]
+    return np.concatenate([forces, there.flow[:, :3]], axis=1)
+
+
+def water_of_wave(sea: Sea, wave: Floats, places: Floats) -> Floats:
+    """Velocity and acceleration of the water, and rise of the surface, (n, 7) by a unit wave.
+
+    Of amplitude 1 m and phase 0, at places (n, 3) m.
+    """
+    there, found = SmallSea(sea, len(places)), []
+    for each in chain([there.still()], there.waves(wave)):  # one at a time: they share their arrays
+        wave_kinematics(each, places, np.zeros_like(places))
+        found.append(each.flow.copy())
+    return _amplitudes(found, wave)
+
+
+class SmallSea:
+    """A sea with one small wave or none, whose arrays are written anew: what is bound once stays bound."""
+
+    def __init__(self, sea: Sea, places: int) -> None:
+        """places: at which there is water."""
+        self.sea = sea._replace(
+            waves=np.zeros((1, sea.waves.shape[1])), orbits=np.zeros(1), now=np.array([0.0, sea.now[1], 1.0, 0.0]),
+            flow=np.zeros((places, 7)), lanes=np.zeros((12, LANES)),
+        )  # fmt: skip
+
+    def still(self) -> Sea:
+        """Without waves."""
+        self.sea.waves[0], self.sea.orbits[0] = 1.0, 0.0
+        self.sea.waves[0, 0] = 0.0
+        return self.sea
+
+    def waves(self, wave: Floats) -> Iterator[Sea]:
+        """With the cosine, then with the sine of a wave (6,) that is small."""
+        for phase in (0.0, -0.5 * np.pi):
+            self.sea.waves[0] = wave
+            self.sea.waves[0, [0, 4]] = _small(wave), phase
+            self.sea.orbits[0] = self.sea.waves[0, 0] * self.sea.waves[0, 1]
+            yield self.sea
+
+
+def _small(wave: Floats) -> float:
+    return float(SMALL_WAVE * 2.0 * np.pi / wave[5])
+
+
+def _amplitudes(found: list[Floats], wave: Floats) -> Floats:
+    """Complex amplitudes by a wave of 1 m, of what was found in each of its seas."""
+    return np.asarray(((found[1] - found[0]) + 1j * (found[2] - found[0])) / _small(wave))
+
+
+def half_cells(line: Line, sea: Sea, state: State) -> tuple[np.ndarray, Floats, Floats, Floats, Floats]:
+    """Node (H,), direction (H, 3), drag (H,) twice, and current (H, 3) m/s of every half cell.
+
+    Drag is across and along it, N s^2/m^2, as far as it is wet; bodies at nodes are not among them.
+    """
+    n = line.h.size
+    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+    node = np.concatenate([np.arange(n), np.arange(1, n + 1)])
+    cell = np.concatenate([np.arange(n), np.arange(n)])
+    wet = np.ones(2 * n)
+    if line.bits & SURFACE:
+        z = state.r[node, 2] + 0.25 * np.concatenate([state.e[:, 2], -state.e[:, 2]])
+        wet = np.clip((sea.surface - z) / np.maximum(line.diameter[cell], 1e-300) + 0.5, 0.0, 1.0)
+    drag = bool(line.bits & DRAG)
+    cn, ct = ((wet * x[cell] if drag else np.zeros(2 * n)) for x in (line.drag_n, line.drag_t))
+    return node, d[cell], cn, ct, current_at(line, sea, state.r[node])
+
+
+def current_at(line: Line, sea: Sea, places: Floats) -> Floats:
+    """The fully grown current (n, 3) m/s at places (n, 3)."""
+    if not line.bits & FLOW:
+        return np.zeros((len(places), 3))
+    part = float(sea.now[1])
+    return part * np.column_stack([np.interp(places[:, 2], sea.z, sea.current[:, k]) for k in range(3)])
+
 
 STRAIGHT = 1e-9  # 1/m: less is no bend
 AWRY = (0.3, 0.9, 0.4)  # along no axis
@@ -44,7 +231,7 @@ class LoadedLine:
 
     def __init__(self, x: JoinedLine, linear: LinearLine, model: Model, omegas: Floats) -> None:
         self.name, self.linear, self.x, self.hinges = linear.name, linear, x, model.cable.hinges
-        self.line, state, self.sea = linear.line, linear.state, model.sea.at(np.inf)
+        self.line, state, self.sea = linear.line, linear.state, model.sea.at_time(np.inf)
         self.obstacles = model.sea.names
         self.carried: dict[int, Floats] = {}  # (F, N+1, 3) m, motions of obstacles that bodies carry, at the nodes
         count, calm = self.line.s.size, _without_drag(self.line)
@@ -261,8 +448,8 @@ def _without_drag(line: Line) -> Line:
 # Morison members of a free body about rest in the sea: what waves do to the body, and linear drag of its pieces.
 #
 # A piece at an arm a from the origin moves by  T q,  T = [1, -[a]x],  of the shifts and turns q of its body.  With the
-# linear drag B of a half cell (hybrid.linear.drag) for its velocity relative to the water, amplitudes of a frequency
-# are
+# linear drag B of a half cell (linear.response_results) for its velocity relative to the water, amplitudes of a
+# frequency are
 #
 #     damping  sum T^T B T,    load  sum T^T (B u + w cm (a_w - d (d.a_w)) + dw/dz eta F_U),
 #

@@ -35,32 +35,33 @@ from hybrid.kernels.junctions.bodies import PLACE as ORIGIN
 from hybrid.kernels.junctions.body_contact import BY_BODY, BY_NODES, OF_LINE, OF_NODE, OF_SLOT, TOUCHED
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.state.report import (
     BEARING,
     EACH,
     ENDED,
     FREE,
+    FRICTION,
     INERTIA,
     MU,
+    OBSTACLES,
     ONSET_OF,
     SLIP,
     STILL_AXIS,
     TURNED,
 )
-from hybrid.kernels.state.obstacle_rows import FORCE as FORCE_OF
-from hybrid.kernels.state.report import FRICTION, OBSTACLES
+from hybrid.kernels.state.report import FORCE as FORCE_OF
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model
-from hybrid.model.lines_contact import Touching
+from hybrid.model.contents import Touching
 from hybrid.model.network import NetworkModel, NetworkResolution
 from hybrid.scene.network import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
 from hybrid.simulation.new_run import static_system
-from hybrid.solve.contact_stability import contact_stiffness
-from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.solve.contact_statics import contact_stiffness
 from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stepper import JoinedLine, NetworkState
 
 
 @dataclass(frozen=True)
@@ -338,7 +339,7 @@ def _turning(
 ) -> sparse.csr_array:
     """Shift (3 n, unknowns) of surfaces against each other at points as their strands turn.
 
-    The symbols are of kernels.contact.self_contact_friction.
+    The symbols are of kernels.contact.self_contact_law.
     """
     r = np.concatenate([x.r for x in states.lines])
     spins = np.concatenate([np.append(x.line.spin != 0, False) for x in touching.solver.lines])
@@ -386,7 +387,7 @@ class Rest:
 def rest_of(system: Any, resolution: NetworkResolution) -> Rest:
     """The equilibrium of a scene on such cells; ComputationError: there is none."""
     form = system.form
-    with form.said():
+    with form.in_words():
         run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
     assert run.found is not None
     bodies = (*(body.name for body in run.model.bodies), *run.model.rigid)

@@ -18,14 +18,12 @@ from hybrid.scene.read import located_in, read_text
 from hybrid.scene.root import Scene
 from hybrid.simulation.case import CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
-from hybrid.store.array_contents import MemoryTarget
+from hybrid.store.format import MemoryTarget
 from hybrid.store.reader import Result, written_result
-from hybrid.view.along import along
-from hybrid.view.decimate import even
+from hybrid.view.curves import along, even
 from hybrid.view.figure import BED, BODY, INK, colour_of
 from hybrid.view.lines import LINE_COLOURS, AllLines, arms_of, bodies_of, points_of
-from hybrid.view.obstacles import rings
-from hybrid.view.projections import bed_heights, whole_zones
+from hybrid.view.projections import bed_heights, rings, whole_zones
 from hybrid.view.scenery import box_and_planes
 from hybrid.view.summary import facts_of
 

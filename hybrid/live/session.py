@@ -12,9 +12,18 @@ from typing import Any
 
 from hybrid.errors import SceneError
 from hybrid.live import pictures
-from hybrid.live.document import Document, Refused, Stamp, named_files, stamp_of
-from hybrid.live.new_scenes import example_text, examples, new_scene, questions
-from hybrid.live.workers import Run, Workers
+from hybrid.live.document import (
+    Document,
+    Refused,
+    Stamp,
+    example_text,
+    examples,
+    named_files,
+    new_scene,
+    questions,
+    stamp_of,
+)
+from hybrid.live.workers import WatchedRun, Workers
 from hybrid.scene.read import text_of
 from hybrid.store.hdf5_file import is_held, is_result
 from hybrid.store.reader import Result, open_result
@@ -54,7 +63,7 @@ class Session:
         """document: None of a result alone, which `playback` plays; workers: some that are started, or its own."""
         self.document, self.playback = document, playback
         self.workers = workers or Workers()
-        self.run: Run | None = None
+        self.run: WatchedRun | None = None
         self._clients: list[Client] = []
         self._count = 0
         self._wanted = asyncio.Event()  # a text waits for its picture
@@ -73,7 +82,7 @@ class Session:
         await self.workers.start()
         if self.document is not None and self.document.text.strip():
             self._wanted.set()
-        work = (self._compute(), self._watch(), self._watch_named(), self._follow())
+        work = (self._compute(), self._watch(), self._watch_named(), self._read_new())
         self._tasks = [asyncio.create_task(x) for x in work]
 
     async def stop(self) -> None:
@@ -292,12 +301,12 @@ class Session:
         if self.playback is not None:
             self.playback.close()
         self.playback = None
-        self.run = Run(document.path, target, self._send_state)
+        self.run = WatchedRun(document.path, target, self._send_state)
         self._spawn(self._run_to_end(self.run))
 
-    async def _run_to_end(self, run: Run) -> None:
+    async def _run_to_end(self, run: WatchedRun) -> None:
         before = run.target.stat().st_mtime_ns if run.target.exists() else 0
-        following = asyncio.ensure_future(run.follow())
+        following = asyncio.ensure_future(run.watch())
         while not following.done():
             await asyncio.wait([following], timeout=0.1)
             begun = run.target.exists() and run.target.stat().st_mtime_ns != before and is_held(run.target)
@@ -323,7 +332,7 @@ class Session:
             self.playback = Playback(target)
         await self._read(again=True)
 
-    async def _follow(self) -> None:
+    async def _read_new(self) -> None:
         """Read what is new in the result that is played."""
         while True:
             if self.playback is not None and (self._clients or not self.playback.head) and self.playback.due:

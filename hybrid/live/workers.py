@@ -134,7 +134,7 @@ LONGEST_LINE = 16_000_000
 INSIST = 2.0  # s after which a run that has computed nothing yet is asked again to stop: it may be compiling
 
 
-class Run:
+class WatchedRun:
     """One run; `state` is what the page shows of it."""
 
     def __init__(self, scene: Path, target: Path, changed: Callable[[], None]) -> None:
@@ -144,7 +144,7 @@ class Run:
         self._child: asyncio.subprocess.Process | None = None
         self._stopped = False
 
-    async def follow(self) -> None:
+    async def watch(self) -> None:
         """Start it, and follow it to its end."""
         new_group = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)  # of Windows: signals are for a group there
         asked = "run", _argument(self.scene), "-o", _argument(self.target), "--json"

@@ -17,22 +17,18 @@ from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.contact.self_contact_law import OUTER
 from hybrid.kernels.contact.self_contact_pairs import WINDOW
 from hybrid.kernels.laws.axial_law import DYNAMIC, STRAIN, TENSION
-from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.bending_law import MOMENT
-from hybrid.kernels.laws.bending_slip import EACH, PER_TENSION, STIFF
-from hybrid.kernels.laws.bending_slip import MOMENT as SLIPS_AT
+from hybrid.kernels.laws.bending_law import EACH, PER_TENSION, STIFF, TABLE_MOMENT
+from hybrid.kernels.laws.bending_law import TABLE_MOMENT as SLIPS_AT
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
+from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.laws.soil import DEPTH, PRESSES, STEEP, SUCTION
 from hybrid.kernels.state.report import OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.state import Floats
-from hybrid.linear.drag import shape_of_drag
-from hybrid.linear.excitation import current_at
-from hybrid.linear.loaded_line import STRAIGHT, LoadedLine, LoadedMembers
-from hybrid.linear.matrices import LinearNetwork
-from hybrid.linear.memory import pulls
-from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse
+from hybrid.linear.loaded_line import STRAIGHT, LoadedLine, LoadedMembers, current_at
+from hybrid.linear.matrices import LinearNetwork, pulls
+from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse, shape_of_drag
 from hybrid.linear.touching import Rest, Touch
-from hybrid.simulation.self_watch import diameters
+from hybrid.simulation.lines_contact import diameters
 
 # Parts of the motion beyond which the line is not linear.
 SLACK_SHARE = 1e-3  # of the time, in which it would be slack
@@ -103,7 +99,7 @@ def _kinks(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     line = x.line
     tables = (
         ("tension", line.law, line.law_table[:, [TENSION, STRAIN]], found.mean_tension, found.middle, "N"),
-        ("curvature", line.bend_law, line.bend_table[:, : MOMENT + 1], found.mean_curvature, found.s, "1/m"),
+        ("curvature", line.bend_law, line.bend_table[:, : TABLE_MOMENT + 1], found.mean_curvature, found.s, "1/m"),
     )
     for name, law, table, mean, places, unit in tables:
         deviation = found.deviation(name)

@@ -1,9 +1,15 @@
-"""Rigid bodies as numbers: what a free one is, where it is first, what loads it, and how a known one moves."""
+"""Rigid bodies as numbers, and ends that are clamped to them.
+
+Rigid bodies as numbers: what a free one is, where it is first, what loads it, and how a known one moves.
+
+Ends of lines that are clamped to points and bodies: frames in axes of these, axes of free points.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,17 +30,22 @@ from hybrid.kernels.junctions.bodies import (
     STIFFNESS,
     V,
     blank_members_job,
-    stir_members,
+    update_members,
 )
-from hybrid.kernels.laws.members import ALONG, CM, CN, CT, MIDDLE, PIECE, WET
+from hybrid.kernels.junctions.joined_lines import SEAT, TURNS, WITH_BODY
+from hybrid.kernels.laws.water import ALONG, CM, CN, CT, MIDDLE, PIECE, WET
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.state import Floats, Sea
-from hybrid.model.ends import EndLoad, end_load
+from hybrid.model.build import Model
+from hybrid.model.ends import EndLoad, end_load, first_director, transported
+from hybrid.model.mesh import LineOnBase
 from hybrid.model.sea import Surroundings
 from hybrid.scene.base import turned
 from hybrid.scene.bodies import FixedBody, FreeBody
-from hybrid.scene.end_loads import GivenLoad
+from hybrid.scene.ends import Triple
 from hybrid.scene.motion import EndMotion, MotionTerms
+from hybrid.scene.motion_tables import GivenLoad
+from hybrid.scene.network import Network
 
 # Morison members of a body as pieces: coefficients, added mass, and the water around them.
 
@@ -105,12 +116,12 @@ class Members:
 
         row: of a state, that the body has dt (s) before.
         """
-        self._sea.at(t)
+        self._sea.at_time(t)
         self._state[:], self._asked[:, 0] = row, (dt, np.isfinite(t))
-        stir_members(self.into(out).numbers)
+        update_members(self.into(out).numbers)
 
     def into(self, out: Floats) -> Table:
-        """Arguments of kernels.junctions.bodies.stir_members, which writes into `out` (n, PIECE)."""
+        """Arguments of kernels.junctions.bodies.update_members, which writes into `out` (n, PIECE)."""
         self._job.bind(out=out)
         return self._job
 
@@ -216,9 +227,9 @@ class FairleadMotion:
         self._seat = None if seat is None else seat[:9].reshape(3, 3)
         self.base = body.base
 
-    def at(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]:
+    def at_time(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]:
         """As of `EndMotion`; where the line turns freely there is no frame."""
-        origin, velocity, frame, spin = self._body.at(t)
+        origin, velocity, frame, spin = self._body.at_time(t)
         assert frame is not None
         arm = frame @ self._place
         place, speed = origin + arm, velocity + np.cross(spin, arm)
@@ -234,3 +245,102 @@ class FairleadMotion:
     def terms(self) -> MotionTerms:
         """Those of its body, and where it is there."""
         return self._body.terms()._replace(ride=(self._body.axes, self._place, self._seat))
+
+
+STRAIGHT = (1.0, 0.0, 0.0)  # direction of a line through a free point in axes of that, where none is given
+SECOND = 1e-3  # weight of the material axis of the first line at a free point against directions of lines
+
+OPPOSITE = -0.9  # cosine of the angle of tangents that count as opposite
+
+Ends = tuple[str, str]  # name of a line, and `start` or `end`
+Held = tuple[Triple, Triple | None]  # inertial tangent and material axis a1 of an end
+
+
+def directions_at_rigid(system: Network, point: str) -> dict[Ends, tuple[Floats, Floats]]:
+    """Tangent and material axis a1 (3,) of each line that is clamped to a free point, in axes of the point."""
+    found: dict[Ends, tuple[Floats, Floats]] = {}
+    here = system.clamped_at(point)
+    for name, end in here:
+        held = system.clamp(name, end)
+        assert held is not None
+        tangent = np.array(held.tangent or STRAIGHT)
+        if held.tangent is None and (name, end) != here[0] and end == here[0][1]:
+            tangent = -tangent  # both lines run to the point, or from it
+        tangent = tangent / np.linalg.norm(tangent)
+        found[name, end] = tangent, first_director(tangent, held.normal)
+    return found
+
+
+def axes_of_point(
+    directions: Mapping[Ends, tuple[Floats, Floats]], models: Mapping[str, Model], far: Held | None
+) -> Floats:
+    """Axes (3, 3) of a free point that fit best to how the lines that are clamped to it lie.
+
+    far: tangent and material axis at the other end of the first line, so that this is not twisted; None: it may be.
+    """
+    H = np.zeros((3, 3))
+    for k, ((name, end), (tangent, director)) in enumerate(directions.items()):
+        cell = 0 if end == "start" else -1
+        d = models[name].start.e[cell] / np.linalg.norm(models[name].start.e[cell])
+        H += np.outer(d, tangent)
+        if k == 0:
+            a1 = models[name].start.a1[cell] if far is None else brought(far, tuple(d.tolist()))
+            H += SECOND * np.outer(a1, director)
+    U, _, V = np.linalg.svd(H)
+    return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V)
+
+
+def brought(held: Held, tangent: Triple) -> Floats:
+    """The material axis (3,) of one end at the other, whose tangent is given, of a line bent the short way between."""
+    first = first_director(held[0], held[1])
+    return np.asarray(transported(first, np.array([held[0], tangent], float))[-1])
+
+
+def untwisted(start: Held, end: Held) -> tuple[Held, Held]:
+    """Both ends with material axes, of a line without twist where they are not given.
+
+    It is bent the short way from tangent to tangent: first shapes of lines are far from where they come to rest, and
+    may be folded.  Tangents that are nearly opposite have no such way: they stay as they are.
+    """
+    a, b = (np.array(x[0], float) / np.linalg.norm(x[0]) for x in (start, end))
+    if a @ b < OPPOSITE or (start[1] is not None and end[1] is not None):
+        return start, end
+    if start[1] is None and end[1] is not None:
+        return (start[0], _triple(brought(end, start[0]))), end
+    first = start[0], _triple(first_director(start[0], start[1]))
+    return first, (end[0], _triple(brought(first, end[0])))
+
+
+def _triple(x: Floats) -> Triple:
+    return float(x[0]), float(x[1]), float(x[2])
+
+
+def seat_of(frame: Floats, axes: Floats, kind: float = WITH_BODY) -> Floats:
+    """(SEAT,) of an end whose frame (9,) turns with axes (3, 3); kind: of a body or of a point."""
+    seat = np.zeros(SEAT)
+    seat[:TURNS] = (axes.T @ frame.reshape(3, 3)).ravel()
+    seat[TURNS] = kind
+    return seat
+
+
+def seated(seat: Floats, axes: Floats) -> tuple[Triple, Triple]:
+    """Inertial tangent and material axis a1 of an end with a seat, in axes (3, 3)."""
+    frame = (axes @ seat[:TURNS].reshape(3, 3)).tolist()
+    tangent, director = ((frame[0][i], frame[1][i], frame[2][i]) for i in (2, 0))
+    return tangent, director
+
+
+def with_clamps(model: Model, clamped: Model, ends: Sequence[int]) -> Model:
+    """The model with the elements that another one of the same line has at these ends, and what they hold."""
+    line = model.line
+    names = ("element", "kb", "k0", "hn", *(("bend_law",) if line.bend_law.size else ()))
+    new = {name: getattr(line, name).copy() for name in names}
+    for k in ends:
+        for name, values in new.items():
+            values[-k] = getattr(clamped.line, name)[-k]
+    line = line._replace(torsion=clamped.line.torsion, **new)
+    if model.layout is None:
+        return replace(model, line=line)
+    held = ("held_tangent", "held_twist", "springs", "hinged")
+    cable = replace(model.cable, **{name: getattr(clamped.cable, name) for name in held})
+    return replace(model, line=line, cable=cable, on_base=LineOnBase(cable, model.layout.base))

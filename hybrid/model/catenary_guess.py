@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.laws.hanging import find_force
+from hybrid.kernels.laws.closed_forms import find_force
 from hybrid.kernels.state.state import Floats
 
 # |t| is rounded off at this part of the largest load, so that a folded or slack line has a minimum too.

@@ -1,24 +1,37 @@
-"""The contents of a model: what a scene switches on and by which key, what is off and what would switch it on."""
+"""What a scene switches on, and which lines may touch.
+
+Whether contact of a line with itself is computed: as the scene asks, else wherever the line can reach itself.
+
+The contents of a model: what a scene switches on and by which key, what is off and what would switch it on.
+
+Which lines of a system may touch each other, as numbers.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.errors import OF_AN_END
 from hybrid.kernels.march.zone_torque import FIRST, LAST
 from hybrid.kernels.mesh.zone_criteria import CRITERIA
-from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.kernels.state.report import (
     BENDING_LAW,
     BENDING_SLIP,
     DRAG,
     FORCES,
+    MAY_MEET,
     MAY_TOUCH,
     SELF_CONTACT,
     SELF_FRICTION,
+    STIFFNESS,
     VORTICES,
 )
 from hybrid.kernels.state.state import Floats, Line
@@ -35,11 +48,101 @@ from hybrid.model.resolution import (
     wants_survey,
 )
 from hybrid.model.sections import swivels
-from hybrid.model.self_reach import self_reach
 from hybrid.scene.accuracy import USUAL
-from hybrid.scene.body_shapes import Carried
-from hybrid.scene.ends import Clamped, End, Pinned
-from hybrid.scene.schema import AdaptiveModel, LineScene, RecordedWaves, StreamFunctionWaves
+from hybrid.scene.bodies import Carried, FreeBody
+from hybrid.scene.ends import Clamped, End, Payout, Pinned
+from hybrid.scene.network import Network, SomeScene
+from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, LinesContact
+from hybrid.scene.schema import AdaptiveModel, CatenaryModel, LineScene, RecordedWaves, StreamFunctionWaves
+
+# Diameters of slack of the smallest loop: WINDOW of contact.self_contact_pairs less OUTER of contact.self_contact_law,
+# which a plan does not import.
+LOOP = 2.7 - 1.05
+
+
+# Of a reason why a line touches itself: that it does where it comes near itself.
+WHERE_NEAR = "from where it comes near itself"
+# By runs with and without contact of plectonemes, loops and hoses: 1.7 to 21 times.
+COST = "its steps take 2 to 20 times as long, and may be shorter; contact: {self: false} switches it off"
+
+
+class SelfReach(NamedTuple):
+    """asked: computed from the start; may: from when the line comes near itself; why: which, or why neither."""
+
+    asked: bool
+    may: bool
+    why: str
+
+
+def self_reach(scene: LineScene) -> SelfReach:
+    """Whether contact of the line with itself is computed, by the scene alone."""
+    asked = scene.contact.self
+    if asked is not None:
+        return SelfReach(asked, False, f"contact.self: {str(asked).lower()}")
+    model = scene.model
+    sections = [*scene.cable.sections, *(x for paid in payouts(scene) for x in paid.reel or ())]
+    off = {
+        "a section has no diameter": any(x.diameter is None for x in sections),
+        "catenaries that stay touch each other with contact: {self: true} alone": isinstance(model, CatenaryModel),
+        "dimension: 2, where contact: {self: true} alone computes it": scene.dimension == 2 or scene.contact.in_plane,
+    }
+    why = next((text for text, holds in off.items() if holds), "")
+    if why:
+        return SelfReach(False, False, why)
+    slack, least = slack_of(scene), least_slack(scene)
+    if slack <= least:
+        return SelfReach(False, False, f"the slack of {max(slack, 0.0):.3g} m is less than {least:.3g} m, of a loop")
+    much = "whatever its ends do" if math.isinf(slack) else f"a slack of {slack:.3g} m, and a loop takes {least:.3g} m"
+    return SelfReach(False, True, f"{WHERE_NEAR}: {much}; {COST}")
+
+
+def no_contact(scene: LineScene) -> str:
+    """Why a line may be within itself in a run of a scene."""
+    reach = self_reach(scene)
+    return "parts are in each other, and contact begins where they are apart" if reach.may else reach.why
+
+
+def payouts(scene: LineScene) -> list[Payout]:
+    """How line is paid out, at the ends at which it is."""
+    found = [getattr(end, "payout", None) for end in scene.ends.both]
+    return [x for x in found if x is not None]
+
+
+def slack_of(scene: LineScene) -> float:
+    """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may, is set from
+
+    outside, breaks or is let go, or it is paid out.
+    """
+    a, b = (end.held_position for end in scene.ends.both)
+    if a is None or b is None or payouts(scene) or scene.contact.ends_are_set:
+        return math.inf
+    if any(x.prescribed_motion or x.release or not x.is_placed for x in scene.ends.both):
+        return math.inf
+    return scene.length - math.dist(a, b)
+
+
+def least_slack(scene: LineScene) -> float:
+    """The slack, m, that two points take to meet which are no neighbours along the line: that of the smallest loop."""
+    return LOOP * min(x.diameter or math.inf for x in scene.cable.sections)
+
+
+def contact_bits(scene: LineScene) -> int:
+    """Bits of kernels.state.report for the start of a run."""
+    reach = self_reach(scene)
+    if reach.asked:
+        return SELF_CONTACT | (SELF_FRICTION if scene.contact.friction else 0)
+    return MAY_TOUCH if reach.may else 0
+
+
+def touching_no_more(line: Line) -> Line:
+    """The line, of which contact with itself is computed no longer."""
+    return line._replace(bits=line.bits & ~(SELF_CONTACT | SELF_FRICTION))
+
+
+def touching(line: Line, friction: float) -> Line:
+    """The line, of which contact with itself is computed from now on."""
+    return line._replace(bits=line.bits | SELF_CONTACT | (SELF_FRICTION if friction else 0))
+
 
 # Part of the variance of a record that is round-off.
 LOST = 1e-6
@@ -327,3 +430,108 @@ def contents_of(scene: LineScene, line: Line, zones: Sequence[Zone], flat: Entry
                 )
             )
     return tuple(entries)
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Which lines of a system may touch, K of them."""
+
+    lines: tuple[int, ...]  # their numbers, in order
+    meets: NDArray[np.int64]  # (K, K) whether two of them may touch, or one itself
+    friction: Floats  # (K, K) coefficients
+    joined: NDArray[np.int64]  # (K, 2) what ends are joined to: those of one number are beside each other
+
+    def partners(self, number: int) -> tuple[int, ...]:
+        """Numbers of the other lines that a line may touch; none where it is not among these."""
+        if number not in self.lines:
+            return ()
+        mine = self.lines.index(number)
+        return tuple(k for j, k in enumerate(self.lines) if j != mine and self.meets[mine, j])
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Numbers of lines that may touch each other, two each, in order."""
+        return [(self.lines[j], self.lines[k]) for j, k in np.argwhere(np.triu(self.meets, 1)).tolist()]
+
+    def bits(self, line: Line) -> Line:
+        """The line with the bits of one that is in contact from the start."""
+        more = SELF_CONTACT | (SELF_FRICTION if self.friction.any() else 0)
+        return line._replace(bits=(line.bits & ~(MAY_TOUCH | SELF_FRICTION)) | more)
+
+
+def touching_of(system: Network, scenes: Mapping[str, LineScene]) -> Touching | None:
+    """Which lines of a system touch each other, as it asks; None: it does not.
+
+    scenes: of the lines by name.  What is held, or moved, is one thing: ends there are beside each other.
+    """
+    names = list(system.lines)
+    return touching_among(system, scenes, [(names.index(a), names.index(b)) for a, b in system.touching_pairs])
+
+
+def touching_among(
+    system: Network, scenes: Mapping[str, LineScene], pairs: Iterable[tuple[int, int]]
+) -> Touching | None:
+    """Lines of which these pairs, by number, touch each other; scenes: of the lines by name; None: there is no pair."""
+    names, pairs = list(system.lines), [*pairs]
+    lines = sorted({k for pair in pairs for k in pair})
+    if not lines:
+        return None
+    place = {k: j for j, k in enumerate(lines)}
+    meets, friction = np.zeros((len(lines), len(lines)), np.int64), np.zeros((len(lines), len(lines)))
+    for a, b in pairs:
+        for j, k in ((place[a], place[b]), (place[b], place[a])):
+            meets[j, k], friction[j, k] = 1, system.contact.friction if system.contact is not None else 0.0
+    for j, k in enumerate(lines):
+        line, scene = system.lines[names[k]], scenes[names[k]]
+        reach = self_reach(scene)
+        if reach.asked or reach.may:
+            meets[j, j], friction[j, j] = 1, line.contact.friction
+    return Touching(tuple(lines), meets, friction, joined_ends_of(system)[lines])
+
+
+# Of the contents of a line that may come to touch others.
+OTHERS = "contact with other lines"
+MEETS = Entry(OTHERS, True, "from where they come near each other; contact: {between: []} switches it off")
+
+
+def beside_others(line: Line) -> Line:
+    """The line with the bit of one that may come to touch others."""
+    return line._replace(bits=line.bits | MAY_MEET)
+
+
+def that_may_meet(system: Network, scenes: Mapping[str, LineScene]) -> tuple[int, ...]:
+    """Numbers of the lines that touch each other from where they come near, because a scene says nothing of contact.
+
+    scenes: of the lines by name.  They have diameters, steps are given, and no error is estimated (scene.combinations).
+    """
+    time = system.time
+    if system.contact is not None or system.dimension == 2 or time is None or not (time.step or time.tolerance):
+        return ()
+    found = tuple(k for k, x in enumerate(scenes.values()) if _may_meet(x))
+    return found if len(found) > 1 else ()
+
+
+def passing_each_other(scene: SomeScene) -> SomeScene:
+    """The same, of which no line touches another one unless the scene asks for it."""
+    if len(scene.lines) == 1 or scene.contact is not None:
+        return scene
+    return scene.model_copy(update={"contact": LinesContact(between=())})
+
+
+def _may_meet(scene: LineScene) -> bool:
+    sections = [*scene.cable.sections, *(x for paid in payouts(scene) for x in paid.reel or ())]
+    return scene.accuracy is None and not scene.output.errors and all(x.diameter is not None for x in sections)
+
+
+def joined_ends_of(system: Network) -> NDArray[np.int64]:
+    """(L, 2) what the ends of lines are joined to, a free point or body by number; 0: what is held or moved."""
+    free = {name: 1 + k for k, name in enumerate((*system.points, *system.bodies))}
+    joined = np.zeros((len(system.lines), 2), np.int64)
+    for k, line in enumerate(system.lines.values()):
+        for end, point in enumerate((line.start, line.end)):
+            found = system.points[point]
+            if isinstance(found, FreePoint | GuidedPoint):
+                joined[k, end] = free[point]
+            elif isinstance(found, Fairlead) and isinstance(system.bodies[found.body], FreeBody):
+                joined[k, end] = free[found.body]
+    return joined

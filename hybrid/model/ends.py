@@ -63,7 +63,7 @@ class Motion(Protocol):
 
     base: Floats
 
-    def at(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]: ...
+    def at_time(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]: ...
 
     def turn_from(self, frame: Floats) -> None: ...
 
@@ -87,9 +87,9 @@ class EndLoad(NamedTuple):
     def grown(self, t: float) -> Floats:
         """The load (3,) at t (s), as far as it has grown."""
         part, _ = rise(t, self.ramp or 0.0)
-        return np.asarray(part * self.at(t))
+        return np.asarray(part * self.at_time(t))
 
-    def at(self, t: float) -> Floats:
+    def at_time(self, t: float) -> Floats:
         """The load (3,) at t (s), when it has grown; at infinity: as at 0, as motions."""
         if not len(self.history):
             return self.value
@@ -183,7 +183,7 @@ class EndConditions:
         self._set: set[tuple[str, int]] = set()  # loads that are set from outside
         self._paths = np.zeros((2, PATH))  # of ends that are set from outside
         self.set_loads(0.0)
-        self.at(np.inf)
+        self.at_time(np.inf)
 
     @property
     def moments(self) -> Floats:
@@ -212,7 +212,7 @@ class EndConditions:
             x._replace(ramp=ramped.get((x.what, x.end), x.ramp)) if x.ramp is None else x for x in self._loads
         )
         self.set_loads(t)
-        self.at(t)
+        self.at_time(t)
 
     def released_at(self, k: int, t: float) -> EndConditions:
         """The same from t (s) on with end k free; its motion and its direction are over."""
@@ -226,7 +226,7 @@ class EndConditions:
         out._turns, out._bring_in = {j: x for j, x in self._turns.items() if j != k}, self._bring_in
         out._set, out._paths, out.breaks = set(self._set), self._paths, self.breaks
         out.set_loads(t)
-        out.at(t)
+        out.at_time(t)
         return out
 
     def copy_frames(self, old: EndConditions) -> None:
@@ -268,16 +268,16 @@ class EndConditions:
         self._loads = tuple(x._replace(ramp=ramp or None) for x, ramp in zip(self._loads, ramps, strict=True))
         self.set_loads(t)
         self._moves = moves
-        self.at(t)
+        self.at_time(t)
         return float(np.abs(saved["position"] - self.values.position).max())
 
-    def at(self, t: float) -> Ends:
+    def at_time(self, t: float) -> Ends:
         """Positions, frames and loads at t; the arrays returned are overwritten by the next call.
 
         t = infinity asks for what is given when everything has grown and turned in (motions stand at 0).
         """
         for k, motion in self.motions.items():
-            position, velocity, frame, spin = motion.at(t if np.isfinite(t) else 0.0)
+            position, velocity, frame, spin = motion.at_time(t if np.isfinite(t) else 0.0)
             self.values.position[k] = position
             self.velocity[k] = velocity
             if frame is not None:
@@ -357,11 +357,11 @@ class EndConditions:
         """Accelerations (2, 3) of the ends at t, m/s2, by a central difference of their velocities over dt."""
         if not self.motions:
             return np.zeros((2, 3))
-        self.at(t + 0.5 * dt)
+        self.at_time(t + 0.5 * dt)
         after = self.velocity.copy()
-        self.at(t - 0.5 * dt)
+        self.at_time(t - 0.5 * dt)
         out = (after - self.velocity) / dt
-        self.at(t)
+        self.at_time(t)
         return np.asarray(out)
 
     def bring_in(
@@ -387,7 +387,7 @@ class EndConditions:
             x._replace(ramp=duration) if x.end in self._turns and x.ramp is None else x for x in self._loads
         )
         self.set_loads(0.0)
-        self.at(0.0)
+        self.at_time(0.0)
         return [(k, angle) for k, (_, angle) in self._turns.items()]
 
     def _turn(self, t: float) -> None:
@@ -474,7 +474,7 @@ class DrivenEnd:
         path, numbers, record = self.path, self._numbers, self.record
         before = self._mean_velocity() if velocity is None and one_step else (STILL, 0.0)
         if begin < numbers[TO]:  # on its way
-            path[AT:SPEED], path[SPEED:THERE], frame, _ = self.at(begin)
+            path[AT:SPEED], path[SPEED:THERE], frame, _ = self.at_time(begin)
             path[FRAME:TURN] = np.ravel(frame)
         else:
             numbers[AT:THERE] = numbers[THERE:FRAME]
@@ -495,7 +495,7 @@ class DrivenEnd:
 
     def stay(self, begin: float, end: float, one_step: bool) -> None:
         """Be where it is at `begin` (s) until `end`; at rest there, unless its velocity follows from its places."""
-        self.set(begin, end, self.at(begin)[0], None if self.record[IMPLIED] else STILL, STILL, one_step)
+        self.set(begin, end, self.at_time(begin)[0], None if self.record[IMPLIED] else STILL, STILL, one_step)
 
     def _mean_velocity(self) -> tuple[Vector, float]:
         """Mean velocity (3,) m/s of the way that is over, and how long that took, s; of none: zeros."""
@@ -557,7 +557,7 @@ class DrivenEnd:
         """Be on the way of then."""
         self.path[:], self.record[:] = kept[:PATH], kept[PATH:]
 
-    def at(self, t: float) -> tuple[Floats, Floats, Floats, Floats]:
+    def at_time(self, t: float) -> tuple[Floats, Floats, Floats, Floats]:
         """Position (3,) m, velocity (3,) m/s, frame (3, 3), angular velocity (3,) 1/s at t (s); inertial."""
         p = self.path
         dt = max(p[TO] - p[FROM], 0.0)

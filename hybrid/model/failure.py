@@ -13,8 +13,8 @@ import numpy as np
 
 from hybrid.kernels.state.state import NO_TORSION, Line
 from hybrid.model.build import Model
-from hybrid.model.layout import LineOnBase
 from hybrid.model.line import with_spin_inertia
+from hybrid.model.mesh import LineOnBase
 from hybrid.model.network import NetworkModel
 from hybrid.scene.network import Network
 from hybrid.scene.points import Failure

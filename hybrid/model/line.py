@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.laws.axial_law import SHIFT, follow_law
-from hybrid.kernels.laws.axial_law_with_torque import follow_law_with_torque
+from hybrid.kernels.laws.axial_law import SHIFT, linearise_law
 from hybrid.kernels.laws.bending_law import (
+    EACH,
     ENERGY,
     FIRST_A,
     FIRST_B,
@@ -18,12 +18,13 @@ from hybrid.kernels.laws.bending_law import (
     HALF_B,
     LAST_A,
     LAST_B,
+    update_slip,
 )
-from hybrid.kernels.laws.bending_slip import EACH, follow_slip
 from hybrid.kernels.laws.element import NO_SPRING
+from hybrid.kernels.laws.tension_torque import linearise_law_with_torque
 from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
-from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH, Cable, blank_line_job, fill_line
+from hybrid.kernels.mesh.remesh import OF_POINTS, PER_LENGTH, Cable, blank_line_job, fill_line
 from hybrid.kernels.state.report import (
     AXIAL_LAW,
     BENDING_LAW,
@@ -52,7 +53,7 @@ from hybrid.kernels.state.state import (
     state_for,
 )
 from hybrid.model.material import Material, elastic_layer
-from hybrid.scene.stretch import Curve, Layer, slopes
+from hybrid.scene.section_laws import Curve, Layer, slopes
 
 # What inertia the sections of rods have.
 NO_INERTIA, ABOUT_CHORDS, WITH_SECTIONS = range(3)
@@ -88,7 +89,7 @@ def on_base(
 ) -> Line:  # fmt: skip
     """The line of a material with nodes s (N+1,) m; of_cell, rod: (N,) base cells of its cells, whether they are rod.
 
-    cable: that on the base cells; job: a table of kernels.mesh.fill_line.LineJob, None: a new one.
+    cable: that on the base cells; job: a table of kernels.mesh.remesh.LineJob, None: a new one.
     """
     h, of = np.diff(s), material.piece(0.5 * (s[:-1] + s[1:]))
     torque, twist = material.torque_by_tension(h, of)
@@ -113,7 +114,7 @@ def on_base(
 
 
 def made_of(material: Material, inertia: int = WITH_SECTIONS) -> Floats:
-    """(K, COLUMNS) of each piece of a material what cells of it are made of (kernels.mesh.fill_line)."""
+    """(K, COLUMNS) of each piece of a material what cells of it are made of (kernels.mesh.remesh)."""
     of = {name: getattr(material, name) for name in PER_LENGTH}
     if inertia == NO_INERTIA:
         of["rotary"] = of["polar"] = np.full(material.polar.size, np.nan)
@@ -238,7 +239,7 @@ def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Fl
     table = np.concatenate(rows)
     blank = blank_line(1)._replace(law=law, law_table=table)
     state = state_for(blank)
-    follow = follow_law_with_torque if material.tension_torque.size else follow_law
+    follow = linearise_law_with_torque if material.tension_torque.size else linearise_law
     address = follow.address(blank, state, state, no_work(), 0.0, 0.0)
     return law, table, np.array([address], np.int64)
 
@@ -278,7 +279,7 @@ def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
     found = line._replace(slip_law=law, slip_now=np.zeros_like(law))
     blank = blank_line(1)._replace(slip_law=law[:2].copy(), slip_now=law[:2].copy())
     state = state_for(blank)
-    address = follow_slip.address(blank, no_ends(), state, state, no_work(), 0)
+    address = update_slip.address(blank, no_ends(), state, state, no_work(), 0)
     return found._replace(slip_at=np.array([address], np.int64))
 
 

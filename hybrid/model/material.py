@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.kernels.laws.axial_law import BY_STIFFNESS, EXPONENTIAL, LINEAR, QUADRATIC
-from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
+from hybrid.kernels.mesh.remesh import OF_POINTS, PER_LENGTH
 from hybrid.kernels.state.report import (
     ADDED_MASS,
     BODIES,
@@ -42,7 +42,7 @@ from hybrid.model.sections import (
     torsional_stiffness,
 )
 from hybrid.scene.schema import BendRestrictor, BendStiffener, LineScene, Section, Vortices
-from hybrid.scene.stretch import Curve, Layer, slopes, stiffened
+from hybrid.scene.section_laws import Curve, Layer, slopes, stiffened
 
 # The tension below which bending counts as much as tension, in (EI w^2)^(1/3): there a cable bends under its weight as
 # much as its tension straightens it.  A cable without weight or stiffness has a least one, as a part of the scale.
@@ -113,7 +113,7 @@ class Material:
     rubs: bool = False  # whether friction with itself or other lines may turn it about its axis
     sections_turn: bool = False  # whether sections are given an inertia, which rods that come and go have too
     # (K,) of pieces, of each layer that slips: stiffness, N m2, slip moment, N m, what this and that gain by tension
-    # (kernels.laws.bending_slip; of one that is elastic the moment is below 0)
+    # (kernels.laws.bending_law; of one that is elastic the moment is below 0)
     layers: list[tuple[tuple[float, float, float, float], ...]] = field(default_factory=list)
 
     @property

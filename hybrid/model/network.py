@@ -10,34 +10,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.junctions.bodies import FORCE, FRAME, LEVEL, LIFT, MASS, MOMENT, NUMBERS, PLACE, STATE, STIFFNESS, V
-from hybrid.kernels.junctions.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
-from hybrid.kernels.laws.members import PIECE
+from hybrid.kernels.junctions.joined_lines import SEAT, TURNS, WITH_BODY, WITH_POINT
+from hybrid.kernels.laws.water import PIECE
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.obstacle_rows import MEETS_FROM, MEETS_TO, ONSET_OF, STRAND, TURNED
+from hybrid.kernels.state.report import MEETS_FROM, MEETS_TO, ONSET_OF, STRAND, TURNED
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.newton import TOLERANCE
-from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of, loads_of
-from hybrid.model.build import Model, build
-from hybrid.model.catenary_guess import pulls
-from hybrid.model.clamps import (
+from hybrid.model.bodies import (
+    BodyModel,
+    FairleadMotion,
+    KnownMotion,
     axes_of_point,
+    body_model,
     directions_at_rigid,
+    frame_of,
+    loads_of,
     seat_of,
     seated,
     untwisted,
     with_clamps,
 )
-from hybrid.model.contents import IDLE, Entry, obstacle_entries
+from hybrid.model.build import WHAT, Model, build
+from hybrid.model.catenary_guess import pulls
+from hybrid.model.contents import (
+    IDLE,
+    MEETS,
+    Entry,
+    Touching,
+    beside_others,
+    obstacle_entries,
+    that_may_meet,
+    touching_of,
+)
 from hybrid.model.ends import EndConditions, EndLoad
 from hybrid.model.initial_shape import dead_loads, first_state, hung
-from hybrid.model.lines_contact import MEETS, Touching, beside_others, that_may_meet, touching_of
 from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
 from hybrid.model.payout import naming_connection
-from hybrid.model.plane import WHAT
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
-from hybrid.scene.bodies import FixedBody
-from hybrid.scene.body_shapes import way_out
+from hybrid.scene.bodies import FixedBody, way_out
 from hybrid.scene.network import Network
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import Connections, Fairlead
@@ -96,7 +107,7 @@ class NetworkModel:
     bodies: tuple[BodyModel, ...]  # that are free; they are numbered behind the free points
     body_places: Floats  # (B, STATE) where they, and the points behind them, are first
     fairleads: Floats  # (L, 2, 3) m, of ends at free bodies, in axes of the body
-    seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.junctions.carried_frames)
+    seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.junctions.joined_lines)
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
     scenes: Mapping[str, LineScene]  # of the lines by name, with their points where the system has them
     resolution: NetworkResolution
@@ -637,7 +648,7 @@ def _least_energy(
 def _loads(model: Model) -> Floats:
     """Dead loads (N+1, 3) N on the nodes of a line: weight, full buoyancy, forces at its ends."""
     loads = dead_loads(model.line)
-    force = model.ends.at(np.inf).force
+    force = model.ends.at_time(np.inf).force
     loads[0] += force[0]
     loads[-1] += force[1]
     return loads

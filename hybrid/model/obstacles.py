@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import SceneError
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.state.report import (
     ALONG,
     AXIS,
     BEARING,
@@ -29,6 +29,7 @@ from hybrid.kernels.state.obstacle_rows import (
     FIXED,
     FLAT,
     FREE,
+    FRICTION,
     GROOVE,
     HALF_HEIGHT,
     HALF_LENGTH,
@@ -46,6 +47,7 @@ from hybrid.kernels.state.obstacle_rows import (
     NO_FACETS,
     NORMAL,
     OBSTACLE,
+    OBSTACLES,
     OFFSET,
     ONSET_OF,
     PLACE,
@@ -69,14 +71,13 @@ from hybrid.kernels.state.obstacle_rows import (
     TURNED,
     TURNS,
 )
-from hybrid.kernels.state.report import FRICTION, OBSTACLES
 from hybrid.kernels.state.state import NO_CARRIED, NO_MOVES, NO_OBSTACLES, Floats, Moves
 from hybrid.model.ends import PATH, DrivenEnd, Motion, table_of_motions
 from hybrid.model.payout import longest_out, whole_scene, winch_side
 from hybrid.model.sections import merged_sections, tension_scale
 from hybrid.scene.analysis import Straight
 from hybrid.scene.base import unit
-from hybrid.scene.body_shapes import Carried, CarriedBox, CarriedCylinder
+from hybrid.scene.bodies import Carried, CarriedBox, CarriedCylinder
 from hybrid.scene.mesh_file import Mesh, read_mesh
 from hybrid.scene.motion import Elevation, EndMotion
 from hybrid.scene.obstacles import (
@@ -233,7 +234,7 @@ def least_cells(scene: LineScene) -> float:
     return min(CELLS_PER_RADIUS * scene.length / min(radii), MOST_CELLS) if radii else 0.0
 
 
-# How obstacles of a scene move, as arrays for kernels.laws.obstacle_motion, and those that are set from outside.
+# How obstacles of a scene move, as arrays for kernels.laws.obstacles, and those that are set from outside.
 
 
 class Courses(NamedTuple):
@@ -287,7 +288,7 @@ def courses_of(scene: LineScene, rows: Floats, waves: Floats, ramp: float, eleva
     return Courses(table_of_motions(motions, position, frame, paths, frame), carried, driven)
 
 
-# Surfaces of triangles of obstacles as arrays for kernels.laws.facets: normals of their features, a tree of boxes.
+# Surfaces of triangles of obstacles as arrays for kernels.laws.surfaces: normals of their features, a tree of boxes.
 
 FLAT_EDGE = 1e-5  # rad; what turns by less at an edge is flat, as coordinates of single precision are
 STRAIGHT = 1e-4  # rad; edges whose directions differ by less are one

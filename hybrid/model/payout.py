@@ -17,12 +17,12 @@ from hybrid.kernels.reel import winch as w
 from hybrid.kernels.reel.reel import LEAVES
 from hybrid.kernels.state.report import SOIL
 from hybrid.kernels.state.state import Floats, Line, slip_size
-from hybrid.model.layout import Layout, LineOnBase
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of
 from hybrid.model.material import Material, material
-from hybrid.model.mesh import MOST_CELLS, Zone
+from hybrid.model.mesh import MOST_CELLS, Layout, LineOnBase, Zone
 from hybrid.model.sections import bending_stiffness, restrictors_of, stiffeners_of
-from hybrid.scene.payout import Payout
+from hybrid.scene.ends import Payout
+from hybrid.scene.motion_file import RecordRefused, check_file, read_table
 from hybrid.scene.schema import AdaptiveModel, LineScene, Section, Spread
 
 # The fewest cells that may be left.
@@ -491,8 +491,6 @@ def law_of(payout: Payout, length: float, duration: float, where: str = "payout"
 
 def _rows_of(path: str, length: float, where: str) -> dict[str, Floats]:
     """Rates or lengths over time of a file, by their key in the scene; length: m, at t = 0."""
-    from hybrid.scene.motion_file import RecordRefused, check_file, read_table
-
     name = Path(path).name
 
     def checked(_: str, header: list[str]) -> list[str]:

@@ -73,7 +73,7 @@ class Limited(NamedTuple):
     allowed_right: Floats
     finest: float
 
-    def at(self, places: np.ndarray) -> Limited:
+    def at_points(self, places: np.ndarray) -> Limited:
         """The same at some of the output points, by their numbers; none: at all of them."""
         return self._replace(allowed=self.allowed[places]) if places.size else self
 

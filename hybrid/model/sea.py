@@ -7,17 +7,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hybrid.kernels.laws.bed import HEIGHTS
-from hybrid.kernels.laws.obstacle_motion import carry_obstacles
+from hybrid.kernels.laws.obstacles import carry_obstacles
+from hybrid.kernels.laws.seabed import HEIGHTS
 from hybrid.kernels.laws.soil import LATERAL, LEFT_A, LEFT_L, NUMBERS, OVER, PART, STRENGTH, SUCTION, WEDGE
-from hybrid.kernels.state.obstacle_rows import ANGLE, EACH, INERTIA, ROLLED
-from hybrid.kernels.state.report import BREAKOUT, FRICTION, REMEMBERS, SEABED, SOIL
+from hybrid.kernels.state.report import ANGLE, BREAKOUT, EACH, FRICTION, INERTIA, REMEMBERS, ROLLED, SEABED, SOIL
 from hybrid.kernels.state.state import NO_SLOW, Floats, Sea, State, no_sea, with_waves
 from hybrid.model.ends import DrivenEnd, rise
 from hybrid.model.obstacles import courses_of, facet_tables, obstacle_rows
 from hybrid.model.sections import pressing
 from hybrid.scene.schema import CurrentProfile, LineScene, PowerLawCurrent, Seabed, UniformCurrent
-from hybrid.scene.spectra import (
+from hybrid.scene.wave_theory import (
     JonswapWaves,
     OchiHubbleWaves,
     PiersonMoskowitzWaves,
@@ -25,10 +24,18 @@ from hybrid.scene.spectra import (
     Spreading,
     SumOfWaves,
     TorsethaugenWaves,
+    wavenumber,
 )
-from hybrid.scene.stream_function import wavenumber
-from hybrid.scene.wave_files import FINE, shares
-from hybrid.scene.waves import GivenWaves, MeasuredWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
+from hybrid.scene.waves import (
+    FINE,
+    GivenWaves,
+    MeasuredWaves,
+    RecordedWaves,
+    RegularWaves,
+    StreamFunctionWaves,
+    Waves,
+    shares,
+)
 
 # Contact sets in over half the penetration of a cable at rest: it then rests on the linear part.
 ONSET = 0.5
@@ -45,7 +52,7 @@ class Surroundings:
     def __init__(self, values: Sea, names: tuple[str, ...] = (), driven: Mapping[str, DrivenEnd] | None = None) -> None:
         """names: of obstacles; driven: those of them that are set from outside."""
         self.values, self.names, self.driven = values, names, dict(driven or {})
-        self.at(np.inf)
+        self.at_time(np.inf)
 
     def on(self, cells: int) -> Surroundings:
         """The same sea around a line of another number of cells."""
@@ -62,7 +69,7 @@ class Surroundings:
         """The same sea and obstacles, with arrays of their own."""
         return Surroundings(values, self.names, self.driven)
 
-    def at(self, t: float) -> Sea:
+    def at_time(self, t: float) -> Sea:
         """The sea at t; t = infinity asks for what stays: the current fully grown, and no waves."""
         now = self.values.now
         now[0] = t if math.isfinite(t) else 0.0

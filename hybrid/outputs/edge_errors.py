@@ -7,7 +7,7 @@ so that runs on other cells, whose nodes lie otherwise beside it, may agree by c
 
     (T w')' - (EI w'')'' + q + P(-w, -dw/dt) = 0
 
-is therefore solved anew over some cells about the edge, each cut into parts (kernels.watch.contact_edges has the
+is therefore solved anew over some cells about the edge, each cut into parts (kernels.watch.observed_outputs has the
 symbols).  Loads q, weight, drag and inertia among them, are those that balance the nodes; beyond these cells the line
 stays.  An end stays where it is, with its moment or, where it is clamped, its direction.
 """
@@ -20,9 +20,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.state.state import Floats, Sea
-from hybrid.kernels.watch.contact_edges import (
+from hybrid.kernels.watch.observed_outputs import (
     WORK,
     Bed,
     Cuts,

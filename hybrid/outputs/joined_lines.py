@@ -17,7 +17,7 @@ from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Batch, Floats,
 from hybrid.kernels.watch.observed_outputs import observed_joined
 from hybrid.model.mesh import Zone
 from hybrid.outputs.observation import Observation, Touchdown, links, touchdown
-from hybrid.outputs.output_grid import Grid, Rows, linear
+from hybrid.outputs.observed_states import Grid, Rows, linear
 
 # What a batch has of the nodes and of the cells; the rest is of each output as it is.
 NODES_OF_BATCH, CELLS_OF_BATCH = ("r", "v", "vd"), ("e", "T", "a1", "w")

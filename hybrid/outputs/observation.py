@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.bending_law import RIGID
+from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.laws.soil import PRESSES
 from hybrid.kernels.march.link import link_of
 from hybrid.kernels.march.zone_torque import TORQUE, TURN, torsion_energy
@@ -33,8 +33,7 @@ from hybrid.kernels.state.report import (
     STRETCH_ENERGY,
 )
 from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line, Sea
-from hybrid.outputs.observed_states import ObservedStates, across, cross, size
-from hybrid.outputs.output_grid import means_beside, means_on_line
+from hybrid.outputs.observed_states import ObservedStates, across, cross, means_beside, means_on_line, size
 from hybrid.outputs.strains import EndLayer, between_nodes, part_without_spring, strains
 
 

@@ -1,4 +1,10 @@
-"""A batch of states on nodes, cells and ends of a line: what of it was computed, each array made once if needed.
+"""A batch of states, and the output grid that it is brought to.
+
+From a mesh to the fixed output grid: interpolation as sparse matrices, of second order and more.
+
+Zone by zone: a joint, or a point load, may be a kink, and nothing is drawn across it.
+
+A batch of states on nodes, cells and ends of a line: what of it was computed, each array made once if needed.
 
 Arrays have the node or cell first, then the component, and the nb outputs of the batch last: one numpy operation serves
 the batch.
@@ -6,19 +12,323 @@ the batch.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
+from itertools import pairwise
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.algebra.sparse_rows import add_rows, cubic_rows, linear_rows
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.kernels.watch.observed_outputs import observed
-from hybrid.outputs.output_grid import Grid, ends_of
+from hybrid.model.mesh import Zone
+
+Integers = NDArray[np.int64]
+NO_HINGES: Floats = np.zeros((3, 3))
+ROUND_OFF = 1e-9  # of a length: points that are nearer are the same
+
+
+class Rows(NamedTuple):
+    """A sparse matrix by rows: row i has weights[begin[i] : begin[i+1]] in the columns of the same places."""
+
+    begin: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    weights: Floats
+    outputs: int = 0  # 0: one matrix for all; else so many, one below the other, each for one output
+    size: int = 0  # columns of each
+
+    def __matmul__(self, x: Floats) -> Floats:
+        """The product with x (n, ...), along its first axis; of several matrices with x (n, ..., outputs)."""
+        if self.outputs:
+            one = self._replace(outputs=0)
+            apart = np.ascontiguousarray(np.moveaxis(x, -1, 0)).reshape(self.outputs * self.size, *x.shape[1:-1])
+            found = (one @ apart).reshape(self.outputs, -1, *x.shape[1:-1])
+            return np.ascontiguousarray(np.moveaxis(found, 0, -1))
+        out = np.zeros((self.begin.size - 1, math.prod(x.shape[1:])))
+        x = np.require(x, float, ("C", "W"))
+        add_rows(self.begin, self.columns, self.weights, x.reshape(x.shape[0], out.shape[1]), out)
+        return out.reshape(-1, *x.shape[1:])
+
+
+def _rows(count: int, most: int, make: Callable[..., None], *given: Any) -> Rows:
+    """Rows for so many points with at most `most` weights each, from a kernel."""
+    begin, columns, weights = np.empty(count + 1, np.int64), np.empty(most * count, np.int64), np.empty(most * count)
+    make(*given, begin, columns, weights)
+    return Rows(begin, columns[: begin[-1]], weights[: begin[-1]])
+
+
+def linear(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray, shift: np.ndarray | None = None) -> Rows:
+    """Interpolation along x[first] .. x[last], and beyond; where first = last, that one counts alone.
+
+    shift: (ns,) added to the columns of points.
+    """
+    shift = np.zeros(at.size, np.int64) if shift is None else shift
+    return _rows(at.size, 2, linear_rows, x, at, first, last, shift)
+
+
+def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone, ...]:
+    """What joints, and point loads, cut the line into: neighbours of the same kind are made one first.
+
+    loads: arc lengths (m) of floats, clumps and the like: tension jumps there, and a catenary has a kink.
+    """
+    whole: list[Zone] = []
+    for zone in zones:
+        if whole and whole[-1].kind == zone.kind:
+            whole[-1] = Zone(zone.kind, whole[-1].s_a, zone.s_b)
+        else:
+            whole.append(zone)
+    parts: list[Zone] = []
+    for zone in whole:
+        near = 1e-9 * whole[-1].s_b
+        kinks = [x for x in loads if zone.s_a + near < x < zone.s_b - near]
+        bounds = [zone.s_a, *kinks, zone.s_b]
+        parts += [Zone(zone.kind, a, b) for a, b in pairwise(bounds)]
+    return tuple(parts)
+
+
+class SpanEnds(NamedTuple):
+    """The ends of stretches, first all beginnings, then all ends."""
+
+    row: Integers  # of the sides of all nodes
+    node: Integers
+    cell: Integers  # beside it, in the stretch
+    inner: Integers  # the next node in the stretch
+    inward: Integers  # 1 or -1: from row to row, into the stretch
+
+
+def ends_of(spans: Integers) -> SpanEnds:
+    """Ends of stretches (n, 3): first node, last node, row of the first side."""
+    a, b, o = spans.T
+    one = np.ones_like(a)
+    pairs = (o, o + b - a), (a, b), (a, b - 1), (a + 1, b - 1), (one, -one)
+    return SpanEnds(*(np.concatenate(pair) for pair in pairs))
+
+
+class Grid:
+    """Interpolation from a mesh with its zones to output points s (ns,), as sparse matrices, made when asked for.
+
+    nodes: cubic, from node values (positions, velocities); chords: linear, from node values, across joints as well
+    (depth, which the contact force is integrated over); cells: linear, from values at
+    the middle of the cells; held: the same with the values at both ends of the line as
+    well (tensions, which the supports know); sides: linear, from node values that may differ on the two
+    sides of a joint (one entry per stretch and node, `side_nodes`).  A point on a joint
+    shows the side before it, or the one `after` it.
+    """
+
+    def __init__(
+        self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
+        changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
+        hinges: Floats = NO_HINGES,
+    ) -> None:  # fmt: skip
+        """Points s (ns,) m on a mesh with nodes nodes_s (N+1,) m.
+
+        loads: arc lengths, m, that cut the line, as of `stretches`; changes: those of them where one section ends
+        and the next begins; after: a point on a cut shows the side after it; kept: those of loads where no force acts;
+        hinges: (2 + K, 3) as of `Material`.
+        """
+        nodes_s = np.require(nodes_s, float, ("C", "W"))  # so that kernels have one signature
+        self.loads, self.changes, self.after, self.hinges = tuple(loads), tuple(changes), after, hinges
+        self.parts, self._kinds = stretches(zones, loads), [zone.kind for zone in zones]
+        bounds = np.array([self.parts[0].s_a, *(part.s_b for part in self.parts)])
+        cuts = np.abs(nodes_s - bounds[:, None]).argmin(axis=1)  # their nodes
+        # first node, last node, offset of the stretch's sides: every joint before it has one side more
+        self.spans = [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts.tolist()))]
+        self.side_nodes = np.concatenate([np.arange(a, b + 1) for a, b, _ in self.spans])
+
+        self._cuts, self._kept = cuts, frozenset(kept)
+        self._joints = bounds[1:-1] + (-1e-12 if after else 1e-12) * nodes_s[-1]
+        self._put(nodes_s, s)
+
+    def _put(self, nodes_s: Floats, s: Floats) -> None:
+        self._x, self.s = nodes_s, np.require(s, float, ("C", "W"))
+        self._stretch = np.searchsorted(self._joints, s)
+        self._first, self._last = self._cuts[self._stretch], self._cuts[self._stretch + 1]  # of each point's stretch
+
+    def of_line_of(self, node: int) -> NDArray[np.bool_]:
+        """(ns,) whether points lie on the line that a node is of: of one line all do."""
+        return np.ones(self.s.size, bool)
+
+    @property
+    def in_catenary(self) -> NDArray[np.bool_]:
+        """(ns,) whether points lie in a catenary."""
+        return np.array([part.kind == "catenary" for part in self.parts])[self._stretch]
+
+    def suits(self, nodes_s: Floats, zones: Sequence[Zone]) -> bool:
+        """Whether a line of these nodes (N+1,) m and zones has the same cells in the same stretches, but for its ends.
+
+        Its nodes are the same except the first or the last few, and it is cut at nodes that stay.
+        """
+        if nodes_s.size != self._x.size or [zone.kind for zone in zones] != self._kinds:
+            return False
+        if not self.loads and len(zones) == 1:
+            return True
+        inside = self._cuts[1:-1]
+        low, high, near = nodes_s[0], nodes_s[-1], 1e-9 * nodes_s[-1]
+        cuts = [x for x in self.loads if low + near < x < high - near]
+        cuts += [zone.s_a for zone in zones[1:]]
+        found = np.unique(cuts) if cuts else np.zeros(0)
+        same = found.size == inside.size and bool(np.all(found == nodes_s[inside]))
+        return same and bool(np.all(found == self._x[inside]))
+
+    def moved(self, nodes_s: Floats, s: Floats) -> Grid:
+        """The grid of the same stretches with nodes (N+1,) m elsewhere in them, and points s (ns,) m."""
+        other = Grid.__new__(Grid)
+        for name in (
+            "loads",
+            "changes",
+            "after",
+            "hinges",
+            "parts",
+            "spans",
+            "side_nodes",
+            "_cuts",
+            "_kept",
+            "_joints",
+            "_kinds",
+        ):
+            setattr(other, name, getattr(self, name))
+        other._put(nodes_s, s)
+        return other
+
+    @property
+    def points(self) -> Floats:
+        """(ns, 1) m, or (ns, nb) of a grid that varies: its points, on the line."""
+        return self.s[:, None]
+
+    @cached_property
+    def _middles(self) -> Floats:
+        return np.asarray(0.5 * (self._x[:-1] + self._x[1:]))
+
+    @cached_property
+    def nodes(self) -> Rows:
+        """Hermite, with slopes of parabolas through the three nearest nodes; of one cell alone there is no other."""
+        given = (self._x, self._middles, self.s, self._first, self._last, np.empty(4))
+        return _rows(self.s.size, 4, cubic_rows, *given)
+
+    @cached_property
+    def cells(self) -> Rows:
+        return linear(self._middles, self.s, self._first, self._last - 1)
+
+    @cached_property
+    def chords(self) -> Rows:
+        n, first = self._x.size, np.zeros_like(self._first)
+        return linear(self._x, self.s, first, np.full_like(first, n - 1))
+
+    @cached_property
+    def held(self) -> Rows:
+        """Columns: start, cells, end; next to an end its value takes part."""
+        return linear(self._held_at, self.s, *self._held_between)
+
+    @property
+    def _held_at(self) -> Floats:
+        return np.concatenate([self._x[:1], self._middles, self._x[-1:]])
+
+    @property
+    def _held_between(self) -> tuple[np.ndarray, np.ndarray]:
+        """Columns of `held` between which each point lies.
+
+        In a stretch of one cell the values beside it take part, but across point loads: tension goes on at a joint.
+        """
+        x, middles = self._x, self._middles
+        start, end = self._first + 1, self._last.copy()
+        single = start == end
+        if single.any():
+            loads = np.array([x for x in self.loads if x not in self._kept])
+            goes_on = np.array([not (np.abs(x[k] - loads) < 1e-9 * x[-1]).any() for k in self._cuts])
+            start -= single & goes_on[self._stretch]
+            end += single & goes_on[self._stretch + 1]
+        start[self.s < middles[0]] = 0
+        end[self.s > middles[-1]] = x.size
+        return start, end
+
+    @cached_property
+    def sides(self) -> Rows:
+        return linear(self._x, self.s, self._first, self._last, self._stretch)
+
+
+class VaryingGrid(Grid):
+    """A `Grid` for each of nb outputs, on the same stretches: its matrices multiply the values of each by its own."""
+
+    def __init__(
+        self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
+        changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
+        hinges: Floats = NO_HINGES,
+    ) -> None:  # fmt: skip
+        """Points s (nb, ns) m on nodes nodes_s (nb, N+1) m of every output.
+
+        zones: of the first output; the rest as of `Grid`.
+        """
+        super().__init__(nodes_s[0], zones, s[0], loads, changes, after, kept, hinges)
+        self._grids = [self.moved(x, at) for x, at in zip(nodes_s, s, strict=True)]
+
+    def _stacked(self, size: int, of: Callable[[Grid], Rows]) -> Rows:
+        """One matrix below the other; size: columns of each."""
+        parts = [of(grid) for grid in self._grids]
+        ends = np.cumsum([0, *(x.columns.size for x in parts)])
+        begin = np.concatenate([*(x.begin[:-1] + end for x, end in zip(parts, ends[:-1], strict=True)), ends[-1:]])
+        columns = np.concatenate([x.columns + k * size for k, x in enumerate(parts)])
+        return Rows(begin, columns, np.concatenate([x.weights for x in parts]), len(parts), size)
+
+    @property
+    def points(self) -> Floats:
+        return np.stack([grid.s for grid in self._grids], axis=1)
+
+    @cached_property
+    def nodes(self) -> Rows:
+        return self._stacked(self._x.size, lambda grid: grid.nodes)
+
+    @cached_property
+    def cells(self) -> Rows:
+        return self._stacked(self._x.size - 1, lambda grid: grid.cells)
+
+    @cached_property
+    def chords(self) -> Rows:
+        return self._stacked(self._x.size, lambda grid: grid.chords)
+
+    @cached_property
+    def held(self) -> Rows:
+        return self._stacked(self._x.size + 1, lambda grid: grid.held)
+
+    @cached_property
+    def sides(self) -> Rows:
+        return self._stacked(len(self.side_nodes), lambda grid: grid.sides)
+
+
+# --- means over the lengths that output points stand for, so that nothing between them is missed ---
+
+
+def means_beside(s: Floats, nodes: Floats, values: Floats) -> Floats:
+    """Means (ns, nb) of values (nb, N+1) at nodes (N+1,) m, from halfway to the point before to halfway to the next.
+
+    s: (ns,) m, increasing, two at least.  The means times those lengths add up to the integral.
+    """
+    middles = 0.5 * (s[1:] + s[:-1])
+    first, last = 2.0 * s[0] - middles[0], 2.0 * s[-1] - middles[-1]
+    edges = np.concatenate([[max(first, nodes[0])], middles, [min(last, nodes[-1])]])
+    h = np.diff(nodes)
+    total = np.zeros_like(values)
+    np.cumsum(0.5 * h * (values[:, 1:] + values[:, :-1]), axis=1, out=total[:, 1:])
+    cell = np.clip(np.searchsorted(nodes, edges, side="right") - 1, 0, h.size - 1)
+    x = edges - nodes[cell]
+    slope = (values[:, cell + 1] - values[:, cell]) / h[cell]
+    upto = total[:, cell] + values[:, cell] * x + 0.5 * slope * x * x
+    return np.asarray((np.diff(upto, axis=1) / np.diff(edges)).T)
+
+
+def means_on_line(s: Floats, nodes: Floats, values: Floats) -> Floats:
+    """The same (ns,) of one output (N+1,), whose points s (ns,) m may be the same where line is still on a reel."""
+    points, which = np.unique(s, return_inverse=True)
+    apart = np.append(True, np.diff(points) > ROUND_OFF * (nodes[-1] - nodes[0]))
+    points, which = points[apart], (np.cumsum(apart) - 1)[which]
+    if points.size == 1:
+        return np.full(s.size, np.interp(points[0], nodes, values))
+    return np.asarray(means_beside(points, nodes, values[None])[which, 0])
 
 
 def last(x: Floats) -> Floats:

@@ -19,7 +19,7 @@ from hybrid.kernels.contact.self_contact_pairs import WINDOW, Contact
 from hybrid.kernels.contact.self_distance import NEIGHBOURS
 from hybrid.kernels.laws.obstacles import cells_met, distances, put_obstacles, thinner_cells
 from hybrid.kernels.laws.seabed import G1, G2
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.state.report import (
     DAMPING,
     FIXED,
     ONSET_OF,
@@ -213,7 +213,7 @@ def obstacle_fields(names: Sequence[str]) -> list[Field]:
 
 
 def obstacle_values(names: Sequence[str], seen: Floats) -> dict[str, Floats]:
-    """Their values (nb, 3); seen: (nb, M, SEEN) of kernels.state.obstacle_rows."""
+    """Their values (nb, 3); seen: (nb, M, SEEN) of kernels.state.report."""
     found = {}
     for k, name in enumerate(names):
         x = seen[:, k]

@@ -19,13 +19,13 @@ from hybrid.model.sections import NEAR, OutputPoints
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
 from hybrid.outputs.observation import Observation, Probe
+from hybrid.outputs.observed_states import NO_HINGES, Grid, VaryingGrid
 from hybrid.outputs.obstacle_forces import (
     obstacle_fields,
     obstacle_force_fields,
     obstacle_force_values,
     obstacle_values,
 )
-from hybrid.outputs.output_grid import NO_HINGES, Grid, VaryingGrid
 from hybrid.outputs.quantities import Quantities
 from hybrid.solve.stepper import POWERS
 from hybrid.store.format import Field

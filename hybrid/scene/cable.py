@@ -21,17 +21,19 @@ from hybrid.scene.base import (
     number_or_list,
     refuse,
 )
-from hybrid.scene.code_check import Code, RiserCode, capacity_findings
 from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent
-from hybrid.scene.stretch import (
+from hybrid.scene.section_laws import (
+    Code,
     Creep,
     Curve,
     DynamicStiffness,
     Layer,
+    RiserCode,
     SlipLayer,
     Syrope,
     TensionStrain,
     bending_findings,
+    capacity_findings,
     first_loading_findings,
     interpolated,
     layers_of,

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any, Protocol
 
-from hybrid.scene import attachment_checks, combinations, motion_checks, sea_checks, start_checks
+from hybrid.scene import combinations, motion_checks, sea_checks, start_checks
+from hybrid.scene import start_checks as attachment_checks
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -29,11 +30,10 @@ from hybrid.scene.analysis import (
     ZonesModel,
 )
 from hybrid.scene.base import Finding, Pair, Place
-from hybrid.scene.body_shapes import Carried
+from hybrid.scene.bodies import Carried
 from hybrid.scene.cable import Cable, Contact, Environment, Section
-from hybrid.scene.ends import Clamped, Ends, Free, Pinned
+from hybrid.scene.ends import Clamped, Ends, Free, Payout, Pinned
 from hybrid.scene.obstacles import Obstacles, SheaveObstacle
-from hybrid.scene.payout import Payout
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.quantities import of_one_line
 from hybrid.scene.start_checks import SAME_LENGTH

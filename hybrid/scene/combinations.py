@@ -16,9 +16,8 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import AdaptiveModel, RodModel, RodZone, ZonesModel
 from hybrid.scene.base import Finding, Place, Table, dotted
 from hybrid.scene.cable import Cable, Section
-from hybrid.scene.end_loads import Load
-from hybrid.scene.ends import Clamped, Ends, Pinned
-from hybrid.scene.payout import Payout
+from hybrid.scene.ends import Clamped, Ends, Payout, Pinned
+from hybrid.scene.motion_tables import Load
 from hybrid.scene.start_checks import SAME_LENGTH
 from hybrid.scene.waves import StreamFunctionWaves
 

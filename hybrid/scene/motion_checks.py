@@ -8,22 +8,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from hybrid.scene.analysis import Time
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.cable import Cable, Environment
-from hybrid.scene.end_loads import GivenLoad, Row
 from hybrid.scene.ends import End, Ends, Triple
-from hybrid.scene.motion_tables import SHIFTS, Harmonic, Motion, Vessel
+from hybrid.scene.motion_file import (
+    MISSED,
+    Record,
+    RecordRefused,
+    fastest_in,
+    missed_between,
+    read_history,
+    read_record,
+    shortest_in,
+)
+from hybrid.scene.motion_tables import SHIFTS, GivenLoad, Harmonic, Motion, Row, Vessel
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.sea_checks import deepest_place
-
-if TYPE_CHECKING:
-    from hybrid.scene.motion_file import Record
-
 
 # A harmonic motion counts as starting from rest below this part of its top speed: round-off.
 AT_REST = 1e-6
@@ -164,7 +169,6 @@ def _harmonic_jump(motion: Motion) -> Iterator[Finding]:
 def _judged(end: End | Held, motion: Motion, duration: float | None) -> tuple[Record | None, list[Finding]]:
     """A motion file, if it can be read, and what is wrong with it."""
     from hybrid.scene.motion import motion_record
-    from hybrid.scene.motion_file import RecordRefused
     from hybrid.scene.motion_jumps import judge_record
 
     try:
@@ -185,8 +189,7 @@ def _judged(end: End | Held, motion: Motion, duration: float | None) -> tuple[Re
 
 def _vessel(end: End | Held, vessel: Vessel) -> Iterator[Finding]:
     """A vessel whose table cannot be read, or whose fairlead is not where the end is held."""
-    from hybrid.scene.motion_file import RecordRefused
-    from hybrid.scene.rao_file import read_rao
+    from hybrid.scene.motion import read_rao
 
     try:
         if vessel.rao is not None:
@@ -229,8 +232,6 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
             fix = f"over: {_rounded_up(enough)} (s) or more, if way and time are meant so"
             yield Finding(("travel", "over"), limit_text(speed, acceleration), fix, given)
     if record is not None:
-        from hybrid.scene.motion_file import fastest_in
-
         speed, acceleration = fastest_in(record)
         if stretch(speed, acceleration) > most:
             given = f"{record.name}: up to {speed:.3g} m/s and {acceleration:.3g} m/s^2"
@@ -274,7 +275,6 @@ def lasting_period(moved: Iterable[tuple[End | Held, Motion]], environment: Envi
         times += [h.period for _, _, h in _periods((), motion)]
         if motion.file is not None:
             from hybrid.scene.motion import motion_record
-            from hybrid.scene.motion_file import shortest_in
 
             times.append(shortest_in(motion_record(motion, end.held_position, end.held_tangent is not None)))
     return min(times, default=math.inf)
@@ -329,8 +329,6 @@ def prescribed_twist(ends: Ends) -> float:
         harmonics = [h for name, given in motion.harmonics().items() if name not in SHIFTS for h in given]
         twist += math.radians(sum(abs(h.amplitude) for h in harmonics))
         if motion.file is not None:
-            from hybrid.scene.motion_file import read_record
-
             rotation = read_record(motion.file).rotation
             if rotation is not None:
                 twist += math.radians(float(abs(rotation).max()) * math.sqrt(3.0))
@@ -368,8 +366,6 @@ def _unresolved(
         fix = f"ramp: {2 * waves.main_period:.3g}, two periods"
         yield Finding(("environment", "fluid", "waves", "ramp"), expected, fix, f"{waves.ramp:g}")
     if record is not None:
-        from hybrid.scene.motion_file import missed_between
-
         missed = missed_between(record, step)
         if missed is not None:
             where = dotted((*here, "file"))
@@ -421,7 +417,6 @@ def _unreadable(load: GivenLoad) -> Finding | None:
     """Why the file of a load cannot be used."""
     if load.load.file is None:
         return None
-    from hybrid.scene.motion_file import RecordRefused, read_history
 
     try:
         read_history(load.load.file)
@@ -432,8 +427,6 @@ def _unreadable(load: GivenLoad) -> Finding | None:
 
 def _missed(rows: Sequence[Row], step: float) -> float | None:
     """Time of a row that departs from a line between two steps by a large part of the range of the history."""
-    from hybrid.scene.motion_file import MISSED
-
     table = np.array(rows)
     times, values = table[:, 0], table[:, 1:]
     reach = float(np.ptp(values, axis=0).max())
@@ -515,7 +508,7 @@ def moved_into_the_ground(
     moving = EndMotion(motion, place)
     deepest, when, there = 0.0, 0.0, place
     for t in _times(motion, record, time):
-        x, y, z = moving.at(t)[0].tolist()
+        x, y, z = moving.at_time(t)[0].tolist()
         under = bed.height(x, y) - z
         if under > max(sunk, deepest):
             deepest, when, there = under, t, (x, y, z)

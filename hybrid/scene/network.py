@@ -43,10 +43,9 @@ from hybrid.scene.base import (
 )
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
 from hybrid.scene.cable import Cable, Contact, Section
-from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import AtPoint, Clamped, End, Ends, Guided, Pinned, Triple
 from hybrid.scene.motion_checks import Held, lasting_period, moved_in
-from hybrid.scene.motion_tables import Motion
+from hybrid.scene.motion_tables import GivenLoad, Motion
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.points import (
     WINCH,

@@ -27,6 +27,7 @@ from hybrid.scene.base import (
     turned,
     unit,
 )
+from hybrid.scene.motion_file import readable
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.points import Name
 
@@ -246,7 +247,6 @@ class MeshObstacle(_Rotated):
     @model_validator(mode="after")
     def _readable(self) -> Self:
         from hybrid.scene.mesh_file import WHAT, read_mesh
-        from hybrid.scene.motion_file import readable
 
         with readable(self.file, WHAT):
             read_mesh(self.file)

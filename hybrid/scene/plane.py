@@ -17,6 +17,7 @@ from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.combinations import PLANE, refused
 from hybrid.scene.ends import End, Ends, Triple
+from hybrid.scene.motion_file import RecordRefused, read_record
 from hybrid.scene.motion_tables import SHIFTS, TURNS, Motion
 from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, UniformCurrent
 
@@ -224,8 +225,6 @@ def _moved(motion: Motion, here: Place) -> Iterator[Witness]:
             yield Witness((*here, "vessel"), "along", axis)
         return
     if motion.file is not None:
-        from hybrid.scene.motion_file import RecordRefused, read_record  # numpy, for scenes that need it
-
         try:
             record = read_record(motion.file)
         except RecordRefused:

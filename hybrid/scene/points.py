@@ -24,10 +24,8 @@ from hybrid.scene.base import (
     parallel,
     refuse,
 )
-from hybrid.scene.end_loads import GivenLoad, Loading, Triple
-from hybrid.scene.ends import BEND_STIFFNESS, PAYOUT, TWISTED_BY, AtPoint, Body, Free, moved_guides
-from hybrid.scene.motion_tables import Motion
-from hybrid.scene.payout import Payout
+from hybrid.scene.ends import BEND_STIFFNESS, PAYOUT, TWISTED_BY, AtPoint, Body, Free, Payout, moved_guides
+from hybrid.scene.motion_tables import GivenLoad, Loading, Motion, Triple
 
 _BREAK = (
     "when what holds the point fails, at a time or after the first step with so large a force of its lines: they hang "

@@ -1,8 +1,27 @@
-"""The one root of a scene: points, bodies, lines and their environment, also where it was written as a cable."""
+"""The one root of a scene, and the short form of one line.
+
+The scene of a cable as a network of one line, and where the keys of the one are in the other.
+
+Words of the short form, left, and of the network:
+
+    cable.sections, cable.attachments        lines.cable.sections, lines.cable.attachments
+    model, mesh, resolution, contact, initial    lines.cable.model, ...
+    ends.end of kind pinned or clamped       points.end of kind fixed; how the line is held: lines.cable.connections.end
+    ends.end of kind guided                  points.end of kind guided, with such a connection
+    ends.end of kind free or body            points.end of kind free
+    everything else                          as it is
+
+The line is called `cable`, and the points are called as the ends are.
+
+The one root of a scene: points, bodies, lines and their environment, also where it was written as a cable.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import (
@@ -16,12 +35,191 @@ from pydantic import (
 from pydantic.functional_validators import ModelWrapValidatorHandler as Handler
 from pydantic.json_schema import models_json_schema
 
-from hybrid.scene.base import Finding, refuse
+from hybrid.errors import ComputationError, SceneError
+from hybrid.scene.analysis import CatenaryModel, Output
+from hybrid.scene.base import Finding, Place, dotted, refuse
+from hybrid.scene.cable import Contact
+from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned, Release
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.network import Network
 from hybrid.scene.network_checks import findings_of
+from hybrid.scene.points import ClampedConnection, Connection, Failure, FreePoint, Point
 from hybrid.scene.schema import LineScene, SceneTables, standard_schema
-from hybrid.scene.short_form import ShortForm, line_of, network_tables, short_form, tables_of_cable
+
+LINE = "cable"
+ENDS = ("start", "end")
+# Tables of a scene that a line has.
+OF_LINE = ("mesh", "resolution", "contact", "initial")
+# Those that both forms have.
+SAME = ("title", "environment", "obstacles", "time", "accuracy", "dimension")
+# Keys of the output that are by name of the line.
+OF_PLACES = ("points", "history")
+# Of an end by its kind: the kind of its point, what keys of the point are called there, which keys the connection has.
+POINTS: dict[str, tuple[str, dict[str, str], tuple[str, ...]]] = {
+    "pinned": ("fixed", {"release_at": "break_at"}, ("payout",)),
+    "clamped": (
+        "fixed", {"release_at": "break_at"}, ("tangent", "normal", "turns", "swivel", "bend_stiffness", "payout"),
+    ),
+    "guided": ("guided", {}, ("tangent", "normal", "turns")),
+    "free": ("free", {}, ()),
+    "body": ("free", {"thrust": "force"}, ()),
+}  # fmt: skip
+
+# What networks say of points, and what is said of ends.
+WORDS = {
+    "gives way": "is let go",
+    "break_at": "release_at",
+    "; what came loose is free": " and is free",
+    "a moment at a point": "an end moment",
+    "points and bodies move otherwise": "the ends move otherwise",
+}
+
+
+@dataclass(frozen=True)
+class ShortForm:
+    """Where keys of a network are in the scene that it was made of.
+
+    pairs: places in the network and in the scene; what is below such a place is below the other one.  Without any the
+    scene is that network.  names: of the lines of the network, each as in the scene: "" of the one without a name.
+    """
+
+    pairs: tuple[tuple[Place, Place], ...]
+    names: Mapping[str, str]
+
+    def place(self, at: Place) -> Place:
+        """Where a key of the network is in the scene."""
+        known = [x for x in self.pairs if at[: len(x[0])] == x[0]]
+        if not known:
+            return at
+        there, here = max(known, key=lambda x: len(x[0]))
+        return (*here, *at[len(there) :])
+
+    def text(self, message: str) -> str:
+        """A message about the network in words of the scene."""
+        if not self.pairs:
+            return message
+        for there, here in sorted(self.pairs, key=lambda x: -len(x[0])):
+            message = re.sub(rf"\b{re.escape(dotted(there))}\b", dotted(here), message)
+        message = re.sub(rf"\bline {LINE}\b", "the cable", message)
+        for words, instead in WORDS.items():
+            message = message.replace(words, instead)
+        return re.sub(r"\bpoint (start|end)\b", r"ends.\1", message)
+
+    @contextmanager
+    def in_words(self) -> Iterator[None]:
+        """What fails within, of the network, is said in words of the scene."""
+        try:
+            yield
+        except ComputationError as error:
+            raise self.error(error) from None
+        except SceneError as error:
+            said = [
+                replace(
+                    x,
+                    where=self.text(x.where),
+                    value=self.text(x.value),
+                    expected=self.text(x.expected),
+                    fix=self.text(x.fix),
+                )
+                for x in error.complaints
+            ]
+            raise SceneError(said, error.file) from None
+
+    def error(self, error: ComputationError) -> ComputationError:
+        """What has failed of the network, in words of the scene."""
+        if not self.pairs:
+            return error
+        detail, first = re.sub(r"^the cable(; |$)", "", self.text(error.detail)), self.text(error.first)
+        return ComputationError(error.outcome, error.t, error.s, detail, error.snapshot, first)
+
+    def finding(self, found: Finding) -> Finding:
+        """What is wrong with the network, of the scene."""
+        given = None if found.given is None else self.text(found.given)
+        return Finding(self.place(found.at), self.text(found.expected), self.text(found.fix), given)
+
+
+def network_tables(scene: LineScene) -> dict[str, Any]:
+    """The tables of the network of a cable."""
+    made = {name: _point_of(getattr(scene.ends, name)) for name in ENDS}
+    line: dict[str, Any] = {name: getattr(scene, name) for name in OF_LINE if getattr(scene, name) is not None}
+    line |= {"start": "start", "end": "end", "connections": {name: held for name, (_, held) in made.items()}}
+    line |= {key: getattr(scene.cable, key) for key in type(scene.cable).model_fields}
+    if "model" in scene.model_fields_set or not isinstance(scene.model, CatenaryModel):
+        line["model"] = scene.model  # else a catenary stands for none, and is a rod where it goes slack
+    tables: dict[str, Any] = {
+        "points": {name: point for name, (point, _) in made.items()}, "lines": {LINE: line},
+        "output": _output(scene.output),
+    }  # fmt: skip
+    return tables | {name: getattr(scene, name) for name in SAME if getattr(scene, name) is not None}
+
+
+def line_of(network: Network) -> LineScene:
+    """The cable of which a network was made."""
+    line = network.lines[LINE]
+    tables: dict[str, Any] = {name: getattr(line, name) for name in (*OF_LINE, "cable")}
+    tables |= {name: getattr(network, name) for name in SAME}
+    tables |= {"model": line.chosen_model, "accuracy": line.accuracy or network.accuracy}
+    tables["ends"] = Ends(**{name: _end_of(network.points[name], getattr(line.connections, name)) for name in ENDS})
+    kept = {key: getattr(network.output, key) for key in Output.model_fields}
+    kept |= {"points": network.output.points_of(LINE), "history": network.output.history.get(LINE)}
+    kept["quantities"] = {name: q.model_copy(update={"line": None}) for name, q in kept["quantities"].items()}
+    return LineScene.model_construct(**tables, output=Output.model_construct(**kept))
+
+
+def tables_of_cable(update: Mapping[str, Any]) -> dict[str, Any]:
+    """Of changed tables those that a cable has, and a network has not, or of another kind."""
+    own = {"cable", "ends", "model", *OF_LINE} - {"contact"}
+    return {key: x for key, x in update.items() if key in own or type(x) in (Output, Contact)}
+
+
+def short_form(scene: LineScene) -> ShortForm:
+    """Where the keys of the network of a cable are in its scene."""
+    pairs: list[tuple[Place, Place]] = [(("lines", LINE), ("cable",))]
+    pairs += [(("lines", LINE, name), (name,)) for name in ("model", *OF_LINE)]
+    pairs += [(("output", name, LINE), ("output", name)) for name in OF_PLACES]
+    for name in ENDS:
+        _, called, _ = POINTS[getattr(scene.ends, name).kind]
+        pairs += [(("points", name), ("ends", name)), (("lines", LINE, "connections", name), ("ends", name))]
+        pairs += [(("points", name, there), ("ends", name, here)) for here, there in called.items()]
+    return ShortForm(tuple(pairs), {LINE: ""})
+
+
+def _point_of(end: End) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The point of an end, and how the line is connected to it."""
+    kind, called, connected = POINTS[end.kind]
+    given = {key: getattr(end, key) for key in type(end).model_fields if key != "kind"}
+    given = {key: x for key, x in given.items() if x is not None}
+    point = {called.get(key, key): _table(x) for key, x in given.items() if key not in connected}
+    held = {key: x for key, x in given.items() if key in connected}
+    return {"kind": kind} | point, {"kind": "clamped" if "tangent" in held else "pinned"} | held
+
+
+def _end_of(point: Point, held: Connection) -> End:
+    """The end of a cable from its point and how the line is connected to that."""
+    clamped, body = isinstance(held, ClampedConnection), isinstance(point, FreePoint) and point.is_body
+    made = {"fixed": Clamped if clamped else Pinned, "guided": Guided, "free": Body if body else Free}[point.kind]
+    _, called, connected = POINTS[made.model_fields["kind"].default]
+    keys = [key for key in made.model_fields if key != "kind"]
+    given = {key: getattr(held if key in connected else point, called.get(key, key)) for key in keys}
+    if isinstance(when := given.get("release_at"), Failure):
+        given["release_at"] = Release(time=when.time, tension=when.tension)
+    end: End = made(**given)
+    return end
+
+
+def _table(value: Any) -> Any:
+    """When an end is let go, as a point says it; all else as it is."""
+    return Failure(time=value.time, tension=value.tension) if isinstance(value, Release) else value
+
+
+def _output(output: Output) -> dict[str, Any]:
+    """What is kept, by the name of the line where lines have their own."""
+    found = {key: getattr(output, key) for key in type(output).model_fields if getattr(output, key) is not None}
+    found["quantities"] = {name: q.model_copy(update={"line": LINE}) for name, q in output.quantities.items()}
+    for key in OF_PLACES:
+        if isinstance(found.get(key), tuple):
+            found[key] = {LINE: found[key]}
+    return found
 
 
 def names_lines(data: Any) -> bool:

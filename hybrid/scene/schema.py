@@ -43,10 +43,9 @@ from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, 
 from hybrid.scene.base import Table, Text, Vector, refuse
 from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section, Vortices
 from hybrid.scene.checks import contradictions
-from hybrid.scene.end_loads import Load
 from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned
 from hybrid.scene.motion_checks import lasting_period, moved_in
-from hybrid.scene.motion_tables import Harmonic, Motion, Travel
+from hybrid.scene.motion_tables import Harmonic, Load, Motion, Travel
 from hybrid.scene.obstacles import (
     BoxObstacle,
     CylinderObstacle,
@@ -66,7 +65,7 @@ from hybrid.scene.sea import (
     Seabed,
     UniformCurrent,
 )
-from hybrid.scene.spectra import (
+from hybrid.scene.wave_theory import (
     JonswapWaves,
     OchiHubbleWaves,
     PiersonMoskowitzWaves,

@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from hybrid.scene.analysis import Equilibrium, Initial, Straight, Time
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
-from hybrid.scene.depths import Depths
 from hybrid.scene.ends import Ends, Triple
-from hybrid.scene.sea import Seabed
-from hybrid.scene.stream_function import FADED, steady_wave, wavenumber
+from hybrid.scene.sea import Depths, Seabed
+from hybrid.scene.wave_theory import FADED, steady_wave, wavenumber
 from hybrid.scene.waves import RecordedWaves, StreamFunctionWaves
 
 # Miche (1944): a wave of height H and length L breaks where H / L reaches 0.142 tanh(k depth).

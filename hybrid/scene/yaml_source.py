@@ -13,7 +13,7 @@ from typing import Any
 
 from hybrid.errors import Complaint
 from hybrid.scene.base import Place, Table, decimal_comma, did_you_mean, dotted
-from hybrid.scene.schema_walk import has_names, keys_at, shorthand_keys, tables_at
+from hybrid.scene.schema_messages import has_names, keys_at, shorthand_keys, tables_at
 from hybrid.scene.yaml_nodes import READABLE, WRITE_OUT, TooDeep, composed
 
 Spot = tuple[int, int]

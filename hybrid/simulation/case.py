@@ -19,9 +19,9 @@ from hybrid.errors import ComputationError, ResultError
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.model_costs import with_models
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.payout import longest_out, winch_side
+from hybrid.model.plan import with_models
 from hybrid.model.resolution import (
     Reach,
     Resolution,
@@ -38,18 +38,15 @@ from hybrid.scene.network import Network
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.layer_mesh import rods_at_rest
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
-from hybrid.simulation.mesh_survey import Survey, survey_duration, survey_points
-from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.mesh_survey import Survey, rods_at_rest, survey_duration, survey_points
 from hybrid.simulation.new_run import Recording, new_run, start_of
 from hybrid.simulation.own_parts import RunPart
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter, at_once
-from hybrid.simulation.restart import LoadChange, changes_text, with_own_contact
-from hybrid.simulation.restore import is_cut_off, kept_resolution
-from hybrid.simulation.result_checks import damped_vibrations
-from hybrid.simulation.run_file import AnyRecorder, Asked
+from hybrid.simulation.restart import LoadChange, changes_text, is_cut_off, kept_resolution, with_own_contact
+from hybrid.simulation.run import Run
 from hybrid.simulation.run_of_lines import Heard
+from hybrid.simulation.run_record import AnyRecorder, Asked
 from hybrid.simulation.run_sample import (
     ALL,
     COMPARED,
@@ -59,6 +56,7 @@ from hybrid.simulation.run_sample import (
     catenary_share,
     compared_cells,
     compared_places,
+    damped_vibrations,
     is_along,
     most_at_places,
     rods_of,
@@ -66,12 +64,11 @@ from hybrid.simulation.run_sample import (
     usual_cells,
 )
 from hybrid.simulation.zones_at_rest import Start
-from hybrid.store.array_contents import MemoryTarget, Target
-from hybrid.store.copying import group_of, root_of
 from hybrid.store.envelope import GROUP as ENVELOPE
-from hybrid.store.hdf5_file import open_file
+from hybrid.store.format import MemoryTarget, Target
+from hybrid.store.hdf5_file import group_of, open_file, root_of
+from hybrid.store.integrity import Tree
 from hybrid.store.limits import EXTREMES, extremes_about
-from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import ERROR_ESTIMATE, THERE
 from hybrid.store.stored_rows import ComparisonRecorder, RowsRecorder, StoredArray, rows_path
@@ -195,14 +192,14 @@ class Case:
 
         A file that errors will be added to, and that is complete before it had to be there, waits in `late_file`.
         """
-        first = self._takes_its_place(target)
+        first = self._is_in_place(target)
         begin = self._begin_result(resolution.one, first)
         kept = before or {} if isinstance(target, Path) else None
         mode = WriteMode(kept, late=not (first and self.progress.heard), unseen=not first)
         recording = Recording(mode, pending=ERROR_ESTIMATE if before else "", notes=self.notes)
         return self._move(self._network_run(resolution, target, recording), begin, first)
 
-    def _take_late_file(self, recorder: AnyRecorder, first: bool) -> LateFile | None:
+    def _place_late_file(self, recorder: AnyRecorder, first: bool) -> LateFile | None:
         """The file of a complete result that has still to be put in its place; first: as of `_begin_result`."""
         waits = recorder.late_file if isinstance(recorder, Recorder) else None
         if first:
@@ -211,11 +208,11 @@ class Case:
             self.late_finer = waits
         return waits
 
-    def _takes_its_place(self, target: Target) -> bool:
+    def _is_in_place(self, target: Target) -> bool:
         """Whether a result is where it belongs, and not beside one that it may replace."""
         return self.beside_result is None or target == self.beside_result
 
-    def settle(self, kept: bool) -> bool:
+    def decide(self, kept: bool) -> bool:
         """Let a finer result take the place of the one before it, or drop it; False: it is a file that is there."""
         late, self.late_finer = self.late_finer, None
         waits = late is not None and not late.placed
@@ -232,7 +229,7 @@ class Case:
     def resume(self, source: Path, target: Path, before: Tree | None = None) -> Samples:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
         resolution = kept_resolution(self.scene, source)
-        first = self._takes_its_place(target)
+        first = self._is_in_place(target)
         begin = self._begin_result(resolution.one, first)
         recording = Recording(WriteMode(before or {}), source, ERROR_ESTIMATE if before else "")
         run = self._network_run(resolution, target, recording)
@@ -260,20 +257,20 @@ class Case:
         self._results += 1
         return clock.process_time()
 
-    def _move(self, run: NetworkRun, begin: float, first: bool) -> Samples:
+    def _move(self, run: Run, begin: float, first: bool) -> Samples:
         """A result to its end; begin: s of processor time, when it was begun; first: as of `_begin_result`."""
         recorder, target = run.recorder, run.target
         assert target is not None and isinstance(recorder, Recorder)
         recorder.amended = self.wants_errors
-        with recorder, self._said():
+        with recorder, self._in_words():
             self._compute(run)
-        return self._compared(run, target, clock.process_time() - begin, self._take_late_file(recorder, first))
+        return self._compared(run, target, clock.process_time() - begin, self._place_late_file(recorder, first))
 
-    def _compute(self, run: NetworkRun) -> None:
+    def _compute(self, run: Run) -> None:
         """Compute a run to its end."""
         run.record_motion()
 
-    def _compared(self, run: NetworkRun, target: Target, cpu: float, late: LateFile | None) -> Samples:
+    def _compared(self, run: Run, target: Target, cpu: float, late: LateFile | None) -> Samples:
         """What is to be compared of a complete result; late: it has no file yet."""
         if not self.wants_errors:
             found = {x.name: (run.resolution.lines[x.name], compared_cells(x.model)) for x in run.lines}
@@ -293,7 +290,7 @@ class Case:
         return samples
 
     def _sample_of(
-        self, line: LineResult, run: NetworkRun, data_of: Callable[[str], Any], result: Result, cpu: float,
+        self, line: LineResult, run: Run, data_of: Callable[[str], Any], result: Result, cpu: float,
         stay: Path | None,
     ) -> RunSample:  # fmt: skip
         """What is compared of a line in a complete result.
@@ -364,7 +361,7 @@ class Case:
         own = self.criterion is not None or bool(self.parts)
         threads = thread_count() if not own and steps >= WORTH_THREADS else 1
         self._unwanted.clear()
-        return beside(samples, threads, self.progress.look, self._unwanted.set)
+        return beside(samples, threads, self.progress.end_pass, self._unwanted.set)
 
     def sample(
         self, resolution: NetworkResolution, points: Mapping[str, Floats] | None = None, until: float | None = None
@@ -390,7 +387,7 @@ class Case:
                     key = rows_key(resolution.lines[line.name], self.names[line.name])
                     line.recorder = RowsRecorder(rows_path(self.beside_result, key), FORCE_COLUMNS)
         try:
-            with self._said():
+            with self._in_words():
                 self._compute(run)
         finally:
             for line in run.lines:
@@ -401,7 +398,7 @@ class Case:
         cpu = clock.thread_time() - begin
         return {x.name: self._compared_line(x, run, cpu, judged=points is None) for x in run.lines}
 
-    def _compared_line(self, line: LineResult, run: NetworkRun, cpu: float, judged: bool) -> RunSample:
+    def _compared_line(self, line: LineResult, run: Run, cpu: float, judged: bool) -> RunSample:
         """What is compared of a line in a run for comparison; judged: extremes, too."""
         name, resolution, found = line.name, run.resolution.lines[line.name], line.recorder
         assert isinstance(found, ComparisonRecorder)
@@ -458,18 +455,18 @@ class Case:
 
     # --- runs of the network ----------------------------------------------------------------------
 
-    def _said(self) -> AbstractContextManager[None]:
+    def _in_words(self) -> AbstractContextManager[None]:
         """What fails within, in the words of the scene."""
-        return self.scene.form.said()
+        return self.scene.form.in_words()
 
-    def _network_run(self, resolution: NetworkResolution, target: Target | None, recording: Recording) -> NetworkRun:
+    def _network_run(self, resolution: NetworkResolution, target: Target | None, recording: Recording) -> Run:
         """The run of the network, as yet without a first output; recording: beside what the case says."""
         recording = recording._replace(planes=True, asked=Asked(self.scene, self.changes), parts=self.parts)
         interrupted = self._comparison_interrupted if target is None else self._result_interrupted
         recording = recording._replace(heard=Heard(self.progress, interrupted))
         if recording.points is None:
             recording = recording._replace(points=self.points)
-        with self._said():
+        with self._in_words():
             if recording.source is None:
                 recording = recording._replace(start=self._first_state(resolution))
             texts, end = self._texts, (self.criterion, self.changes)
@@ -488,7 +485,7 @@ class Case:
         network = self.scene
         if network.adaptive:  # as rods, before zones are found
             return rods_at_rest(network, resolution, self.moves)
-        with self._said():
+        with self._in_words():
             start = self._first_state(resolution)
         self._start = network, resolution, start
         states = [x.start for x in start.model.models] if start.found is None else start.found.state.lines
@@ -529,7 +526,7 @@ class CaseAtRest(Case):
         """Compute the result into a file, or memory; what is to be compared of it.  before: nobody goes on with it."""
         begin, pending = clock.process_time(), ERROR_ESTIMATE if self.wants_errors else ""
         recording = Recording(WriteMode(late=True), pending=pending)
-        return self._move(self._network_run(resolution, target, recording), begin, self._takes_its_place(target))
+        return self._move(self._network_run(resolution, target, recording), begin, self._is_in_place(target))
 
     def beside(
         self, samples: Sequence[Callable[[], Samples]]
@@ -537,19 +534,19 @@ class CaseAtRest(Case):
         """Equilibria are found one after the other."""
         return nullcontext(samples)
 
-    def _compute(self, run: NetworkRun) -> None:
+    def _compute(self, run: Run) -> None:
         run.record_equilibrium()
 
-    def _compared(self, run: NetworkRun, target: Target, cpu: float, late: LateFile | None) -> Samples:
+    def _compared(self, run: Run, target: Target, cpu: float, late: LateFile | None) -> Samples:
         if not self.wants_errors:
             return super()._compared(run, target, cpu, late)
         return {line.name: _sample(line, run, cpu) for line in run.lines}
 
-    def _compared_line(self, line: LineResult, run: NetworkRun, cpu: float, judged: bool) -> RunSample:
+    def _compared_line(self, line: LineResult, run: Run, cpu: float, judged: bool) -> RunSample:
         return _sample(line, run, cpu)
 
 
-def _sample(line: LineResult, run: NetworkRun, cpu: float) -> RunSample:
+def _sample(line: LineResult, run: Run, cpu: float) -> RunSample:
     """What is compared of a line in an equilibrium that has been recorded; cpu: s, that it took."""
     k, model = line.number, line.model
     batch = line.state_now(0.0, run.solver.lines[k].ends, run.state.lines[k], run.solver.work[k])
@@ -610,14 +607,14 @@ def beside(
     pool = ThreadPoolExecutor(min(threads, len(tasks)) - 1, "hybrid-run")
     try:
         futures = [pool.submit(task) for task in tasks[1:]]
-        yield [tasks[0], *(partial(_found, *each, look) for each in zip(tasks[1:], futures, strict=True))]
+        yield [tasks[0], *(partial(_by_path, *each, look) for each in zip(tasks[1:], futures, strict=True))]
     finally:
         if any(not future.done() for future in futures):
             stop()
         pool.shutdown(wait=True, cancel_futures=True)  # so that none writes a file after it was removed
 
 
-def _found(task: Callable[[], Found], future: Future[Found], look: Callable[[], None]) -> Found:
+def _by_path(task: Callable[[], Found], future: Future[Found], look: Callable[[], None]) -> Found:
     if future.cancel():  # no thread has begun with it
         return task()
     while wait([future], LOOK_EVERY).not_done:

@@ -12,27 +12,28 @@ from hybrid.kernels.machine.binding import Packed, Room, Table
 from hybrid.kernels.mesh import remesh as f
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_changes import (
+    begin_switch,
     blank_cell_planner,
     blank_renew_job,
+    blank_switch_job,
     cells_due,
     clear_state,
+    end_switch,
     keep_places,
     plan_cells,
     renew,
 )
-from hybrid.kernels.mesh.fill_line import blank_kinds_job, blank_line_job, fill_kinds, fill_line
-from hybrid.kernels.mesh.zone_switch import begin_switch, blank_switch_job, end_switch
+from hybrid.kernels.mesh.remesh import blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.kernels.mesh.zone_transfer import Match, Transfer
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import PLANAR, REMEMBERS
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.model.build import Model
-from hybrid.model.layout import kinds_of
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
+from hybrid.model.mesh import kinds_of
 from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.simulation.envelope import marks_on
-from hybrid.simulation.line_of_run import OfRun, OneOfMany, by_itself
-from hybrid.simulation.remesh import PAIRS, Part, Remesh, Shaped, copy_fields, shaped
+from hybrid.simulation.remesh import PAIRS, OfRun, OneOfMany, Part, Remesh, Shaped, by_itself, copy_fields, shaped
 from hybrid.zones.change import ZoneSwitching
 from hybrid.zones.manager import OF_BASE, all_zones
 from hybrid.zones.plan import Change
@@ -262,12 +263,12 @@ class CellChanges(Remesh):
         switching, manager, t = self._switching, self._switching.manager, self._owner.t
         switching.zones.next_rod[:] = change.rod
         z.plan_next(switching.table.numbers)
-        for k, clamp in enumerate(switching.clamps(self._owner.model.ends.at(t))):
+        for k, clamp in enumerate(switching.clamps(self._owner.model.ends.at_time(t))):
             self._held[k] = clamp is not None
             if clamp is not None:
                 self._clamps[k] = clamp
         booked = self.change(lambda: manager.adopt_rods(change.rod, change, t))
-        manager.take(manager.layout._replace(rod=change.rod.copy()), self._zones_on(self.side, self.cells))
+        manager.use_cells_of(manager.layout._replace(rod=change.rod.copy()), self._zones_on(self.side, self.cells))
         switching.limit_steps(self._owner.clock)
         self.sync()
         return booked

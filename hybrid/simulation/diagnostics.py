@@ -13,7 +13,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import (
     bend_radii,
     cells_met,
@@ -22,44 +21,57 @@ from hybrid.kernels.laws.obstacles import (
     half_thickness,
     put_obstacles,
 )
+from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, Clock
-from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RIDES
 from hybrid.kernels.state.report import (
     BEND,
+    FLAT,
     FRICTION,
+    KIND,
     OBSTACLES,
     PLANAR,
+    RIDES,
     SEABED,
     SELF_CONTACT,
     TWIST_NODE,
 )
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea, State
 from hybrid.kernels.step.accept import LARGEST_TWIST
-from hybrid.model.build import Model
+from hybrid.model.build import Model, as_kept
 from hybrid.model.initial_shape import HUNG
 from hybrid.model.obstacles import CELLS_PER_RADIUS
-from hybrid.model.plane import as_kept
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.scene.plane import OUT
-from hybrid.simulation import scheme_watch
-from hybrid.simulation.contact_watch import Knot, note_departures, note_knot, sheaves_of
+from hybrid.simulation import watches as scheme_watch
 from hybrid.simulation.events import EventLog
-from hybrid.simulation.failure import borne_strain, most_stretched
-from hybrid.simulation.hockling_watch import LOOP, Loops, note_hockling, note_loops
-from hybrid.simulation.mesh_survey import ASKEW, hidden_layer, layer_text
-from hybrid.simulation.scheme_watch import PRESSED, SchemeWatch, Stop
-from hybrid.simulation.slack_bends import (
+from hybrid.simulation.failure import (
     TURNS,
     Bounds,
+    borne_strain,
     doubtful,
     kinks_at,
+    most_stretched,
     slack_text_of,
     too_long_for_weight,
     turns_by_weight,
     weight_text,
+)
+from hybrid.simulation.mesh_survey import ASKEW, hidden_layer, layer_text
+from hybrid.simulation.watches import (
+    LOOP,
+    PRESSED,
+    Knot,
+    Loops,
+    SchemeWatch,
+    Stop,
+    note_departures,
+    note_hockling,
+    note_knot,
+    note_loops,
+    sheaves_of,
 )
 from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left, passed_obstacles, rubs_on
 from hybrid.solve.stability import is_stable
@@ -188,7 +200,7 @@ class Diagnostics:
         self.watch(books.clock)
         return placed if placed.size else r[books.base].copy()
 
-    def follow(self, model: Model) -> None:
+    def use_model(self, model: Model) -> None:
         """Watch the same line with other zones."""
         if model is not self._model:
             self._model, self._longest = model, 1.0 + borne_strain(model)
@@ -227,7 +239,7 @@ class Diagnostics:
             text = "this equilibrium holds within the plane alone: in space (`dimension: 3`) the cable would leave it"
             self.note(0.0, int(np.argmin(state.T)), "out of plane", text)
 
-    def found_by(self, pushed: bool, slack: int, state: State) -> None:
+    def note_at_rest(self, pushed: bool, slack: int, state: State) -> None:
         """An equilibrium beside one that is not stable, or with a slack catenary cell (-1: none)."""
         if pushed:
             text = (
@@ -353,7 +365,7 @@ class Diagnostics:
         clock.bend_limit, clock.twist_limit, clock.scaled_jump = self._bend, self._twist, self._jump
         clock.slack_limit = self._slack if warns else -np.inf
 
-    def look(self, run: Watched, flags: int) -> Stop:
+    def judge(self, run: Watched, flags: int) -> Stop:
         """Look at what a run has flagged in its last step (kernels.state.books)."""
         t, state, stop = run.t, run.state, None
         if flags & b.JUMPED:
@@ -422,7 +434,7 @@ class Diagnostics:
             if (stop := self.left_plane(output.batch.r)) is not None:
                 return stop
         for k in np.flatnonzero(doubtful(seen, values, self._bounds)).tolist():
-            self.follow(_with_line(*lines[k]))
+            self.use_model(_with_line(*lines[k]))
             one = seen.one(k)
             self.mesh(one)
             self.of_scheme.judge_rest(self._model, one.batch, {name: x[k : k + 1] for name, x in values.items()})

@@ -3,7 +3,7 @@
 The compiled run keeps them on the mesh of the moment (watch.extremes).  Every node of any layout is a node of the
 layout that is all rod, so when cells change, the extremes of those that go are folded into those on its nodes: inside
 a cell the extremes of its two nodes are interpolated, with the time of the nearer one.  Nodes whose cells stay go on
-with theirs (kernels.watch.carried_extremes).
+with theirs (kernels.watch.extremes).
 """
 
 from __future__ import annotations
@@ -19,21 +19,19 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.report import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.watch.carried_extremes import Watched, pass_on
-from hybrid.kernels.watch.extremes import fold_extremes
-from hybrid.model.build import Model
+from hybrid.kernels.watch.extremes import Watched, fold_extremes, pass_on
+from hybrid.model.build import Model, as_begun
+from hybrid.model.contents import no_contact
 from hybrid.model.payout import whole_scene
-from hybrid.model.plane import as_begun
 from hybrid.model.sections import NEAR, SECTION_LIMITS, limits_along, modules_of, section_changes
-from hybrid.model.self_reach import no_contact
-from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.section_use import Pipes, StepQuantities
+from hybrid.outputs.observed_states import Grid
+from hybrid.outputs.quantities import Pipes, StepQuantities
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.self_watch import SelfWatch
-from hybrid.solve.run import no_extremes
+from hybrid.simulation.lines_contact import SelfWatch
+from hybrid.solve.network_steps import no_extremes
 from hybrid.store.envelope import BEGIN, END, GROUP, SCALE, Recorded, limits_of
 from hybrid.store.format import Field
-from hybrid.store.named_arrays import matched
+from hybrid.store.integrity import matched
 
 # Rows of the books: name, unit, what it is, and what a line needs to have it.
 QUANTITIES = {

@@ -17,31 +17,29 @@ import numpy as np
 
 from hybrid.errors import Complaint, Outcome, SceneError
 from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE
-from hybrid.kernels.junctions.carried_frames import TURNS
-from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
+from hybrid.kernels.junctions.joined_lines import TURNS
+from hybrid.kernels.laws.water import PIECE, PUSH, WATER, WET
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
 from hybrid.kernels.mesh.zone_criteria import twist_of_rods
 from hybrid.kernels.state.report import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats, State
-from hybrid.model.build import Model
-from hybrid.model.coarsen import MANY, coarser, refined
+from hybrid.model.build import Model, as_kept, leaves_plane, planar
 from hybrid.model.initial_shape import GIVEN, HUNG, reasons_against
+from hybrid.model.nearby import MANY, coarser, refined
 from hybrid.model.network import NetworkModel, balanced_places, starts_between
-from hybrid.model.plane import as_kept, leaves_plane, planar
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.base import dotted
 from hybrid.scene.network import Network
 from hybrid.scene.network_checks import floating_groups
 from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.contact_equilibrium import letting_touch, settle, with_contact
 from hybrid.simulation.failure import borne_strain
-from hybrid.simulation.run_start import named
+from hybrid.simulation.run_start import at_rest_with_contact, letting_touch, named, with_contact
 from hybrid.solve.flaws import ON_BED, behind_obstacles, passed_obstacles, rubs_on
-from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, joined_ends
 from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest, settled_with_friction
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import PUSHED, Start
+from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, joined_ends
 
 # Turns that close the frames of the initial shape, at most, and round-off; the twist of a cell, rad, that is resolved.
 CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
@@ -137,7 +135,7 @@ def solve_from(
     group = group_of(model, t, bodies)
     if found.settled:
         model, group = letting_touch(model, group)
-        return _keep_turns(model, t, settle(model, group, start, near=True))
+        return _keep_turns(model, t, at_rest_with_contact(model, group, start, near=True))
     if found.with_friction and not found.pulled:  # where the lines were laid, which nothing else leads to
         ways = dict.fromkeys(found.with_friction, "start")
         return _keep_turns(model, t, settled_with_friction(group, ways, (name, start)))
@@ -154,10 +152,10 @@ def joined_lines(model: NetworkModel, t: float) -> list[JoinedLine]:
     """The lines with their ends and their sea at t (s), whose arrays `ends.at` and `sea.at` overwrite."""
     lines = []
     for x, joints, fairleads, seats in zip(model.models, model.joints, model.fairleads, model.seats, strict=True):
-        ends, floor, slackens = joined_ends(x.ends.at(t), joints), x.slack_floor, x.slack == "warn"
+        ends, floor, slackens = joined_ends(x.ends.at_time(t), joints), x.slack_floor, x.slack == "warn"
         lines.append(
             JoinedLine(
-                x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens,
+                x.line, x.sea.at_time(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens,
                 model.rides, borne_strain(x) if x.line.bits & OBSTACLES else np.zeros(0),
                 x.payout is not None or x.layout is not None,
                 x.payout is not None and x.payout.holds_tension,
@@ -472,7 +470,7 @@ def ways_to_settle(model: NetworkModel) -> dict[int, str]:
 
 
 def settling(scene: LineScene, model: Model, touches: bool = False) -> str:
-    """How friction is to settle, as of `settled_with_friction`.
+    """How friction is to at_rest_with_contact, as of `settled_with_friction`.
 
     A shape that the scene gives is where the line was laid.  "usual": as "pull" on a bed alone, where that leads
     anywhere, else not, which a scene has that says nothing of it.  What is paid out was laid under tension; and
@@ -549,11 +547,11 @@ def lost_turns(network: NetworkModel, t: float, k: int, state: State, keeps_link
     if not model.line.element[1:-1].all():  # zones: whether it has passed through itself, or around a clamp
         if keeps_link or not holds_twist(model.line):
             return "", s
-        ends = model.ends.at(t)
+        ends = model.ends.at_time(t)
         wound, has = (link_of(model.line, ends, x.r, x.e, x.a1, x.turn)[LINK] for x in (model.start, state))
         text = f"{where}; the line starts with a link of {wound:.4g} turns, that of the equilibrium is {has:.4g}"
         return (text if abs(has - wound) > 0.5 else ""), s
-    frames = model.ends.at(t).frame
+    frames = model.ends.at_time(t).frame
     wound, has = (twist_of_rods(model.line, frames, x.e, x.a1) / (2.0 * np.pi) for x in (model.start, state))
     if abs(wound - asked) > CLOSING:
         least = int(np.ceil(2.0 * np.pi * abs(asked) / MOST_TWIST))

@@ -14,6 +14,7 @@ import numpy as np
 
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.machine.compile import entry, is_warm
+from hybrid.kernels.mesh.remesh import ask_cells, change_cells, put_cells
 from hybrid.model.build import Model, build
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import first_resolution, wants_errors
@@ -25,15 +26,15 @@ from hybrid.scene.schema import Equilibrium, LineScene
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.entry.in_plane", "run.entry.in_space")
 OUTPUTS = "watch.observed_outputs.observe_outputs"
-ZONES = "mesh.zone_step.follow_zones"
+ZONES = "mesh.zone_step.advance_zones"
 CRITERIA = "mesh.zone_step.evaluate_criteria"
-ZONE_CHANGES = "mesh.zone_switch.begin_switch", "mesh.zone_switch.end_switch", "mesh.cell_changes.renew"
+ZONE_CHANGES = "mesh.cell_changes.begin_switch", "mesh.cell_changes.end_switch", "mesh.cell_changes.renew"
 STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
 # Steps, equilibria, lines that are joined or touch, those that are paid out.
 OF_JOINED = "run.network.solve_system", "junctions.junctions.join_lines"
 STEPS_OF_LINES, REST_OF_LINES = "run.network_run.run_system", "run.network_run.sample_system"
 BOOKS_OF_LINES, START_OF_LINES = "run.network.book_system_step", "run.network.begin_line"
-TOUCHING_LINES = "junctions.lines_contact.touch_system", "junctions.shared_contact.shared_task"
+TOUCHING_LINES = "junctions.lines_contact.touch_system", "junctions.lines_contact.shared_task"
 PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "mesh.remesh.change_cells"  # this one: the rest
 
 NO_TABLE = np.zeros(0, np.int64)  # of which only the type counts
@@ -156,7 +157,7 @@ def _compile_by_table(names: Sequence[str], *kernels: str) -> None:
 
 def payout_kernels() -> tuple[Any, ...]:
     """All that a line calls that is paid out, in the order in which a run asks for it; each takes one table."""
-    from hybrid.kernels.mesh import cell_changes, remesh
+    from hybrid.kernels.mesh import cell_changes
     from hybrid.kernels.reel import node_changes, payout, payout_nodes
 
     first = (
@@ -168,13 +169,13 @@ def payout_kernels() -> tuple[Any, ...]:
         payout.lengthen,
         payout.limit_next_step,
         payout.put_forces_on,
-        payout.take_forces_off,
+        payout.remove_forces,
         payout_nodes.carry_node,
     )
     line = node_changes.change_line, node_changes.fit_changed, node_changes.book_change, node_changes.renew_run
     planner = node_changes.node_due, node_changes.plan_node, node_changes.keep_reel, node_changes.make_line
     forces = cell_changes.before_forces, cell_changes.after_forces
-    return *first, *line, *planner, *forces, remesh.put_cells, remesh.ask_cells, remesh.change_cells
+    return *first, *line, *planner, *forces, put_cells, ask_cells, change_cells
 
 
 def _compile_outputs(model: Model) -> None:

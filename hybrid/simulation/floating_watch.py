@@ -11,21 +11,22 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.junctions.bodies import FRAME, V
 from hybrid.kernels.junctions.bodies import PLACE as BODY_PLACE
-from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import distances, put_obstacles
-from hybrid.kernels.run.network_sampling import SAMPLE_AXES, SAMPLE_PLACE
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.laws.seabed import planes_under
+from hybrid.kernels.run.network import SAMPLE_AXES, SAMPLE_PLACE
+from hybrid.kernels.state.report import (
     AXIS,
     BOX,
     HALF_LENGTH,
     HALF_WIDTH,
+    OBSTACLES,
     PLACE,
     RADIUS,
     RIDES,
+    SEABED,
     SIDE,
     STRAND,
 )
-from hybrid.kernels.state.report import OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.network import NetworkModel, build_system
 from hybrid.scene.attachments import sphere_diameter
@@ -36,7 +37,7 @@ from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.run_points import Sampled, times
-from hybrid.solve.joined import LineFailed
+from hybrid.solve.stepper import LineFailed
 
 # Of the height of a point: what it must be below the surface to be under water, beyond round-off.
 UNDER = 1e-3

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
-from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.link import holds_twist
 from hybrid.kernels.march.zone_torque import answers_of
@@ -33,9 +33,8 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.report import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, State, Work, batch_of_one, sampled_size, slip_size
-from hybrid.model.build import Model
+from hybrid.model.build import Model, as_begun, planar
 from hybrid.model.mesh import Zone
-from hybrid.model.plane import as_begun, planar
 from hybrid.model.resolution import follows_curvature, wants_errors
 from hybrid.model.sections import OutputPoints, output_points, section_changes, wave_step
 from hybrid.outputs.joined_lines import Output, outputs_in
@@ -46,18 +45,16 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.diagnostics import Diagnostics, Stop
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
-from hybrid.simulation.failure import FASTEST, borne_strain, stretch_text
-from hybrid.simulation.line_of_run import Around, HasPlane
-from hybrid.simulation.lines_contact import LinesWatch
+from hybrid.simulation.failure import FASTEST, borne_strain, note_laid, stretch_text
+from hybrid.simulation.lines_contact import LinesWatch, LineWatch, diameters, least_bending
+from hybrid.simulation.remesh import Around, HasPlane
 from hybrid.simulation.run_sample import COMPARED
-from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
-from hybrid.simulation.slack_bends import note_laid
+from hybrid.solve.contact import SelfContact
 from hybrid.solve.flaws import slack_cell
-from hybrid.solve.joined import JoinedLine, LineFailed
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.run import batch_of_rows, no_extremes
-from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.network_steps import batch_of_rows, no_extremes
+from hybrid.solve.stepper import JoinedLine, LineFailed
 from hybrid.store.recorder import Rows
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.zones.manager import DomainManager
@@ -274,7 +271,7 @@ class LineResult:
         turned: whether the system has moments at points.
         """
         line = self.model.line
-        self.diagnostics.found_by(found.pushed, slack_cell(x, state), state)
+        self.diagnostics.note_at_rest(found.pushed, slack_cell(x, state), state)
         self.diagnostics.within_plane(state, self.number in found.with_friction)
         if self.number not in found.with_friction:
             self.diagnostics.friction_neglected(
@@ -324,7 +321,7 @@ class LineResult:
         change = change and self._moves and not self.touches and self.shown is None
         return change and may_be_joined(self.observer, self.model.line)
 
-    def follow(self, model: Model, other_cells: bool = False) -> None:
+    def use_model(self, model: Model, other_cells: bool = False) -> None:
         """Go on with another model, after what waits has been recorded.
 
         other_cells: of other cells, for which outputs that may wait all the same go on to do so.
@@ -337,15 +334,15 @@ class LineResult:
         self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
         self.observer.first_energy = first
         self.books.hinges[:] = model.hinges
-        self.diagnostics.follow(model)
+        self.diagnostics.use_model(model)
         self._itself = LineWatch(self.envelope.itself, model)
         if self.touches != bool(self.books.touch.size):
             self.books = self.books._replace(touch=self._blank_touch())
 
-    def take_cells(self, model: Model, extremes: bool = True) -> None:
+    def use_cells(self, model: Model, extremes: bool = True) -> None:
         """Go on with other cells; extremes: whether those of now count."""
         was, before = self.model, self.books
-        self.follow(model, other_cells=True)
+        self.use_model(model, other_cells=True)
         names = ("asked", "reached", "path", "radii", "walls", "clock", "counts", "worst", "placed")
         same, blank = (
             {name: getattr(before, name) for name in names},
@@ -362,16 +359,16 @@ class LineResult:
         """What changes of kinds have to know of the line."""
         return Around(work, self.books, self.envelope, self.marked, self.envelope.itself.itself.cells)
 
-    def take_kinds(self, model: Model) -> None:
+    def use_kinds(self, model: Model) -> None:
         """Go on with other kinds of the same cells, in the same arrays, after what waited has been recorded."""
         self.model = model
-        self.diagnostics.follow(model)
+        self.diagnostics.use_model(model)
         self._itself.set_model(model)
 
     def adopt_cells(self, model: Model) -> None:
         """Go on with other cells, which steps have changed to with the books, of which some outputs may wait."""
         self.model = model
-        self.diagnostics.follow(model)
+        self.diagnostics.use_model(model)
         self._itself.adopt_cells(model)
 
     @property
@@ -389,7 +386,7 @@ class LineResult:
         """Log steps (n, len(LOG) + 1), the last column the time of the processor, s."""
         self._log.append(rows)
 
-    def look_at_itself(self, solver: NetworkSolver, seen: int, t: float, dt: float, state: State) -> None:
+    def note_nearness(self, solver: NetworkSolver, seen: int, t: float, dt: float, state: State) -> None:
         """What the step of dt (s) to t (s) has seen (bits of kernels.state.books) of how near the line is to itself."""
         if seen & IS_BENT:
             found, bound = self._itself.bends()
@@ -415,7 +412,7 @@ class LineResult:
             flags &= ~(STRETCHED | JUMPED)
         if flags & (STRETCHED | JUMPED):
             self.write_down()  # what stopped the run before comes first
-        self._stop_if(self.diagnostics.look(step, flags), step.t, step.state)
+        self._stop_if(self.diagnostics.judge(step, flags), step.t, step.state)
 
     def _stop_if(self, stop: Stop, t: float | None, state: State | None = None) -> None:
         """LineFailed where going on after t (s) would make no sense; state: then, where it says more."""
@@ -485,7 +482,7 @@ class LineResult:
             watch = None if isinstance(self.recorder, ComparisonRecorder) else self.diagnostics
             t = float(self._aside.waiting[-1][1].batch.t[-1])
             stop = self._aside.record(self.observer, self.recorder, watch)
-            self.diagnostics.follow(self.model)
+            self.diagnostics.use_model(self.model)
             self._stop_if(stop, t)
         if not self._waiting:
             return
@@ -494,7 +491,7 @@ class LineResult:
         batch = waiting[0]
         if len(waiting) > 1:
             batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
-        there, seen, more = self.look(batch)
+        there, seen, more = self.observe(batch)
         ratios = np.concatenate(known) if known else None
         values = there.values_of(seen, ratios)
         self.observer.first_energy = there.first_energy
@@ -508,10 +505,10 @@ class LineResult:
             stop = self.diagnostics.outputs(seen, values)
         self._stop_if(stop, float(batch.t[-1]))
 
-    def look(self, batch: Batch) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
+    def observe(self, batch: Batch) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
         """What makes values of outputs, these as computed, and the zones of all but the first where they differ."""
         if self.paying is not None:
-            return self.paying.look(self.observer, self.model, batch)
+            return self.paying.observe(self.observer, self.model, batch)
         if self.observer.zones is not self.model.zones:  # kinds have changed
             model, first = self.model, self.observer.first_energy
             self.observer = self.observer.on(model.line, model.sea.values, model.zones, self.books.hinges)

@@ -1,15 +1,36 @@
-"""Lines beside each other: their contact, whether they cross between two shapes, a watch over those without contact."""
+"""How near lines come to themselves and each other.
+
+How near a line comes to itself in a run: an event where its surfaces meet, and the least clearance for the file.
+
+Lines beside each other: their contact, whether they cross between two shapes, a watch over those without contact.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.contact.self_contact_law import OUTER
+from hybrid.kernels.contact.self_contact_law import INNER, OUTER
+from hybrid.kernels.contact.self_contact_pairs import WINDOW
+from hybrid.kernels.contact.self_distance import (
+    ENDS,
+    HIDES,
+    MEETS,
+    NEARS,
+    NEIGHBOURS,
+    PARTS,
+    TURNED,
+    UNBENT,
+    WIDER,
+    blank_itself,
+    blank_itself_job,
+    watch_itself,
+)
 from hybrid.kernels.junctions.lines_distance import (
     AT,
     HAVE_MET,
@@ -24,20 +45,316 @@ from hybrid.kernels.junctions.lines_distance import (
     watch_lines,
 )
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.books import Clock
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.books import Clock, Counts
+from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT
+from hybrid.kernels.state.state import Floats, State, state_for
 from hybrid.model.build import Model
-from hybrid.model.lines_contact import Touching, joined_ends_of
+from hybrid.model.contents import COST, Touching, joined_ends_of
 from hybrid.model.network import NetworkModel
 from hybrid.scene.network import Network
-from hybrid.simulation.self_watch import diameters, least_bending
-from hybrid.solve.joined import NetworkState
-from hybrid.solve.shared_contact import SharedContact, TouchingLine
+from hybrid.solve.contact import SelfContact, SharedContact, TouchingLine
+from hybrid.solve.stepper import NetworkState
+from hybrid.store.format import Field
+
+GROUP = "self_distance"
+# In the file: where in `found` it stands, unit, meaning.
+FIELDS = {
+    f"{GROUP}/clearance": ("least", "m", "least clearance between surfaces of the line that are no neighbours"),
+    f"{GROUP}/distance": ("least_distance", "m", "distance of the centrelines there"),
+    f"{GROUP}/s_a": ("least_s", "m", "arc length where it was"),
+    f"{GROUP}/s_b": ("least_other", "m", "arc length of the other place"),
+    f"{GROUP}/time": ("least_time", "s", "when it was"),
+}
+
+
+def diameters(model: Model) -> Floats:
+    """Outer diameters (N,) m of the cells; 0 where the scene gives none."""
+    s = model.line.s
+    return np.asarray(model.cable.outer_diameter[model.cable.piece(0.5 * (s[:-1] + s[1:]))])
+
+
+def least_bending(model: Model) -> Floats:
+    """Bending stiffness (N,) N m2 of the sections of the cells, the lower of two; 0 where the scene gives none."""
+    s = model.line.s
+    return np.asarray(model.cable.B[model.cable.piece(0.5 * (s[:-1] + s[1:])), :2].min(axis=1))
+
+
+# Diameters and cells, of both ends together, within which held ends are neighbours (contact.self_contact_pairs).
+BESIDE, BESIDE_CELLS = WINDOW, NEIGHBOURS + 1
+REMEDY = "contact: {self: true} does, of catenaries too"
+
+
+def meeting_text(
+    s: float, other: float, distance: float, width: float, dt: float, why: str, remedy: str = REMEDY
+) -> str:
+    """Text of the event of a line that comes within `distance`, m, of itself at two arc lengths, m.
+
+    width: m, of the cable; dt: s, the step in which it does, 0: in none; why: no contact is computed; remedy: what
+    computes it.
+    """
+    passing = f" in a step of {dt:.3g} s" if dt > 0.0 else ""
+    return (
+        f"s = {s:.6g} m and s = {other:.6g} m come within {distance:.3g} m of each other{passing}, less than the "
+        f"diameter of {width:.3g} m: nothing keeps it from passing through itself here ({why}); {remedy}"
+    )
+
+
+BEGINS = f"contact of the line with itself is computed from here on, until they are apart; {COST}"
+GIVEN_UP = "contact there let no step lead on, and begins again where parts are apart"
+HIDDEN_BY_BEND = "a bend between them is sharper than its cells show, and contact is not judged there"
+
+
+def hidden_text(model: Model, state: State, i: int, j: int, node: int) -> str:
+    """Text of the event of a bend at a node that hides how near cells i and j, beside it, are."""
+    s, e = model.line.s, state.e
+    turn = math.atan2(float(np.linalg.norm(np.cross(e[node - 1], e[node]))), float(e[node - 1] @ e[node]))
+    cells = min(float(model.line.h[node - 1]), float(model.line.h[node])) / turn
+    cable = model.cable
+    natural = float(cable.bending_length(1e-9 * model.tension_scale / model.length)[cable.piece(s[node : node + 1])][0])
+    if natural > 0.0:
+        cells = min(cells, natural)
+    return (
+        f"the line turns by {math.degrees(turn):.0f} deg from one cell to the next at s = {s[node]:.6g} m: how near "
+        f"s = {s[i]:.6g} m and s = {s[j + 1]:.6g} m beside it are is not known, and contact of the line with itself is "
+        f"not judged there; cells of at most {cells:.2g} m there (mesh) would show it"
+    )
+
+
+def touching_text(s: float, other: float, distance: float, width: float) -> str:
+    """Text of the event of a line that touches itself, with contact; as `meeting_text`."""
+    return (
+        f"s = {s:.6g} m and s = {other:.6g} m touch: their centrelines are {distance:.3g} m apart, the diameter is "
+        f"{width:.3g} m"
+    )
+
+
+class SelfWatch:
+    """Watches one line for as long as a run lasts; a line without a diameter is not watched."""
+
+    def __init__(self, model: Model, why: str = "statics compute no contact", remedy: str = REMEDY) -> None:
+        """why: no contact is computed, for an event; remedy: what computes it."""
+        self.on, self.why, self.remedy = bool(diameters(model).any()), why, remedy
+        self.asks = False  # whether it is asked when the line comes near itself, so that contact begins
+        self.itself = blank_itself(np.ones(1))
+        self._touches = False  # whether contact is computed
+
+    def renew(self, model: Model) -> None:
+        """Go on with the cells of a model; events tell of contact from now on where it is computed."""
+        self.itself = blank_itself(diameters(model))._replace(found=self.itself.found)
+        self._touches = bool(model.line.bits & SELF_CONTACT)
+        self.itself.found.meeting = OUTER - 1.0 if self._touches else 0.0
+        self.asks = bool(model.line.bits & MAY_TOUCH) and not self._touches
+        ends = self._touches and bool(model.line.bits & MAY_TOUCH)
+        self.itself.ahead.asked = 1.0 if self.asks else WIDER if ends else -1.0
+
+    def foresees(self, state: State, step: float, look: Callable[[], int]) -> bool:
+        """Whether a look at a state, from which steps (s) are to be made, finds that the line will be near itself."""
+        self.itself.ahead.seconds = step
+        found = look()
+        self.itself.ahead.seconds, self.itself.found.told, self.itself.found.hidden = 0.0, 0.0, ENDS
+        return bool(found & NEARS)
+
+    def begins(self, t: float, model: Model, event: Callable[..., None] | None) -> None:
+        """Contact is computed from now on; event: as of `tell`, None where nobody is told."""
+        found = self.itself.found
+        found.away = 0.0
+        if event is None:
+            return
+        s, other, where = float(model.line.s[0]), float(model.line.s[-1]), "parts of the line"
+        if math.isfinite(found.distance):
+            s, other = sorted((float(found.s), float(found.other_s)))
+            where = f"s = {s:.6g} m and s = {other:.6g} m, whose surfaces are {found.clearance:.3g} m apart,"
+        event(t, s, other, "contact begins", f"{where} come near each other: {BEGINS}")
+
+    def waits(self) -> None:
+        """Contact is not computed again before parts have come apart; where they meet until then, that is told."""
+        self.itself.found.waits, self.itself.found.told = 1.0, 0.0
+
+    def report_hidden(self, t: float, model: Model, state: State, event: Callable[..., None]) -> None:
+        """An event for a bend that hides how near parts are."""
+        ahead = self.itself.ahead
+        i, j, node = int(ahead.hidden_i), int(ahead.hidden_j), int(ahead.sharp)
+        s = float(model.line.s[node])
+        event(t, s, s, "unresolved bend", hidden_text(model, state, i, j, node))
+
+    def report_meeting(self, t: float, dt: float, event: Callable[..., None]) -> None:
+        """The event of a line that meets itself, where contact could not begin, unless it has been told."""
+        found = self.itself.found
+        if found.clearance < 0.0 and found.told == 0.0:
+            found.told = 1.0
+            self.report(t, dt, event)
+
+    def report(self, t: float, dt: float, event: Callable[..., None]) -> None:
+        """An event for what was found; dt: s, the step in which it was, 0: in none."""
+        found = self.itself.found
+        distance, width = float(found.distance), float(found.distance - found.clearance)
+        s, other = sorted((float(found.s), float(found.other_s)))
+        if self._touches:
+            text = touching_text(s, other, distance, width)
+            event(t, s, other, "line touches itself", text, value=distance, threshold=width)
+        else:
+            why, remedy = self.why, self.remedy
+            if self.asks and found.waits > 0.0:
+                why, remedy = GIVEN_UP, "shorter cells"
+            elif self.asks and found.hidden == 0.0:
+                why, remedy = HIDDEN_BY_BEND, "shorter cells"
+            text = meeting_text(s, other, distance, width, dt, why, remedy)
+            event(t, s, other, "line meets itself", text, value=distance, threshold=width)
+
+    def report_too_near(self, model: Model, event: Callable[..., None]) -> None:
+        """At the end of a run: an event where a line whose contact is computed has come nearer than contact lets it."""
+        found, s = self.itself.found, model.line.s
+        distance = float(found.least_distance)
+        width = distance - float(found.least)
+        if not (self.on and self._touches and distance < INNER * width):
+            return
+        first, last = sorted((float(found.least_s), float(found.least_other)))
+        why, remedy = "its cells are too long for contact there", "shorter cells"
+        beside = BESIDE * width + BESIDE_CELLS * float(np.diff(s).max())
+        if model.ends.values.held.all() and first + float(s[-1]) - last < beside:
+            why = "beside ends that are held no contact is computed of one with the other"
+            remedy = "ends that stay a diameter apart"
+        text = meeting_text(first, last, distance, width, 0.0, why, remedy)
+        event(float(found.least_time), first, last, "line meets itself", text, value=distance, threshold=width)
+
+    def fields(self) -> list[Field]:
+        """Fields of the file; NaN where the line never came near itself."""
+        if not self.on:
+            return []
+        return [
+            Field(name, unit, f"{text}; NaN: it was never near", nan_ok=True)
+            for name, (_, unit, text) in FIELDS.items()
+        ]
+
+    def values(self) -> dict[str, np.ndarray]:
+        """Values of those fields."""
+        found = self.itself.found
+        near = self.on and math.isfinite(found.least)
+        return {x.name: np.array(getattr(found, FIELDS[x.name][0]) if near else np.nan) for x in self.fields()}
+
+
+class LineWatch:
+    """Watches one of several lines, in the steps of their run and in states that are handed over."""
+
+    def __init__(self, watch: SelfWatch, model: Model) -> None:
+        """watch: what is known of the line so far, which goes on on the cells of `model`."""
+        self._watch, self._model = watch, model
+        self._job: Table | None = None
+        self.running: Table | None = None  # of the steps of a run
+        self._address, self.is_bent = 0, False
+        if watch.on:
+            watch.renew(model)
+
+    def _bind(self) -> Table:
+        """Get ready for the kernel, when the line is so bent for the first time that it could come near itself."""
+        model, job = self._model, Table(blank_itself_job)
+        self._now, self._before = state_for(model.line), state_for(model.line)
+        self._clock = Clock()
+        job.bind(
+            line=model.line, ends=model.ends.values, old=self._now, new=self._before, clock=self._clock,
+            counts=Counts(), itself=self._watch.itself,
+        )  # fmt: skip
+        return job
+
+    def attach(self, states: tuple[State, State], clock: Clock, counts: Counts) -> dict[str, Any]:
+        """What the job of a line is to have so that its steps, between two states in turn, look by themselves.
+
+        clock, counts: of the run (kernels.state.books).
+        """
+        if not self._watch.on:
+            return {"itself": 0}
+        job = Table(blank_itself_job)
+        model = self._model
+        job.bind(
+            line=model.line, ends=model.ends.values, old=states[0], new=states[1], clock=clock, counts=counts,
+            itself=self._watch.itself,
+        )  # fmt: skip
+        self.running = job
+        if self.is_bent:
+            self._address = watch_itself.address(job.numbers)
+        return {"itself": self._address if self.is_bent else UNBENT, "itself_table": job.numbers}
+
+    def adopt_cells(self, model: Model) -> None:
+        """Go on with a line of other cells, of which steps know."""
+        self._model, self._job = model, None
+
+    def set_model(self, model: Model) -> None:
+        """Go on with a line of the same cells."""
+        self._model = model
+        for job in (self._job, self.running):
+            if job is not None:
+                job.bind(line=model.line)
+
+    def bends(self) -> tuple[int, dict[str, Any]]:
+        """A line of a run is bent, so that every step looks from now on: bits of the last, and its job."""
+        self.is_bent, job = True, self.running
+        assert job is not None
+        self._address = watch_itself.address(job.numbers)
+        return int(watch_itself(job.numbers)), {"itself": self._address}
+
+    def check(self, t: float, state: State, event: Callable[..., None]) -> int:
+        """As `judge`, of a state at t (s) from which no step has been made."""
+        watch = self._watch
+        if not watch.on:
+            return 0
+        if not is_bent(state) and watch.itself.ahead.asked != WIDER:
+            watch.itself.found.told = 0.0
+            return 0
+        return self.judge(self._search(t, state, state.r), t, 0.0, state, event)
+
+    def judge(self, found: int, t: float, dt: float, state: State, event: Callable[..., None]) -> int:
+        """Report surfaces that have met in the step of dt (s) to a state at t (s), or a bend that hides it.
+
+        found: bits of the search.  Returns NEARS where the line is so near itself, in place of an event, that its
+        contact has to begin, PARTS where it may end.
+        """
+        told = self._watch.itself.found
+        if found & HIDES:
+            self._watch.report_hidden(t, self._model, state, event)
+        if found & NEARS:
+            told.told = 0.0 if found & MEETS else told.told
+        elif found & MEETS:
+            self._watch.report(t, dt, event)
+        return found & (NEARS | PARTS)
+
+    def is_near(self, t: float, state: State, step: float) -> bool:
+        """Whether a line that may touch itself is near itself at t (s), from which a step (s) is to be made."""
+        watch = self._watch
+        if not (watch.on and watch.asks and is_bent(state)):
+            return False
+        return watch.foresees(state, step, lambda: self._search(t, state, state.r))
+
+    def _search(self, t: float, state: State, before: Floats) -> int:
+        """MEETS and NEARS of kernels.contact.self_distance."""
+        if self._job is None:
+            self._job = self._bind()
+        self._now.r[:], self._now.e[:], self._now.v[:], self._before.r[:] = state.r, state.e, state.v, before
+        self._clock.now = t
+        return int(watch_itself(self._job.numbers))
+
+
+def is_bent(state: State) -> bool:
+    """As kernels.contact.self_distance.is_bent, which only kernels can call."""
+    c = state.r[-1] - state.r[0]
+    along, size = state.e @ c, TURNED * TURNED * (c @ c) * np.einsum("ij,ij->i", state.e, state.e)
+    return not bool(((along > 0.0) & (along * along > size)).all())
+
+
+def deepest_text(contact: SelfContact, model: Model) -> str:
+    """Where parts of a line are deepest in each other, of a state that contact has looked at last."""
+    p, q = contact.deepest
+    s, other = sorted((float(model.line.s[p]), float(model.line.s[q])))
+    width = float(0.5 * (contact.contact.width[p] + contact.contact.width[q]))
+    return (
+        f"the centrelines of s = {s:.6g} m and s = {other:.6g} m are {contact.least_distance:.3g} m apart, less than "
+        f"{INNER:g} of the diameter of {width:.3g} m"
+    )
+
 
 PASSED = "lines pass through each other"  # kind of an event
 # Parts of a straight way between two shapes, and by how much the Gauss integral of two lines jumps where one passes
 # through the other: by 1, and by far less in a part of a way on which none does.
-PARTS, JUMP = 48, 0.5
+OUTLINE_PARTS, JUMP = 48, 0.5
 FLAT = 1e-9  # volume, over the lengths, of chords that lie in one plane but for round-off, as neighbours do
 
 
@@ -73,7 +390,7 @@ def jumps(a: Floats, b: Floats) -> float:
 
     a (2, n, 3), b (2, m, 3): m, first and last nodes of each.
     """
-    parts = np.linspace(0.0, 1.0, PARTS + 1)
+    parts = np.linspace(0.0, 1.0, OUTLINE_PARTS + 1)
     found = [gauss_integral((1.0 - x) * a[0] + x * a[1], (1.0 - x) * b[0] + x * b[1]) for x in parts]
     return float(np.abs(np.diff(found)).max())
 

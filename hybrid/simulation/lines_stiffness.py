@@ -12,30 +12,27 @@ from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.junctions.bodies import ARM, FORCE, FRAME, MASS, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.march.assembly import JOINED
-from hybrid.kernels.state.obstacle_rows import EACH, STRAND
-from hybrid.kernels.state.obstacle_rows import FORCE as FORCE_OF
-from hybrid.kernels.state.obstacle_rows import STIFFNESS as STIFFNESS_OF
-from hybrid.kernels.state.report import FORCE_A, MOMENT_A
+from hybrid.kernels.state.report import EACH, FORCE_A, MOMENT_A, STRAND
+from hybrid.kernels.state.report import FORCE as FORCE_OF
+from hybrid.kernels.state.report import STIFFNESS as STIFFNESS_OF
 from hybrid.kernels.state.state import Floats
-from hybrid.model.bodies import angles_of, frame_of
-from hybrid.model.clamps import seat_of, seated
+from hybrid.model.bodies import angles_of, frame_of, seat_of, seated
+from hybrid.model.build import in_space
 from hybrid.model.network import NetworkModel, build_system
-from hybrid.model.plane import in_space
 from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import nearest
-from hybrid.scene.bodies import FixedBody, FreeBody, HeldBody
-from hybrid.scene.body_shapes import BodyShape
+from hybrid.scene.bodies import BodyShape, FixedBody, FreeBody, HeldBody
 from hybrid.scene.network import JoinedLine, Network
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
-from hybrid.simulation.contact_equilibrium import contacts_of
 from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.run_contact import refuse_within_itself
+from hybrid.simulation.run_start import contacts_of
 from hybrid.solve.contact_statics import touching_solver
-from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stepper import NetworkState
 
 VERTICAL = np.array([0.0, 0.0, 1.0])
 # Where the stiffness is that between equilibria: how far these are apart, of the longest line, and rad; where lines
@@ -88,7 +85,7 @@ def stiffness(scene: SceneLike, at: str) -> Stiffness:
     SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
     """
     asked = as_scene(scene)
-    with asked.form.said():
+    with asked.form.in_words():
         return _stiffness_at(asked, at)
 
 
@@ -247,7 +244,7 @@ def offsets(scene: SceneLike, at: str, distances: Sequence[float], heading: floa
         given = f"{distances!r:.60} m, heading {heading!r:.20}"
         fix = "give finite numbers, such as --reach 20 --heading 90"
         raise SceneError([Complaint("offsets", given, "distances (m) and a heading (deg)", fix)])
-    with asked.form.said():
+    with asked.form.in_words():
         return _offsets_at(asked, at, distances, heading)
 
 

@@ -23,15 +23,14 @@ from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import OBSTACLES, PLANAR, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.kernels.step.accept import GROWN
-from hybrid.model.build import Model
+from hybrid.model.build import Model, in_space, leaves_plane, planar, untwist
 from hybrid.model.network import NetworkModel
-from hybrid.model.plane import in_space, leaves_plane, planar, untwist
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import on_nodes, scaled, seed
-from hybrid.store.named_arrays import matched
+from hybrid.store.integrity import matched
 
 TOUCHES = "where it may touch"
 # Of the length: how far the push displaces a cable that goes on in space: a hundred times what an equilibrium may be
@@ -99,7 +98,7 @@ class PlaneMonitor:
             push = on_nodes(run.push, self._s, line.s) if self._s.size else seed(line.s, self.speed)
             self._give(run, push, line.s)
 
-    def take(self, line: Line) -> None:
+    def use_cells_of(self, line: Line) -> None:
         """Go on with other cells, to which the run has carried the push."""
         if self.speed:
             self._s = line.s
@@ -328,7 +327,7 @@ class LonePlanes(Part):
     def adopt_cells(self, number: int, line: Line) -> None:
         """Steps have carried the push to other cells of a line."""
         if number in self._lines:
-            self._lines[number].monitor.take(line)
+            self._lines[number].monitor.use_cells_of(line)
 
     def note_step(self) -> None:
         """Hear of what a step has flagged: pushes that are given anew, and lines that are to leave or to come back."""

@@ -20,25 +20,22 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.floating_watch import FloatingWatch
 from hybrid.simulation.line_result import LineResult, Wanted
 from hybrid.simulation.lone_planes import LonePlanes
-from hybrid.simulation.network_run import First, NetworkRun
 from hybrid.simulation.own_parts import OwnParts, RunPart
 from hybrid.simulation.parts import Part, Parts
 from hybrid.simulation.progress import RESULT, ProgressReporter, at_once
-from hybrid.simulation.restart import LoadChange
-from hybrid.simulation.restore import kept_resolution
+from hybrid.simulation.restart import LoadChange, kept_resolution
+from hybrid.simulation.run import First, Run
 from hybrid.simulation.run_checkpoint import kept_changes
 from hybrid.simulation.run_contact import RunContact
 from hybrid.simulation.run_failures import Cuts, Failures
-from hybrid.simulation.run_file import Asked, RunFile
 from hybrid.simulation.run_of_lines import Heard, LoadChanges, ProgressOfRun, WatchedLines, loaded_as, with_loads_of
-from hybrid.simulation.run_record import RunRecorder
+from hybrid.simulation.run_record import Asked, RunFile, RunRecorder
 from hybrid.simulation.run_zones import RunZones
 from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
 from hybrid.simulation.zones_at_rest import Start, managers_for, start_at_rest, zones_as_placed
-from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.store.array_contents import Target
-from hybrid.store.format import Text
+from hybrid.solve.stepper import NetworkState
+from hybrid.store.format import Target, Text
 from hybrid.store.writer import AT_ONCE, WriteMode
 from hybrid.zones.criteria import UserCriterion
 
@@ -63,7 +60,7 @@ class Recording(NamedTuple):
     source: Path | None = None
     pending: str = ""
     notes: Sequence[tuple[str, str]] = ()
-    begun: Callable[[NetworkRun], None] | None = None
+    begun: Callable[[Run], None] | None = None
     planes: bool = False
     start: Start | None = None
     points: Mapping[str, OutputPoints] | None = None
@@ -81,7 +78,7 @@ def new_run(
     system: Network, target: Target | None, text: Text, moves: bool,
     resolution: NetworkResolution | None = None, recording: Recording = ALONE,
     criterion: UserCriterion | None = None, changes: Sequence[LoadChange[Network]] = (),
-) -> NetworkRun:  # fmt: skip
+) -> Run:  # fmt: skip
     """A run that stands at its start, or at a checkpoint.
 
     target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether its
@@ -96,10 +93,10 @@ def new_run(
     else:
         first = _at_checkpoint(system, recording.source, changes, criterion)
     kept = recording.mode.before is not None and isinstance(target, Path)
-    run = NetworkRun(first, _steps(first, moves, end), target, criterion, kept)
+    run = Run(first, _steps(first, moves, end), target, criterion, kept)
     run.changes, run.notes, run.begun = changes, recording.notes, recording.begun
     _equip(run, first, system, text, recording)
-    run.recorder = run.file.begin() if recording.source is None else run.go_on(recording.source)
+    run.recorder = run.file.begin() if recording.source is None else run.continue_file(recording.source)
     return run
 
 
@@ -149,7 +146,7 @@ def _steps(first: First, moves: bool, end: float) -> NetworkSteps:
     return NetworkSteps(first.network.require_time().rho_inf, [0.0, *times], *follow, turn)
 
 
-def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording: Recording) -> None:
+def _equip(run: Run, first: First, system: Network, text: Text, recording: Recording) -> None:
     """Give a run its file, its lines and its parts; system: with the loads of its start."""
     me = proxy(run)  # for parts: in a circle a run would wait for the search for garbage
     moves, named = run.moves, dict(zip(first.model.names, first.scenes, strict=True))
@@ -187,7 +184,7 @@ def _equip(run: NetworkRun, first: First, system: Network, text: Text, recording
     run.parts = Parts([*parts, RunRecorder(me), FloatingWatch(me, moves)])
 
 
-def _add_lines(run: NetworkRun, first: First, recording: Recording, paid: Mapping[int, PayingOut]) -> None:
+def _add_lines(run: Run, first: First, recording: Recording, paid: Mapping[int, PayingOut]) -> None:
     """Give a run its lines, each with what records it; paid: those that are paid out, by number."""
     points = recording.points or {}
     run.lines = []
@@ -226,7 +223,7 @@ def run_system(
     interrupted: Callable[[], bool], name: str = RESULT, resolution: NetworkResolution | None = None,
     recording: Recording = ALONE, criterion: UserCriterion | None = None,
     changes: Sequence[LoadChange[Network]] = (),
-) -> NetworkRun:  # fmt: skip
+) -> Run:  # fmt: skip
     """Compute the motion of a system into a file with checkpoints, into memory, or (target None) to be compared with.
 
     name: of the pass; resolution, recording, criterion, changes: as of `new_run`.
@@ -241,7 +238,7 @@ def run_system(
 
 def static_system(
     system: Network, target: Target | None, text: Text, resolution: NetworkResolution | None = None, pending: str = ""
-) -> NetworkRun:
+) -> Run:
     """Compute the equilibrium of a system under full loads; target, resolution, pending: as of `run_system`."""
     run = new_run(system, target, text, False, resolution, Recording(pending=pending))
     run.record_equilibrium()

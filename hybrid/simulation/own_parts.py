@@ -27,9 +27,9 @@ from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import Floats
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.solve.joined import LineFailed
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.store.named_arrays import pack
+from hybrid.solve.stepper import LineFailed
+from hybrid.store.integrity import pack
 
 NAME = re.compile(r"[A-Za-z][\w-]{0,26}")  # with "part " before it a kind of events, which has 32 bytes
 # Verbs of a part that are called for a run, and how many arguments each has.

@@ -17,11 +17,10 @@ from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.run_points import Sampled
-from hybrid.solve.joined import LineFailed, NetworkTaken
+from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.stepper import LineFailed, NetworkTaken
 from hybrid.zones.plan import Change
 
 # What is asked of several parts is asked in this order.

@@ -14,31 +14,30 @@ from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel.node_changes import energy_of
+from hybrid.kernels.reel.paid_length import carry_layers
 from hybrid.kernels.reel.payout import (
     end_payout,
     fit_line,
     lengthen,
     limit_next_step,
     put_forces_on,
+    remove_forces,
     stand_still,
-    take_forces_off,
 )
-from hybrid.kernels.reel.payout_layers import carry_layers
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
 from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FRICTION, LENGTH_OUT, PAYOUT_RATE, STIFFNESS_DAMPING, TOUCHES
 from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, slip_size, state_for
 from hybrid.model.build import Model
-from hybrid.model.layout import Layout, LineOnBase, on_other_parts
-from hybrid.model.mesh import Zone
+from hybrid.model.mesh import Layout, LineOnBase, Zone, on_other_parts
 from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, length_at, lengths_at, payout_of
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
-from hybrid.scene.payout import SOURCES
+from hybrid.scene.ends import SOURCES
 from hybrid.scene.schema import LineScene
-from hybrid.store.named_arrays import matched
+from hybrid.store.integrity import matched
 
 ROUND_OFF = 1e-9  # of a length
 # Arrays of a line that its length changes, and that outputs ask for.
@@ -214,7 +213,7 @@ class PayingOut:
         try:
             yield
         finally:
-            take_forces_off(self.table.numbers)
+            remove_forces(self.table.numbers)
 
     @property
     def lengthening(self) -> Floats:
@@ -282,7 +281,7 @@ class PayingOut:
         self._fit(changed.line, reel, length, run.t)
         if carry is not None:
             carry(changed, source, of_base)
-        ends, sea = model.ends.at(run.t), model.sea.at(run.t)
+        ends, sea = model.ends.at_time(run.t), model.sea.at_time(run.t)
         more = energy(changed.line, ends, out, sea) - energy(model.line, ends, state, sea)
         if model.line.law.size:
             more += stretch_energy(changed.line, out) - stretch_energy(model.line, state)
@@ -383,7 +382,7 @@ class PayingOut:
         self._fitting.bind(line=line, reel=reel, clock=self._clock)
         fit_line(self._fitting.numbers)
 
-    def look(
+    def observe(
         self, observer: Observer, model: Model, batch: Batch
     ) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
         """The outputs of a batch, each of a line as long as it was then, and the zones of all but the first."""
@@ -502,7 +501,7 @@ class PayingOut:
             getattr(self.reel, name)[:] = x
         return self.on(model, float(self.reel.numbers.length))
 
-    def go_on(self, begin: float, end: float, asked: tuple[float | None, float] | None) -> None:
+    def advance(self, begin: float, end: float, asked: tuple[float | None, float] | None) -> None:
         """From `begin` to `end`, s, a length that is set from Python goes where it was asked to, or on at its rate.
 
         ValueError: it cannot be so long, or so short.

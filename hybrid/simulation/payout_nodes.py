@@ -35,8 +35,18 @@ from hybrid.model.build import Model
 from hybrid.model.line import lines
 from hybrid.outputs.joined_lines import Output
 from hybrid.simulation.envelope import marks_on
-from hybrid.simulation.line_of_run import OfRun, OneOfMany, by_itself
-from hybrid.simulation.remesh import NO_LAWS, PAIRS, Part, Remesh, Shaped, copy_fields, shaped
+from hybrid.simulation.remesh import (
+    NO_LAWS,
+    PAIRS,
+    OfRun,
+    OneOfMany,
+    Part,
+    Remesh,
+    Shaped,
+    by_itself,
+    copy_fields,
+    shaped,
+)
 
 SHARED = ("law", "pieces", "winch", "layer")  # what all reels of a line have in common
 

@@ -170,7 +170,7 @@ class ProgressReporter:
                 cost = self._beside[here][0]
                 self._beside[here] = cost, cost if finished else cost * t / self._duration
 
-    def look(self) -> None:
+    def end_pass(self) -> None:
         """The present pass has ended, and others, in other threads, go on."""
         if self._listener is not None:
             self._report(False)

@@ -1,34 +1,353 @@
-"""What a result leaves to be done: the rest of a run that was cut off, more of it, or other loads from some time on."""
+"""A run made again from its checkpoint, and what a result leaves to be done.
+
+Checkpoints of a cable as hybrid-cable 1.0 and before kept them, as those of a run of one line.
+
+Such a tree has no names of lines: the state of the line, its books and the clock of the steps stand beside each other.
+
+A run made again from its checkpoint: the model from scene and mesh, what moves its zones, how finely it is computed.
+
+A checkpoint holds named arrays and plain values alone.  What follows from the scene is made from the scene, and every
+number that is read is checked for its type, its shape and, where a wrong one would do harm, its size.
+
+What a result leaves to be done: the rest of a run that was cut off, more of it, or other loads from some time on.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
+import platform
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from importlib.metadata import version
+from math import inf
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from hybrid.errors import Complaint, ResultError, SceneError
+from hybrid.kernels.machine.cache import compiler_hash
+from hybrid.kernels.mesh.cell_errors import CURVATURE, QUANTITIES
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
+from hybrid.model.contents import passing_each_other, self_reach
 from hybrid.model.ends import EndConditions
-from hybrid.model.lines_contact import passing_each_other
+from hybrid.model.failure import Weakness
+from hybrid.model.mesh import MOST_CELLS, Grading, Layout
 from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.payout import longest_out, winch_side
+from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sections import OutputPoints
-from hybrid.model.self_reach import self_reach
 from hybrid.scene.base import dotted
+from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene, read_text, scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.restore import kept_resolution, refused, restored_points
-from hybrid.store.checkpoint import read_before, read_checkpoint
-from hybrid.store.hdf5_file import opened
-from hybrid.store.named_arrays import Tree
+from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
+from hybrid.store.hdf5_file import is_result, opened
+from hybrid.store.integrity import Tree, matched, pack
 from hybrid.store.reader import Result, open_result
+from hybrid.zones.criteria import UserCriterion
+
+FIRST_WORKS = 11  # works that were booked once
+FIRST_REPORT = 34  # numbers that a report had once; later ones have more behind these
+SAME_NODE = 1e-9  # of the length: round-off of the place of a node
+# What the tree of a line calls names of the old one, and what that of the run does.
+OF_LINE = {x: x for x in ("state", "rho", "work", "power", "envelope", "ends", "first_energy", "torsion")}
+OF_LINE |= {"_stored": "stored", "watch": "noted", "first_places": "first_places", "first_turns": "first_turns"}
+OF_RUN = {x: x for x in ("t", "steps", "changes", "cpu", "rho", "leg")} | {"dt": "last", "last": "interval"}
+# What becomes something else, and what follows from the scene, or is of the last step alone.
+TURNED_INTO_OTHERS = {"report", "tension", "twist", "control", "vibration", "lengths", "_turned", "_slackened", "mesh"}
+TURNED_INTO_OTHERS |= {"self_contact", "zoning", "payout", "plane", "push", "home"}
+LEFT_OUT = {"iterations", "floor", "_beyond", "correction"}
+
+
+def is_of_cable(saved: Any) -> bool:
+    """Whether a state, or a resolution, of a checkpoint is that of a cable, without a name of its line."""
+    return isinstance(saved, Mapping) and ("mesh" in saved or "fineness" in saved)
+
+
+def as_of_line(saved: Mapping[str, Any], name: str, model: Model, weaknesses: Sequence[Weakness]) -> dict[str, Any]:
+    """The tree of a run of one line of this name; what a cable has none of is left out of it.
+
+    model: of the line as the run begins; weaknesses: what may break. ValueError: it is of another line.
+    """
+    known = {*OF_LINE, *OF_RUN, *TURNED_INTO_OTHERS, *LEFT_OUT}
+    if odd := [x for x in saved if x not in known]:
+        raise ValueError(f"{', '.join(odd)}: not in the checkpoint of any cable")
+    _check_mesh(saved["mesh"], model)
+    line = {new: saved[old] for old, new in OF_LINE.items() if old in saved}
+    line.setdefault("envelope", None)  # files of 0.6 have none, and no end had been let go in them
+    line["ends"] = {"released": np.zeros(2, int)} | line["ends"]
+    if not line.get("torsion"):
+        line.pop("torsion", None)
+    contact = saved.get("self_contact")
+    if contact is not None:
+        line["self_contact"] = contact
+    if "report" in saved:  # not in a file of 0.6
+        line["report"] = saved["report"][0]
+        line["before"] = {"report": saved["report"][1], "tension": saved["tension"], "twist": saved["twist"]}
+        line["before"]["touch"] = np.zeros((1, 0)) if contact is None else contact["touch"][None]
+    found = _of_run(saved) | {"lines": {name: line}, "quantities": {}, "dry": [], "overlaps": [], "under": {}}
+    found["broken"] = _broken(line["ends"]["released"], weaknesses)
+    found["vibrations"] = {name: saved["vibration"]} if "vibration" in saved else {}
+    found["zones"] = {} if saved["zoning"] is None else {name: _zones(saved)}
+    found["planes"] = {name: {"plane": saved["plane"], "home": saved.get("home"), "push": _push(saved["push"])}}
+    return found if saved.get("payout") is None else found | {"payout": {name: saved["payout"]}}
+
+
+def _of_run(saved: Mapping[str, Any]) -> dict[str, Any]:
+    """The clock of the steps, and what has been told of them."""
+    found = {new: saved[old] for old, new in OF_RUN.items() if old in saved}
+    if "report" not in saved:  # nor where steps to a stop began, nor anything of the step before
+        found |= {"leg": [saved["t"], 0], "interval": 0.0}
+    control = saved["control"]
+    longest, *counted = saved.get("lengths", [0.0] * 7)
+    told = [float(saved.get(key, False)) for key in ("_turned", "_slackened")]
+    cuts = [*told, longest, 0.0, *(float(x) for x in counted)]
+    steps = [] if control is None else [control["next"], control["before"], float(control["wary"])]
+    return found | {"loaded": saved["t"], "control": steps, "cuts": cuts}
+
+
+def _zones(saved: Mapping[str, Any]) -> dict[str, Any]:
+    """Zones that move; those of a line that is paid out are of the cells that its winch has made."""
+    cells = saved["mesh"] if saved.get("payout") is None else saved["payout"]
+    return {"rod": cells["rod"], "here": cells.get("here"), "switching": saved["zoning"]}
+
+
+def _push(saved: Any) -> Any:
+    """A push out of the plane; a file of 0.6 does not say whether it was real, and none was."""
+    return {"real": False} | saved if isinstance(saved, dict) else saved
+
+
+def _broken(saved: Any, weaknesses: Sequence[Weakness]) -> list[int]:
+    """Numbers of what may break, of the ends (2,) that had been let go."""
+    released = matched(saved, np.zeros(2, int), "ends/released")
+    if not np.isin(released, (0, 1)).all():
+        raise ValueError(f"ends that are let go: {released}")
+    found = {x.ends[0][1]: k for k, x in enumerate(weaknesses)}
+    return [found[k] for k in np.flatnonzero(released).tolist()]
+
+
+def _check_mesh(saved: Any, model: Model) -> None:
+    """ValueError: the nodes, or the zones, of a checkpoint are not those of the model."""
+    mine = mesh_tree(model)
+    mesh = matched({"here": None} | dict(saved), dict.fromkeys({"here": None} | mine), "mesh")
+
+    def same(a: Any, b: Floats) -> bool:
+        return isinstance(a, np.ndarray) and a.shape == b.shape and bool((abs(a - b) <= SAME_NODE * model.length).all())
+
+    if "s" in mine:
+        fits = same(mesh["s"], mine["s"]) and mesh["zones"] == mine["zones"]
+    else:
+        fits = same(mesh["base"], mine["base"]) and np.array_equal(mesh["parts"], mine["parts"])
+    if not fits:
+        raise ValueError("nodes that are not those of the line")
+
+
+def mesh_tree(model: Model) -> Tree:
+    """Where the nodes of a model are, and its zones, for a checkpoint."""
+    if model.layout is not None:
+        return (model.layout if model.payout is None else model.payout.first_layout)._asdict()
+    assert not isinstance(model.mesh, Layout)
+    s, zones = model.mesh
+    return {"s": s, "zones": [[x.kind, x.s_a, x.s_b] for x in zones]}
+
+
+def of_line(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """What a checkpoint has of a line, whatever it is worth."""
+    lines = saved.get("lines")
+    line = lines.get(name) if isinstance(lines, Mapping) else None
+    return line if isinstance(line, Mapping) else {}
+
+
+def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
+    """The zones of a checkpoint, of an older version too: that had no cells that follow, or one largest curvature, or
+
+    did not look at velocities, or said nothing of kinks.
+    """
+    saved = {"following": None} | saved
+    following, manager, largest = saved["following"], saved.get("manager"), np.zeros(QUANTITIES)
+    if isinstance(following, dict) and isinstance(following.get("peak"), float):
+        largest[CURVATURE] = following["peak"]
+        saved["following"] = {name: x for name, x in following.items() if name != "peak"}
+    following = saved["following"]
+    if isinstance(following, dict) and isinstance(following.get("calm"), np.ndarray):
+        saved["following"] = {"waves": np.zeros(following["calm"].shape)} | following
+    if isinstance(manager, dict):
+        saved["manager"] = {"largest": largest, "fastest": 0.0, "kinked": False} | manager
+    return saved
+
+
+# Rooms that have a part in the numbers of a file.
+COMPUTES = ("accuracy", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store", "zones")
+# Times as fine or as coarse as the scene asks for that a run may be: far beyond what error control chooses.
+FARTHEST = 1e4
+
+
+@cache
+def program() -> str:
+    """Which program this is: version, and a hash of all that computes.  The same one gives the same bits."""
+    digest, package = hashlib.sha256(compiler_hash().encode()), Path(__file__).parents[1]
+    digest.update(" ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "h5py")).encode())
+    digest.update(platform.python_version().encode())
+    for file in sorted(package.rglob("*.py")):
+        if file.relative_to(package).with_suffix("").parts[0] in COMPUTES:
+            digest.update(file.read_bytes())
+    return f"{version('hybrid-cable')} {digest.hexdigest()[:16]}"
+
+
+def other_program(point: Checkpoint) -> str:
+    """Text of the event of a run that another program has begun; empty if this one has."""
+    if point.program == program():
+        return ""
+    wrote, this = (x.split()[0] for x in (point.program, program()))
+    text = f"begun by hybrid-cable {wrote}, from here on by {this}" + " in another state" * (wrote == this)
+    return f"{text}: the last digits may be others"
+
+
+def require_same(point: Checkpoint, files: Mapping[str, str], criterion: UserCriterion | None, source: Path) -> None:
+    """ResultError: the criterion of a run is missing, or the files that it reads have changed.
+
+    files: digests by path, as they are now; source: the result whose checkpoint this is.
+    """
+    if point.asks and criterion is None:
+        advice = "hybrid.resume(path, criterion=...) with the function that it was run with"
+        raise ResultError(f"{source} was computed with a criterion of its own\n    try:      {advice}")
+    changed = [path for path, digest in point.files.items() if files.get(path) != digest]
+    if changed:
+        detail = f"{', '.join(changed)}: other than when the run began"
+        raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
+
+
+@contextmanager
+def refused(source: Path) -> Iterator[None]:
+    """What a checkpoint raises that does not fit its scene, as a ResultError."""
+    try:
+        yield
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, ArithmeticError) as error:
+        kind = "" if type(error) is ValueError else f"{type(error).__name__}: "
+        detail = f"{kind}{error}".splitlines()[0]
+        raise ResultError(
+            f"{source} has a checkpoint that does not fit its scene\n    detail:   {detail}\n"
+            "    try:      run its scene again"
+        ) from error
+
+
+# --- how finely ---------------------------------------------------------------------------------
+
+
+def resolution_tree(resolution: Resolution) -> Tree:
+    """A resolution for a checkpoint."""
+    tree = {x.name: getattr(resolution, x.name) for x in fields(resolution)}
+    rows = {x: np.array(getattr(resolution, x), float).ravel() for x in ("rods", "places", "ends")}
+    return tree | {"grading": resolution.grading and vars(resolution.grading)} | rows
+
+
+def resolution_from(tree: Any, scene: LineScene) -> Resolution:
+    """The resolution again.  ValueError: it is none for this scene."""
+    first = first_resolution(scene)
+    if not is_of_cable(tree) and len(tree) == 1:
+        (tree,) = tree.values()  # by the name of the only line
+    if "later" not in tree:  # of a checkpoint of before, whose steps were short from one end to the other
+        tree = tree | {"later": first.later * tree["step"] / first.step if first.step else 0.0, "still": first.still}
+    later = {
+        "bends": inf,
+        "rods": np.zeros(0),
+        "parts": 1,
+        "places": np.zeros(0),
+        "ends": np.zeros(0),
+    }  # all cells of before had one part
+    tree = {name: x for name, x in tree.items() if name != "follow"}  # of checkpoints of 1.0
+    saved = matched(later | tree, resolution_tree(first) | {"grading": None}, "resolution")
+    for name in ("fineness", "step", "local", "zones", "later", "still"):
+        asked, is_ = getattr(first, name), saved[name]
+        if (asked is None) != (is_ is None):
+            raise ValueError("steps that follow the motion in one place, fixed ones in the other")
+        if asked is not None and not asked / FARTHEST <= is_ <= asked * FARTHEST:
+            raise ValueError(f"{name} = {is_:g}, where the scene asks for {asked:g}")
+    grading = saved["grading"]
+    if grading is not None:
+        grading = Grading(**matched(grading, {"s": np.zeros(0), "density": np.zeros(0)}, "grading"))
+        s, density = grading.s, grading.density
+        ordered = s.ndim == density.ndim == 1 and 1 < s.size == density.size and bool((np.diff(s) > 0.0).all())
+        within = ordered and 0.0 <= s[0] < s[-1] <= scene.length * (1 + 1e-9) and density.min() > 0.0
+        if not within or saved["fineness"] * density.max() * scene.length > MOST_CELLS:
+            raise ValueError("cells that no mesh has")
+    if not (saved["fineness"] * 100 <= MOST_CELLS and 1 <= saved["every"] <= FARTHEST and saved["bends"] > 0.0):
+        raise ValueError("cells that no mesh has")
+    if not (1 <= saved["parts"] <= FARTHEST and (np.diff(saved["places"]) > 0.0).all()):
+        raise ValueError("places of nodes that no mesh has")
+    rods = saved["rods"]
+    if rods.size % 3 or not np.isfinite(rods).all() or not (rods[::3] <= rods[1::3]).all():
+        raise ValueError("stretches that no line has")
+    rods = rods.reshape(-1, 3)
+    rows = {
+        "rods": tuple((float(a), float(b), float(x)) for a, b, x in rods),
+        "places": tuple(saved["places"].tolist()),
+        "ends": tuple(saved["ends"].tolist()),
+    }
+    return Resolution(**saved | {"grading": grading} | rows)
+
+
+def kept_resolution(system: Network, source: Path) -> NetworkResolution:
+    """How finely a result was computed that has a checkpoint.  ResultError: it is none of this system."""
+    with opened(source) as file:
+        tree = read_checkpoint(file).resolution
+    first = NetworkResolution.first(system)
+    if not tree:  # of an earlier program
+        return first
+    with refused(source):
+        tree = {next(iter(system.lines)): tree} if is_of_cable(tree) else tree
+        if set(tree) != set(system.lines):
+            raise ValueError("resolutions of other lines")
+        found = {name: resolution_from(tree[name], system.scene_of(name)) for name in system.lines}
+        if len({(x.step, x.every, x.local is None) for x in found.values()}) > 1:
+            raise ValueError("lines with other steps")
+        return NetworkResolution(found)
+
+
+def is_cut_off(source: Path, texts: tuple[str, str], resolution: NetworkResolution) -> bool:
+    """Whether a file holds a run of a scene and its changes (texts), with this resolution, that goes on."""
+    if not is_result(source):
+        return False
+    try:
+        with open_result(source) as result:
+            if (result.scene_text, result.changes_text) != texts:
+                return False
+        with opened(source) as file:
+            tree = read_checkpoint(file).resolution
+    except ResultError:
+        return False
+    asked = {name: resolution_tree(x) for name, x in resolution.lines.items()}
+    return pack(dict.fromkeys(asked, tree) if is_of_cable(tree) else tree) == pack(asked)
+
+
+def restored_points(result: Result, length: float, far: float | None = None) -> OutputPoints:
+    """The output points of a result, which whoever continues it keeps; one of 0.6 has no jumps.
+
+    far: m, arc length of the end of a line that is paid out at its start.
+    ValueError: none of a cable of that length (m).
+    """
+    s = np.asarray(result["s"], float)
+    jumps = np.asarray(result["right/s"], float) if "right/s" in result else np.zeros(0)
+    ordered = s.ndim == 1 and s.size > 0 and bool((np.diff(s) > 0.0).all())
+    begin, end = (0.0, length) if far is None else (far - length, far)
+    near = 1e-9 * length if far is not None else 0.0
+    if not (ordered and s[0] >= begin - near and s[-1] <= end + 1e-9 * length):
+        raise ValueError(f"s: output points that increase from {begin:g} to {end:g} m at most were expected")
+    if jumps.ndim != 1 or not np.isin(jumps, s).all():
+        raise ValueError("right/s: places among the output points s were expected")
+    return OutputPoints(s, jumps)
+
+
+# --- the model ----------------------------------------------------------------------------------
+
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
 MAY_CHANGE = (
@@ -80,7 +399,7 @@ def remaining(
 
     ResultError: nothing, or it cannot be told; SceneError: what is asked cannot be.
     """
-    left, done = _found(path)
+    left, done = _what_is_left(path)
     if start is not None and not settings:
         raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
     if until is None and not settings:
@@ -106,7 +425,7 @@ def remaining(
     return replace(left, anew=True, reached=0.0, points=None) if begin < left.reached else left
 
 
-def _found(path: Path) -> tuple[Remaining[Any], bool]:
+def _what_is_left(path: Path) -> tuple[Remaining[Any], bool]:
     """What is left of a result as it is, and whether that is nothing."""
     with opened(path) as file:
         before, point = read_before(file), read_checkpoint(file)
@@ -118,7 +437,7 @@ def _found(path: Path) -> tuple[Remaining[Any], bool]:
             lines = dict(result.each_line())
             scene_of_file = read_text(result.scene_text)[0]
             scene = _as_often(as_begun(scene_of_file, lines, meets), result)
-            told = [(t, as_begun(read_text(text)[0], lines, meets)) for t, text in _told(path, result)]
+            told = [(t, as_begun(read_text(text)[0], lines, meets)) for t, text in _changes_of(path, result)]
             with refused(path):
                 points = {name: _points_of(part, scene.asked_scene(name)) for name, part in lines.items()}
             done = result.done and not before
@@ -216,7 +535,7 @@ def _as_often(scene: Any, result: Result) -> Any:
     return scene.model_copy(update={"output": scene.output.model_copy(update={"every": every})})
 
 
-def _told(path: Path, result: Result) -> list[tuple[float, str]]:
+def _changes_of(path: Path, result: Result) -> list[tuple[float, str]]:
     """Times (s) and scenes of the changes of a result; ResultError: they cannot be read."""
     try:
         return [(float(x["t"]), str(x["scene"])) for x in json.loads(result.changes_text or "[]")]
@@ -272,7 +591,7 @@ def _refuse_jump(before: Model, after: Model, k: int, t: float, where: str) -> N
 
 def _place(ends: EndConditions, k: int, t: float) -> tuple[np.ndarray, ...]:
     """Position (3,) m, velocity (3,) m/s, frame (9,) and its spin (3,) rad/s of an end."""
-    now = ends.at(t)
+    now = ends.at_time(t)
     return now.position[k].copy(), ends.velocity[k].copy(), now.frame[k].copy(), now.spin[k].copy()
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.laws.seabed import planes_under
+from hybrid.kernels.state.report import (
     AXIS,
     BEHIND,
     GROOVE,
@@ -19,18 +19,20 @@ from hybrid.kernels.state.obstacle_rows import (
     LEAF,
     MESH,
     NORMAL,
+    OBSTACLES,
     PLACE,
     RADIUS,
     RIM,
     RING,
     ROOT,
     ROUND,
+    SEABED,
     SIDE,
     STILL_AXIS,
     STILL_SIDE,
     STRAND,
+    SURFACE,
 )
-from hybrid.kernels.state.report import OBSTACLES, SEABED, SURFACE
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.build import Model
 from hybrid.model.payout import whole_scene
@@ -39,8 +41,7 @@ from hybrid.outputs.probes import Observer
 from hybrid.scene.quantities import Quantity
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.envelope import Envelope
-from hybrid.store.capacity import CORNERS
-from hybrid.store.code_checks import ROWS
+from hybrid.store.capacity import CORNERS, ROWS
 from hybrid.store.format import Field, Header, Text
 from hybrid.store.recorder import Rows
 
@@ -186,7 +187,7 @@ def _limits_of_quantities(observer: Observer) -> list[tuple[Field, np.ndarray]]:
         rows, what = capacities.rows(), "corners of capacity polygons: from and to (m), tension (N), curvature (1/m)"
         out.append((Field(CORNERS, "", what, rows.shape, ("corner", "capacity_row")), rows))
     if (codes := observer.quantities.codes) is not None:
-        rows, what = codes.rows(), "sections that are checked by a code, as of hybrid.store.code_checks.Row"
+        rows, what = codes.rows(), "sections that are checked by a code, as of hybrid.store.capacity.Row"
         out.append((Field(ROWS, "", what, rows.shape, ("code_row", "code_number")), rows))
     if pipes is None or np.isnan(pipes.limits).all():
         return out

@@ -14,13 +14,21 @@ from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE
 from hybrid.model.failure import weaknesses
 from hybrid.scene.base import Table
-from hybrid.simulation.old_checkpoints import FIRST_REPORT, FIRST_WORKS, as_of_line, is_of_cable, of_line
-from hybrid.simulation.restore import program, refused, resolution_tree
+from hybrid.simulation.restart import (
+    FIRST_REPORT,
+    FIRST_WORKS,
+    as_of_line,
+    is_of_cable,
+    of_line,
+    program,
+    refused,
+    resolution_tree,
+)
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.solve.run import no_extremes
+from hybrid.solve.network_steps import no_extremes
 from hybrid.store.checkpoint import digest_of, read_checkpoint
 from hybrid.store.hdf5_file import opened
-from hybrid.store.named_arrays import matched
+from hybrid.store.integrity import matched
 from hybrid.zones.criteria import UserCriterion
 
 REFERENCES = "first_places", "first_turns"  # of outputs of a line

@@ -18,20 +18,17 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line
 from hybrid.model.build import Model
-from hybrid.model.lines_contact import touching_among
+from hybrid.model.contents import contact_bits, touching, touching_among, touching_no_more
 from hybrid.model.network import NetworkModel
-from hybrid.model.self_reach import contact_bits, touching, touching_no_more
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.contact_equilibrium import contact_of, crossings, energy_between, touches_alone
-from hybrid.simulation.lines_contact import PASSED, LinesWatch, pair_text, shared_of
-from hybrid.simulation.old_checkpoints import of_line
+from hybrid.simulation.lines_contact import PASSED, LinesWatch, deepest_text, diameters, pair_text, shared_of
 from hybrid.simulation.parts import Part
+from hybrid.simulation.restart import of_line
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.self_watch import deepest_text, diameters
-from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.simulation.run_start import contact_of, crossings, energy_between, touches_alone
+from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.stepper import JoinedLine, NetworkState
 from hybrid.store.envelope import meeting_text
 
 Pair = tuple[int, int]
@@ -138,7 +135,7 @@ class RunContact(Part):
     def at_rest(self) -> None:
         """Look which lines overlap in an equilibrium."""
         self._watch_lines()
-        self._look_for_overlaps()
+        self._find_overlaps()
 
     def _watch_lines(self) -> None:
         """Look from now on which lines overlap without contact, beside those that are known to."""
@@ -155,11 +152,11 @@ class RunContact(Part):
 
     # --- the start ------------------------------------------------------------------------------------
 
-    def _look_for_overlaps(self) -> None:
+    def _find_overlaps(self) -> None:
         """Look which lines overlap without contact in the first state, and which the search for it has let cross."""
         run = self._run
         if self.watch is not None and self.watch.is_needed:
-            run.solver.look_at(run.state)
+            run.solver.join_states(run.state)
             self._passed |= self.watch.begin(run.network)
         for a, c in crossings(run.network, run.model, run.found.state) if run.found is not None else ():
             one, two = run.model.names[a], run.model.names[c]
@@ -184,7 +181,7 @@ class RunContact(Part):
 
     def begin(self) -> None:
         """Likewise of lines that are near each other there."""
-        self._look_for_overlaps()
+        self._find_overlaps()
         if self.watch is not None and self.watch.near() and self._begin_between():
             self._run.balance()
 

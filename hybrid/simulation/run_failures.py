@@ -37,10 +37,9 @@ from hybrid.simulation.events import (
 from hybrid.simulation.failure import Stopped, explanation, first_remedy, touch_text
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.solve.joined import LineFailed, NetworkState, NetworkTaken
-from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.run import Tried
-from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.contact import SharedContact
+from hybrid.solve.network_steps import NetworkSteps, Tried
+from hybrid.solve.stepper import LineFailed, NetworkState, NetworkTaken
 
 SAME_TIME = 1e-6  # of a step: a time so near is now
 
@@ -80,15 +79,15 @@ class Failures(Part):
                 self._break(k, why)
                 found = True
         if found:
-            self._go_on()
+            self._renew()
 
     def break_now(self, weakness: Weakness, why: str) -> None:
         """Break now what a program outside lets go."""
         self.all = (*self.all, weakness)
         self._break(len(self.all) - 1, why)
-        self._go_on()
+        self._renew()
 
-    def _go_on(self) -> None:
+    def _renew(self) -> None:
         """Accelerations jump, and there is room for the next state."""
         self._run.restart_steps()
         self._run.renew_other()
@@ -146,7 +145,7 @@ class Failures(Part):
         run.model = after_failure(run.model, self.all[k], run.t)
         self.broken.append(k)
         for line, model in zip(run.lines, run.model.models, strict=True):
-            line.follow(model)
+            line.use_model(model)
         for part in run.parts:
             part.release(self.all[k].ends)
         states = [
@@ -165,7 +164,7 @@ def elastic(model: Model, t: float, state: State) -> float:
     """Energy of bending and torsion, J, at t (s), with that of zones that a torque passes through."""
     cells, energy = model.cells, np.zeros(4)
     observed = Observed(np.zeros((cells + 1, 3)), np.zeros((cells + 1, 3)), energy)
-    observe(model.line, model.ends.at(t), state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
+    observe(model.line, model.ends.at_time(t), state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
     line = model.line
     twist = float(torsion_energy(line, state.turn[:, TURN], state.T)) if line.torsion.size else 0.0
     return float(energy[1] + energy[2]) + twist

@@ -13,9 +13,9 @@ from hybrid.kernels.junctions.bodies import DONE, SPRING
 from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Line, Work
 from hybrid.model.build import Model
+from hybrid.model.contents import touching
 from hybrid.model.failure import unclamped, without_hold
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
-from hybrid.model.self_reach import touching
 from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import Sink
@@ -23,10 +23,10 @@ from hybrid.simulation.line_result import LineResult, LineStep
 from hybrid.simulation.parts import Part, Parts
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restart import LoadChange
-from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
+from hybrid.solve.stepper import NetworkState
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
 from hybrid.zones.change import on_layout
@@ -127,7 +127,7 @@ class WatchedLines(Part):
         run, solver = self._run, self._run.solver
         for line, new, old, work in zip(run.lines, run.state.lines, run.other.lines, solver.work, strict=True):
             if seen := int(run.loop.seen[line.number]):
-                line.look_at_itself(solver, seen, run.t, run.last_step, new)
+                line.note_nearness(solver, seen, run.t, run.last_step, new)
             if line.books.counts.notices:
                 line.watch(LineStep(run.t, new, old, work.report, line.books))
 
@@ -211,7 +211,7 @@ class LoadChanges(Part):
         run.loaded = run.t  # loads that end now, or would have ended before, act no more
         run.start_from(run.rest)
         for line, model in zip(run.lines, run.model.models, strict=True):
-            line.follow(model)
+            line.use_model(model)
         for part in run.parts:
             part.change_loads()
         done = run.solver.body_work[:, DONE:SPRING].copy()

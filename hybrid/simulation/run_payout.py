@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.mesh.stiffness_ramp import soften
+from hybrid.kernels.mesh.zone_criteria import soften
 from hybrid.kernels.reel.payout import iterate, iterate_with_others, pay_out, stand_among
 from hybrid.kernels.reel.reel import MovingZones, ReelJob, zones_that_stay
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats, State, state_for
 from hybrid.model.build import Model
-from hybrid.model.layout import Layout
+from hybrid.model.mesh import Layout
 from hybrid.model.network import NetworkModel
 from hybrid.model.payout import FEWEST_CELLS
 from hybrid.scene.schema import LineScene
@@ -29,9 +29,9 @@ from hybrid.simulation.parts import Part
 from hybrid.simulation.payout import Before, PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.solve.joined import LineFailed, NetworkState
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
+from hybrid.solve.stepper import LineFailed, NetworkState
 from hybrid.zones.at_start import rods_at_winch
 from hybrid.zones.change import ZoneSwitching, change_base
 from hybrid.zones.manager import DomainManager
@@ -176,7 +176,7 @@ class RunPayout(Part):
         self._run = run
         self.zones: dict[int, PaidZones] = {}  # of those whose zones move
         self.lines = {k: PayingOut(x) for k, x in enumerate(run.model.models) if x.payout is not None}
-        self._take({k: x.on(run.model.models[k], run.model.models[k].length) for k, x in self.lines.items()})
+        self._use_models({k: x.on(run.model.models[k], run.model.models[k].length) for k, x in self.lines.items()})
         for k, x in self.lines.items():
             x.begin_phases(run.model.models[k].line, run.state.lines[k])
         self._rows = np.array([x.table.numbers for x in self.lines.values()])
@@ -184,7 +184,7 @@ class RunPayout(Part):
             x.table.move(row)
         self._nodes: dict[int, NodeChanges] = {}  # what lets nodes enter and leave without Python
 
-    def _take(self, models: Mapping[int, Model]) -> None:
+    def _use_models(self, models: Mapping[int, Model]) -> None:
         run = self._run
         found = tuple(models.get(k, x) for k, x in enumerate(run.model.models))
         run.model = replace(run.model, models=found)
@@ -310,12 +310,12 @@ class RunPayout(Part):
         model, states[k], booked = paying.change(
             before, run.model.models[k], zones.carry if zones is not None else None
         )
-        if line.contact is not None or line.shares:  # whose forces kernels.reel.payout_balance does not know
+        if line.contact is not None or line.shares:  # whose forces kernels.reel.paid_length does not know
             paying.leave_unbalanced()
         line.books.work[0, b.ZONES] += booked
-        self._take({k: model})
+        self._use_models({k: model})
         run.state = NetworkState(states, run.state.bodies)
-        line.take_cells(model)
+        line.use_cells(model)
 
     def let_go(self, ends: Iterable[tuple[int, int]]) -> None:
         """Ends (line, 0 or 1) come loose: at a winch no more line comes."""
@@ -325,7 +325,7 @@ class RunPayout(Part):
                 run.lines[k].write_down()  # with the law as it is
                 model, books = run.model.models[k], run.lines[k].books
                 before = Before(run.state.lines[k], run.t, run.loop.clock, books.tension)
-                books.work[0, b.ZONES] += self.lines[k].end(before, model.line, model.ends.at(run.t))
+                books.work[0, b.ZONES] += self.lines[k].end(before, model.line, model.ends.at_time(run.t))
 
     def begin_leg(self) -> None:
         """The next step is no longer than the laws of the lengths allow."""
@@ -352,9 +352,9 @@ class RunPayout(Part):
             model = x.restore(saved[run.lines[k].name], run.model.models[k])
             if k in self.zones:
                 self.zones[k].resume(model)
-            self._take({k: model})
+            self._use_models({k: model})
             states[k] = state_for(model.line)
-            run.lines[k].take_cells(model, extremes=False)
+            run.lines[k].use_cells(model, extremes=False)
         run.state = NetworkState(states, run.state.bodies)
         return True
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.run.network_sampling import (
+from hybrid.kernels.run.network import (
     SAMPLE_AXES,
     SAMPLE_DONE,
     SAMPLE_ENERGIES,
@@ -82,7 +82,7 @@ class Sampled(NamedTuple):
     """Outputs of a system: nb states of its lines and bodies."""
 
     lines: Sequence[Batch]
-    bodies: Floats  # (nb, B, BODY_SAMPLE) of kernels.run.network_sampling
+    bodies: Floats  # (nb, B, BODY_SAMPLE) of kernels.run.network
 
     @property
     def t(self) -> Floats:
@@ -131,7 +131,7 @@ def values_of(system: Network, model: NetworkModel, seen: Sampled) -> dict[str, 
         if system.body_of(name) is not None:
             pulls[point.body].append((position, force, none if moment is None else moment))  # type: ignore[union-attr]
     for name, known in model.known.items():
-        found = [known.at(x) for x in t]
+        found = [known.at_time(x) for x in t]
         position, velocity, frame, spin = (np.array(x) for x in zip(*found, strict=True))
         force = sum((f for _, f, _ in pulls[name]), none)
         moment = sum((np.cross(place - position, f) + m for place, f, m in pulls[name]), none)
@@ -178,7 +178,7 @@ def _place(
     line, node = first
     ends, found = model.supports.get((line, -node), model.models[line].ends), []
     for t in seen.t:
-        ends.at(t)
+        ends.at_time(t)
         found.append((ends.values.position[-node].copy(), ends.velocity[-node].copy()))
     position, velocity = (np.array(x) for x in zip(*found, strict=True))
     return position, velocity

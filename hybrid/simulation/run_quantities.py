@@ -9,13 +9,12 @@ import numpy as np
 
 from hybrid.kernels.state.state import Batch, Floats
 from hybrid.kernels.watch.named_quantities import PATH_ROW
-from hybrid.model.model_costs import with_models
 from hybrid.model.network import NetworkModel, build_system
+from hybrid.model.plan import with_models
 from hybrid.model.resolution import model_is_free
 from hybrid.outputs.observation import Probe
 from hybrid.outputs.obstacle_forces import KEYS, Lines, pair_fields, pair_forces
-from hybrid.outputs.quantities import Quantities
-from hybrid.outputs.section_use import StepQuantities
+from hybrid.outputs.quantities import Quantities, StepQuantities
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.network import Network
 from hybrid.scene.points import FreePoint
@@ -26,10 +25,10 @@ from hybrid.simulation.line_result import LineResult, observer_of
 from hybrid.simulation.parts import Part
 from hybrid.simulation.result_file import STEP_FIELDS, limits_of
 from hybrid.simulation.run_points import fields_of
+from hybrid.solve.contact import SharedContact
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.shared_contact import SharedContact
-from hybrid.store.copying import group_of
 from hybrid.store.format import Field
+from hybrid.store.hdf5_file import group_of
 
 MORE_CELLS = 4  # times as many as at first may a line have whose chords are looked at; with more nothing is known
 
@@ -162,7 +161,7 @@ class RunQuantities(Part):
                 for q in found.wanted.values()
                 if q.other is not None
             }
-            _, seen, _ = lines[name].look(self._seen(name, states[name]))
+            _, seen, _ = lines[name].observe(self._seen(name, states[name]))
             out |= {key: np.array(probe.value(seen)) for key, probe in probes.items()}
         return out
 
@@ -202,7 +201,7 @@ class Rotations(Part):
         """Go on from there."""
         self.last[:] = saved["rotations"]
 
-    def go_on(self, values: dict[str, Floats]) -> None:
+    def unwind(self, values: dict[str, Floats]) -> None:
         """Put in place of the rotations (nb, 3) in `values` the same ones, deg, each nearest to the one before it."""
         for k, name in enumerate(self.names):
             for row in values.get(name, ()):

@@ -15,17 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import KINK_COUNTS, Outcome
-from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.mesh.cell_changes import blank_renew_job, clear_state, renew
-from hybrid.kernels.mesh.fill_line import blank_line_job, fill_line
-from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME
-from hybrid.kernels.mesh.zone_step import LOOKAHEAD, follow_zones
-from hybrid.kernels.mesh.zone_switch import (
+from hybrid.kernels.mesh.cell_changes import (
     begin_switch,
+    blank_renew_job,
     blank_switch_job,
+    clear_state,
     end_switch,
+    renew,
 )
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME, blank_line_job, fill_line
+from hybrid.kernels.mesh.zone_step import LOOKAHEAD, advance_zones
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state import books as b
@@ -33,19 +34,18 @@ from hybrid.kernels.state.books import Counts
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import FIELDS, ROD, Ends, Line, State, state_for
 from hybrid.model.build import Model
-from hybrid.model.layout import Layout
+from hybrid.model.mesh import Layout
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.cell_changes import CellChanges, carries_all
 from hybrid.simulation.envelope import marks_on
 from hybrid.simulation.events import EventLog
-from hybrid.simulation.line_of_run import Around
-from hybrid.simulation.old_checkpoints import zoning_of_today
 from hybrid.simulation.parts import Part
+from hybrid.simulation.remesh import Around
+from hybrid.simulation.restart import zoning_of_today
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.run import Tried
-from hybrid.store.named_arrays import matched
+from hybrid.solve.network_steps import NetworkSteps, Tried
+from hybrid.store.integrity import matched
 from hybrid.zones.change import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, on_layout
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Change
@@ -104,7 +104,7 @@ class _LineZones:
         self.paid: PaidZones | None = None  # of a line that is paid out
         self.cells: CellChanges | None = None  # what changes its cells without Python
 
-    def follow(self, run: RunOfLines, phase: int, t: float, end: float, old: State, new: State) -> None:
+    def do_phase(self, run: RunOfLines, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
         self.counts.phase, self.clock.now, self.clock.try_end = phase, t, end
         model = self.switching.model
@@ -113,7 +113,7 @@ class _LineZones:
             counts=self.counts, work=run.lines[self.number].books.work, zones=self.switching.zones,
             near=self.switching.manager.near, review=0,
         )  # fmt: skip
-        follow_zones(self.switching.table.numbers)
+        advance_zones(self.switching.table.numbers)
 
     def bind(self, run: RunOfLines, loop: NetworkSteps) -> Table:
         """What follows the zones within the compiled steps of a loop."""
@@ -227,7 +227,7 @@ class RunZones(Part):
                 self._run.lines[x.number].events.event(0.0, 0.0, length, "zones fixed", HELD)
 
     def _ends(self, x: _LineZones) -> Ends:
-        return self._run.model.models[x.number].ends.at(self._run.t)
+        return self._run.model.models[x.number].ends.at_time(self._run.t)
 
     @property
     def remeshes(self) -> bool:
@@ -283,7 +283,7 @@ class RunZones(Part):
             x.switching, x.pending = ZoneSwitching(model, manager, followed=True), None
             x.full = replace(x.full, line=x.full.line._replace(bits=model.line.bits))
             models[k], states[k] = model, state_for(model.line)
-            run.lines[k].take_cells(model, extremes=False)
+            run.lines[k].use_cells(model, extremes=False)
         run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
         return True
 
@@ -299,7 +299,7 @@ class RunZones(Part):
         """Lengths and stiffness as they will be then."""
         run = self._run
         for x in self.lines if not self._compiled else ():
-            x.follow(run, b.SOLVE, run.t, end, run.state.lines[x.number], run.other.lines[x.number])
+            x.do_phase(run, b.SOLVE, run.t, end, run.state.lines[x.number], run.other.lines[x.number])
 
     def wants_retry(self) -> bool:
         """Whether lines have got more rod, with which the step is to be repeated."""
@@ -315,7 +315,7 @@ class RunZones(Part):
             if taken.outcome != Outcome.OK and taken.line not in (k, -1):
                 continue
             if taken.outcome == Outcome.OK and not self._compiled:
-                x.follow(run, b.JUDGE, run.t, end, old, new)
+                x.do_phase(run, b.JUDGE, run.t, end, old, new)
             change = x.switching.rescue(how, end, end - run.t, new, self._rescues)
             if change is None and last:
                 change = x.switching.all_rod(how)
@@ -334,7 +334,7 @@ class RunZones(Part):
             state, before = run.state.lines[k], run.other.lines[k]
             if not self._compiled:
                 x.clock.last_dt, x.clock.last_rho = run.last_step, run.last_rho
-                x.follow(run, b.END_STEP, run.t, run.t, state, before)
+                x.do_phase(run, b.END_STEP, run.t, run.t, state, before)
             x.pending = x.switching.book_step(run.t, state)
 
     def after_step(self) -> None:
@@ -369,7 +369,7 @@ class RunZones(Part):
             run.lines[x.number].write_down()
             model, booked = self._kinds.change(x.number, x.switching, change)
             self._note(x, change, model, booked)
-            run.lines[x.number].take_kinds(model)
+            run.lines[x.number].use_kinds(model)
         run.go_on_as_attached(AFTER_CHANGE)
 
     def _note(self, x: _LineZones, change: Change, model: Model, booked: float) -> None:
@@ -391,7 +391,7 @@ class RunZones(Part):
         if x.paid is not None:
             run.lines[k].write_down()  # with the reel as it is
             x.paid.as_now(run.model.models[k], run.t, run.state.lines[k])
-        sea, line = run.model.models[k].sea.at(run.t), run.lines[k]
+        sea, line = run.model.models[k].sea.at_time(run.t), run.lines[k]
         at, risen = run.model.models[k].line.s, run.state.lines[k].T - line.books.tension[0]
         model, state, booked = x.switching.switch(change, run.t, self._ends(x), run.state.lines[k], sea, here)
         if x.paid is not None:
@@ -400,7 +400,7 @@ class RunZones(Part):
         states[k] = state
         self._note(x, change, model, booked)
         run.state = run.state._replace(lines=states)
-        line.take_cells(model)
+        line.use_cells(model)
         if x.paid is not None:  # a node that enters or leaves now asks for the rates of tensions, as of the old cells
             middle, old = (0.5 * (s[:-1] + s[1:]) for s in (model.line.s, at))
             line.books.tension[0] = state.T - np.interp(middle, old, risen)
@@ -418,18 +418,18 @@ class RunZones(Part):
             for k in (k for number, k in ends if number == x.number):
                 model = self._run.model.models[x.number]
                 x.switching.release(k, model)
-                self._take_full(x, model)
+                self._use_full(x, model)
 
     def change_loads(self) -> None:
         """Go on with the models of the run, whose loads and motions are others on the same cells."""
         for x in self.lines:
             model = self._run.model.models[x.number]
-            self._take_full(x, model)
+            self._use_full(x, model)
             x.switching.model = model
             x.switching.manager.load(model.ends.moments)
 
     @staticmethod
-    def _take_full(x: _LineZones, model: Model) -> None:
+    def _use_full(x: _LineZones, model: Model) -> None:
         """Other loads, or other ends, of the line on the cells that it began with; those of one at a winch change."""
         assert x.full.layout is not None
         if x.paid is None:

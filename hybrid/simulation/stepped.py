@@ -1,20 +1,32 @@
-"""What `hybrid.Simulation` gives out and takes in: states, forces, vectors that are checked, obstacles that are set."""
+"""What `hybrid.Simulation` gives out and takes in, and states to come back to.
+
+What `hybrid.Simulation` gives out and takes in: states, forces, vectors that are checked, obstacles that are set.
+
+Several lines in motion kept in memory, to come back to: for steps that are computed several times over.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from math import isfinite
+from time import monotonic
 from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 
-from hybrid.kernels.state.obstacle_rows import SEEN_FORCE, SEEN_MOMENT, SEEN_TURN
+from hybrid.kernels.state.report import SEEN_FORCE, SEEN_MOMENT, SEEN_TURN
 from hybrid.kernels.state.state import Floats, State, obstacles_now
 from hybrid.model.ends import STILL, DrivenEnd, rotation_vector
 from hybrid.model.mesh import Zone
+from hybrid.model.network import NetworkModel
 from hybrid.model.sea import Surroundings
 from hybrid.scene.network import SomeScene
+from hybrid.simulation.run import Run
+from hybrid.simulation.run_checkpoint import checkpoint, set_state
+from hybrid.solve.stepper import NetworkState
+from hybrid.store.recorder import Mark, Rows
+from hybrid.store.writer import Recorder
 
 
 class CableState(NamedTuple):
@@ -166,7 +178,7 @@ class SettableObstacles:
         than half a turn on the way.  One that is not set again stays where it is.  ValueError: there is no such one.
         """
         self._check_open()
-        now = self._obstacle_paths(name)[0].at(self.t)
+        now = self._obstacle_paths(name)[0].at_time(self.t)
         there = triple(now[0] if position is None else position, "position")
         speed, turn = None if velocity is None else triple(velocity, "velocity"), STILL
         if rotation is not None:
@@ -187,7 +199,7 @@ class SettableObstacles:
         k, found = list(self.scene.obstacles).index(name), []
         for around, state in self._states():
             around.roll_as(state)
-            found.append(obstacles_now(around.at(self.t), state)[k])
+            found.append(obstacles_now(around.at_time(self.t), state)[k])
         first, acting = found[0], np.sum(found, axis=0)
         rotation = first[SEEN_TURN:SEEN_FORCE].reshape(3, 3).copy()
         return ObstacleState(
@@ -234,3 +246,117 @@ class SettableObstacles:
 
 def _one_of(names: Any) -> str:
     return f"an obstacle of the scene ({', '.join(names) or 'there is none'})"
+
+
+# Outputs and events, of which no more may be taken back: they are in memory.
+MOST_WAITING = 1000
+
+
+class Saved(NamedTuple):
+    """What `Simulation.save` returns."""
+
+    owner: object  # what tells one simulation from another
+    number: int  # of the state that was final then
+    run: Mapping[str, Any]  # arrays and plain values, as of a checkpoint
+    model: NetworkModel  # with what had broken by then
+    waiting: tuple[Any, ...]  # rows of each line that are not recorded yet
+    marks: tuple[Mark, ...]  # of the recorders
+    stops: tuple[float, ...]  # s, that are still to come
+    before: NetworkState  # the state before the last step
+    stood: tuple[tuple[Floats, Floats], ...]  # positions (2, 3) m and frames (2, 9) of the ends of each line
+    loads: tuple[Any, ...]  # of these ends
+    driven: Mapping[str, list[DrivenEnd]]  # what moves points that are set from outside, for each end there
+    paths: Mapping[str, list[Floats]]  # on which they are
+    next: Mapping[str, Course]  # where points are to be at the end of the next step
+    obstacles: Any  # what is set of them
+    wound: Mapping[int, tuple[float | None, float]]  # length (m) and rate (m/s) that lines are to have then
+
+
+def recorders(run: Run) -> list[Rows]:
+    """Those of the system and of its lines."""
+    found = dict.fromkeys((run.recorder, *(line.recorder for line in run.lines)))  # that of a cable is the only one
+    return [x for x in found if isinstance(x, Rows)]
+
+
+def marks_of(run: Run) -> tuple[Mark, ...]:
+    """Where all recorders stand."""
+    return tuple(x.mark() for x in recorders(run))
+
+
+def is_full(run: Run, marks: Sequence[Mark]) -> bool:
+    """Whether too much came after these marks."""
+    return any(x.since(mark) > MOST_WAITING for x, mark in zip(recorders(run), marks, strict=True))
+
+
+def commit(run: Run) -> None:
+    """What has been recorded until now is final; it is written where that is due.
+
+    LineFailed where an output says that going on would make no sense.
+    """
+    assert isinstance(run.recorder, Recorder)
+    due, begin = run.recorder.due, monotonic()
+    run.record_samples()
+    run.write_log()
+    if due:
+        for line in run.lines:
+            line.write_down()
+            line.write_envelope(run.t)
+        run.recorder.replace(run.file.quantities.range_values())
+    run.gather_events()
+    if due:
+        run.recorder.flush(monotonic() - begin)
+
+
+def kept(run: Run) -> dict[str, Any]:
+    """What a run depends on, in copies: fields of `Saved`."""
+    run.record_samples()
+    run.write_log()
+    run.ends_of_now()
+    run.gather_events()
+    return {
+        "run": copied(checkpoint(run)), "model": run.model, "waiting": tuple(line.waiting() for line in run.lines),
+        "marks": marks_of(run), "before": run.other.copy(),
+        "stood": tuple((x.ends.values.position.copy(), x.ends.values.frame.copy()) for x in run.model.models),
+        "loads": tuple(model.ends.keep_loads() for model in run.model.models),
+    }  # fmt: skip
+
+
+def bring_back(run: Run, saved: Saved) -> None:
+    """Be as when `kept` was called; ends that are set from outside must be on their paths of then."""
+    run.gather_events()
+    for recorder, mark in zip(recorders(run), saved.marks, strict=True):
+        recorder.back_to(mark)
+    # Something has broken since, or contact has begun, or zones or lengths have changed, or what changes is under way.
+    moving = {k for part in run.parts for k in part.changed}
+    if run.model is not saved.model or moving:
+        run.model = saved.model
+        for k, (line, model, rows) in enumerate(zip(run.lines, saved.model.models, saved.waiting, strict=True)):
+            line.wait_again(rows._replace(outputs=(), ratios=(), aside=(), log=()))
+            if k not in moving:
+                line.use_model(model)
+        for part in reversed(run.parts):
+            part.restore_cells(saved.run)
+        if moving:
+            run.renew_other()
+        run.make_solver()
+    for model, loads in zip(run.model.models, saved.loads, strict=True):
+        model.ends.bring_back_loads(loads, saved.run["t"])
+    set_state(run, saved.run)
+    for old, then in zip(run.other.lines, saved.before.lines, strict=True):
+        for x, value in zip(old, then, strict=True):
+            x[:] = value
+    for line, rows in zip(run.lines, saved.waiting, strict=True):
+        line.wait_again(rows)
+        line.model.sea.at_time(run.t)
+    run.model.load_bodies(run.t, run.solver.bodies, run.loaded)
+
+
+def copied(x: Any) -> Any:
+    """Named arrays and plain values, as they are once they have been in a file."""
+    if isinstance(x, np.ndarray):
+        return x.copy()
+    if isinstance(x, dict):
+        return {name: copied(value) for name, value in x.items()}
+    if isinstance(x, list | tuple):
+        return [copied(value) for value in x]
+    return x.item() if isinstance(x, np.generic) else x

@@ -19,7 +19,7 @@ from hybrid.kernels.run import entry
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B, PLANAR
 from hybrid.kernels.state.state import Floats, State
-from hybrid.kernels.step.generalized_alpha import before_fixed, weights
+from hybrid.kernels.step.step_control import before_fixed, weights
 from hybrid.model.build import Model
 from hybrid.model.ends import STILL, DrivenEnd, EndConditions, rotation_vector
 from hybrid.model.failure import Weakness
@@ -28,8 +28,8 @@ from hybrid.model.sea import Surroundings
 from hybrid.scene.base import dotted
 from hybrid.scene.network import Network
 from hybrid.scene.points import Fairlead
-from hybrid.scene.short_form import ENDS, ShortForm
-from hybrid.simulation.network_run import NetworkRun
+from hybrid.scene.root import ENDS, ShortForm
+from hybrid.simulation.run import Run
 from hybrid.simulation.stepped import (
     CableState,
     Course,
@@ -40,8 +40,7 @@ from hybrid.simulation.stepped import (
     triple,
     vector,
 )
-from hybrid.solve.joined import LineFailed
-from hybrid.solve.stepper import workspace_of
+from hybrid.solve.stepper import LineFailed, workspace_of
 
 # Of the largest component: what is out of a plane by no more is in it.
 IN_PLANE = 1e-9
@@ -76,7 +75,7 @@ class SteppedPoints(SettableObstacles):
 
     _system: Network  # what is computed
     _form: ShortForm  # what points and lines are called in the scene
-    _run: NetworkRun
+    _run: Run
     _driven: dict[str, list[DrivenEnd]]  # of points that are set, for each end there
     _next: dict[str, Course]  # where points are to be at the end of the next step
     _wound: dict[int, tuple[float | None, float]]  # length and rate that are asked of lines
@@ -125,12 +124,12 @@ class SteppedPoints(SettableObstacles):
         if ends is None:
             ends = self._driven[name] = [conditions.drive(k) for conditions, k in self._conditions_at(name)]
         where, turn = ends[0], STILL
-        there = triple(where.at(self.t)[0] if position is None else position, "position")
+        there = triple(where.at_time(self.t)[0] if position is None else position, "position")
         speed = None if velocity is None else triple(velocity, "velocity")
         if self.scene.dimension == 2:
-            self._check_plane(name, "position", np.array(there) - where.at(self.t)[0])
+            self._check_plane(name, "position", np.array(there) - where.at_time(self.t)[0])
         if frame is not None:
-            turn = triple(rotation_vector(where.at(self.t)[2].T @ rotation_asked(frame)), "frame")
+            turn = triple(rotation_vector(where.at_time(self.t)[2].T @ rotation_asked(frame)), "frame")
         self._next[name] = there, speed, turn
 
     def set_end(
@@ -188,7 +187,7 @@ class SteppedPoints(SettableObstacles):
         names = {"position" if held else "force"}
         if self._turns_alone(name):
             names.add("frame")
-        elif not held and self._takes_moment(*here[0]):
+        elif not held and self._is_of_rod(*here[0]):
             names.add("moment")
         return frozenset(names)
 
@@ -231,7 +230,7 @@ class SteppedPoints(SettableObstacles):
             raise ValueError(f"{said} is held: set_end moves it")
         if not self._is_free_end(name):
             raise ValueError(f"{said} is no free end of one line: give it a force over time in the scene")
-        if moment is not None and not self._takes_moment(*here[0]):
+        if moment is not None and not self._is_of_rod(*here[0]):
             raise ValueError(f"moment: the line is a catenary at {said}, which takes no moment")
         wanted, turning = vector(force, "force"), vector(STILL if moment is None else moment, "moment")
         self._check_plane(name, "force", wanted)
@@ -240,7 +239,7 @@ class SteppedPoints(SettableObstacles):
         if moment is not None:
             conditions.load("moment", k, turning, self.t)
 
-    def _takes_moment(self, line: int, end: int) -> bool:
+    def _is_of_rod(self, line: int, end: int) -> bool:
         """Whether an end is that of a rod."""
         return bool(self._run.model.models[line].line.spin[-end])
 
@@ -373,7 +372,7 @@ class SteppedPoints(SettableObstacles):
         k, run = self._line(name), self._run
         run.ends_of_now()
         line, state = run.lines[k], run.state.lines[k]
-        _, seen, _ = line.look(line.state_now(run.t, run.solver.lines[k].ends, state, run.solver.work[k]))
+        _, seen, _ = line.observe(line.state_now(run.t, run.solver.lines[k].ends, state, run.solver.work[k]))
         return np.array(seen.tension[:, 0])
 
     def frames(self) -> Floats:
@@ -457,7 +456,7 @@ def rotation_asked(matrix: Any, name: str = "frame") -> Floats:
 #
 # With the balance of the end in place of its condition, the equations of the step are A x = b, where a force f on the
 # end is b = -f in its rows; the end then gives way by the inverse of what it takes to shift it.  Inertia and damping of
-# the step (dv'/dr' = cv, dvd'/dr' = ca, step.generalized_alpha) are in A, so that it is what an iteration over the
+# the step (dv'/dr' = cv, dvd'/dr' = ca, step.step_control) are in A, so that it is what an iteration over the
 # same step needs, not the static stiffness.
 
 

@@ -21,18 +21,29 @@ from hybrid.scene.network import Network
 from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.simulation.first_use import compile_beside
-from hybrid.simulation.layer_mesh import layered, rods_at_rest
-from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, with_survey
-from hybrid.simulation.network_run import NetworkRun
+from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, layered, rods_at_rest, with_survey
 from hybrid.simulation.new_run import Recording, new_run, static_system
 from hybrid.simulation.own_parts import RunPart, checked_parts
-from hybrid.simulation.run_file import Asked
-from hybrid.simulation.saving import Saved, bring_back, commit, is_full, kept, marks_of
-from hybrid.simulation.stepped import ONE_STEP, SLIVER, end_of_step, in_space, iterations_allowed, one_thread
+from hybrid.simulation.run import Run
+from hybrid.simulation.run_record import Asked
+from hybrid.simulation.stepped import (
+    ONE_STEP,
+    SLIVER,
+    Saved,
+    bring_back,
+    commit,
+    end_of_step,
+    in_space,
+    is_full,
+    iterations_allowed,
+    kept,
+    marks_of,
+    one_thread,
+)
 from hybrid.simulation.stepped_points import SteppedPoints
-from hybrid.solve.joined import LineFailed
 from hybrid.solve.network_steps import ROWS_OUTSIDE
-from hybrid.store.array_contents import MemoryTarget
+from hybrid.solve.stepper import LineFailed
+from hybrid.store.format import MemoryTarget
 from hybrid.store.hdf5_file import check_target, locked
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.recorder import Mark
@@ -118,12 +129,12 @@ class Simulation(SteppedPoints):
         self.scene = in_space(scene.with_lines(contact))
         self._system, self._form = self.scene, self.scene.form
 
-    def _begun(self, most: int, criterion: UserCriterion | None, parts: Sequence[RunPart]) -> NetworkRun:
+    def _begun(self, most: int, criterion: UserCriterion | None, parts: Sequence[RunPart]) -> Run:
         """The run at its start; most: iterations that a step may take.  ComputationError."""
         compile_beside(self.scene)
         # in space points may be set anywhere
         recording = Recording(planes=self._system.dimension == 2, asked=Asked(self.scene), parts=parts)
-        with self._form.said():
+        with self._form.in_words():
             cells, text = layers_at_rest(self._system), scene_text(self.scene)
             run = new_run(self._system, self._target, text, True, cells, recording, criterion)
         run.loop.counts.most_iterations, run.loop.most_rows, run.read_every = most, ROWS_OUTSIDE, READ_OUTSIDE
@@ -190,7 +201,7 @@ class Simulation(SteppedPoints):
     def _start_courses(self, now: float, until: float) -> None:
         """What has been set is on its way from `now` to `until` (s)."""
         for k, paying in self._paid:
-            paying.go_on(now, until, self._wound.pop(k, None))
+            paying.advance(now, until, self._wound.pop(k, None))
         one_step = until - now <= ONE_STEP * (self._fixed_step or self._run.last_step)
         for name, ends in self._driven.items():
             course = self._next.pop(name, None)
@@ -287,17 +298,17 @@ class Simulation(SteppedPoints):
                     position, frame = saved.stood[line]
                     end.stand(position[k], frame[k])
         self._driven, self._driven_of = dict(saved.driven), None
-        self._follow(saved.paths)
+        self._set_paths(saved.paths)
         self._bring_back_courses(saved.obstacles)
         bring_back(self._run, saved)
         self._bring_back_courses(saved.obstacles)  # of the model of then
-        self._follow(saved.paths)  # with the frames of then
+        self._set_paths(saved.paths)  # with the frames of then
         for model in self._run.model.models:
-            model.ends.at(self.t)
+            model.ends.at_time(self.t)
         self._stops, self._next = [*saved.stops], dict(saved.next)
         self._wound, self._failed = dict(saved.wound), None
 
-    def _follow(self, paths: Mapping[str, list[Floats]]) -> None:
+    def _set_paths(self, paths: Mapping[str, list[Floats]]) -> None:
         """Let points that are set from outside be on these paths."""
         for name, rows in paths.items():
             for end, path in zip(self._driven[name], rows, strict=True):

@@ -17,7 +17,7 @@ from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.line_result import FORCE_COLUMNS
 from hybrid.simulation.parts import Part
-from hybrid.store.named_arrays import matched
+from hybrid.store.integrity import matched
 
 SEEN = 2.0  # periods of the vibration over which its amplitude is found, and from one look at it to the next
 DEGREE = 3  # of the polynomial that stands for what else a force does in this time

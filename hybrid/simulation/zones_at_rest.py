@@ -9,18 +9,18 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.state.report import SELF_CONTACT
 from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
-from hybrid.model.coarsen import refined
+from hybrid.model.nearby import refined
 from hybrid.model.network import NetworkModel
 from hybrid.scene.network import Network
 from hybrid.scene.schema import AdaptiveModel, LineScene
-from hybrid.simulation.contact_equilibrium import nearness_in
 from hybrid.simulation.equilibrium import equilibrium_of, joined_lines, solve_from
-from hybrid.solve.joined import NetworkState
+from hybrid.simulation.run_start import nearness_in
 from hybrid.solve.lines_at_rest import LinesAtRest
+from hybrid.solve.stepper import NetworkState
 from hybrid.zones.at_start import (
     MOST_ROUNDS,
     STRICTER,
@@ -105,7 +105,7 @@ def _with_catenaries(model: NetworkModel, found: LinesAtRest, managers: Mapping[
         assert full.layout is not None
         layout = full.layout._replace(rod=free)
         others[k] = on_layout(full, layout)
-        states[k] = on_fewer(states[k], full.line, others[k].line, full.ends.at(t))
+        states[k] = on_fewer(states[k], full.line, others[k].line, full.ends.at_time(t))
         manager.set_layout(layout)
     if not others:
         return model, found
@@ -165,7 +165,7 @@ def _zones_at_rest(
     try:
         for part in STRICTER:
             for k, manager in managers.items():
-                _take_rods(manager, model.models[k])
+                _use_rods(manager, model.models[k])
                 manager.tolerance = part * allowed[k]
             answer = _within(model, found, managers, t)
             if answer is None:
@@ -178,7 +178,7 @@ def _zones_at_rest(
     for k, manager in managers.items():
         manager.held |= held
         manager.tolerance = allowed[k] if held else manager.tolerance
-        _take_rods(manager, most.models[k])
+        _use_rods(manager, most.models[k])
     return most, rest
 
 
@@ -201,7 +201,7 @@ def _with_rods(
         full = model.models[k]
         assert full.layout is not None
         models[k] = on_layout(full, full.layout._replace(rod=rod))
-        states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at(t))
+        states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at_time(t))
     other, start = replace(model, models=tuple(models)), NetworkState(states, found.state.bodies)
     return other, solve_from(found, other, t, found.bodies, start, "the equilibrium of rods")
 
@@ -216,7 +216,7 @@ def zones_as_placed(
     return replace(model, models=tuple(models)), managers
 
 
-def _take_rods(manager: DomainManager, model: Model) -> None:
+def _use_rods(manager: DomainManager, model: Model) -> None:
     assert model.layout is not None
     manager.set_layout(model.layout)
 
@@ -231,7 +231,7 @@ def _within(
             return None
         other, answer = _with_rods(model, found, rods, t)
         for k, manager in managers.items():
-            _take_rods(manager, other.models[k])
+            _use_rods(manager, other.models[k])
         more = {k: rods[k] | asked for k, asked in _asked(managers, other, answer, t).items()}
         if all((more[k] == rods[k]).all() for k in managers):
             return other, answer
@@ -247,7 +247,7 @@ def _asked(
     for k, manager in managers.items():
         model, state = system.models[k], found.state.lines[k]
         manager.near = near.get(k, np.zeros(0))
-        manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), state, 0.0)
+        manager.evaluate_criteria(model.line, model.sea.at_time(t), model.ends.at_time(t), state, 0.0)
         rods[k] = manager.initial_rods(state)
     return rods
 

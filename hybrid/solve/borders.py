@@ -19,16 +19,14 @@ from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import WORK
 from hybrid.kernels.junctions.body_contact import EACH_BODY, TOUCHED, blank_meeting_job, meet_bodies
 from hybrid.kernels.junctions.borders import blank_border_job
-from hybrid.kernels.junctions.carried_frames import ANSWER, TURNS
-from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
-from hybrid.kernels.junctions.joined_sheaves import blank_spinning_job, spin_sheaves
-from hybrid.kernels.junctions.joined_winches import blank_winding_job, wind_lines
+from hybrid.kernels.junctions.joined_lines import ANSWER, COLUMNS, FUNCTIONAL, TURNS
 from hybrid.kernels.junctions.junctions import HANDED, join_lines, twist_lines
 from hybrid.kernels.junctions.lines_contact import blank_touching_job, room_for_products, touch_system
 from hybrid.kernels.junctions.network_job import blank_system_job
+from hybrid.kernels.junctions.sheaves_and_winches import blank_spinning_job, blank_winding_job, spin_sheaves, wind_lines
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.state import Floats
-from hybrid.solve.joined import JoinedLine
+from hybrid.solve.stepper import JoinedLine
 
 Values = dict[str, Any]
 

@@ -7,30 +7,33 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances, half_thickness
+from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.laws.soil import LATERAL
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.state.report import (
     AXIS,
+    BODIES,
     FLAT,
+    FRICTION,
     HALF_LENGTH,
     KIND,
     MESH,
     MU,
+    OBSTACLES,
     PLACE,
     RADIUS,
     RIDES,
     RING,
     ROUND,
+    SEABED,
     SHEAVE,
     STRAND,
     TORUS,
 )
-from hybrid.kernels.state.report import BODIES, FRICTION, OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats, Line, Sea, State
-from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.stability import Stability, is_judged
+from hybrid.solve.stepper import JoinedLine, NetworkState
 
 LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign: what a catenary needs more of at rest
 # A line that lies this part of its length, and this many onsets of contact, under the bed has gone through it.

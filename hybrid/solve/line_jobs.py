@@ -12,21 +12,20 @@ from hybrid.kernels.algebra.block_elimination import KEPT, ROW
 from hybrid.kernels.contact.self_contact import blank_contact_job
 from hybrid.kernels.junctions.bodies import U
 from hybrid.kernels.junctions.body_contact import CARRY
-from hybrid.kernels.junctions.carried_frames import SEAT
-from hybrid.kernels.junctions.lone_lines import find_near, lead_lone
-from hybrid.kernels.junctions.network_job import NetworkTask
-from hybrid.kernels.laws.obstacle_motion import carry_obstacles
+from hybrid.kernels.junctions.joined_lines import SEAT
+from hybrid.kernels.junctions.network_job import NetworkTask, find_near, lead_lone
+from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH, in_plane, in_space
 from hybrid.kernels.run.network import solve_system
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.obstacle_rows import FREE, MOVES
 from hybrid.kernels.state.report import (
+    FREE,
+    MOVES,
     PLANAR,
 )
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, Work, state_for
-from hybrid.kernels.step.job import blank_job
-from hybrid.kernels.step.newton import ASSEMBLY, RUN, Limits, Task
+from hybrid.kernels.step.newton import ASSEMBLY, RUN, Limits, Task, blank_job
 from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.borders import (
     JointJobs,
@@ -38,11 +37,9 @@ from hybrid.solve.borders import (
     room_to_touch,
     room_to_wind,
 )
-from hybrid.solve.joined import JoinedLine, NetworkState, is_answered_again, room_of_line
-from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
-from hybrid.solve.stepper import REACH
+from hybrid.solve.stepper import REACH, JoinedLine, NetworkState, is_answered_again, room_of_line
 
 
 def _always(room: dict[str, Any]) -> Callable[[Sequence[int]], dict[str, Any]]:
@@ -232,7 +229,7 @@ class LineJobs:
         find_near(self._all.jobs[0].numbers)
 
     def regroup(self) -> dict[str, Any]:
-        """Solve lines with what they have been found near, and others by themselves: as of `take_turns`."""
+        """Solve lines with what they have been found near, and others by themselves: as of `swap_states`."""
         self._group()
         return self._bind_turns()
 
@@ -347,7 +344,7 @@ class LineJobs:
         """(2, L, ..) jobs of all lines, of steps of even and of odd parity."""
         return self._numbers
 
-    def look_at(self, states: NetworkState) -> None:
+    def join_states(self, states: NetworkState) -> None:
         """Let the jobs of even parity lead from states to the same."""
         self.turns = None
         self._bind_states(0, states, states)
@@ -363,7 +360,7 @@ class LineJobs:
         if self._contacts or self.shared is not None:
             self._touch()
 
-    def take_turns(self, states: tuple[NetworkState, NetworkState]) -> dict[str, Any]:
+    def swap_states(self, states: tuple[NetworkState, NetworkState]) -> dict[str, Any]:
         """Steps lead from the first state to the second and back from now on: what run.network_run.StepsJob has."""
         self.turns = states
         return self._bind_turns()

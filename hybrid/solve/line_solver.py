@@ -9,17 +9,16 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import NUMBERS
-from hybrid.kernels.laws.soil import settle_in_soil
+from hybrid.kernels.laws.soil import rest_in_soil
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import Limits
 from hybrid.kernels.state.report import FRICTION, OBSTACLES, RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
-from hybrid.solve.joined import JoinedLine, NetworkState, NetworkTaken
 from hybrid.solve.search import Solution
 from hybrid.solve.stability import DAMPING, Stability, stop
-from hybrid.solve.stepper import Stepper, Taken, workspace_of
+from hybrid.solve.stepper import JoinedLine, NetworkState, NetworkTaken, Stepper, Taken, workspace_of
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 REACH = 0.1  # of the length: largest shift of a node in one iteration
@@ -93,7 +92,7 @@ class LineSolver:
             new.r[:] += self.work.u
             new.vd[:], new.wd[:] = 0.0, 0.0  # of the anchor's springs
             new.slip[:] = sea.slid if line.bits & FRICTION else 0.0
-            settle_in_soil(line, sea, new.r, new.soil)
+            rest_in_soil(line, sea, new.r, new.soil)
             if outcome != Outcome.OK or not proves:
                 break
             # Newton stops by turns and tensions; a very stiff seabed makes much force of little way

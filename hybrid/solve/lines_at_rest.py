@@ -15,12 +15,12 @@ from typing import NamedTuple
 from hybrid.errors import Outcome
 from hybrid.kernels.state.report import FRICTION, PLANAR, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats
-from hybrid.model.plane import leaves_plane, planar, untwist
-from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState
+from hybrid.model.build import leaves_plane, planar, untwist
 from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.network_solver import NO_BODIES, NetworkSolver
 from hybrid.solve.search import PULLED, PUSHED, Attempt, Start, Tally, attempts, first_sound, pulled, stuck, summary_of
 from hybrid.solve.stability import is_stable
+from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState
 
 # Why an equilibrium is not the one that is sought: as of `first_sound`.
 Refused = Callable[[NetworkState], tuple[Outcome, int, int]]

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
-from hybrid.kernels.laws.obstacle_motion import carry_obstacles
-from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
+from hybrid.kernels.laws.obstacles import carry_obstacles
+from hybrid.kernels.laws.soil import lie_in_soil, rest_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_system_step, solve_system
 from hybrid.kernels.state.report import (
@@ -36,14 +36,12 @@ from hybrid.kernels.state.state import Floats, State, Work
 from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, TOLERANCE, Limits, Task
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.step.step_law import REFUSED
+from hybrid.solve.contact import SelfContact, SharedContact, left_over
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
-from hybrid.solve.joined import JoinedLine, NetworkState, NetworkTaken
 from hybrid.solve.line_jobs import LineJobs
 from hybrid.solve.line_solver import BALANCED, BALANCING, CLOSER, MOST_ITERATIONS
-from hybrid.solve.self_contact import SelfContact, left_over
-from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING
-from hybrid.solve.stepper import HEAVY, REACH, lie_on_bed, workspace_of
+from hybrid.solve.stepper import HEAVY, REACH, JoinedLine, NetworkState, NetworkTaken, lie_on_bed, workspace_of
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
 
 # Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.
@@ -208,7 +206,7 @@ class NetworkSolver(LineJobs):
     def _push(self, states: NetworkState) -> dict[int, Floats]:
         """Forces (N+1, 3) N on lines that may touch each other, by number, in states at rest."""
         assert self.shared is not None
-        self.look_at(states)
+        self.join_states(states)
         self.shared.rest_energy(self.work)
         return self.shared.forces()
 
@@ -233,7 +231,7 @@ class NetworkSolver(LineJobs):
     def contact_energy(self, states: NetworkState) -> float:
         """Energy, J, of contact of lines with each other in states at rest; infinite: they are in each other."""
         assert self.shared is not None
-        self.look_at(states)
+        self.join_states(states)
         return self.shared.rest_energy(self.work)
 
     # --- motion -------------------------------------------------------------------------------------
@@ -290,7 +288,7 @@ class NetworkSolver(LineJobs):
                 work.u[0] = -self._gaps[k, 0]
             if x.line.moved.size:
                 carry_obstacles(t, t, x.sea)
-            settle_in_soil(x.line, x.sea, state.r, state.soil)
+            rest_in_soil(x.line, x.sea, state.r, state.soil)
             self._around(x, state, work)
             ends = x.ends._replace(position=state.r[[0, -1]])
             self.bind_line(k, work=work._replace(gaps=gaps), ends=ends)
@@ -462,7 +460,7 @@ class NetworkSolver(LineJobs):
             state.vd[:], state.wd[:] = 0.0, 0.0  # of the springs
             if x.line.bits & FRICTION:
                 state.slip[:] = x.sea.slid
-            settle_in_soil(x.line, x.sea, state.r, state.soil)
+            rest_in_soil(x.line, x.sea, state.r, state.soil)
         return taken
 
     def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> NetworkSolver:

@@ -1,19 +1,25 @@
-"""Steps of several lines, many in a call: what kernels.run.network_run works with, and its clock for Python."""
+"""Steps of several lines, many in a call.
+
+What is said of compiled steps outside: how long calls are, how a try ended, samples of a line as views.
+
+Steps of several lines, many in a call: what kernels.run.network_run works with, and its clock for Python.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
-from hybrid.kernels.junctions.bodies import WORK, stir_members
+from hybrid.kernels.junctions.bodies import WORK, update_members
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.remesh import ask_cells, change_cells
-from hybrid.kernels.mesh.zone_step import follow_zones
-from hybrid.kernels.run.network import book_system_step
+from hybrid.kernels.mesh.zone_step import advance_zones
+from hybrid.kernels.run.network import BODY_SAMPLE, book_system_step
 from hybrid.kernels.run.network_run import (
     CUT_LINE,
     LINE,
@@ -25,15 +31,94 @@ from hybrid.kernels.run.network_run import (
     run_system,
     sample_system,
 )
-from hybrid.kernels.run.network_sampling import BODY_SAMPLE
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.state import Floats, Moves
+from hybrid.kernels.state.report import REPORT_SIZE, SEEN
+from hybrid.kernels.state.state import (
+    NO_LAYERS_SEEN,
+    NO_SOIL,
+    NO_SOIL_SEEN,
+    NOT_VARYING,
+    Batch,
+    Floats,
+    Moves,
+)
 from hybrid.kernels.step.sampling import SAME_TIME
 from hybrid.kernels.step.step_law import FIRST, WARY
-from hybrid.solve import run as one_line
-from hybrid.solve.joined import NetworkState, NetworkTaken
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.stepper import MOST_ITERATIONS, REACH
+from hybrid.solve.stepper import MOST_ITERATIONS, REACH, NetworkState, NetworkTaken
+
+# Steps and samples that a call may take before Python writes them down.
+ROWS = 512
+# Cells times steps of a call: about 0.1 s, after which interrupts are heard and progress is reported.
+CELL_STEPS = 200_000
+# Waves that cost a cell in a step what all else does.
+WAVES_OF_A_CELL = 10
+# Numbers that the buffer of samples may hold, 16 MB.
+MOST_SAMPLED = 2_000_000
+# Of steps that have become short: kernels.state.books.Counts.
+LENGTHS = "tiny_steps", "cut_by_gain", "cut_by_turn", "cut_by_newton", "cut_by_error", "cut_at"
+
+
+class Tried(NamedTuple):
+    """How a try ended."""
+
+    outcome: Outcome
+    iterations: int  # of Newton's method
+    correction: float  # the next one, as it is predicted, relative
+    where: int  # cell or node where it was worst
+
+
+def batch_of_rows(
+    rows: Floats,
+    cells: int,
+    held: np.ndarray,
+    varies: bool,
+    zones: int,
+    touching: int,
+    obstacles: int = 0,
+    layers: int = 0,
+    soil: bool = False,
+) -> Batch:
+    """Samples (n, size) of a line as views (kernels.state.books.sample_size).
+
+    held: (2,) as `Ends` has it; varies: whether they have lengths and stiffness; zones: that a torque passes through;
+    touching: N+1, or 0 where the line does not touch itself; obstacles: of which one moves; layers: numbers of a node;
+    soil: whether nodes remember it.
+    """
+    at, count = 0, len(rows)
+
+    def part(*shape: int) -> Floats:
+        nonlocal at
+        begin, at = at, at + math.prod(shape)
+        return rows[:, begin:at].reshape(count, *shape)
+
+    t, sea, position, frame = part(), part(4), part(2, 3), part(2, 9)
+    spin, force, moment, report, work = (
+        part(2, 3),
+        part(2, 3),
+        part(2, 3),
+        part(REPORT_SIZE),
+        part(b.WORKS),
+    )
+    r, v, vd = part(cells + 1, 3), part(cells + 1, 3), part(cells + 1, 3)
+    e, T, a1, w = part(cells, 3), part(cells), part(cells, 3), part(cells)
+    h, kb = (part(cells), part(cells + 1, 3)) if varies else (NOT_VARYING, NOT_VARYING)
+    turn, touch, seen = part(zones, 3), part(touching), part(obstacles, SEEN)
+    slipped = part(cells + 1, layers) if layers else NO_LAYERS_SEEN
+    remembered = part(cells + 1, NO_SOIL.shape[1]) if soil else NO_SOIL_SEEN
+    ends = np.repeat(held[None], count, axis=0)
+    return Batch(
+        t, r, v, vd, e, T, a1, w, ends, position, frame, spin, force, moment, report, work, sea, h, kb, turn, touch,
+        seen, slipped, remembered,
+    )  # fmt: skip
+
+
+def no_extremes(columns: int) -> Floats:
+    """Extremes (4, EXTREMES, columns) of nothing: lowest infinite, highest minus infinite, times unknown."""
+    out = np.full((4, b.EXTREMES, columns), np.nan)
+    out[0], out[1] = np.inf, -np.inf
+    return out
+
 
 # Numbers of the log of all lines, at most.
 MOST_LOGGED = 2_000_000
@@ -58,7 +143,7 @@ class NetworkSteps:
         follow their errors; 0: none do; most_turn: rad, by which an end that is moved may turn in a step.
         """
         self.outputs = np.array(outputs, float)
-        self.most_rows = one_line.ROWS  # steps that wait to be logged
+        self.most_rows = ROWS  # steps that wait to be logged
         self.body_samples, self.worked = np.zeros((0, 0, BODY_SAMPLE)), np.zeros((3, 0, WORK))
         self.clock, self.counts = b.Clock(), b.Counts()
         self.lines = np.zeros(4, np.int64)
@@ -93,7 +178,7 @@ class NetworkSteps:
             rows = max(16, min(self.most_rows, MOST_LOGGED // (lines * len(b.LOG))))
             self._log, self.seen = np.zeros((rows, lines, len(b.LOG))), np.zeros(lines, np.int64)
             counts.rows = 0
-        jobs, self._is_new = solver.take_turns(self._states), True
+        jobs, self._is_new = solver.swap_states(self._states), True
         self._cells = sum(x.line.h.size for x in solver.lines)
         self._waves = max((len(x.sea.waves) for x in solver.lines), default=0)
         self.worked[0] = solver.body_work
@@ -138,7 +223,7 @@ class NetworkSteps:
             return
         tables = np.array([x.numbers for x in members.values()])
         self._job.bind(
-            members=tables, with_members=np.array([*members], np.int64), stirrer=stir_members.address(tables[0])
+            members=tables, with_members=np.array([*members], np.int64), stirrer=update_members.address(tables[0])
         )
 
     def watch(self, even: np.ndarray, odd: np.ndarray, watcher: int) -> None:
@@ -162,7 +247,7 @@ class NetworkSteps:
             return
         self.hold_zones(zones)
         due = np.zeros(len(zones), np.int64)
-        self._job.bind(followed=self._followed, follower=follow_zones.address(self._followed[0]), due=due)
+        self._job.bind(followed=self._followed, follower=advance_zones.address(self._followed[0]), due=due)
 
     def change_cells(self, lines: Sequence[NDArray[np.int64] | None]) -> None:
         """These tables of kernels.mesh.remesh change cells of lines that `follow` has, where there is one."""
@@ -221,8 +306,8 @@ class NetworkSteps:
 
     def set_quota(self, most: int) -> None:
         """As many steps as interrupts and progress can wait for; most: as far as Python knows what they cost."""
-        cost = max(self._cells, 1) * (1.0 + self._waves / one_line.WAVES_OF_A_CELL)
-        self.counts.quota = max(1, min(one_line.ROWS, most, int(one_line.CELL_STEPS / cost)))
+        cost = max(self._cells, 1) * (1.0 + self._waves / WAVES_OF_A_CELL)
+        self.counts.quota = max(1, min(ROWS, most, int(CELL_STEPS / cost)))
 
     def go(self) -> int:
         """Go on until a code of kernels.state.books."""
@@ -316,14 +401,14 @@ class NetworkSteps:
         """What has been told of steps that were cut, and what is known of those that became short."""
         clock, counts = self.clock, self.counts
         known = clock.mute_cuts, clock.mute_slack, clock.longest, counts.cut_short
-        return [float(x) for x in (*known, *(getattr(counts, name) for name in one_line.LENGTHS))]
+        return [float(x) for x in (*known, *(getattr(counts, name) for name in LENGTHS))]
 
     def restore_cuts(self, saved: Sequence[float]) -> None:
         """Go on as `cuts` has told."""
         clock, counts = self.clock, self.counts
         (clock.mute_cuts, clock.mute_slack, clock.longest), counts.cut_short = saved[:3], int(saved[3])
         clock.cut_angle = clock.slack_step = 0.0  # of steps that are undone
-        for name, number in zip(one_line.LENGTHS, saved[4:], strict=True):
+        for name, number in zip(LENGTHS, saved[4:], strict=True):
             setattr(counts, name, int(number))
 
     def control(self) -> list[float]:

@@ -15,11 +15,21 @@ from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, MASS, V
-from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import half_thickness
+from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.laws.soil import PART, depth_under
-from hybrid.kernels.state.obstacle_rows import FREE, MOVES, ONSET_OF, STIFFNESS
-from hybrid.kernels.state.report import AXIAL_LAW, FLOW, OBSTACLES, SEABED, SOIL, TOUCHES
+from hybrid.kernels.state.report import (
+    AXIAL_LAW,
+    FLOW,
+    FREE,
+    MOVES,
+    OBSTACLES,
+    ONSET_OF,
+    SEABED,
+    SOIL,
+    STIFFNESS,
+    TOUCHES,
+)
 from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Ends, Floats, Line, Sea, State
 from hybrid.model.sea import ONSET
 from hybrid.solve.flaws import (
@@ -29,7 +39,6 @@ from hybrid.solve.flaws import (
     on_obstacles,
     slack_text,
 )
-from hybrid.solve.joined import JoinedLine, LineFailed, NetworkState, NetworkTaken
 from hybrid.solve.stability import (
     CALM,
     GROWN,
@@ -42,7 +51,7 @@ from hybrid.solve.stability import (
     nudged,
     stop,
 )
-from hybrid.solve.stepper import Stepper, Taken
+from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, NetworkTaken, Stepper, Taken
 
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
 NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
-from hybrid.kernels.algebra.block_elimination_plane import WIDE
+from hybrid.kernels.algebra.plane import WIDE
 from hybrid.kernels.algebra.sparse_rows import is_definite
 from hybrid.kernels.laws.out_of_plane import BAND, REACH, wrong_pivots_at_rest
 from hybrid.kernels.mesh.zone_transfer import carry_push

@@ -1,10 +1,10 @@
 """Checkpoints in a result file: from which a run goes on, kept so that a kill at any instant leaves one whole.
 
-Two slots are written in turn, each with its own length and digest (store.named_arrays), so a slot that a kill has cut
+Two slots are written in turn, each with its own length and digest (store.integrity), so a slot that a kill has cut
 off is recognised and the other is as good as it was.
 
 A file that a killed process was writing cannot be opened for writing again; what goes on is a copy of its rows up to
-the checkpoint (store.copying), put in its place when it is whole.
+the checkpoint (store.hdf5_file), put in its place when it is whole.
 """
 
 from __future__ import annotations
@@ -19,10 +19,9 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.copying import GROUP, of_all
 from hybrid.store.format import Field, check_column, plain_text
-from hybrid.store.integrity import stored
-from hybrid.store.named_arrays import DIGEST, Tree, matched, pack, unpack
+from hybrid.store.hdf5_file import GROUP, of_all
+from hybrid.store.integrity import DIGEST, Tree, matched, pack, stored, unpack
 
 # What was found before the run (the error controller's runs), beside the two slots.
 SLOTS, BEFORE = ("checkpoint/slot_0", "checkpoint/slot_1"), "checkpoint/before"

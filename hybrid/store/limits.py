@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.store.capacity import NAME, bound_of_steps
-from hybrid.store.code_checks import F201, code_of_steps, mooring_of_steps, rows_of
-from hybrid.store.code_checks import NAME as CODE_USED
+from hybrid.store.capacity import CODE_NAME as CODE_USED
+from hybrid.store.capacity import F201, NAME, bound_of_steps, code_of_steps, mooring_of_steps, rows_of
 from hybrid.store.envelope import GROUP as GROUP_OF_NODES
 from hybrid.store.envelope import (
     NOT_VERIFIED,

@@ -16,9 +16,9 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.statistics import extremes, fatigue, moments
-from hybrid.store.array_contents import MemoryTarget
 from hybrid.store.capacity import mooring_use
 from hybrid.store.envelope import Judged, Pressed, contacts_of
+from hybrid.store.format import MemoryTarget
 from hybrid.store.hdf5_file import is_held
 from hybrid.store.histories import (
     FIBRES,

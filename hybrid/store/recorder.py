@@ -15,8 +15,9 @@ import numpy as np
 from h5py import h5d, h5s, h5t
 
 from hybrid.errors import OMITTED, ResultError
-from hybrid.store.array_contents import ArrayContents, ArrayDataset
 from hybrid.store.format import (
+    ArrayContents,
+    ArrayDataset,
     Field,
     Header,
     attributes_of_format,

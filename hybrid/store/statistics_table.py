@@ -10,8 +10,8 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.statistics.extremes import THREE_HOURS
 from hybrid.statistics.moments import exceedance, summary
+from hybrid.store.capacity import CODE_NAME as CODE_USED
 from hybrid.store.capacity import NAME as CAPACITY_USED
-from hybrid.store.code_checks import NAME as CODE_USED
 from hybrid.store.envelope import extreme
 from hybrid.store.histories import (
     Window,

@@ -38,9 +38,8 @@ from typing import Any, Self
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.array_contents import ArrayContents, MemoryTarget
-from hybrid.store.contents import Contents, FileContents
-from hybrid.store.copying import Lines
+from hybrid.store.format import ArrayContents, MemoryTarget
+from hybrid.store.hdf5_file import Lines
 from hybrid.store.integrity import readable
 from hybrid.store.records import (
     ALIASES,
@@ -51,7 +50,9 @@ from hybrid.store.records import (
     PENDING,
     THERE,
     Attributes,
+    Contents,
     Event,
+    FileContents,
     MeshHistory,
     OnRequest,
     UnknownName,
@@ -234,7 +235,7 @@ class StoredResult:
         head = f"{name}({', '.join(self._dims[name])})" + (f" in {unit}" if unit else "")
         return f"{head}: {description}" + (f" ({frame} frame)" if frame else "")
 
-    def at(
+    def values_at(
         self, *, t: Any = None, s: Any = None, names: Sequence[str] | None = None, side: str | None = None
     ) -> dict[str, Any]:
         """Every field at the times t (s) and arc lengths s (m), linear between outputs and grid points.
@@ -258,6 +259,8 @@ class StoredResult:
                 along = t is not None and "t" in dims
                 answer[key] = _interpolate(array, dims.index("t"), self["t"], t, "t", "s") if along else array
         return answer
+
+    at = values_at
 
     def _at_places(self, name: str, axis: int, s: Any, side: str | None) -> dict[str, np.ndarray]:
         """A field at arc lengths s, m, from values on the same side of every jump; of two values both, as of `at`."""

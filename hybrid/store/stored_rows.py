@@ -18,7 +18,7 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.store.envelope import Recorded
 from hybrid.store.hdf5_file import unwritable
-from hybrid.store.named_arrays import DIGEST, Tree, matched
+from hybrid.store.integrity import DIGEST, Tree, matched
 
 # What is kept of a run to compare with: arrays of its outputs, and no result that anyone opens.
 

@@ -20,8 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import AS_MUCH, EVENTS_BY_WEIGHT, IN_SPACE, KINK_COUNTS, OF_AN_END
-from hybrid.store.capacity import bound_of_steps, bound_with_errors
-from hybrid.store.code_checks import code_of_steps, code_with_errors
+from hybrid.store.capacity import bound_of_steps, bound_with_errors, code_of_steps, code_with_errors
 from hybrid.store.envelope import (
     BROKEN,
     GROUP,

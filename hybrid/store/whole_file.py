@@ -26,14 +26,13 @@ import h5py
 import numpy as np
 from h5py import h5a, h5d, h5ds, h5o, h5p, h5s, h5t
 
-from hybrid.store.array_contents import ArrayContents
 from hybrid.store.checkpoint import SLOTS, create_slots, write_before, write_slot
-from hybrid.store.copying import GROUP, TOGETHER
 from hybrid.store.format import (
     BLOCK,
     FORMAT_VERSION,
     SCALAR,
     STATUS_WIDTHS,
+    ArrayContents,
     annotate,
     attach_scales,
     chunk_rows,
@@ -42,9 +41,8 @@ from hybrid.store.format import (
     versions,
     write_texts,
 )
-from hybrid.store.hdf5_file import beside, image_of, in_memory, unwritable
-from hybrid.store.integrity import tail_of
-from hybrid.store.named_arrays import Tree
+from hybrid.store.hdf5_file import GROUP, TOGETHER, beside, image_of, in_memory, unwritable
+from hybrid.store.integrity import Tree, tail_of
 from hybrid.store.recorder import NUMBERS
 
 WAITS = 0.2  # s, that it waits at most while errors of the result are estimated, as outputs are held back

@@ -37,7 +37,7 @@ WARM_PART = 0.02
 # Keys of a model that set the resolution: the study chooses these.
 FINENESS = ("kind", "tolerance", "rod_cell", "hold_time")
 COMPARED = ("position", "reaction_start", "reaction_end")
-# The same of runs for a level (studies.levels).
+# The same of runs for a level (studies.tradeoff).
 ALONG = ("bending_moment", "curvature")
 # Files of the package that change no answer, only how it is shown or ranked.
 SHOWS = ("cli", "view", "exports", "interop")

@@ -30,12 +30,12 @@ from hybrid.outputs.probes import PROBES
 from hybrid.scene.study import LIMIT_OF, Kept, Study, read_study, study_from
 from hybrid.simulation.own_parts import RunPart, checked_parts, require_parts
 from hybrid.store.hdf5_file import locked
-from hybrid.store.named_arrays import pack
+from hybrid.store.integrity import pack
 from hybrid.store.records import ALIASES
 from hybrid.store.study_file import OPEN, OWN, Column, StudyFile, open_study
 from hybrid.studies.cases import Cases, cases_of, digest_of, scene_of
-from hybrid.studies.collect import names_of, one_value_of, usual
 from hybrid.studies.dispatch import AHEAD, StudyRunning, compute_open_batches
+from hybrid.studies.workers import names_of, one_value_of, usual
 
 if TYPE_CHECKING:
     import xarray

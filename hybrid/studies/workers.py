@@ -1,8 +1,14 @@
-"""What runs on a worker of a study: a batch of cases, and what is kept of each."""
+"""What runs on a worker of a study, and what it keeps.
+
+What a study keeps of each run: numbers, histories and profiles, with units.
+
+What runs on a worker of a study: a batch of cases, and what is kept of each.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import time as clock
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,11 +18,235 @@ import numpy as np
 
 from hybrid.accuracy.api import run, static
 from hybrid.errors import EVENTS_BY_WEIGHT, HybridError, ResultError, SceneError
-from hybrid.scene.study import Kept
+from hybrid.scene.study import LIMIT_OF, Kept
 from hybrid.simulation.own_parts import RunPart
+from hybrid.statistics import moments
+from hybrid.store.envelope import farthest
+from hybrid.store.histories import History, extreme_of, history_of, lies_along
+from hybrid.store.limits import at_every_step
+from hybrid.store.reader import Result
+from hybrid.store.statistics_table import too_far_apart
 from hybrid.store.study_file import DONE, FAILED, NOT_WRITTEN, OWN, Column, StudyFile, accuracy_of_case
+from hybrid.store.verdicts import section_limits
 from hybrid.studies.cases import scene_of
-from hybrid.studies.collect import Variable, collected
+
+Floats = np.ndarray
+HOUR = 3600.0
+# What is kept where a study does not say: name, quantity, what of it.
+USUAL: dict[str, tuple[str, tuple[str, ...]]] = {
+    "end_force_start": ("end_force_start", ("max", "min", "mean", "deviation")),
+    "end_force_end": ("end_force_end", ("max", "min", "mean", "deviation")),
+    "tension": ("tension", ("max", "min")),
+    "curvature": ("curvature", ("max",)),
+}
+AT_REST: dict[str, tuple[str, tuple[str, ...]]] = {
+    "tension": ("tension", ("max", "min", "profile")),
+    "curvature": ("curvature", ("max",)),
+}
+# Of a summary, and its unit; none: that of the quantity.
+OF_SUMMARY = {
+    "mean": ("mean", None), "deviation": ("standard_deviation", None), "skewness": ("skewness", ""),
+    "period": ("crossing_period", "s"), "significant": ("significant_range", None),
+}  # fmt: skip
+WORDS = {
+    "max": "largest", "min": "smallest", "mean": "mean of", "median": "median of", "deviation": "standard deviation of",
+    "skewness": "skewness of", "period": "period between up-crossings of the mean of",
+    "significant": "significant range of", "extreme": "most probable maximum (MPM) of",
+    "fractile": "P90 of the maximum of", "damage": "fatigue damage", "history": "history",
+    "exceedance": "part of the time", "utilisation": "largest part that is used of",
+    "profile": "largest at each place",
+}  # fmt: skip
+
+
+class Variable(NamedTuple):
+    """One thing that is kept: its unit, what it is, its dimensions beside `case`, and their coordinates with units."""
+
+    unit: str
+    description: str
+    dims: tuple[str, ...]
+    coordinates: Mapping[str, tuple[str, Floats]]
+
+
+def usual(static: bool, lines: Sequence[str] = ()) -> dict[str, Kept]:
+    """What is kept where a study does not say; lines: names of several lines, of each of which it is kept."""
+    table = AT_REST if static else USUAL
+    if not lines:
+        return {name: Kept(quantity=q, take=take) for name, (q, take) in table.items()}
+    return {
+        re.sub(r"\W", "_", f"{line}_{name}"): Kept(quantity=q, take=take, line=line)
+        for line in lines
+        for name, (q, take) in table.items()
+    }
+
+
+def names_of(wanted: Mapping[str, Kept]) -> dict[str, tuple[str, str]]:
+    """Names under which things are kept: of which entry of `collect`, and what is taken."""
+    found: dict[str, tuple[str, str]] = {}
+    for name, kept in wanted.items():
+        for take in kept.take:
+            found[f"{name}_{take}" if len(kept.take) > 1 or take in ("history", "profile") else name] = (name, take)
+    return found
+
+
+def one_value_of(quantity: str) -> str:
+    """What to keep instead of a quantity that has several values at a time."""
+    if quantity in ("touchdown", "touchdown_position"):
+        return "output.quantities of the scene: {td: {kind: touchdown, end: end}}, and collect td"
+    return "end_force_end, or one of output.quantities of the scene"
+
+
+class NotAlwaysThere(ResultError):
+    """A quantity of this run has times without a value, or a value that is not verified.
+
+    Such as a touchdown point while nothing touches.
+    """
+
+
+class Collected(NamedTuple):
+    """What is kept of a result, and the reasons for what is not, by name.
+
+    absent: the first reason that has nothing to do with the values of this run, such as a quantity that it does not
+    have; "": there is none.
+    """
+
+    kept: dict[str, tuple[Variable, Floats]]
+    reasons: dict[str, str]
+    absent: str
+
+
+def collected(result: Result, wanted: Mapping[str, Kept]) -> Collected:
+    """What is wanted of a result, by name: `<name>_<take>`, or the name alone where one thing is taken."""
+    kept: dict[str, tuple[Variable, Floats]] = {}
+    reasons, absent = {}, ""
+    memory: dict[tuple[str, str], Any] = {}
+    for key, (name, take) in names_of(wanted).items():
+        try:
+            of = result if wanted[name].line is None else result.line(str(wanted[name].line))
+            kept[key] = _taken(of, name, wanted[name], take, memory)
+        except (HybridError, KeyError, AttributeError) as error:
+            reasons[key] = str(error).splitlines()[0]
+            if not isinstance(error, NotAlwaysThere):
+                absent = absent or reasons[key]
+    return Collected(kept, reasons, absent)
+
+
+def _taken(
+    result: Result, own: str, kept: Kept, take: str, memory: dict[tuple[str, str], Any]
+) -> tuple[Variable, Floats]:
+    """One thing that is kept of a result under the name `own`; its times and places are dimensions of that name.
+
+    memory: the history under a name and its summary, for the next thing that is taken of it.
+    """
+    name, at = kept.quantity, None if kept.at is None else np.atleast_1d(np.asarray(kept.at, float))
+    if take in ("max", "min") and at is None and kept.times is None:
+        known = _over_steps(result, name, take)
+        if known is not None:
+            return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(known)
+    if take == "utilisation":
+        limit = LIMIT_OF[name]
+        return Variable("", f"{WORDS[take]} {limit}, every step", (), {}), np.asarray(_utilisation(result, name, limit))
+    if take == "damage":
+        return _damage(result, own, kept, at)
+    if at is not None and not lies_along(result, name):
+        raise ResultError(f"'{name}' has no value at an arc length")
+    history = memory.get((own, "history")) or history_of(result, name, kept.times, at)
+    memory[own, "history"] = history
+    if history.values.ndim > (1 if history.s is None else 2):
+        count, fix = history.values[0].size, one_value_of(name)
+        raise ResultError(f"'{name}' has {count} values at a time, and one is kept\n    try:      {fix}")
+    dims, places = ((), {}) if at is None or history.s is None else _places(own, history.s)
+    unit, about = history.unit, f"{name}, {history.basis}"
+    values = history.values
+    if take == "profile":
+        if history.s is None:
+            raise ResultError(f"'{name}' has no profile: it is no quantity along the line")
+        along = "s" if kept.line is None else f"{own}_s"
+        variable = Variable(unit, f"{WORDS[take]}: {about}", (along,), {along: ("m", history.s)})
+        return variable, np.fmax.reduce(values, axis=0)
+    if take == "history":
+        if history.s is not None and at is None:
+            raise ResultError(f"a history of '{name}' is at a place\n    try:      at: [0]")
+        time = f"{own}_time"
+        axes = {time: ("s", history.t)} | places
+        return Variable(unit, about, (time, *dims), axes), values if dims else values.reshape(-1)
+    flat = values.reshape(history.t.size, -1)
+    if take not in ("max", "min") and not np.isfinite(flat).all():
+        raise NotAlwaysThere(f"'{name}' has times or places without a value, and {take} needs all of them")
+    text = f"{WORDS[take]} {about}"
+    if take in ("extreme", "fractile"):
+        found = [_extreme(result, history, flat[:, k], kept.hours, take) for k in range(flat.shape[1])]
+        return _placed(Variable(unit, f"{text} ({kept.hours:g} h)", dims, places), np.array(found))
+    if take in ("max", "min"):
+        worst = (np.fmax if take == "max" else np.fmin).reduce(flat, axis=0)
+        return _placed(Variable(unit, text, dims, places), worst, take)
+    if take == "exceedance":
+        side, value = ("above", kept.above) if kept.above is not None else ("below", kept.below)
+        text = f"{WORDS[take]} {side} {value:g} {unit}: {about}"
+        part = moments.exceedance(history.t, flat, kept.above, kept.below)
+        return _placed(Variable("", text, dims, places), part)
+    if take == "median":
+        return _placed(Variable(unit, text, dims, places), moments.median_over_time(history.t, flat))
+    attribute, other = OF_SUMMARY[take]
+    summary = memory.get((own, "summary")) or moments.summary(history.t, flat)
+    memory[own, "summary"] = summary
+    variable = Variable(unit if other is None else other, text, dims, places)
+    return _placed(variable, getattr(summary, attribute))
+
+
+def _over_steps(result: Result, name: str, take: str) -> float | None:
+    """The largest or smallest value over every step, NaN without one; None: the result knows that of outputs only."""
+    if f"envelope/{name}_{take}" in result:
+        farther = farthest(result, name, take)
+        return np.nan if farther is None else farther.value
+    known = at_every_step(result, name, "largest" if take == "max" else "smallest")
+    return None if known is None else known[0]
+
+
+def _utilisation(result: Result, name: str, limit: str) -> float:
+    """The used part of a limit of sections, over every step."""
+    judged = next((x for x in section_limits(result) if x.limit == limit), None)
+    if judged is None:
+        raise ResultError(f"no section has a {limit}, which {name} would be held against")
+    if judged.used is None:
+        raise NotAlwaysThere(f"utilisation of {limit} {judged.not_verified}")
+    return judged.used
+
+
+def _damage(result: Result, own: str, kept: Kept, at: Floats | None) -> tuple[Variable, Floats]:
+    """Fatigue damage along the line, or at the arc lengths `at`, m."""
+    assert kept.curve is not None
+    s, damage = result.damage(kept.curve, strength=kept.strength, section=kept.section, times=kept.times, at=at)
+    if few := too_far_apart(result, float(s[np.argmax(damage)]), kept.times):
+        raise NotAlwaysThere(few)
+    text = f"fatigue damage by {kept.curve}"
+    if at is None:
+        along = "s" if kept.line is None else f"{own}_s"
+        return Variable("", text, (along,), {along: ("m", s)}), damage
+    dims, places = _places(own, s)
+    return Variable("", text, dims, places), damage if dims else damage[0]
+
+
+def _places(own: str, s: Floats) -> tuple[tuple[str, ...], dict[str, tuple[str, Floats]]]:
+    """Dimension and coordinate of several places s (m); none of one.  Where a quantity jumps a place comes twice."""
+    return ((), {}) if s.size == 1 else ((f"{own}_at",), {f"{own}_at": ("m", s)})
+
+
+def _extreme(result: Result, history: History, x: Floats, hours: float, take: str) -> float:
+    """NaN where there are too few peaks, of round-off, and beyond what an angle can be."""
+    try:
+        found = extreme_of(result, history.name, history.unit, history.t, x, hours * HOUR)
+    except ResultError:
+        return np.nan
+    return found.most_probable if take == "extreme" else found.fractile
+
+
+def _placed(variable: Variable, values: Floats, take: str = "max") -> tuple[Variable, Floats]:
+    """Values (n,) at the places that are wanted; without any the largest of all (of smallest values the smallest)."""
+    if variable.dims:
+        return variable, values
+    known = values[np.isfinite(values)]
+    return variable, np.asarray((known.min() if take == "min" else known.max()) if known.size else np.nan)
+
 
 # How the reason of a case begins that was computed, and of which something could not be kept.
 NOT_KEPT = "not kept: "

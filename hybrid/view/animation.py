@@ -15,13 +15,11 @@ import numpy as np
 
 from hybrid.errors import ResultError, command_for
 from hybrid.store.reader import Result
-from hybrid.view.along import along
-from hybrid.view.decimate import even
-from hybrid.view.figure import Band, Item, Line, Panel, colour_of, prefix, short
+from hybrid.view.curves import along, even
+from hybrid.view.figure import COMMENT, Band, Item, Line, Panel, check_target, colour_of, prefix, short, write_file
 from hybrid.view.lines import AllLines, bodies_in, film_page
 from hybrid.view.panels import cable, framed, page_of, profiles, sea
 from hybrid.view.projections import View, aspect_of, pieces_of, views_of
-from hybrid.view.save import COMMENT, check_target, write_file
 from hybrid.view.scenery import speed_of
 
 FORMATS = (".mp4", ".gif")

@@ -15,13 +15,24 @@ from hybrid.store.envelope import BROKEN, NOT_VERIFIED
 from hybrid.store.reader import Result
 from hybrid.store.verdicts import section_limits
 from hybrid.view import report_parts as parts
-from hybrid.view.along import along, worst
-from hybrid.view.decimate import Store, script_json
-from hybrid.view.figure import ZERO, Axis, Item, Line, Panel, prefix, short, title_of
+from hybrid.view.curves import Store, along, script_json, worst
+from hybrid.view.figure import (
+    PAGES,
+    REPORT_MARK,
+    ZERO,
+    Axis,
+    Item,
+    Line,
+    Panel,
+    check_target,
+    prefix,
+    short,
+    title_of,
+    write_file,
+)
 from hybrid.view.panels import RANGES, only_line
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.projections import views_of
-from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 from hybrid.view.summary import amount, length_of
 from hybrid.view.zones import warnings_of
 

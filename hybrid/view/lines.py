@@ -13,11 +13,10 @@ from typing import Any, cast
 import numpy as np
 
 from hybrid.store.reader import Result
-from hybrid.view.along import along, worst, worst_first
+from hybrid.view.curves import along, worst, worst_first
 from hybrid.view.figure import BODY, INK, Axis, Band, Item, Line, Marks, Page, Panel, Text, earlier_grey, prefix, short
-from hybrid.view.obstacles import outlines
 from hybrid.view.panels import framed, page_of, sea
-from hybrid.view.projections import Numbers, View, aspect_of, telling_times, view_named, views_of
+from hybrid.view.projections import Numbers, View, aspect_of, outlines, telling_times, view_named, views_of
 
 LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#000000", "#7F7F7F")
 OTHERS = "#9FB1BB"  # of lines without a colour of their own

@@ -20,9 +20,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from hybrid.view.decimate import Stretches, stretches_of
+from hybrid.view.curves import Stretches, stretches_of
 from hybrid.view.figure import (
     ALARM,
+    DPI,
     GREY,
     INK,
     NORMAL,
@@ -41,7 +42,6 @@ from hybrid.view.figure import (
     changes_sign,
     short,
 )
-from hybrid.view.save import DPI
 
 _DASHES: dict[str, Any] = {"": "-", "dash": (0, (4, 1.5)), "dot": ":"}
 _ENTRIES = 8  # of a legend, in a row

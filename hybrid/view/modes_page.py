@@ -11,10 +11,23 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.view.decimate import even
-from hybrid.view.figure import GREY, Axis, Item, Line, Page, Panel, colour_of, short
+from hybrid.view.curves import even
+from hybrid.view.figure import (
+    GREY,
+    PAGES,
+    REPORT_MARK,
+    Axis,
+    Item,
+    Line,
+    Page,
+    Panel,
+    check_target,
+    colour_of,
+    save_figure,
+    short,
+    write_file,
+)
 from hybrid.view.report_parts import footer, page_file, page_of, table_html
-from hybrid.view.save import PAGES, REPORT_MARK, check_target, save_figure, write_file
 
 # Pictures of mode shapes: the equilibrium, and the line at both ends of its swing.
 

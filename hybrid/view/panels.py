@@ -17,8 +17,7 @@ from hybrid.errors import ResultError
 from hybrid.store.limits import held_of
 from hybrid.store.reader import Result
 from hybrid.store.records import not_converged_in
-from hybrid.view.along import AXES, Along, along, extent
-from hybrid.view.decimate import Kept, even
+from hybrid.view.curves import AXES, Along, Kept, along, even, extent
 from hybrid.view.figure import (
     ALARM,
     BED,
@@ -49,7 +48,6 @@ from hybrid.view.figure import (
     short,
     title_of,
 )
-from hybrid.view.obstacles import outlines
 from hybrid.view.projections import (
     STILL,
     Numbers,
@@ -60,6 +58,7 @@ from hybrid.view.projections import (
     free_edges,
     magnification,
     not_to_scale,
+    outlines,
     pieces_of,
     telling_times,
     view_named,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.view.decimate import Store, outline
+from hybrid.view.curves import Store, outline
 from hybrid.view.figure import GREY, INK, Area, Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule, Text
 
 Spec = dict[str, Any]

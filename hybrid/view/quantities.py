@@ -13,7 +13,7 @@ from hybrid.statistics.moments import welch
 from hybrid.store.histories import History, history_of, lies_along
 from hybrid.store.reader import Result
 from hybrid.store.records import error_words
-from hybrid.view.along import AXES, along, extent
+from hybrid.view.curves import AXES, along, extent
 from hybrid.view.figure import (
     ALARM,
     GREY,
@@ -27,6 +27,7 @@ from hybrid.view.figure import (
     Panel,
     distinct_texts,
     prefix,
+    save_figure,
     short,
     title_of,
 )
@@ -43,7 +44,6 @@ from hybrid.view.projections import (
     views_of,
     whole_zones,
 )
-from hybrid.view.save import save_figure
 from hybrid.view.zones import counted, share_of_rod, why_rods, zone_map
 
 if TYPE_CHECKING:

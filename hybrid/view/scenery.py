@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from hybrid.store.reader import Result
-from hybrid.view.decimate import Kept, Store
+from hybrid.view.curves import Kept, Store
 from hybrid.view.figure import BED, BODY, INK, LEVEL, SAND, TOUCHDOWN, WATER, colour_of, prefix, short
 from hybrid.view.lines import AllLines, arms_of, bodies_of, points_of
-from hybrid.view.obstacles import surfaces
 from hybrid.view.plotly_backend import colour_scale
-from hybrid.view.projections import STILL, bed_heights
+from hybrid.view.projections import STILL, bed_heights, surfaces
 from hybrid.view.zones import COLOURS, span_of
 
 # Pale shades would be lost on white: of nine, those from here on.

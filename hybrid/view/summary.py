@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import LIMIT_EVENTS, is_of_the_run
-from hybrid.store.capacity import formation_ratio, formation_tension
-from hybrid.store.code_checks import clauses_of
+from hybrid.store.capacity import clauses_of, formation_ratio, formation_tension
 from hybrid.store.envelope import (
     BROKEN,
     GROUP,
@@ -29,7 +28,7 @@ from hybrid.store.envelope import (
 from hybrid.store.reader import Result
 from hybrid.store.records import UNKNOWN, not_converged_in
 from hybrid.store.verdicts import accuracy_text, asked_accuracy, doubt_of, quantity_limits, section_limits
-from hybrid.view.along import Along, Worst, along, held_loop, trapped_loop, worst
+from hybrid.view.curves import Along, Worst, along, held_loop, trapped_loop, worst
 from hybrid.view.figure import NEWS, ZERO, prefix, short
 from hybrid.view.projections import STILL, free_edges
 from hybrid.view.zones import warnings_of

@@ -19,7 +19,7 @@ import numpy as np
 from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, weight_of_event
 from hybrid.store.reader import Result
 from hybrid.store.records import RODS_AT_START, Event, Zone
-from hybrid.view.decimate import Kept, even
+from hybrid.view.curves import Kept, even
 from hybrid.view.figure import (
     ALARM,
     INK,

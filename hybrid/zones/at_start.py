@@ -10,14 +10,14 @@ from itertools import pairwise
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.march.torque_transfer import carry_torque
+from hybrid.kernels.march.zone_torque import carry_torque
 from hybrid.kernels.mesh.cell_lengths import CALM_STEPS
 from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, Line, State
 from hybrid.model.build import Model, given_zones
-from hybrid.model.coarsen import FEWER, MANY, picked
-from hybrid.model.layout import edges
+from hybrid.model.mesh import edges
+from hybrid.model.nearby import FEWER, MANY, picked
 from hybrid.model.payout import PayoutPlan, fastest
 from hybrid.model.resolution import Resolution, follows_curvature
 from hybrid.scene.motion_checks import longest_period
@@ -76,7 +76,7 @@ def with_fewer_cells(model: Model) -> Model:
 def planned_cells(model: Model, manager: DomainManager, state: State, t: float) -> np.ndarray:
     """Places of the finest mesh where a state at rest under the loads of t wants nodes, of rods as they are."""
     assert model.layout is not None
-    sea, ends = model.sea.at(t), model.ends.at(t)
+    sea, ends = model.sea.at_time(t), model.ends.at_time(t)
     manager.set_layout(model.layout)
     manager.evaluate_criteria(model.line, sea, ends, state, 0.0)
     switching = ZoneSwitching(model, manager)

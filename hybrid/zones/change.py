@@ -10,31 +10,31 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.machine.binding import Packed, Table
-from hybrid.kernels.march.torque_transfer import carry_torque
+from hybrid.kernels.march.zone_torque import carry_torque
+from hybrid.kernels.mesh.cell_changes import (
+    begin_switch,
+    blank_switch_job,
+    end_switch,
+)
 from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME
 from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.mesh.zone_step import (
     REJECT_RATIO,
     Zones,
+    advance_zones,
     blank_zone_job,
     blank_zones,
-    follow_zones,
     plan_nodes,
-    take_arcs,
-)
-from hybrid.kernels.mesh.zone_switch import (
-    begin_switch,
-    blank_switch_job,
-    end_switch,
+    read_arcs,
 )
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.build import Model
-from hybrid.model.layout import Layout, LineOnBase, on_other_parts
-from hybrid.solve.run import Tried
-from hybrid.store.named_arrays import matched
+from hybrid.model.mesh import Layout, LineOnBase, on_other_parts
+from hybrid.solve.network_steps import Tried
+from hybrid.store.integrity import matched
 from hybrid.zones.manager import OF_BASE, DomainManager
 from hybrid.zones.plan import Change
 
@@ -127,7 +127,7 @@ class ZoneSwitching:
         """Go on with a model of the same zones in other cells, which have been changed to."""
         assert model.layout is not None
         self.model = model
-        self.manager.take(model.layout, zones)
+        self.manager.use_cells_of(model.layout, zones)
 
     def _set_line(self, line: Line, lengths: Floats) -> None:
         """A line with all of its stiffness and its true lengths; lengths: (N,) m, that its cells have now."""
@@ -207,7 +207,7 @@ class ZoneSwitching:
         zones = self.zones
         if zones.clock.share > 0.0:  # chords become as long as arcs within a pace
             self._plan_table.bind(line=self.model.line, ends=ends, new=state, zones=zones)
-            take_arcs(self._plan_table.numbers)
+            read_arcs(self._plan_table.numbers)
             zones.lack[:], zones.since[:] = zones.true - self.model.line.h, 0.0
             zones.counts.relaxing = 1
 
@@ -239,7 +239,7 @@ class ZoneSwitching:
     def _update_criteria(self) -> None:
         """After a try, or a step, that nobody else has followed."""
         if not (self.compiled or self._followed):
-            follow_zones(self.table.numbers)
+            advance_zones(self.table.numbers)
 
     def all_rod(self, how: Tried) -> Change | None:
         """The last resort of a step that fails however small: rod wherever the scene lets it be; None: it is."""
@@ -274,7 +274,7 @@ class ZoneSwitching:
         line = model.line
         before = self.zones
         changed = on_layout(model, new)
-        changed.sea.at(t)  # obstacles stand where they are now
+        changed.sea.at_time(t)  # obstacles stand where they are now
         target, numbers = changed.line, np.zeros(NUMBERS)
         transfer = self._transfer(old, new, line, target, ends, state)
         numbers[TIME], numbers[RELAXES] = t, before.counts.relaxing
@@ -296,7 +296,7 @@ class ZoneSwitching:
         """(N,) m, by how much the chords of cells are shorter than their arcs."""
         true = self.zones.true.copy()
         self._plan_table.bind(line=self.model.line, new=state, zones=self.zones)
-        take_arcs(self._plan_table.numbers)
+        read_arcs(self._plan_table.numbers)
         less: Floats = np.diff(self.model.line.s) - self.zones.true
         self.zones.true[:] = true
         return less

@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_lengths import FADE
-from hybrid.kernels.mesh.stiffness_ramp import shares
-from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
+from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION, shares
 from hybrid.kernels.mesh.zone_plan import OFF, ROUND_TIME, reach, widen
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
-from hybrid.model.layout import Layout, LineOnBase, edges
 from hybrid.model.material import Material, tension_floor
+from hybrid.model.mesh import Layout, LineOnBase, edges
 from hybrid.zones.criteria import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
 from hybrid.zones.plan import Allowed, Change, Reason, Rules, Times, planned, spread, tidied, wanted
 
@@ -170,7 +169,7 @@ class DomainManager:
         """Take over a layout: what the criteria need of its nodes."""
         kinds = self.on_base.kinds(layout, self.free, self.scale)
         kept = {name: getattr(self.zones, name) for name in OF_BASE}
-        self.take(layout, all_zones(layout.base_of_cell.size, kinds=kinds, **kept))
+        self.use_cells_of(layout, all_zones(layout.base_of_cell.size, kinds=kinds, **kept))
         self.zones.rod[:], self.zones.since[:] = layout.rod, -np.inf
         self.zones.place[:] = layout.places
         self.zones.here[:] = False
@@ -181,7 +180,7 @@ class DomainManager:
         flags.known = flags.relaxing = flags.strained = 0
         flags.all_rod = bool(layout.rod.all())
 
-    def take(self, layout: Layout, zones: Zones) -> None:
+    def use_cells_of(self, layout: Layout, zones: Zones) -> None:
         """Go on with other cells of the same base, of which `zones` knows all."""
         kinds = zones.kinds
         self.layout, self.zones = layout, zones

@@ -5,7 +5,7 @@ import pytest
 from rich.table import Table
 
 import hybrid
-from hybrid.cli import response_command
+from hybrid.cli import statistics_commands as response_command
 from hybrid.cli.console import Console, Grid
 from hybrid.cli.tables import _largest_moment
 from hybrid.linear.response_results import ADDED, LineResponse, Response
@@ -67,5 +67,5 @@ def test_rows_of_a_response_that_is_not_valid_are_marked() -> None:
     for notes, valid in (((), {"tension", "x", "y", "z"}), (("tension at s = 5 m: not valid",), {"x", "y", "z"})):
         rows = response_command._rows(Response("", {"cable": line}, {}, {}, 1, {}, notes), 3.0)
         assert {row["quantity"] for row in rows if row["valid"]} == valid
-        shown = response_command._table(Response("", {"cable": line}, {}, {}, 1, {}, notes), rows, 3.0)
+        shown = response_command._response_table(Response("", {"cable": line}, {}, {}, 1, {}, notes), rows, 3.0)
         assert "curvature, not valid" in [*shown.columns[0].cells] and ("x" in [*shown.columns[0].cells])

@@ -13,7 +13,7 @@ from rich.console import Console
 
 import hybrid
 from hybrid.cli import console as commands_console
-from hybrid.cli.progress_line import ProgressLine, span, speed, zones_in_short
+from hybrid.cli.console import ProgressLine, span, speed, zones_in_short
 from hybrid.model.mesh import Zone
 from hybrid.simulation.progress import Progress
 
@@ -173,7 +173,7 @@ def test_shells_complete_commands(capsys: pytest.CaptureFixture[str], monkeypatc
         monkeypatch.setenv(name, value)
     with pytest.raises(SystemExit):
         main([])
-    assert capsys.readouterr().out.split() == ["response", "report", "resume"]
+    assert capsys.readouterr().out.split() == ["report", "response", "resume"]
 
 
 def test_without_a_terminal_there_is_a_line_every_few_seconds() -> None:

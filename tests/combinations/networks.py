@@ -11,8 +11,7 @@ import yaml
 import hybrid
 from hybrid import Result, Scene
 from hybrid.scene.read import as_scene
-from hybrid.scene.root import in_full
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE, in_full
 
 SAME = 1e-9  # of the scale of a dataset: round-off that a motion of some hundred steps lets grow
 # What says how Newton's method went, and clocks: no quantity of the line.

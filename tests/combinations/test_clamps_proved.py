@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 
 import hybrid
-from hybrid.kernels.laws.bending_slip import EACH, beside_spring, slip_answer
+from hybrid.kernels.laws.bending_law import EACH, beside_spring, slip_answer
 from hybrid.model.build import build
 from hybrid.scene.read import as_scene, one_line
 from tests.combinations.pairs import ADAPTIVE, BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_network

@@ -19,9 +19,8 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.scene.combinations import REFUSALS
 from hybrid.scene.read import _readable_tables, as_scene
-from hybrid.scene.root import Scene, in_full
+from hybrid.scene.root import LINE, Scene, in_full
 from hybrid.scene.schema import LineScene
-from hybrid.scene.short_form import LINE
 from tests.combinations.pairs import (
     FEATURES,
     LENGTH,

@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError
-from hybrid.scene.stream_function import steady_wave, wavenumber
+from hybrid.scene.wave_theory import steady_wave, wavenumber
 from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_network
 from tests.problems import tables_with
 

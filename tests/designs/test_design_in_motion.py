@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import hybrid
-from hybrid.designs.motions import PART, TANGENT, Motions, Peaks
+from hybrid.designs.case_results import PART, TANGENT, Motions, Peaks
 from hybrid.designs.numbers import scene_with
 from hybrid.designs.wanted import over_time, peaks, smoothed
 from tests.designs.test_in_motion import G, W, heaved, on_the_bed

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hybrid.designs.gradients import Gradients
+from hybrid.designs.line_at_rest import Gradients
 from hybrid.designs.network_at_rest import NetworkAtRest
 from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene

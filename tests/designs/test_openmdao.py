@@ -14,7 +14,7 @@ pytestmark = extras.of_file("openmdao")
 import openmdao.api as om
 
 import hybrid
-from hybrid.scene.design import DESIGN
+from hybrid.scene.study import DESIGN
 
 LENGTH, MASS = "cable.sections[0].length", "cable.sections[0].mass"
 EXAMPLES = Path(__file__).parents[2] / "examples"

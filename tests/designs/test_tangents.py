@@ -17,10 +17,9 @@ from hybrid.designs.in_motion import (
     in_motion,
     size_of,
 )
-from hybrid.designs.network_tangents import NetworkOthers
 from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.designs.replay import course_of
-from hybrid.designs.tangents import Unfollowed
+from hybrid.designs.tangents import NetworkOthers, Unfollowed
 from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.state.report import PLANAR
 from tests.designs.test_in_motion import heaved, on_the_bed
@@ -197,7 +196,7 @@ def test_numbers_that_are_not_followed_are_differenced_beside_those_that_are(mon
     plain, tables = NetworkOthers._other, on_the_bed()
 
     def other(self: NetworkOthers, model: Any, k: int, h: float) -> Any:
-        if abs(model.models[0].ends.at(0.0).position[1, 1]) > 0.0:
+        if abs(model.models[0].ends.at_time(0.0).position[1, 1]) > 0.0:
             raise Unfollowed("the number is not followed")
         return plain(self, model, k, h)
 

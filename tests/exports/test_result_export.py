@@ -419,7 +419,7 @@ def test_cycles_of_a_pull_and_of_a_bend_to_both_sides(result: Result, tmp_path: 
 @pytest.mark.needs("rainflow")
 def test_counts_are_those_of_a_series_counted_by_hand(tmp_path: Path) -> None:
     """The series of the example in ASTM E1049, section 5.4.4, as the end force: ranges and counts as published there."""
-    from hybrid.exports.fatigue import _cycles
+    from hybrid.exports.api import _cycles
 
     counts: dict[float, float] = {}
     for size, _, number, _, _ in _cycles(np.array([-2.0, 1, -3, 5, -1, 3, -4, 4, -2])):

@@ -24,7 +24,7 @@ VECTOR, TWICE = "    return (A[i, 0], A[i, 1], A[i, 2])\n", "    return (2.0 * A
 
 PULLED = """
 import numpy as np
-from hybrid.kernels.laws.hanging import find_force
+from hybrid.kernels.laws.closed_forms import find_force
 
 # A cell of 1 m and 1 N between places 2 m apart: 1 N; and 3 N where vectors are read with twice their x.
 places = np.array([[2.0, 0.0, 0.0], [0.5, 0.0, 0.0]])
@@ -157,7 +157,7 @@ import json, pkgutil
 from importlib import import_module
 import hybrid.kernels
 from hybrid.kernels.machine.compile import Entry
-from hybrid.kernels.machine.source_digest import source_digest
+from hybrid.kernels.machine.kept_code import source_digest
 rooms = pkgutil.walk_packages(hybrid.kernels.__path__, "hybrid.kernels.")
 values = [x for room in rooms for x in vars(import_module(room.name)).values() if isinstance(x, Entry)]
 print(json.dumps({f"{x.__module__}.{x.__qualname__}": source_digest(x.py_func) for x in values}))
@@ -190,13 +190,13 @@ def test_an_edit_means_new_code_of_the_kernels_that_it_reaches_and_of_no_others(
     anew = changed("kernels/algebra/rotations.py", VECTOR, TWICE)
     assert reaches <= anew and len(anew) < len(before) - 10
     assert not changed("kernels/algebra/rotations.py", VECTOR, f"    # as a tuple\n{VECTOR}")
-    assert not changed("kernels/run/network_run.py", '"""Steps of all lines until', '"""Steps of lines until')
+    assert not changed("kernels/run/run_module.py", '"""Steps of all lines until', '"""Steps of lines until')
     constant = changed("kernels/state/books.py", "FAILED = range(6)", "FAILED = range(50, 56)")
     assert (
         "hybrid.kernels.run.network_run.run_system" in constant and "hybrid.kernels.run.entry.in_plane" not in constant
     )
     field = "    itself: int = 0  # address of"
-    moved = changed("kernels/step/job.py", field, "    another: int = 0\n" + field)
+    moved = changed("kernels/step/newton.py", field, "    another: int = 0\n" + field)
     assert "hybrid.kernels.run.entry.in_plane" in moved and len(moved) < len(before)
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybrid.kernels.watch.carried_extremes import Watched, pass_on
-from hybrid.kernels.watch.extremes import fold_extremes
+from hybrid.kernels.watch.extremes import Watched, fold_extremes, pass_on
 
 FINEST = np.arange(65.0)
 MARKED = (16, 48)  # places with a left and a right value

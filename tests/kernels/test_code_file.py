@@ -15,8 +15,18 @@ import pytest
 from numba.core.registry import cpu_target
 
 from hybrid.kernels.machine import cache, kept_code
-from hybrid.kernels.machine.cache import CacheWarning, Place, cache_folder, processor, temporary_folder
-from hybrid.kernels.machine.code_file import FORMAT, MAGIC, Unusable, read_code, write_code
+from hybrid.kernels.machine.cache import (
+    FORMAT,
+    MAGIC,
+    CacheWarning,
+    Place,
+    Unusable,
+    cache_folder,
+    processor,
+    read_code,
+    temporary_folder,
+    write_code,
+)
 from hybrid.kernels.machine.compile import kernel
 
 HEAD = len(MAGIC) + 8

@@ -100,7 +100,7 @@ def check(ends: EndConditions, around: Surroundings, times=TIMES) -> None:
         found = Ends(ends.values.held, *(np.full_like(x, np.nan) for x in ends.values[1:]))
         velocity = np.full((2, 3), np.nan)
         ends_of(t, ends.moves(), around.values, found, velocity)
-        wanted = ends.at(t)
+        wanted = ends.at_time(t)
         for name, a, b in zip(Ends._fields, found, wanted, strict=True):
             size = max(1.0, float(np.abs(b).max()))
             np.testing.assert_allclose(a, b, rtol=0, atol=5 * ROUND_OFF * size, err_msg=f"{name} at {t}")
@@ -127,7 +127,8 @@ def test_ends_on_a_body_that_moves_compiled_are_python(tmp_path: Path, name: str
     ends.motions |= {0: FairleadMotion(known, (1.0, 2.0, -3.0)), 1: FairleadMotion(known, (-4.0, 0.5, 1.0), seat)}
     check(ends, around, (*TIMES, math.inf))
     assert (
-        np.abs(ends.at(13.1).position[1] - PLACES[0] - known.axes @ (-4.0, 0.5, 1.0)).max() > 0.05 or name == "at rest"
+        np.abs(ends.at_time(13.1).position[1] - PLACES[0] - known.axes @ (-4.0, 0.5, 1.0)).max() > 0.05
+        or name == "at rest"
     )
 
 
@@ -192,7 +193,7 @@ def test_growth_of_the_sea_compiled_is_python(ramps: tuple[float, float]) -> Non
     for t in (*TIMES, math.inf):
         compiled.now[:] = np.nan
         sea_of(t, compiled)
-        np.testing.assert_allclose(compiled.now, around.at(t).now, rtol=ROUND_OFF, atol=ROUND_OFF)
+        np.testing.assert_allclose(compiled.now, around.at_time(t).now, rtol=ROUND_OFF, atol=ROUND_OFF)
 
 
 # --- how far an end turns ------------------------------------------------------------------------
@@ -200,7 +201,7 @@ def test_growth_of_the_sea_compiled_is_python(ramps: tuple[float, float]) -> Non
 
 def way(ends: EndConditions, a: float, b: float) -> float:
     """The integral of the angular speed of the faster end, by Simpson's rule on a fine grid."""
-    speeds = np.array([np.linalg.norm(ends.at(t).spin, axis=1) for t in np.linspace(a, b, 2001)])
+    speeds = np.array([np.linalg.norm(ends.at_time(t).spin, axis=1) for t in np.linspace(a, b, 2001)])
     weights = np.tile([2.0, 4.0], 1000)
     weights[0] = 1.0
     return float((np.append(weights, 1.0) @ speeds).max() * (b - a) / 6000.0)

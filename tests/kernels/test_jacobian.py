@@ -11,25 +11,32 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
-from hybrid.kernels.march.configuration import update
 from hybrid.kernels.march.energies import Observed, observe
+from hybrid.kernels.march.march import update
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
-from hybrid.kernels.state.obstacle_rows import BEGAN, CARRIED, EACH, ENDED, PLACE, SPEED, SWEEP, TURNING
 from hybrid.kernels.state.report import (
     ADDED_MASS,
+    BEGAN,
     BENDING_LAW,
     BODIES,
     BREAKOUT,
+    CARRIED,
     DRAG,
+    EACH,
+    ENDED,
     FLOW,
     FRICTION,
     MASS_DAMPING,
     OBSTACLES,
+    PLACE,
     ROTARY,
     SEABED,
     SOIL,
+    SPEED,
     STIFFNESS_DAMPING,
     SURFACE,
+    SWEEP,
+    TURNING,
     VORTICES,
     WAVES,
 )
@@ -40,7 +47,7 @@ from hybrid.scene.mesh_file import Mesh
 N = 7
 CV, CA = 3.0, 7.0
 # A plane, a sphere, an endless cylinder, one with round ends, a box, a torus, a sheave and a mesh that the line of
-# `random_case` runs through, each with the numbers of kernels.state.obstacle_rows.
+# `random_case` runs through, each with the numbers of kernels.state.report.
 X, UP, NO = [1.0, 0.0, 0.0], [0.6, 0.0, 0.8], [0.0] * 6
 OBSTACLES_THERE = np.array([
     [0, 0.0, 0.0, -3.0, *UP, *X, 0.1, 0.0, *NO, 0.1, 0.2, 2.0, 0.3, 40.0, 0.3],

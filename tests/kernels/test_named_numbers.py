@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hybrid.kernels.machine.argument_types import key_of
 from hybrid.kernels.machine.binding import Packed, Room, Table
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.named_numbers import NamedNumbers
-from hybrid.kernels.machine.references import reader
+from hybrid.kernels.machine.references import NamedNumbers, key_of, reader
 
 
 class Times(NamedNumbers):

@@ -11,15 +11,15 @@ import pytest
 from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, in_soil, random_case, with_tables
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
-from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE, WIDE, solve_again_planar
 from hybrid.kernels.algebra.kept_factors import solve_again
+from hybrid.kernels.algebra.plane import KEPT, TRIPLE, WIDE, solve_again_planar
 from hybrid.kernels.laws.out_of_plane import BAND, REACH, step_out_of_plane, wrong_pivots_at_rest
-from hybrid.kernels.march.configuration import update
+from hybrid.kernels.march.march import update
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
 from hybrid.kernels.state import report
 from hybrid.kernels.state.report import PLANAR, RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state.state import State
-from hybrid.kernels.step.generalized_alpha import Scheme
+from hybrid.kernels.step.step_control import Scheme
 
 N = 7
 

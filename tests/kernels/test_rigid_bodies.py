@@ -7,7 +7,7 @@ import pytest
 
 from hybrid.kernels.junctions import bodies as k
 from hybrid.kernels.machine.compile import kernel
-from hybrid.kernels.step.generalized_alpha import scheme as k_scheme
+from hybrid.kernels.step.step_control import scheme as k_scheme
 
 
 @kernel

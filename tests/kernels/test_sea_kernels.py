@@ -21,12 +21,10 @@ from hybrid.kernels.laws import seabed, water
 from hybrid.kernels.laws.seabed import contact
 from hybrid.kernels.laws.water import FADED, SAME_WETNESS, wave_kinematics
 from hybrid.kernels.state.state import LANES, no_sea, with_waves
-from hybrid.kernels.watch.wave_slopes import PHASES, SLOPES, wave_slopes, waves_beside
+from hybrid.kernels.watch.tangents import PHASES, SLOPES, wave_slopes, waves_beside
 from hybrid.model.sea import HIGHEST, LOWEST, Surroundings, components, current_table, jonswap, surroundings
-from hybrid.scene.spectra import JonswapWaves
-from hybrid.scene.stream_function import steady_wave
-from hybrid.scene.wave_files import FINE, shares
-from hybrid.scene.waves import RegularWaves, StreamFunctionWaves
+from hybrid.scene.wave_theory import JonswapWaves, steady_wave
+from hybrid.scene.waves import FINE, RegularWaves, StreamFunctionWaves, shares
 
 
 def entry(law):
@@ -142,7 +140,7 @@ def sea_of(waves, depth, ramp=None, surface=0.0, n=1):
 def stirred(around: Surroundings, t: float, points) -> np.ndarray:
     """Velocity, acceleration, elevation (n, 7) at points (n, 3) and t."""
     r = np.atleast_2d(np.asarray(points, float))
-    sea = around.at(t)._replace(flow=np.zeros((len(r), 7)))
+    sea = around.at_time(t)._replace(flow=np.zeros((len(r), 7)))
     wave_kinematics(sea, 0.4 * r, 0.6 * r)  # r + u is what counts
     return sea.flow
 
@@ -194,7 +192,7 @@ def test_slopes_of_waves(depth, stretched):
     waves = components(JonswapWaves(significant_height=1.5, peak_period=6.0, direction=-40.0, seed=3), depth, G)
     points = np.random.default_rng(5).uniform([-300.0, -300.0, -6.0], [300.0, 300.0, 2.0], (37, 3))
     around = sea_of(waves, depth, ramp=20.0, n=len(points))
-    sea = around.at(7.0)._replace(stretched=stretched, flow=np.zeros((len(points), 7)))
+    sea = around.at_time(7.0)._replace(stretched=stretched, flow=np.zeros((len(points), 7)))
 
     def moved(way, x):
         wave_kinematics(sea, points, x * way)

@@ -7,9 +7,12 @@ import pytest
 from test_self_contact_kernels import SHAPES, WIDTH, Tangle
 
 from hybrid.kernels.contact.self_contact import hold_points
-from hybrid.kernels.contact.self_contact_friction import (
+from hybrid.kernels.contact.self_contact_law import (
+    FORCE,
     HELD,
+    NORMAL,
     SLIDES,
+    SPRING,
     TRAVEL,
     TRY,
     add_held,
@@ -17,7 +20,6 @@ from hybrid.kernels.contact.self_contact_friction import (
     keep_grips,
     link_grips,
 )
-from hybrid.kernels.contact.self_contact_law import FORCE, NORMAL, SPRING
 from hybrid.kernels.machine.compile import kernel
 
 MU = 0.3

@@ -12,7 +12,7 @@ from hybrid.kernels.run.entry import workspace
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.state import blank_line, blank_state, no_ends
 from hybrid.kernels.step.newton import ASKED, LIMIT, PREPARE, REST
-from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.contact import SelfContact
 
 WIDTH = 0.1
 

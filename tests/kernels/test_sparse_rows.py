@@ -7,7 +7,7 @@ import pytest
 
 from hybrid.kernels.algebra.sparse_rows import add_rows, is_definite
 from hybrid.model.mesh import Zone
-from hybrid.outputs.output_grid import Grid
+from hybrid.outputs.observed_states import Grid
 
 
 def test_product_of_sparse_rows():

@@ -8,9 +8,9 @@ from kernels.test_zone_torque import residual as zone_residual
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.kept_factors import solve_again
-from hybrid.kernels.laws.axial_law_with_torque import follow_law_with_torque
-from hybrid.kernels.march.configuration import update
+from hybrid.kernels.laws.tension_torque import linearise_law_with_torque
 from hybrid.kernels.march.energies import Observed, observe
+from hybrid.kernels.march.march import update
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace_of
 from hybrid.kernels.state.report import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING, STRETCH_ENERGY
 from hybrid.kernels.state.state import NO_LAW, blank_state
@@ -35,7 +35,7 @@ def with_law(line, st):
     law[1] = 0.0
     line = line._replace(bits=line.bits | AXIAL_LAW, law=law, law_table=np.column_stack([strain, tension, energy]))
     st = st._replace(slow=np.zeros(N))
-    address = follow_law_with_torque.address(line, st, st, workspace_of(line), 0.0, 0.0)
+    address = linearise_law_with_torque.address(line, st, st, workspace_of(line), 0.0, 0.0)
     return line._replace(law_at=np.array([address], np.int64)), st
 
 

@@ -5,7 +5,7 @@ import pytest
 from kernels.test_jacobian import CA, CV, N, random_case
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
-from hybrid.kernels.march.configuration import update
+from hybrid.kernels.march.march import update
 from hybrid.kernels.march.zone_torque import AFTER_STEP, BEFORE_MARCH, pass_torque
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace, workspace_of
 from hybrid.kernels.state.report import MASS_DAMPING, ROTARY, STIFFNESS_DAMPING

@@ -17,7 +17,7 @@ from viewed import SCENE, Page, served
 import hybrid
 from hybrid.live import session as playing
 from hybrid.live.session import Playback
-from hybrid.live.workers import Run
+from hybrid.live.workers import WatchedRun
 
 
 @pytest.mark.long
@@ -116,7 +116,7 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
 def test_a_scene_whose_name_begins_with_a_hyphen_is_no_option(tmp_path: Path) -> None:
     scene = tmp_path / "-rf.yaml"
     scene.write_text(SCENE.replace("duration: 4.0", "duration: 0.1"))
-    run = Run(scene, tmp_path / "-rf.h5", lambda: None)
-    asyncio.run(run.follow())
+    run = WatchedRun(scene, tmp_path / "-rf.h5", lambda: None)
+    asyncio.run(run.watch())
     assert run.state["ended"] == "complete", run.state
     assert sorted(x.name for x in tmp_path.iterdir()) == ["-rf.h5", "-rf.yaml"]

@@ -8,8 +8,7 @@ import re
 import pytest
 
 import hybrid
-from hybrid.live.document import Refused
-from hybrid.live.new_scenes import KINDS, example_text, examples, new_scene
+from hybrid.live.document import KINDS, Refused, example_text, examples, new_scene
 from hybrid.live.pictures import picture_of
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.linear.drag import shape_of_drag
+from hybrid.linear.response_results import shape_of_drag
 from hybrid.modal import validity
 
 EA, LENGTH, T0 = 1e6, 50.0, 2e4

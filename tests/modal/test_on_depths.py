@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.designs.numbers import changed_scene
 from hybrid.designs.sensitivity import at_rest
-from hybrid.scene.depths import Depths
+from hybrid.scene.sea import Depths
 from tests.solve.test_bed_of_depths import PLANE, SLOPE, hill, mooring
 
 G = 9.81

@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.linear.drag import across, along, of_few, phases_of, size_deviation
-from hybrid.linear.response_results import LineResponse, Response
+from hybrid.linear.response_results import LineResponse, Response, across, along, of_few, phases_of, size_deviation
 from hybrid.scene.combinations import RESPONSE_TO_MOTION
 from hybrid.statistics.fatigue import damage
 

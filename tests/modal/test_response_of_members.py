@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.linear.drag import of_few, phases_of
 from hybrid.linear.loaded_line import turning_doubts
+from hybrid.linear.response_results import of_few, phases_of
 from tests.simulation.test_members import RHO, G, body, floating, scene
 
 ANCHORS = {"east": (150.0, 0.0), "north": (-75.0, 130.0), "south": (-75.0, -130.0)}

@@ -10,7 +10,7 @@ from problems import at_rest, pinned, scene
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.model.coarsen import FEWEST, coarser, refined
+from hybrid.model.nearby import FEWEST, coarser, refined
 from hybrid.scene.read import one_line
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -16,11 +16,10 @@ import pytest
 import hybrid
 import hybrid.model.payout
 from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Line
-from hybrid.model.build import Model, build
+from hybrid.model.build import Model, build, in_space, planar
 from hybrid.model.failure import without_hold
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
-from hybrid.model.plane import in_space, planar
 from hybrid.scene.read import one_line
 from tests.inside import OnlyLine
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.laws.loads import body_drag, half_cell_drag
+from hybrid.kernels.laws.water import body_drag, half_cell_drag
 from hybrid.kernels.machine.compile import kernel
 from hybrid.model.build import build
 from hybrid.model.initial_shape import current_drag

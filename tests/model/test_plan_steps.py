@@ -13,8 +13,7 @@ from hybrid.accuracy import run_forecast
 from hybrid.accuracy.run_forecast import Seen, _cost_of_a_step, _steps_a_second, _still_to_come
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.scene.read import as_scene
-from hybrid.scene.root import in_full
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE, in_full
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

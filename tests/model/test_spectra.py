@@ -21,7 +21,7 @@ from hybrid.model.sea import (
     torsethaugen,
     torsethaugen_parts,
 )
-from hybrid.scene.spectra import (
+from hybrid.scene.wave_theory import (
     CROSSINGS,
     JonswapWaves,
     OchiHubbleWaves,

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.laws.hinge_layer import FADED
+from hybrid.kernels.laws.closed_forms import FADED
 from hybrid.kernels.laws.seabed import stored
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.report import CONTACT_FORCE, FORCE_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.mesh import Zone
 from hybrid.outputs.observation import Touchdown
-from hybrid.outputs.output_grid import Grid
+from hybrid.outputs.observed_states import Grid
 from hybrid.outputs.probes import Observer
 
 cross = np.cross

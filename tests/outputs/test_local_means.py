@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybrid.outputs.output_grid import means_beside
+from hybrid.outputs.observed_states import means_beside
 
 
 @pytest.mark.parametrize("points", [5, 37, 400], ids=["coarser", "about as fine", "finer"])

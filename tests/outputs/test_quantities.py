@@ -12,8 +12,7 @@ from scipy.optimize import brentq
 
 import hybrid
 from hybrid.outputs.probes import PROBES
-from hybrid.outputs.quantities import FEW, between, nearest
-from hybrid.outputs.section_use import Walls, largest_stress
+from hybrid.outputs.quantities import FEW, Walls, between, largest_stress, nearest
 from hybrid.scene.quantities import TAKEN
 from hybrid.scene.read import read_text
 from hybrid.store.limits import held_of

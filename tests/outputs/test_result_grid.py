@@ -9,9 +9,9 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from hybrid.model.mesh import Zone
-from hybrid.outputs import output_grid
+from hybrid.outputs import observed_states as output_grid
 from hybrid.outputs.joined_lines import JoinedGrid
-from hybrid.outputs.output_grid import Grid
+from hybrid.outputs.observed_states import Grid
 
 Floats = np.ndarray
 

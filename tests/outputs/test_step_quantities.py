@@ -14,7 +14,7 @@ from hybrid.scene.read import read_text
 from hybrid.scene.study import Kept
 from hybrid.store.limits import held_of
 from hybrid.store.statistics_table import rows_of
-from hybrid.studies.collect import collected
+from hybrid.studies.workers import collected
 
 SCENE = """
 environment: {fluid: {density: 1025, current: [0.4, 0.3, 0], surface: 0}, seabed: {z: -20, stiffness: 1.0e4, damping: 500}}

@@ -38,16 +38,16 @@ def scene(file: str, **motion: float) -> hybrid.Scene:
 def test_it_starts_at_rest_and_is_the_file_after_the_ramp(tmp_path: Path) -> None:
     """C2 at the start; exactly the circle from then on (spline of 31 rows a period: 1e-5 of its radius)."""
     motion = EndMotion(Motion(file=table(tmp_path), ramp=RAMP), PLACE)
-    place, speed = motion.at(0.0)[:2]
+    place, speed = motion.at_time(0.0)[:2]
     assert place.tolist() == PLACE.tolist() and not speed.any()
     h = 1e-4
-    assert np.linalg.norm(motion.at(h)[1]) < 1e-6
+    assert np.linalg.norm(motion.at_time(h)[1]) < 1e-6
     for t in (0.7, 2.2, 4.9, 6.3, 9.0):
-        change = (motion.at(t + h)[0] - motion.at(t - h)[0]) / (2 * h)
-        np.testing.assert_allclose(motion.at(t)[1], change, rtol=0, atol=1e-6)
+        change = (motion.at_time(t + h)[0] - motion.at_time(t - h)[0]) / (2 * h)
+        np.testing.assert_allclose(motion.at_time(t)[1], change, rtol=0, atol=1e-6)
     for t in (5.0, 6.3, 9.0):
         circle = [3.2 + 0.5 * np.sin(W * t), 0.0, 1.0 + 0.5 * np.cos(W * t)]
-        np.testing.assert_allclose(motion.at(t)[0], circle, rtol=0, atol=1e-5)
+        np.testing.assert_allclose(motion.at_time(t)[0], circle, rtol=0, atol=1e-5)
 
 
 def test_a_run_says_how_it_is_blended_in(tmp_path: Path) -> None:

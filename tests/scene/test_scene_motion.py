@@ -64,12 +64,12 @@ def derivative(f: Callable[[float], Array], t: float, h: float = 1e-3) -> Array:
 
 def _check_derivatives(motion: EndMotion, times: list[float], tolerance: float) -> None:
     for t in times:
-        position, velocity, frame, spin = motion.at(t)
-        np.testing.assert_allclose(velocity, derivative(lambda u: motion.at(u)[0], t), atol=tolerance)
+        position, velocity, frame, spin = motion.at_time(t)
+        np.testing.assert_allclose(velocity, derivative(lambda u: motion.at_time(u)[0], t), atol=tolerance)
         assert frame is not None
         np.testing.assert_allclose(frame.T @ frame, np.eye(3), atol=1e-14)
         assert np.linalg.det(frame) == pytest.approx(np.linalg.det(BASE))
-        rate = derivative(lambda u: np.asarray(motion.at(u)[2]), t) @ frame.T
+        rate = derivative(lambda u: np.asarray(motion.at_time(u)[2]), t) @ frame.T
         np.testing.assert_allclose(rate, np.cross(np.eye(3), spin), atol=tolerance)
         assert position.shape == (3,)
 
@@ -99,7 +99,7 @@ def test_angles_follow_the_convention() -> None:
         ]
         for order, given in (("ZYX", angles), ("xyz", angles[::-1])):  # about axes that turn, about those of space
             expected = Rotation.from_euler(order, given, degrees=True).as_matrix() @ BASE
-            np.testing.assert_allclose(motion.at(t)[2], expected, atol=1e-14)
+            np.testing.assert_allclose(motion.at_time(t)[2], expected, atol=1e-14)
 
 
 def test_the_manual_states_the_convention() -> None:
@@ -112,7 +112,7 @@ def test_the_manual_states_the_convention() -> None:
 
     def turned(**angles: float) -> np.ndarray:
         table = {name: Harmonic(amplitude=x, period=4.0, phase=90.0) for name, x in angles.items()}
-        frame = EndMotion(Motion(**table, ramp=1.0), PLACE, np.eye(3)).at(4.0)[2]
+        frame = EndMotion(Motion(**table, ramp=1.0), PLACE, np.eye(3)).at_time(4.0)[2]
         assert frame is not None
         return frame
 
@@ -129,8 +129,8 @@ def test_rotation_vectors_follow_the_convention(recorded: Motion) -> None:
     motion = EndMotion(recorded, PLACE, BASE)
     for t in (2.0, 11.0, 25.0):  # samples, where the spline is exact; 12 digits are in the file
         turn = Rotation.from_rotvec(40.0 * _swell(np.array([t]))[0], degrees=True).as_matrix()
-        np.testing.assert_allclose(motion.at(t)[2], turn @ BASE, atol=1e-10)
-        np.testing.assert_allclose(motion.at(t)[0], PLACE + _swell(np.array([t]))[0], atol=1e-11)
+        np.testing.assert_allclose(motion.at_time(t)[2], turn @ BASE, atol=1e-10)
+        np.testing.assert_allclose(motion.at_time(t)[0], PLACE + _swell(np.array([t]))[0], atol=1e-11)
 
 
 def test_small_and_large_angles_join() -> None:
@@ -152,8 +152,8 @@ def test_c2_across_start_and_end_of_the_ramp(t: float) -> None:
     motion = EndMotion(HARMONIC, PLACE, BASE)
 
     def jump(h: float) -> float:
-        left = (motion.at(t)[1] - motion.at(t - h)[1]) / h
-        right = (motion.at(t + h)[1] - motion.at(t)[1]) / h
+        left = (motion.at_time(t)[1] - motion.at_time(t - h)[1]) / h
+        right = (motion.at_time(t + h)[1] - motion.at_time(t)[1]) / h
         return float(np.abs(right - left).max())
 
     assert jump(1e-4) < 1e-2
@@ -162,7 +162,7 @@ def test_c2_across_start_and_end_of_the_ramp(t: float) -> None:
 
 def test_starts_at_rest_where_it_is_held(recorded: Motion) -> None:
     for motion in (EndMotion(HARMONIC, PLACE, BASE), EndMotion(recorded, PLACE, BASE)):
-        position, velocity, frame, spin = motion.at(0.0)
+        position, velocity, frame, spin = motion.at_time(0.0)
         np.testing.assert_allclose(position, PLACE, atol=1e-14)
         np.testing.assert_allclose(frame, BASE, atol=1e-14)
         assert np.abs(velocity).max() < 1e-14 and np.abs(spin).max() < 1e-14
@@ -172,19 +172,19 @@ def test_what_does_not_move() -> None:
     zero = Motion(heave=Harmonic(amplitude=0.0, period=3.0))
     for motion in (EndMotion(None, PLACE, BASE), EndMotion(zero, PLACE, BASE)):
         assert not motion.moving
-        position, velocity, frame, spin = motion.at(3.0)
-        assert position is motion.at(4.0)[0]  # shared, hence read-only
+        position, velocity, frame, spin = motion.at_time(3.0)
+        assert position is motion.at_time(4.0)[0]  # shared, hence read-only
         with pytest.raises(ValueError):
             position[0] = 1.0
         assert not velocity.any() and not spin.any() and frame is not None
     guided = EndMotion(Motion(yaw=Harmonic(amplitude=3.0, period=3.0), ramp=1.0), None)
-    assert guided.moving and guided.at(2.0)[2] is None
+    assert guided.moving and guided.at_time(2.0)[2] is None
 
 
 def test_after_the_record_the_end_stays(recorded: Motion) -> None:
     """Round-off may ask a hair beyond the last row; no cubic may run away there."""
     motion = EndMotion(recorded, PLACE, BASE)
-    for last, beyond in zip(motion.at(39.75), motion.at(1e9), strict=True):
+    for last, beyond in zip(motion.at_time(39.75), motion.at_time(1e9), strict=True):
         np.testing.assert_array_equal(last, beyond)
 
 
@@ -345,7 +345,7 @@ def test_files_with_and_without_jumps(tmp_path: Path, form: str, kind: str) -> N
     path = _csv(tmp_path / "m.csv", t, {"": values}, form)
     if kind == "smooth":
         _scene(f"{{file: {path}}}", "[0, 0, 0]")
-        assert np.isfinite(EndMotion(Motion(file=path), np.zeros(3)).at(1e9)[0]).all()
+        assert np.isfinite(EndMotion(Motion(file=path), np.zeros(3)).at_time(1e9)[0]).all()
     else:
         said = _refusal(f"{{file: {path}}}", "[0, 0, 0]")
         assert "at t = 0, because the cable starts at rest" in said if kind == "start" else "at t = 60" in said

@@ -60,12 +60,12 @@ def test_velocity_is_the_derivative_of_position(name: str) -> None:
     motion = EndMotion(MOTIONS[name], PLACE, elevation=sea)
     assert motion.moving
     for t in (0.7, 3.3, 4.6, 7.0, 9.5, 11.7, 13.8, 20.0, 47.3):
-        np.testing.assert_allclose(motion.at(t)[1], derivative(lambda u: motion.at(u)[0], t), atol=1e-9)
+        np.testing.assert_allclose(motion.at_time(t)[1], derivative(lambda u: motion.at_time(u)[0], t), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", MOTIONS)
 def test_everything_starts_from_rest_where_it_is_held(name: str) -> None:
-    position, velocity, _, spin = EndMotion(MOTIONS[name], PLACE, elevation=sea).at(0.0)
+    position, velocity, _, spin = EndMotion(MOTIONS[name], PLACE, elevation=sea).at_time(0.0)
     np.testing.assert_allclose(position, PLACE, atol=1e-14)
     assert np.abs(velocity).max() < 1e-12 and not spin.any()
 
@@ -77,8 +77,8 @@ def test_acceleration_is_continuous_where_something_begins_or_ends(name: str, t:
     motion = EndMotion(MOTIONS[name], PLACE, elevation=sea)
 
     def jump(h: float) -> float:
-        left = (motion.at(t)[1] - motion.at(t - h)[1]) / h
-        right = (motion.at(t + h)[1] - motion.at(t)[1]) / h
+        left = (motion.at_time(t)[1] - motion.at_time(t - h)[1]) / h
+        right = (motion.at_time(t + h)[1] - motion.at_time(t)[1]) / h
         return float(np.abs(right - left).max())
 
     assert jump(1e-3) < 2e-2
@@ -91,7 +91,7 @@ def test_harmonics_of_a_list_add_up() -> None:
     for t in (3.0, 25.0):
         for k in (0, 1):
             rest = PLACE if k == 0 else 0.0
-            np.testing.assert_allclose(both.at(t)[k], one.at(t)[k] + other.at(t)[k] - rest, atol=1e-14)
+            np.testing.assert_allclose(both.at_time(t)[k], one.at_time(t)[k] + other.at_time(t)[k] - rest, atol=1e-14)
     assert Motion(heave=SWELL, yaw=[CHOP]).harmonics() == {"heave": (SWELL,), "yaw": (CHOP,)}
 
 
@@ -101,25 +101,25 @@ def test_turns_of_a_list_add_up() -> None:
         Motion(yaw=[Harmonic(amplitude=10, period=8), Harmonic(amplitude=20, period=8)], ramp=10.0), None, frame
     )
     one = EndMotion(Motion(yaw=Harmonic(amplitude=30, period=8), ramp=10.0), None, frame)
-    np.testing.assert_allclose(two.at(23.0)[2], one.at(23.0)[2], atol=1e-14)
-    np.testing.assert_allclose(two.at(23.0)[3], one.at(23.0)[3], atol=1e-14)
+    np.testing.assert_allclose(two.at_time(23.0)[2], one.at_time(23.0)[2], atol=1e-14)
+    np.testing.assert_allclose(two.at_time(23.0)[3], one.at_time(23.0)[3], atol=1e-14)
 
 
 def test_steady_travel_reaches_its_velocity_and_lags_by_half_the_ramp() -> None:
     motion = EndMotion(Motion(velocity=(2.0, 0.0, -1.0), ramp=10.0), PLACE)
-    np.testing.assert_allclose(motion.at(30.0)[1], (2.0, 0.0, -1.0), atol=1e-14)
-    np.testing.assert_allclose(motion.at(30.0)[0] - PLACE, 25.0 * np.array([2.0, 0.0, -1.0]), atol=1e-12)
-    np.testing.assert_allclose(motion.at(5.0)[1], (1.0, 0.0, -0.5), atol=1e-14)
+    np.testing.assert_allclose(motion.at_time(30.0)[1], (2.0, 0.0, -1.0), atol=1e-14)
+    np.testing.assert_allclose(motion.at_time(30.0)[0] - PLACE, 25.0 * np.array([2.0, 0.0, -1.0]), atol=1e-12)
+    np.testing.assert_allclose(motion.at_time(5.0)[1], (1.0, 0.0, -0.5), atol=1e-14)
 
 
 def test_a_travel_arrives_and_stays() -> None:
     motion = EndMotion(MOTIONS["travel"], PLACE)
     for t in (0.0, 3.9, 4.0):
-        np.testing.assert_array_equal(motion.at(t)[0], PLACE)
-    np.testing.assert_allclose(motion.at(9.0)[0] - PLACE, (10.0, 2.5, -1.5), atol=1e-14)
+        np.testing.assert_array_equal(motion.at_time(t)[0], PLACE)
+    np.testing.assert_allclose(motion.at_time(9.0)[0] - PLACE, (10.0, 2.5, -1.5), atol=1e-14)
     for t in (14.0, 1e6):
-        np.testing.assert_allclose(motion.at(t)[0] - PLACE, (20.0, 5.0, -3.0), atol=1e-14)
-        assert not motion.at(t)[1].any()
+        np.testing.assert_allclose(motion.at_time(t)[0] - PLACE, (20.0, 5.0, -3.0), atol=1e-14)
+        assert not motion.at_time(t)[1].any()
 
 
 def test_the_smooth_step_is_the_derivative_of_its_way() -> None:
@@ -135,7 +135,7 @@ def test_the_smooth_step_is_the_derivative_of_its_way() -> None:
 def test_an_end_that_follows_waves_needs_them() -> None:
     with pytest.raises(ValueError, match="elevation"):
         EndMotion(MOTIONS["waves"], PLACE)
-    position, velocity, *_ = EndMotion(MOTIONS["waves"], PLACE, elevation=sea).at(30.0)
+    position, velocity, *_ = EndMotion(MOTIONS["waves"], PLACE, elevation=sea).at_time(30.0)
     eta, rate, *_ = sea(10.0, -2.0, 30.0)
     np.testing.assert_array_equal(position, PLACE + np.array([0.0, 0.0, eta]))
     np.testing.assert_array_equal(velocity, (0.0, 0.0, rate))

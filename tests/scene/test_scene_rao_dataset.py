@@ -17,7 +17,7 @@ from test_scene_vessel import FAIRLEAD, HEADING, scene, table
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.scene.rao_file import read_rao
+from hybrid.scene.motion import read_rao
 from hybrid.scene.read import one_line
 
 DOFS = ["Surge", "Sway", "Heave", "Roll", "Pitch", "Yaw"]
@@ -82,7 +82,7 @@ def test_damping_makes_it_lag() -> None:
          "radiation_damping": (("omega", *pair), [[[0.5]]]),
          "excitation_force": (("omega", "wave_direction", "influenced_dof"), [[[2.0]]])}, one,
     )  # fmt: skip
-    from hybrid.scene.rao_file import _response
+    from hybrid.scene.motion import _response
 
     _, _, X = _response(data, "x.nc")
     assert X[0, 0, 2] == pytest.approx(4.0 * np.exp(-0.5j * np.pi))  # F/(w B) = 4, 90 deg behind
@@ -105,7 +105,7 @@ def test_a_scene_moves_as_with_the_table_of_the_same_numbers(tmp_path: Path) -> 
     made = scene(str(tmp_path / "ship.nc"))
     by_dataset = build(one_line(made))
     for t in (3.0, 20.0, 33.3):
-        assert by_dataset.ends.at(t).position[1] == pytest.approx(by_table.ends.at(t).position[1], abs=1e-9)
+        assert by_dataset.ends.at_time(t).position[1] == pytest.approx(by_table.ends.at_time(t).position[1], abs=1e-9)
     assert made.ends.named_files() == [str(tmp_path / "ship.nc")]
 
 
@@ -149,10 +149,10 @@ def test_a_vessel_drifts_slowly_about_its_mean_place(tmp_path: Path) -> None:
         yaw = math.radians(2.0 * math.sin(2 * math.pi * t / 150.0) + 0.5 * math.sin(2 * math.pi * t / 80.0))
         along, across = surge - yaw * y, yaw * x
         wanted = [c * along - s * across, s * along + c * across, 0.0]
-        assert moved.ends.at(t).position[1] - still.ends.at(t).position[1] == pytest.approx(wanted, abs=1e-9)
-    assert moved.ends.at(0.0).position[1] == pytest.approx(still.ends.at(0.0).position[1])
+        assert moved.ends.at_time(t).position[1] - still.ends.at_time(t).position[1] == pytest.approx(wanted, abs=1e-9)
+    assert moved.ends.at_time(0.0).position[1] == pytest.approx(still.ends.at_time(0.0).position[1])
     with hybrid.run(scene(rao, drift=drift)) as result:
-        assert result.position[50, -1] == pytest.approx(moved.ends.at(float(result.t[50])).position[1], abs=1e-8)
+        assert result.position[50, -1] == pytest.approx(moved.ends.at_time(float(result.t[50])).position[1], abs=1e-8)
 
 
 def test_a_drift_too_fast_for_the_step_is_refused(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ from hybrid.scene.schema import (
     UniformCurrent,
 )
 from hybrid.scene.start_checks import net_weight
-from hybrid.scene.stream_function import wavenumber
+from hybrid.scene.wave_theory import wavenumber
 
 # --- what is read ------------------------------------------------------------------------------
 

@@ -62,7 +62,7 @@ def test_a_vessel_that_heaves_with_the_surface_at_its_origin(tmp_path: Path) -> 
     model = build(one_line(scene(table(tmp_path, {"heave": 1.0}))))
     for t in (0.0, 3.0, 17.0, 25.0):
         height = model.sea.elevation(ORIGIN[0], ORIGIN[1], t)[0]
-        assert model.ends.at(t).position[1, 2] == pytest.approx(FAIRLEAD[2] + height, abs=1e-9)
+        assert model.ends.at_time(t).position[1, 2] == pytest.approx(FAIRLEAD[2] + height, abs=1e-9)
 
 
 def test_phases_lag_behind_the_crest(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_phases_lag_behind_the_crest(tmp_path: Path) -> None:
     model = build(one_line(scene(table(tmp_path, {"heave": 1.0, "heave_phase": 90.0}))))
     for t in (30.0, 33.3):
         height = model.sea.elevation(ORIGIN[0], ORIGIN[1], t - 9.0 / 4.0)[0]
-        assert model.ends.at(t).position[1, 2] == pytest.approx(FAIRLEAD[2] + height, abs=1e-9)
+        assert model.ends.at_time(t).position[1, 2] == pytest.approx(FAIRLEAD[2] + height, abs=1e-9)
 
 
 def test_arms_and_headings(tmp_path: Path) -> None:
@@ -78,14 +78,14 @@ def test_arms_and_headings(tmp_path: Path) -> None:
     alone = build(one_line(scene(table(tmp_path, {"surge": 1.0}))))
     t, c, s = 25.0, math.cos(math.radians(HEADING)), math.sin(math.radians(HEADING))
     base, eta = alone.ends.motions[1].base, alone.sea.elevation(ORIGIN[0], ORIGIN[1], t)[0]
-    np.testing.assert_allclose(alone.ends.at(t).position[1] - base, [c * eta, s * eta, 0.0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(alone.ends.at_time(t).position[1] - base, [c * eta, s * eta, 0.0], rtol=0, atol=1e-9)
     turned = build(one_line(scene(table(tmp_path, {"pitch": 1.5, "roll": 0.7}), clamped=True)))
     pitch, roll = math.radians(1.5 * eta), math.radians(0.7 * eta)
     x, y, z = FAIRLEAD
     body = np.cross([roll, pitch, 0.0], [x, y, z])
     wanted = [c * body[0] - s * body[1], s * body[0] + c * body[1], body[2]]
-    np.testing.assert_allclose(turned.ends.at(t).position[1] - base, wanted, rtol=0, atol=1e-9)
-    tangent = turned.ends.at(t).frame[1].reshape(3, 3)[:, 2]
+    np.testing.assert_allclose(turned.ends.at_time(t).position[1] - base, wanted, rtol=0, atol=1e-9)
+    tangent = turned.ends.at_time(t).frame[1].reshape(3, 3)[:, 2]
     small = np.cross([c * roll - s * pitch, s * roll + c * pitch, 0.0], [0, 0, 1])
     np.testing.assert_allclose(tangent - [0, 0, 1], small, rtol=0, atol=2.0 * (pitch**2 + roll**2))
 
@@ -99,7 +99,7 @@ def test_the_spectrum_of_the_fairlead_is_that_of_the_waves_times_the_square_of_t
 
     model = build(one_line(scene(table(tmp_path, {"heave": heave}), SEA)))
     t = np.arange(20.0, 3620.0, 0.5)
-    z = np.array([model.ends.at(x).position[1, 2] for x in t]) - FAIRLEAD[2]
+    z = np.array([model.ends.at_time(x).position[1, 2] for x in t]) - FAIRLEAD[2]
     eta = np.array([model.sea.elevation(ORIGIN[0], ORIGIN[1], x)[0] for x in t])
     spectra = [np.abs(np.fft.rfft(x * np.hanning(t.size))) ** 2 for x in (z, eta)]
     w, peak = 2 * np.pi * np.fft.rfftfreq(t.size, 0.5), 2 * np.pi / 10.0
@@ -116,7 +116,7 @@ def test_it_runs_and_resumes_with_its_table(tmp_path: Path) -> None:
     model = build(one_line(made))
     with hybrid.run(made) as result:
         for k in (10, 50, 80):
-            wanted = model.ends.at(float(result.t[k])).position[1]
+            wanted = model.ends.at_time(float(result.t[k])).position[1]
             np.testing.assert_allclose(result.position[k, -1], wanted, rtol=0, atol=1e-8)
     assert made.ends.named_files() == [str(tmp_path / "rao.csv")]
 

@@ -70,7 +70,7 @@ def test_the_fairlead_goes_where_the_vessel_takes_it(history: str, clamped: bool
     for t in (0.0, 7.3, 20.0, 29.5):
         at = motion(t)
         R = attitude(*at[3:])
-        found = model.ends.at(t)
+        found = model.ends.at_time(t)
         assert found.position[1] == pytest.approx(at[:3] + R @ FAIRLEAD, abs=2e-6)
         if clamped:
             assert found.frame[1].reshape(3, 3)[:, 2] == pytest.approx(R @ rest.T @ [0, 0, 1], abs=2e-6)
@@ -86,9 +86,9 @@ def test_one_that_is_under_way_is_blended_in(tmp_path: Path) -> None:
         hybrid.run(scene(file))
     made = scene(file, ramp=12.0)
     model = build(one_line(made))
-    assert model.ends.at(0.0).position[1] == pytest.approx(made.ends.end.position)
+    assert model.ends.at_time(0.0).position[1] == pytest.approx(made.ends.end.position)
     at = rows[200, 1:]
-    assert model.ends.at(20.0).position[1] == pytest.approx(at[:3] + attitude(*at[3:]) @ FAIRLEAD, abs=2e-6)
+    assert model.ends.at_time(20.0).position[1] == pytest.approx(at[:3] + attitude(*at[3:]) @ FAIRLEAD, abs=2e-6)
     with hybrid.run(made) as result:
         assert "motion blended in" in {e.kind for e in result.events}
 

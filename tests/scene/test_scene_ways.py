@@ -36,7 +36,7 @@ def test_the_way_of_an_end_is_that_of_its_motion() -> None:
     )  # fmt: skip
     exact = EndMotion(motion, [0.0, 0.0, 0.0])
     for t in (0.0, 1.7, 5.0, 13.1):
-        np.testing.assert_allclose(shift(motion, t), exact.at(t)[0], atol=1e-12)
+        np.testing.assert_allclose(shift(motion, t), exact.at_time(t)[0], atol=1e-12)
 
 
 def test_the_largest_distance_is_found_and_when() -> None:

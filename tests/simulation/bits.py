@@ -12,7 +12,7 @@ import numpy as np
 import hybrid
 import hybrid.accuracy.refinement
 import hybrid.simulation.run_record
-import hybrid.solve.run
+import hybrid.solve.network_steps
 from hybrid.kernels.machine.cache import cache_folder
 from hybrid.simulation import progress as reports
 from hybrid.store.hdf5_file import opened
@@ -68,7 +68,7 @@ class Stopping:
     def __init__(self, monkeypatch, checkpoints: bool = True) -> None:
         monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
         monkeypatch.setattr(hybrid.accuracy.refinement, "LITTLE", np.inf)  # an event that goes by clocks
-        monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)  # a step a call
+        monkeypatch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 1)  # a step a call
         if checkpoints:  # every few steps; they are otherwise some seconds apart
             monkeypatch.setattr(hybrid.simulation.run_record, "WORK", FEW_STEPS)
         self.left, self.heard = -1, 0

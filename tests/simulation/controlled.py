@@ -13,7 +13,7 @@ from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.refinement import Free
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import RequestedAccuracy, Resolution
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE
 from hybrid.simulation.run_sample import RunSample, Samples
 
 Made = Callable[[Resolution], RunSample]

@@ -24,7 +24,7 @@ from bits import differences
 
 import hybrid
 from hybrid.store.checkpoint import BEFORE, SLOTS, read_checkpoint
-from hybrid.store.named_arrays import MAGIC, pack
+from hybrid.store.integrity import MAGIC, pack
 
 MEMORY = 1 << 30  # bytes
 BOMB = 1 << 32  # bytes, of zeros in 4 MB

@@ -14,9 +14,8 @@ import hybrid
 from hybrid.accuracy import error_estimate, line_errors
 from hybrid.accuracy.error_estimate import OF_SIZES, SAFETY, Estimate
 from hybrid.accuracy.error_order import LEAST_FORCE_ORDER, ORDER, ORDERS, START_ORDERS, Errors, confirmed_order
-from hybrid.accuracy.finer_result import Judged
 from hybrid.accuracy.line_errors import LineErrors
-from hybrid.accuracy.refinement import OF_MODEL, Free, Verdict, bounds_of, costly, judge, not_converged, refined
+from hybrid.accuracy.refinement import OF_MODEL, Free, Judged, Verdict, bounds_of, costly, judge, not_converged, refined
 from hybrid.cli.console import Console, Grid
 from hybrid.cli.tables import errors_facts, errors_table, extremes_facts, extremes_rows
 from hybrid.errors import SceneError
@@ -25,10 +24,8 @@ from hybrid.model.mesh import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
 from hybrid.scene.read import one_line
-from hybrid.scene.root import in_full
-from hybrid.scene.short_form import LINE
-from hybrid.simulation.result_checks import cubic_spline
-from hybrid.simulation.run_sample import RunSample
+from hybrid.scene.root import LINE, in_full
+from hybrid.simulation.run_sample import RunSample, cubic_spline
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

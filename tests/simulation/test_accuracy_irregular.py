@@ -10,14 +10,14 @@ from bits import Stopping, differences, went_on
 from controlled import OneLine
 
 import hybrid
+from hybrid.accuracy.error_order import snap_excess, snap_times
 from hybrid.accuracy.error_statistics import STATISTICS, WINDOWS, StatisticEstimate, snaps, statistics_of
 from hybrid.accuracy.refinement import Free
-from hybrid.accuracy.snap_scatter import snap_excess, snap_times
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.model.sections import output_points
 from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import RunSample
-from hybrid.store.named_arrays import pack, unpack
+from hybrid.store.integrity import pack, unpack
 
 SCENE = hybrid.validate_scene({
     "cable": {"sections": [{"length": 1.0, "mass": 1.0}]}, "model": "catenary", "time": {"duration": 1.0},

@@ -202,10 +202,10 @@ def test_a_rod_that_is_judged_at_rest_may_have_a_law_of_stretch(name: str) -> No
 
 def test_judging_stability_leaves_the_law_of_stretch_of_a_line_alone() -> None:
     model = build(one_line(hybrid.validate_scene(bar({"tension_strain": TABLE}, HISTORY, model="rod"))))
-    line, ends = model.line, model.ends.at(0.0)
+    line, ends = model.line, model.ends.at_time(0.0)
     line.ck[:] = 1e-7
     law = line.law.copy()
-    assert is_stable(line, model.sea.at(0.0), ends, model.start, model.length, model.tension_scale)
+    assert is_stable(line, model.sea.at_time(0.0), ends, model.start, model.length, model.tension_scale)
     assert (line.ck == 1e-7).all()
     assert np.array_equal(line.law, law)
 

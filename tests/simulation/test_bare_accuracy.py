@@ -11,7 +11,7 @@ import hybrid
 from hybrid.accuracy.error_order import Errors
 from hybrid.accuracy.refinement import asked_text, bounds_of, judge, not_asked_text
 from hybrid.cli.plan_tables import plan_rows
-from hybrid.model.model_costs import with_model
+from hybrid.model.plan import with_model
 from hybrid.model.resolution import Reach, Resolution, first_resolution, for_motion, requested_accuracy
 from hybrid.scene.read import as_scene, one_line, parse_scene, scene_text
 from hybrid.scene.schema import LineScene

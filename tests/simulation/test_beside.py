@@ -10,7 +10,7 @@ import pytest
 from bits import differences
 
 import hybrid
-import hybrid.solve.run
+import hybrid.solve.network_steps
 from hybrid.model.network import NetworkResolution
 from hybrid.simulation import case as cases
 from hybrid.simulation import progress as reports
@@ -58,7 +58,7 @@ def test_the_listener_is_called_by_the_thread_that_runs(
 ) -> None:
     """A catenary has one more run, with rods in its place; least: part that the result is of all."""
     monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
-    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)
+    monkeypatch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 1)
     monkeypatch.setenv(THREADS, "3")
     heard: list[Progress] = []
 
@@ -87,7 +87,7 @@ def ended(before: set[threading.Thread]) -> bool:
 @pytest.mark.long
 def test_an_interrupt_ends_all_threads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
-    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)
+    monkeypatch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 1)
     monkeypatch.setenv(THREADS, "2")
     before = set(threading.enumerate())
 
@@ -106,7 +106,7 @@ def test_an_interrupt_ends_all_threads(tmp_path: Path, monkeypatch: pytest.Monke
 def test_a_run_that_fails_ends_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first fails in this thread while the second, of two hours, has just begun; there is no error figure then."""
     monkeypatch.setenv(THREADS, "2")
-    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)
+    monkeypatch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 1)
     before, begun = set(threading.enumerate()), threading.Event()
     case = Case(scene("model=catenary", "time.duration=7200"), None)
 

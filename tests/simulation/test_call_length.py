@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 
 import hybrid
-import hybrid.solve.run
+import hybrid.solve.network_steps
 from hybrid.simulation import progress as reports
 from hybrid.simulation.progress import Progress
-from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.run import CELL_STEPS
+from hybrid.solve.network_steps import CELL_STEPS, NetworkSteps
 
 SEA = Path(__file__).parents[2] / "examples" / "irregular_sea.yaml"
 CELLS = 60  # at the start
@@ -22,7 +21,11 @@ def test_changes_of_zones_do_not_put_off_interrupts(monkeypatch: pytest.MonkeyPa
     scene = hybrid.load_scene(SEA, ["time.duration=10"])
     monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
     waves = scene.environment.fluid.waves.components
-    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 20 * CELLS * (1.0 + waves / hybrid.solve.run.WAVES_OF_A_CELL))
+    monkeypatch.setattr(
+        hybrid.solve.network_steps,
+        "CELL_STEPS",
+        20 * CELLS * (1.0 + waves / hybrid.solve.network_steps.WAVES_OF_A_CELL),
+    )
     heard: list[Progress] = []
     hybrid.run(scene, progress=heard.append).close()
     assert len(heard) > 8

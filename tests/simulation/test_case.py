@@ -11,8 +11,7 @@ import pytest
 import hybrid
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.read import as_scene
-from hybrid.scene.root import in_full
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE, in_full
 from hybrid.simulation import line_result
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample

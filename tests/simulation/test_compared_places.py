@@ -13,7 +13,7 @@ from test_result_first import asked, rough, stopped_in  # noqa: F401
 
 import hybrid
 from hybrid.model.sections import OutputPoints
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE
 from hybrid.simulation import run_sample
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, REFINEMENT

@@ -11,15 +11,14 @@ from bits import Stopping, differences, went_on
 from test_self_contact_default import WIDTH, led_through
 
 import hybrid
-import hybrid.solve.self_contact
-from hybrid.kernels.contact.self_contact_friction import AT, NEAREST, TRAVEL
-from hybrid.kernels.contact.self_contact_law import WX, P
+import hybrid.solve.contact
+from hybrid.kernels.contact.self_contact_law import AT, NEAREST, TRAVEL, WX, P
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.state import Line
 from hybrid.kernels.step.accept import MANY, collapses
-from hybrid.simulation import network_run
+from hybrid.simulation import run as run_module
 from hybrid.simulation.run_contact import RunContact
-from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.contact import SelfContact
 
 GIVEN_UP, COLLAPSE = "contact given up", "steps collapse"
 
@@ -59,7 +58,7 @@ def test_it_comes_and_goes_with_the_legs(monkeypatch: pytest.MonkeyPatch) -> Non
 def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """Room for one point of contact: no step leads on with more."""
     for name in ("LEAST_POINTS", "MOST_POINTS"):
-        monkeypatch.setattr(hybrid.solve.self_contact, name, 1)
+        monkeypatch.setattr(hybrid.solve.contact, name, 1)
 
 
 @pytest.mark.usefixtures("no_room")
@@ -110,13 +109,13 @@ def hanging(**output: Any) -> dict[str, Any]:
 @pytest.fixture
 def longest(monkeypatch: pytest.MonkeyPatch) -> None:
     """All runs have made a very long step."""
-    begin = network_run.NetworkRun.begin_motion
+    begin = run_module.Run.begin_motion
 
-    def after_a_long_step(self: network_run.NetworkRun) -> None:
+    def after_a_long_step(self: run_module.Run) -> None:
         begin(self)
         self.loop.clock.longest = 1e3
 
-    monkeypatch.setattr(network_run.NetworkRun, "begin_motion", after_a_long_step)
+    monkeypatch.setattr(run_module.Run, "begin_motion", after_a_long_step)
 
 
 @pytest.mark.usefixtures("longest")

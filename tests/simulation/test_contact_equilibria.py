@@ -11,7 +11,7 @@ import hybrid
 from hybrid.errors import Outcome
 from hybrid.simulation import equilibrium
 from hybrid.simulation.lines_contact import gauss_integral
-from hybrid.solve.joined import LineFailed
+from hybrid.solve.stepper import LineFailed
 
 WIDTH, LENGTH = 0.02, 8.0
 LEGS = {"zones": [{"catenary": 3.0}, {"rod": 2.0}, {"catenary": 3.0}]}

@@ -11,8 +11,7 @@ from test_self_contact_default import led_through
 
 import hybrid
 from hybrid.model.network import NetworkResolution
-from hybrid.scene.root import in_full
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE, in_full
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import Samples
 

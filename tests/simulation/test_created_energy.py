@@ -13,7 +13,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.simulation.events import EventLog
-from hybrid.simulation.scheme_watch import FIRST_MOMENTS, GAIN_NOTED, SchemeWatch
+from hybrid.simulation.watches import FIRST_MOMENTS, GAIN_NOTED, SchemeWatch
 
 MODEL = build(
     one_line(hybrid.validate_scene(

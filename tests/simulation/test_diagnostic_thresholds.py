@@ -106,7 +106,7 @@ def test_what_a_kernel_writes_into_a_table_it_does_not_read_there() -> None:
 
     cv, ca and dt of their tasks, is passed to what is inlined in it."""
     folder = Path(hybrid.kernels.__file__).parent
-    inlined = ("network", "junctions", "joined_lines", "carried_frames", "bodies", "powers", "accept", "extremes")
+    inlined = ("network", "junctions", "joined_lines", "bodies", "energies", "accept", "extremes")
     read = {
         name: re.findall(r"job\.task\.(?:cv|ca|dt)\b", next(folder.rglob(f"{name}.py")).read_text()) for name in inlined
     }

@@ -17,7 +17,7 @@ from test_result_first import stopped_in
 
 import hybrid
 from hybrid.accuracy.error_order import Errors
-from hybrid.accuracy.extreme_errors import ExtremeErrors, figures, order_of
+from hybrid.accuracy.error_statistics import ExtremeErrors, figures, order_of
 from hybrid.accuracy.refinement import figures as told_of
 from hybrid.accuracy.refinement import judge
 from hybrid.model.resolution import Resolution, has_limits, requested_accuracy

@@ -12,8 +12,7 @@ import hybrid
 from hybrid.accuracy import error_control
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.accuracy.error_statistics import STATISTICS, estimates, statistics_of
-from hybrid.accuracy.finer_result import NOT_KEPT, Judged, is_no_better
-from hybrid.accuracy.refinement import Free, Verdict
+from hybrid.accuracy.refinement import NOT_KEPT, Free, Judged, Verdict, is_no_better
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.simulation.case import Case

@@ -14,7 +14,7 @@ import hybrid
 from hybrid import Result
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
-from hybrid.simulation.hockling_watch import Loops, note_hockling, note_loops
+from hybrid.simulation.watches import Loops, note_hockling, note_loops
 
 HEIGHT = 2.0  # m
 

@@ -13,7 +13,7 @@ from hybrid.linear.touching import rest_of
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import as_scene
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE
 
 
 def cantilever(**more):

@@ -15,8 +15,8 @@ import hybrid
 from hybrid.accuracy import api
 from hybrid.simulation.progress import RESULT, Progress
 from hybrid.store import whole_file, writer
-from hybrid.store.array_contents import ArrayContents
-from hybrid.store.contents import FileContents
+from hybrid.store.format import ArrayContents
+from hybrid.store.records import FileContents
 from hybrid.store.whole_file import LateFile
 
 TIMES = ("cpu", "created", "effort_cpu")  # that differ from run to run

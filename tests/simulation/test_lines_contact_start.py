@@ -296,7 +296,7 @@ def write_as_before(patch: pytest.MonkeyPatch) -> None:
         return kept
 
     patch.setattr("hybrid.model.network.that_may_meet", lambda *_: ())
-    patch.setattr("hybrid.simulation.network_run.content", as_before)
+    patch.setattr("hybrid.simulation.run.content", as_before)
 
 
 @pytest.mark.long  # 1.0 s

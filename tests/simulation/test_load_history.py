@@ -10,7 +10,7 @@ from bits import Stopping
 
 import hybrid
 from hybrid.scene.read import one_line, scene_text
-from hybrid.simulation.result_checks import jolts
+from hybrid.simulation.run_sample import jolts
 
 ROWS: list[list[float]] = [[0, 0, 0, 0], [0.5, 3, 0, -1], [0.7, -2, 0, 0], [1.4, 1, 0, 0]]
 
@@ -95,7 +95,7 @@ def test_a_file_is_relative_to_its_scene(tmp_path: Path) -> None:
     text = scene_text(scene({"value": [0.0, 0.0, 1.0]}))
     (tmp_path / "a.yaml").write_text(text.replace("value: [0.0, 0.0, 1.0]", "file: f.csv"))
     found = hybrid.load_scene(tmp_path / "a.yaml").ends.end.loads[0]
-    assert found.at(0.6) == pytest.approx((0.5, 0.0, -0.5))
+    assert found.at_time(0.6) == pytest.approx((0.5, 0.0, -0.5))
 
 
 def test_a_file_that_has_changed_is_not_resumed(tmp_path: Path, monkeypatch) -> None:

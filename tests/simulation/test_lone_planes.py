@@ -24,13 +24,13 @@ Tables = dict[str, Any]
 def flat(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
     """Numbers of the lines whose steps are made in a plane, of each solver of a motion."""
     found: list[list[int]] = []
-    take_turns = NetworkSolver.take_turns
+    swap_states = NetworkSolver.swap_states
 
     def noted(solver: NetworkSolver, states: Any) -> dict[str, Any]:
         found.append([k for k in solver.lone if solver.lines[k].line.bits & PLANAR])
-        return take_turns(solver, states)
+        return swap_states(solver, states)
 
-    monkeypatch.setattr(NetworkSolver, "take_turns", noted)
+    monkeypatch.setattr(NetworkSolver, "swap_states", noted)
     return found
 
 

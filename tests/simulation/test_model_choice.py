@@ -13,11 +13,11 @@ import hybrid
 from hybrid.accuracy import model_choice
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.build import build
-from hybrid.model.model_costs import CHOSEN, REST, Cost, cheapest
 from hybrid.model.network import NetworkResolution
+from hybrid.model.plan import CHOSEN, REST, Cost, cheapest
 from hybrid.model.resolution import model_is_free
 from hybrid.scene.read import one_line
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE
 from hybrid.simulation.case import Case
 from tests.said import both_ways, line_of, said
 

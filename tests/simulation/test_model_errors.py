@@ -10,14 +10,13 @@ import pytest
 from controlled import OneLine
 
 import hybrid
-from hybrid.accuracy.model_errors import leaves_bending_out
+from hybrid.accuracy.model_choice import leaves_bending_out
 from hybrid.accuracy.refinement import Free
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import as_scene, one_line
-from hybrid.scene.root import in_full
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE, in_full
 from hybrid.simulation.run_sample import RunSample, restored_sample
-from hybrid.store.named_arrays import pack, unpack
+from hybrid.store.integrity import pack, unpack
 from hybrid.store.stored_rows import MissingRows
 
 

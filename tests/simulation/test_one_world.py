@@ -11,8 +11,7 @@ import pytest
 import hybrid
 from hybrid.errors import ComputationError
 from hybrid.scene.read import as_scene
-from hybrid.scene.root import in_full
-from hybrid.scene.short_form import LINE
+from hybrid.scene.root import LINE, in_full
 from hybrid.store.reader import open_result
 from tests.combinations.networks import both, differences, events_differ
 from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, S, scene_of

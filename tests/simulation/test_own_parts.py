@@ -14,7 +14,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.state.books import ASK_STEPS
 from hybrid.scene.root import in_full
 from hybrid.simulation.new_run import Recording, new_run
-from hybrid.store.array_contents import MemoryTarget
+from hybrid.store.format import MemoryTarget
 
 LIMIT, OVER = 450.0, 2.0  # N, s
 

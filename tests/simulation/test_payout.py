@@ -14,7 +14,7 @@ import hybrid.model.payout
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import SceneError
 from hybrid.model.payout import law_of, length_at
-from hybrid.scene.payout import Payout
+from hybrid.scene.ends import Payout
 from hybrid.simulation import line_result
 from hybrid.simulation.line_result import LineResult, OutputsAside
 from hybrid.simulation.payout_nodes import NodeChanges

@@ -14,8 +14,7 @@ from scipy.special import ellipe, ellipk
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.model.build import build
-from hybrid.model.plane import WHAT
+from hybrid.model.build import WHAT, build
 from hybrid.scene.read import one_line
 from hybrid.simulation.lone_planes import PlaneMonitor
 

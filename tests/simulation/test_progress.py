@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import hybrid
-import hybrid.solve.run
+import hybrid.solve.network_steps
 from hybrid.model.resolution import Resolution
 from hybrid.simulation import progress as module
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress, ProgressReporter, StatusLine
@@ -44,7 +44,7 @@ def test_every_pass_is_named_and_one_bar_spans_them(heard: list[Progress]) -> No
 
 
 def test_a_run_without_an_error_figure_is_one_pass(heard: list[Progress], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)  # a step a call
+    monkeypatch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 1)  # a step a call
     scene = hybrid.parse_scene(HANGING + "time: {duration: 1.0, step: 0.1}\n")
     hybrid.run(scene, progress=heard.append).close()
     assert {(p.run, p.runs, p.name) for p in heard} == {(1, 1, RESULT)}
@@ -90,7 +90,7 @@ def test_a_run_that_begins_anew_is_at_its_beginning(heard: list[Progress]) -> No
 
 
 def test_the_pre_run_of_several_lines_is_a_part_of_all(heard: list[Progress], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)  # a step a call
+    monkeypatch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 1)  # a step a call
     section = {"length": 10.0, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e5}
     points = {"a": {"position": [0, 0, 0]}, "b": {"position": [8, 0, 0]}, "c": {"position": [8, 4, 0]}}
     lines = {x: {"start": "a", "end": x, "sections": [section], "model": "catenary"} for x in "bc"}

@@ -21,7 +21,8 @@ from hybrid.cli.console import Console
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
-from hybrid.simulation import network_run, zones_at_rest
+from hybrid.simulation import run as run_module
+from hybrid.simulation import zones_at_rest
 from hybrid.simulation.case import Case, CaseAtRest
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
 from hybrid.store import whole_file, writer
@@ -67,7 +68,7 @@ def rough(monkeypatch: pytest.MonkeyPatch) -> None:
     def made(self: passes.Passes, first: NetworkResolution) -> NetworkResolution:
         return NetworkResolution({name: rougher(x) for name, x in surveyed(self, first).lines.items()})
 
-    monkeypatch.setattr(network_run, "LOOK", 1)
+    monkeypatch.setattr(run_module, "LOOK", 1)
     monkeypatch.setattr(passes.Passes, "_surveyed", made)
 
 
@@ -152,7 +153,7 @@ def test_whoever_looks_at_it_is_told(
 @pytest.mark.long
 def test_stopped_in_the_errors_of_fixed_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Stopping(monkeypatch)
-    monkeypatch.setattr(network_run, "LOOK", 1)
+    monkeypatch.setattr(run_module, "LOOK", 1)
     hybrid.run(fixed(), tmp_path / "whole.h5").close()
     stopped_in(ESTIMATION, fixed(), tmp_path / "run.h5")
     with hybrid.open(tmp_path / "run.h5") as result:

@@ -19,7 +19,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 WORK = 30_000
 # The compiled run pauses often enough for them: a checkpoint is written at a pause between two steps.
 PAUSE = WORK // 4
-OFTEN = "import sys, hybrid, hybrid.simulation.run_record as loop, hybrid.solve.run as run; "
+OFTEN = "import sys, hybrid, hybrid.simulation.run_record as loop, hybrid.solve.network_steps as run; "
 OFTEN += f"loop.WORK, run.CELL_STEPS = {WORK}, {PAUSE}; "
 RUN = OFTEN + "hybrid.run(hybrid.load_scene(sys.argv[1], sys.argv[3:]), sys.argv[2])"
 RESUME = OFTEN + "hybrid.resume(sys.argv[1])"

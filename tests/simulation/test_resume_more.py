@@ -16,12 +16,13 @@ import hybrid.simulation.run_record
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.root import in_full
-from hybrid.simulation import case, restore, zones_at_rest
+from hybrid.simulation import case, zones_at_rest
+from hybrid.simulation import restart as restore
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, hdf5_file
 from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
-from hybrid.store.named_arrays import pack, unpack
+from hybrid.store.integrity import pack, unpack
 from hybrid.zones import at_start
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -256,11 +257,11 @@ def test_a_full_disk_loses_nothing(tmp_path):
         from hybrid.cli.commands import main
         from hybrid.store import writer as record
         import hybrid.simulation.run_record
-        import hybrid.solve.run
+        import hybrid.solve.network_steps
         hybrid.simulation.run_record.WORK = 0
         record._PART = 0.0
         record.pause = lambda made: 0.0
-        hybrid.solve.run.CELL_STEPS = 1
+        hybrid.solve.network_steps.CELL_STEPS = 1
         resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))
         main(["run", "-q", {str(tmp_path / "scene.yaml")!r}, "-o", {str(tmp_path / "run.h5")!r}])
     """
@@ -457,7 +458,7 @@ def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeyp
     """By the work done: a run whose file is flushed at every pause has the same ones as one that never is."""
     monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 20 * 40)
     monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 20 * 40)  # 40 steps of 20 cells
-    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 20 * 7)  # a pause every 7 steps
+    monkeypatch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 20 * 7)  # a pause every 7 steps
     places, kept, keep = [], [], record.Recorder.checkpoint
 
     def noted(self, content):

@@ -17,8 +17,8 @@ import pytest
 import hybrid
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.read import one_line
-from hybrid.simulation import restore
-from hybrid.simulation.old_checkpoints import as_of_line
+from hybrid.simulation import restart as restore
+from hybrid.simulation.restart import as_of_line
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.reader import open_result

@@ -9,10 +9,10 @@ import pytest
 
 import hybrid
 from hybrid.accuracy.error_estimate import Estimate
-from hybrid.accuracy.snap_scatter import errors_between, finer_between
+from hybrid.accuracy.error_order import errors_between, finer_between
 from hybrid.model.resolution import Resolution
 from hybrid.simulation.run_sample import RunSample, every_of
-from hybrid.store.named_arrays import pack, unpack
+from hybrid.store.integrity import pack, unpack
 
 DEFECT = Path(__file__).parents[1] / "data" / "defects" / "short_hose_rings.yaml"
 TIMES = np.linspace(0.0, 20.0, 21)

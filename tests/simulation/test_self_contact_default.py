@@ -16,7 +16,7 @@ from hybrid.kernels.contact.self_contact_law import INNER, OUTER
 from hybrid.kernels.contact.self_contact_pairs import WINDOW
 from hybrid.kernels.contact.self_distance import INSIDE
 from hybrid.model.build import build
-from hybrid.model.self_reach import LOOP, self_reach
+from hybrid.model.contents import LOOP, self_reach
 from hybrid.scene.read import one_line
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"

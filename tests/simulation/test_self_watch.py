@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hybrid
-from hybrid.simulation.contact_watch import Knot, crossings_of_knot, note_knot
+from hybrid.simulation.watches import Knot, crossings_of_knot, note_knot
 
 KEYS = [f"self_distance/{name}" for name in ("clearance", "distance", "s_a", "s_b", "time")]
 

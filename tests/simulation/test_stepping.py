@@ -154,7 +154,7 @@ def test_python_and_kernels_move_an_end_alike() -> None:
     for t in (0.5, 1.2, 1.3, 1.77, 1.9, 4.0):
         found = [np.zeros(n) for n in (3, 3, 9, 3)]
         _driven(t, moves, *found)
-        for mine, its in zip(found, end.at(t), strict=True):
+        for mine, its in zip(found, end.at_time(t), strict=True):
             assert np.abs(mine - np.ravel(its)).max() < 1e-12
     turn = np.array([0.3, -1.1, 0.7])
     assert np.abs(rotation_vector(rotation(turn)) - turn).max() < 1e-12

@@ -10,7 +10,7 @@ import pytest
 from test_system_resume import HOSE, LEG, mooring, spar
 
 import hybrid
-import hybrid.simulation.saving
+import hybrid.simulation.stepped
 import hybrid.store.writer
 from hybrid.errors import Outcome
 
@@ -121,7 +121,7 @@ def test_bodies_are_taken_back_too() -> None:
 
 @pytest.mark.long
 def test_too_much_after_a_save_makes_it_final(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hybrid.simulation.saving, "MOST_WAITING", 3)
+    monkeypatch.setattr(hybrid.simulation.stepped, "MOST_WAITING", 3)
     with hybrid.Simulation(scene()) as lines:
         saved = lines.save()
         for _ in range(12):

@@ -12,7 +12,8 @@ from test_system_resume import spar
 import hybrid
 from hybrid.kernels.state import books
 from hybrid.model.plan import SAME_STOP, falls_on
-from hybrid.simulation import network_run, progress
+from hybrid.simulation import progress
+from hybrid.simulation import run as run_module
 
 ROPE = {"mass": 20.0, "diameter": 0.06, "axial_stiffness": 2e7, "drag": {"normal": 1.2}}
 HEAVE = {"heave": {"amplitude": 1.0, "period": 4.0}, "ramp": 4}
@@ -90,7 +91,7 @@ def test_a_line_that_meets_nothing_and_fails_is_named(tmp_path: Path) -> None:
 def test_progress_is_told_whenever_outputs_are_written_down(monkeypatch: pytest.MonkeyPatch) -> None:
     """However few steps there are between two outputs, which may cost more than steps: Ctrl-C is heard there too."""
     monkeypatch.setattr(progress, "REPORT_EVERY", 0.0)
-    monkeypatch.setattr(network_run, "WAITING", 4)
+    monkeypatch.setattr(run_module, "WAITING", 4)
     told: list[float] = []
     every = scene(MEETING, output={"every": 0.05, "points": 7})
     hybrid.run(every, progress=lambda x: told.append(x.t)).close()
@@ -104,7 +105,7 @@ def test_progress_is_told_between_outputs_where_python_looks_at_every_step(monke
     part = MEETING | {"lines": {name: x | {"break_at": {"tension": 1e9}} for name, x in MEETING["lines"].items()}}
     hybrid.run(scene(part, output={"every": 2.0, "points": 7}), progress=lambda x: told.append(x.step)).close()
     inside = [x for x in np.unique(told) if 0 < x < 40]
-    assert inside and np.diff([0, *inside, 40]).max() <= network_run.LOOK
+    assert inside and np.diff([0, *inside, 40]).max() <= run_module.LOOK
 
 
 # A ship that moves and turns, with a line that is clamped to it and one that turns freely, and a buoy that is loaded by
@@ -155,7 +156,7 @@ def test_bodies_are_moved_and_loaded_in_compiled_steps(
 ) -> None:
     """As where Python moves and loads them, and stirs the water around their members, before every try."""
     prepared: list[float] = []
-    prepare, attach = network_run.NetworkRun._prepare, network_run.NetworkRun._attach
+    prepare, attach = run_module.Run._prepare, run_module.Run._attach
 
     def note(run: Any, t: float) -> None:
         prepared.append(t)
@@ -165,10 +166,10 @@ def test_bodies_are_moved_and_loaded_in_compiled_steps(
         attach(run)
         run.loop.counts.asks |= books.ASK_BEFORE
 
-    monkeypatch.setattr(network_run.NetworkRun, "_prepare", note)
+    monkeypatch.setattr(run_module.Run, "_prepare", note)
     compiled = hybrid.run(scene)
     assert not prepared
-    monkeypatch.setattr(network_run.NetworkRun, "_attach", ask)
+    monkeypatch.setattr(run_module.Run, "_attach", ask)
     asked = hybrid.run(scene)
     assert len(prepared) >= 40
     for key in ("position", "rotation"):

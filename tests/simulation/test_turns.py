@@ -195,7 +195,7 @@ def test_a_rotated_scene_is_the_rotated_scene(tmp_path):
     q = Rotation.from_rotvec([0.4, -0.7, 1.1])
     t = np.arange(0.0, 2.0001, 0.005)
     law = EndMotion(Motion(**motion), [0, 0, 0], np.eye(3))
-    vectors = q.apply([Rotation.from_matrix(law.at(x)[2]).as_rotvec(degrees=True) for x in t])
+    vectors = q.apply([Rotation.from_matrix(law.at_time(x)[2]).as_rotvec(degrees=True) for x in t])
     np.savetxt(tmp_path / "r.csv", np.column_stack([t, vectors]), delimiter=",", header="t,rx,ry,rz", comments="")
     assert np.abs(np.diff(vectors, axis=0)).max() < 10.0, "beyond half a turn the vector would jump"
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.simulation.slack_bends import kinks_at
+from hybrid.simulation.failure import kinks_at
 from hybrid.store.verdicts import MET, verdicts_of
 
 KIND = "kink at joint"

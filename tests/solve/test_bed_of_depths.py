@@ -11,9 +11,9 @@ from scipy.interpolate import PchipInterpolator
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.laws.bed import HEIGHTS, planes_under
+from hybrid.kernels.laws.seabed import HEIGHTS, planes_under
 from hybrid.kernels.state.state import Sea, no_sea
-from hybrid.scene.depths import Depths
+from hybrid.scene.sea import Depths
 
 SLOPE = (0.06, 0.03)
 X, Y = [-300.0, -100.0, 50.0, 120.0, 400.0], [-300.0, -50.0, 100.0, 300.0]

@@ -16,8 +16,8 @@ from hybrid.kernels.junctions import bodies as k
 from hybrid.model.bodies import angles_of, body_model, frame_of
 from hybrid.scene.bodies import FreeBody
 from hybrid.simulation.new_run import new_run
-from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stepper import NetworkState
 
 LEG = {"mass": 0.05, "diameter": 0.002, "axial_stiffness": 5e6}
 MASS, ADDED, HEAVE = 5e5, (2e5, 2e5, 3e5, 2e6, 2e6, 1e6), 8e5

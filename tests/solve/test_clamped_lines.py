@@ -20,8 +20,8 @@ from hybrid.model.build import build
 from hybrid.model.network import build_system
 from hybrid.scene.read import one_line
 from hybrid.scene.root import in_full
-from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.new_run import new_run
+from hybrid.simulation.run import Run
 
 LENGTH, CELLS, A, B = 100.0, 40, [0.0, 0.0, 0.0], [70.0, 10.0, -20.0]
 SECTION = {
@@ -69,7 +69,7 @@ def in_pieces(
     return {"environment": WATER, "points": points, "lines": lines, "output": {"points": 2}}
 
 
-def equilibrium(tables: dict[str, Any]) -> NetworkRun:
+def equilibrium(tables: dict[str, Any]) -> Run:
     return new_run(hybrid.Scene.model_validate(tables), io.BytesIO(), "", moves=False)
 
 

@@ -71,7 +71,7 @@ def disagreement(model, state, cv, ca):
     rows = block_rows(model.line)
     work = stepper.work._replace(rows=rows)
     work.u[:] = 0.0
-    assert correction(model.line, model.sea.at(0.0), model.ends.at(0.0), state, cv, ca, work) == -1
+    assert correction(model.line, model.sea.at_time(0.0), model.ends.at_time(0.0), state, cv, ca, work) == -1
     bands, ab, rhs = banded(rows, model.tension_scale)
     reference = solve_banded(bands, ab, rhs).reshape(-1, SIZE)
     reference[:, 0] *= model.tension_scale
@@ -110,10 +110,10 @@ def test_converges_and_agrees_with_lapack(kind, cells, stiffness):
     stepper = Stepper(line, model.length, model.tension_scale, model.slack_floor)
     state = found.state.lines[0].copy()
     state.v[:, 1] = np.sin(np.pi * line.s / LENGTH)
-    stepper.consistent_accelerations(model.sea.at(0.0), model.ends.at(0.0), np.zeros((2, 3)), state)
+    stepper.consistent_accelerations(model.sea.at_time(0.0), model.ends.at_time(0.0), np.zeros((2, 3)), state)
     new = state.copy()
     for _ in range(5):
-        taken = stepper.step(model.sea.at(0.0), model.ends.at(0.0), state, new, 0.01, 0.5, 0.01)
+        taken = stepper.step(model.sea.at_time(0.0), model.ends.at_time(0.0), state, new, 0.01, 0.5, 0.01)
         assert taken.outcome == 0 and taken.iterations <= 4
         state, new = new, state
 
@@ -138,11 +138,11 @@ def test_long_line_at_low_tension(stiffness, tension):
     state = model.start.copy()
     x = model.line.s / 1000.0
     state.v[:, 1], state.v[:, 2] = np.sin(3 * np.pi * x) * x, 0.3 * np.sin(5 * np.pi * x) * x
-    stepper.consistent_accelerations(model.sea.at(0.0), model.ends.at(0.0), np.zeros((2, 3)), state)
+    stepper.consistent_accelerations(model.sea.at_time(0.0), model.ends.at_time(0.0), np.zeros((2, 3)), state)
     new = state.copy()
     most = 0
     for _ in range(50):
-        taken = stepper.step(model.sea.at(0.0), model.ends.at(0.0), state, new, 0.01, 0.5, 0.01)
+        taken = stepper.step(model.sea.at_time(0.0), model.ends.at_time(0.0), state, new, 0.01, 0.5, 0.01)
         assert taken.outcome == 0
         most = max(most, taken.iterations)
         state, new = new, state

@@ -244,7 +244,7 @@ def test_a_number_that_is_not_finite_is_found_at_once(field):
     stepper = Stepper(model.line, model.length, model.tension_scale, model.slack_floor)
     old = model.start.copy()
     getattr(old, field)[17] = np.nan
-    taken = stepper.step(model.sea.at(0.0), model.ends.at(0.0), old, old.copy(), 0.01, 0.5, 0.0)
+    taken = stepper.step(model.sea.at_time(0.0), model.ends.at_time(0.0), old, old.copy(), 0.01, 0.5, 0.0)
     assert taken.outcome in (hybrid.Outcome.NOT_FINITE, hybrid.Outcome.TURNED_TOO_FAR)
     assert taken.iterations <= 1
 

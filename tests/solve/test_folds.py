@@ -15,9 +15,9 @@ from hybrid.scene.network import Network
 from hybrid.scene.root import in_full
 from hybrid.simulation.equilibrium import equilibrium_of, group_of
 from hybrid.solve.flaws import FOLDED, folds
-from hybrid.solve.joined import NetworkState
 from hybrid.solve.lines_at_rest import lines_at_rest
 from hybrid.solve.network_solver import NO_BODIES
+from hybrid.solve.stepper import NetworkState
 
 
 def hairpin(cells: int, model: str = "rod", apart: float = 0.0, **more: Any) -> dict[str, Any]:

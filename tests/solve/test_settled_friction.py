@@ -12,7 +12,7 @@ import pytest
 import hybrid
 from hybrid.errors import Outcome
 from hybrid.scene.analysis import RodModel
-from hybrid.solve.joined import LineFailed
+from hybrid.solve.stepper import LineFailed
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 MU, WEIGHT, EA = 0.8, 1000.0, 6.0e8

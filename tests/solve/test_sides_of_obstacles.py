@@ -22,7 +22,7 @@ SHAPES = {
 def test_a_shape_on_the_other_side_of_an_obstacle_is_told_from_the_same_side(kind: str) -> None:
     tables = over_pipe(obstacles={"thing": SHAPES[kind] | {"at": AT.tolist()}})
     model = build(one_line(as_scene(tables)))
-    line, sea = model.line, model.sea.at(0.0)
+    line, sea = model.line, model.sea.at_time(0.0)
     width = 0.5 * float(model.cable.outer_diameter.max())
     x = np.linspace(-4.0, 4.0, line.s.size)
     rise = RADIUS + width - np.maximum(np.abs(x) - 0.2, 0.0)
@@ -55,4 +55,4 @@ def test_a_line_below_a_ring_is_behind_it_and_one_through_its_hole_is_not(
     state.r[:] = AT + np.stack([np.linspace(-4.0, 4.0, model.line.s.size), *np.zeros((2, model.line.s.size))], axis=1)
     state.r[:, 2] += height + width - 0.01 * np.sign(width)
     state.r[[0, -1]] = [[0, 0, 0], [10, 0, 3]]
-    assert bool([*behind_obstacles(model.line, model.sea.at(0.0), state)]) == behind
+    assert bool([*behind_obstacles(model.line, model.sea.at_time(0.0), state)]) == behind

@@ -12,8 +12,8 @@ from scipy.special import ellipe, ellipk
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.scene.depths import Depths
 from hybrid.scene.read import one_line
+from hybrid.scene.sea import Depths
 from hybrid.solve.stability import Stability
 
 SPAN, WEIGHT = 100.0, 50.0 * 9.81
@@ -117,8 +117,8 @@ def test_the_softest_motion_of_a_strut_is_that_of_euler(cells: int) -> None:
     model = build(one_line(scene))
     state = model.start.copy()
     state.T[:] = -P
-    stability = Stability(model.line, model.sea.at(0.0), model.length, model.tension_scale)
-    square, shape = stability.softest_motion(model.ends.at(0.0), state, np.full(cells, 0.1))
+    stability = Stability(model.line, model.sea.at_time(0.0), model.length, model.tension_scale)
+    square, shape = stability.softest_motion(model.ends.at_time(0.0), state, np.full(cells, 0.1))
     q = math.pi / length
     assert square == pytest.approx((EI * q**2 - P) * q**2 / mass, rel=2e-3)
     aside = np.hypot(shape[:, 1], shape[:, 2])  # in whichever plane through the line

@@ -16,11 +16,10 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
-from hybrid.simulation.network_run import NetworkRun
 from hybrid.simulation.new_run import new_run
-from hybrid.solve.joined import JoinedLine, NetworkState, joined_ends
+from hybrid.simulation.run import Run
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.stepper import Stepper
+from hybrid.solve.stepper import JoinedLine, NetworkState, Stepper, joined_ends
 
 LENGTH, CELLS = 100.0, 40
 A, B = np.zeros(3), np.array([70.0, 10.0, -20.0])
@@ -47,7 +46,7 @@ class Cut:
         element[list(cuts)] = 0
         self.line, self.flips = self.whole.line._replace(element=element), flips
         self.edges = [0, *cuts, CELLS]
-        self.sea, self.ends = self.whole.sea.at(np.inf), self.whole.ends.at(np.inf)
+        self.sea, self.ends = self.whole.sea.at_time(np.inf), self.whole.ends.at_time(np.inf)
         self.state = at_rest(replace(self.whole, line=self.line), np.inf).state.lines[0]
         off = np.random.default_rng(1).uniform(-0.6, 0.6, (len(cuts), 3))
         places = [A, *(self.state.r[list(cuts)] + off), B]
@@ -58,8 +57,8 @@ class Cut:
                 ends, joints = ends[::-1], joints[::-1]
             n = self.edges[i + 1] - self.edges[i]
             model = piece(kind, LENGTH * n / CELLS, *ends, n)
-            held, scale = joined_ends(model.ends.at(np.inf), joints), model.tension_scale
-            lines.append(JoinedLine(model.line, model.sea.at(np.inf), held, model.length, scale, -np.inf, joints))
+            held, scale = joined_ends(model.ends.at_time(np.inf), joints), model.tension_scale
+            lines.append(JoinedLine(model.line, model.sea.at_time(np.inf), held, model.length, scale, -np.inf, joints))
             self.start.append(model.start)
         self.solver = NetworkSolver(lines, len(cuts))
 
@@ -132,7 +131,7 @@ def test_what_consistent_accelerations_are() -> None:
 # --- closed forms --------------------------------------------------------------------------------------
 
 
-def equilibrium(tables: dict[str, Any]) -> NetworkRun:
+def equilibrium(tables: dict[str, Any]) -> Run:
     """The equilibrium of a system, not yet written."""
     import io
 

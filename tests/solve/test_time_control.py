@@ -12,8 +12,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import no_moves
-from hybrid.kernels.step.generalized_alpha import before_fixed, radius_of_step, weights
-from hybrid.kernels.step.step_control import end_of_try, halve, passes, take_past
+from hybrid.kernels.step.step_control import before_fixed, end_of_try, halve, note_past, passes, radius_of_step, weights
 from hybrid.kernels.step.step_law import FIRST, LEAST, MOST, REFUSED, step_end
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
@@ -35,13 +34,15 @@ def motion(model, rho, steps, carried=True):
     made = build(one_line(what))
     stepper = Stepper(made.line, made.length, made.tension_scale)
     old = at_rest(made).state.lines[0]
-    stepper.consistent_accelerations(made.sea.at(0.0), made.ends.at(0.0), made.ends.acceleration(0.0, 1e-5), old)
+    stepper.consistent_accelerations(
+        made.sea.at_time(0.0), made.ends.at_time(0.0), made.ends.acceleration(0.0, 1e-5), old
+    )
     new = old.copy()
     t, before, radius, out = 0.0, 0.0, rho, {}
     for dt in steps:
         t += dt
         taken = stepper.step(
-            made.sea.at(t), made.ends.at(t), old, new, dt, rho, *((before, radius) if carried else (dt, rho))
+            made.sea.at_time(t), made.ends.at_time(t), old, new, dt, rho, *((before, radius) if carried else (dt, rho))
         )
         assert taken.outcome == Outcome.OK, f"{taken.outcome} at t = {t}"
         old, new, before, radius = new, old, dt, taken.rho
@@ -255,7 +256,7 @@ def test_failed_steps_are_halved_and_do_not_grow_at_once():
 
 @kernel
 def _take_past(clock, count):
-    take_past(clock, count)
+    note_past(clock, count)
 
 
 @kernel

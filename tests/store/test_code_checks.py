@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.errors import SceneError
-from hybrid.store.code_checks import E301, F201, Row, code_of_steps, collapse, of_riser, use
+from hybrid.store.capacity import E301, F201, Row, code_of_steps, collapse, of_riser, use
 from hybrid.store.statistics_table import rows_of
 
 PIPE = {"outer": 0.2731, "wall": 0.0159, "modulus": 207e9, "yields": 430.08e6, "breaks": 509.76e6}

@@ -12,7 +12,7 @@ from reported import reported
 
 import hybrid
 from hybrid.cli.commands import main
-from hybrid.cli.statistics_command import _fatigue_at, _fatigue_lines
+from hybrid.cli.statistics_commands import _fatigue_at, _fatigue_lines
 from hybrid.errors import ResultError
 from hybrid.statistics import fatigue, moments
 from hybrid.store.histories import bends_of, extreme_of, history_of

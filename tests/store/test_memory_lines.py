@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import hybrid
-from hybrid.store.array_contents import MemoryTarget
+from hybrid.store.format import MemoryTarget
 
 ROPE = {"length": 60, "mass": 4, "diameter": 0.04, "axial_stiffness": 1e7}
 SCENE = {

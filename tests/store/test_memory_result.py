@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.store.array_contents import ArrayContents, MemoryTarget
-from hybrid.store.format import Field, Header
+from hybrid.store.format import ArrayContents, Field, Header, MemoryTarget
 from hybrid.store.reader import Result, written_result
 from hybrid.store.writer import Recorder
 

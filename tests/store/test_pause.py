@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.simulation import network_run
+from hybrid.simulation import run as run_module
 from hybrid.simulation.line_result import LineResult
 from hybrid.store import writer
-from hybrid.store.array_contents import MemoryTarget
-from hybrid.store.format import Header
+from hybrid.store.format import Header, MemoryTarget
 
 GIVEN = Header(np.zeros(1), (), (), {})
 
@@ -48,7 +47,7 @@ def test_outputs_of_lines_are_made_together(monkeypatch: pytest.MonkeyPatch) -> 
 
     The clock is asked between compiled steps: here after five outputs, or all of the run would wait in their buffer.
     """
-    monkeypatch.setattr(network_run, "ROWS", 5)
+    monkeypatch.setattr(run_module, "ROWS", 5)
     rope = {"length": 101.0, "mass": 5.0, "diameter": 0.03, "axial_stiffness": 1e6}
     points = {"a": {"position": [0, 0, 0]}, "b": {"position": [100, 0, 0]}}
     points["b"]["motion"] = {"heave": {"amplitude": 0.5, "period": 5.0}, "ramp": 10.0}

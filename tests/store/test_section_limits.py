@@ -14,8 +14,8 @@ from hybrid.cli.tables import extremes_facts
 from hybrid.scene.study import Kept
 from hybrid.store.envelope import extreme, extremes_of_outputs, farthest, judged
 from hybrid.store.recorder import _PIECE
-from hybrid.studies.collect import collected
-from hybrid.view.along import extent
+from hybrid.studies.workers import collected
+from hybrid.view.curves import extent
 
 
 def envelope(tension: list[float]) -> dict[str, np.ndarray]:

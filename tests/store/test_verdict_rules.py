@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from reported import reported
 
-from hybrid.store.code_checks import Row
+from hybrid.store.capacity import Row
 from hybrid.store.limits import Held
 from hybrid.store.records import Event
 from hybrid.store.verdicts import DOUBTS, OF_ACCURACY, asked_accuracy, quantity_limits, section_limits, worst_accuracy

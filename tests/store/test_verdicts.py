@@ -19,7 +19,7 @@ from hybrid.scene.study import Kept
 from hybrid.store.reader import Result
 from hybrid.store.records import error_words
 from hybrid.store.verdicts import DOUBTS, OF_ACCURACY, Asked, accuracy_text, doubt_of, worst_accuracy
-from hybrid.studies.collect import collected
+from hybrid.studies.workers import collected
 from hybrid.view.report_parts import verdict_html
 from hybrid.view.summary import facts_of
 

@@ -20,8 +20,7 @@ import distributed
 from hybrid.errors import ResultError
 from hybrid.store.study_file import DONE, FAILED, Column, StudyFile
 from hybrid.studies import dispatch
-from hybrid.studies.collect import Variable
-from hybrid.studies.workers import Job, Outcome
+from hybrid.studies.workers import Job, Outcome, Variable
 
 CASES, BATCH = 8, 2
 

@@ -13,7 +13,7 @@ import pytest
 import hybrid
 from hybrid.store.tradeoff_table import FAILED, Row
 from hybrid.studies import runs
-from hybrid.studies.levels import ALONG, LEVELS, LevelRow, LevelTable, level_row, status_of
+from hybrid.studies.tradeoff import ALONG, LEVELS, LevelRow, LevelTable, level_row, status_of
 
 SAG: dict[str, Any] = {
     "title": "a line that sags",
@@ -79,7 +79,7 @@ def test_levels_are_computed_once_and_kept(tmp_path: Path, monkeypatch: pytest.M
         return real(scene, *args, **more)
 
     monkeypatch.setattr(runs, "run", run)
-    monkeypatch.setattr("hybrid.studies.levels.MODELS", ("rod", "catenary"))
+    monkeypatch.setattr("hybrid.studies.tradeoff.MODELS", ("rod", "catenary"))
     first = hybrid.trade_levels(SAG, tmp_path)
     assert made == ["rod", "rod", "catenary", "rod", "rod"], "the reference; a catenary is asked for no moment"
     assert [(row.level, row.model) for row in first.rows] == [(x, y) for x in LEVELS for y in ("rod", "catenary")]

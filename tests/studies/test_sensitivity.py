@@ -11,8 +11,7 @@ import pytest
 import hybrid
 from hybrid.errors import ResultError
 from hybrid.store.study_file import DONE, FAILED, Column, StudyFile
-from hybrid.studies.cases import scaled
-from hybrid.studies.sensitivity import design
+from hybrid.studies.cases import design, scaled
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
 

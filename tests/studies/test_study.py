@@ -19,8 +19,8 @@ from hybrid.errors import ResultError, SceneError
 from hybrid.scene.study import Kept, read_study, study_from
 from hybrid.store.study_file import DONE, FAILED, KILLED, NOT_WRITTEN, OPEN, StudyFile
 from hybrid.studies.cases import cases_of, short_names
-from hybrid.studies.collect import collected
 from hybrid.studies.dispatch import client_of
+from hybrid.studies.workers import collected
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
 

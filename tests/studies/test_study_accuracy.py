@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hybrid.cli.console import Console
-from hybrid.cli.study_command import _show
+from hybrid.cli.study_commands import _show
 from hybrid.scene.study import study_from
 from hybrid.store.study_file import open_study, unmet_accuracy
 from hybrid.studies.cases import cases_of

@@ -15,7 +15,7 @@ from hybrid.kernels.junctions.bodies import FRAME, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.books import blank_books
-from hybrid.kernels.state.obstacle_rows import EACH, FORCE, STIFFNESS
+from hybrid.kernels.state.report import EACH, FORCE, STIFFNESS
 from hybrid.model.bodies import body_model
 from hybrid.model.build import build
 from hybrid.model.network import build_system
@@ -23,8 +23,8 @@ from hybrid.scene.bodies import FreeBody, turned
 from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene, one_line
 from hybrid.simulation.equilibrium import joined_lines
-from hybrid.solve.joined import JoinedLine, NetworkState
 from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stepper import JoinedLine, NetworkState
 
 RADIUS, STRAND, SPAN, APART, MASS = 0.6, 0.01, 10.0, 0.2, 20.0
 Tables = dict[str, Any]
@@ -392,7 +392,7 @@ def thrown(friction: float, step: float) -> tuple[Any, list[float], Any, float]:
     state.v[:] = (0.5, 0.0, -4.0)
     one = body_model("ball", body, 0.0, 0.0)
     x = JoinedLine(
-        model.line, model.sea.at(0.0), model.ends.at(0.0), model.length, model.tension_scale, -np.inf, (-1, -1),
+        model.line, model.sea.at_time(0.0), model.ends.at_time(0.0), model.length, model.tension_scale, -np.inf, (-1, -1),
         rides=np.zeros(1, np.int64),
     )  # fmt: skip
     solver = NetworkSolver([x], 0, one.numbers[None])

@@ -16,15 +16,15 @@ import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import PLACE, V, W
 from hybrid.kernels.state.books import blank_books
-from hybrid.kernels.state.obstacle_rows import STIFFNESS
+from hybrid.kernels.state.report import STIFFNESS
 from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import shared_of
-from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stepper import NetworkState
 from tests.validation.test_validation_body_contact import MASS, on_two_lines, pushed
 from tests.validation.thrown_lines import WIDTH, straight, throw
 

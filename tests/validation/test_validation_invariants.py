@@ -76,7 +76,7 @@ def test_link_is_twist_and_writhe(report):
     worst = largest = 0.0
     for k, (t, state) in enumerate(motion(scene, lean)):
         if k % 40 == 0:
-            ends = model.ends.at(t)
+            ends = model.ends.at_time(t)
             d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
             corner = solid_angle(d[-1], ends.frame[0].reshape(3, 3)[:, 2], d[0]) / (2 * math.pi)
             w = writhe(state.r[:-1])

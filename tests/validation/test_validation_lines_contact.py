@@ -20,8 +20,8 @@ from hybrid.kernels.state.books import Clock
 from hybrid.model.network import build_system
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import LinesWatch
-from hybrid.solve.joined import NetworkState
 from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stepper import NetworkState
 from tests.simulation.test_system_contact import HOSE, system
 from tests.validation.test_validation_obstacles_of_lines import system_of
 from tests.validation.thrown_lines import WIDTH as D
@@ -305,7 +305,7 @@ def test_legs_of_a_bridle_are_no_passage() -> None:
     model = build_system(system_of(tables))
     watch, solver = LinesWatch(system_of(tables), model, set(), Clock()), NetworkSolver(joined_lines(model, 0.0), 1)
     watch.attach(solver.line_tables)
-    solver.look_at(NetworkState([x.start for x in model.models], model.body_places))
+    solver.join_states(NetworkState([x.start for x in model.models], model.body_places))
     assert not watch.begin(system_of(tables))  # they are looked at beyond the joint
 
 
@@ -363,7 +363,7 @@ def test_the_distance_of_lines_is_that_of_their_cells() -> None:
             x.r[:] += 0.05 * random.normal(size=3) + 0.01 * random.normal(size=x.r.shape)
             x.r[:, 2] *= 0.3
         watch._room[0, APART] = 0.0  # of another shape
-        solver.look_at(states)
+        solver.join_states(states)
         watch.begin(system_of(tables))
         apart = float(watch._room[0, APART])
         p, q = (x.r for x in states.lines)

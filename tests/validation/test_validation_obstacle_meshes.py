@@ -14,8 +14,7 @@ from hybrid.kernels.laws.obstacles import distances
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.view.figure import Area
-from hybrid.view.obstacles import closed_way, obstacles_at, outlines, rings, surfaces
-from hybrid.view.projections import view_named
+from hybrid.view.projections import closed_way, obstacles_at, outlines, rings, surfaces, view_named
 from tests.meshes import box, prism, sphere, text_stl
 from tests.validation.obstacle_scenes import DRUM, Tables, capstan, half_turn, over_pipe
 from tests.validation.test_validation_obstacle_shapes_combined import by

@@ -12,8 +12,7 @@ from hybrid.kernels.laws.obstacles import distances
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.view.figure import Area
-from hybrid.view.obstacles import outlines, surfaces
-from hybrid.view.projections import view_named
+from hybrid.view.projections import outlines, surfaces, view_named
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, capstan, over_pipe
 from tests.validation.test_validation_obstacles import falling
 

@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.state.obstacle_rows import STIFFNESS
+from hybrid.kernels.state.report import STIFFNESS
 from hybrid.model.network import build_system
 from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-import hybrid.simulation.network_run
+import hybrid.simulation.run
 from tests.validation.test_validation_body_contact import on_two_lines
 from tests.validation.test_validation_lines_contact import AREA, DENSITY, RADIUS, crossing, force_between
 

@@ -9,7 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.state.obstacle_rows import OBSTACLE, PIECE_END, STIFFNESS, STRAND, THINNER
+from hybrid.kernels.state.report import OBSTACLE, PIECE_END, STIFFNESS, STRAND, THINNER
 from hybrid.model.build import build
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.scene.read import one_line

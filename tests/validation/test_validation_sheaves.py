@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.state.obstacle_rows import SPIN
+from hybrid.kernels.state.report import SPIN
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND
 from tests.validation.test_validation_moving_obstacles import ran, weights
 from tests.validation.thrown_lines import WIDTH, straight, throw

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-import hybrid.simulation.network_run
+import hybrid.simulation.run
 from tests.combinations.pairs import scene_of
 from tests.validation.test_validation_body_contact import RADIUS, STRAND, on_two_lines, pushed
 from tests.validation.test_validation_lines_contact import RADIUS as ROPE

@@ -14,17 +14,16 @@ from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import depths_in_obstacles, stored_energy
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.books import blank_books
-from hybrid.kernels.state.obstacle_rows import INERTIA, SPIN
-from hybrid.kernels.state.report import OBSTACLES
+from hybrid.kernels.state.report import INERTIA, OBSTACLES, SPIN
 from hybrid.model.bodies import body_model
 from hybrid.model.build import build
-from hybrid.model.lines_contact import Touching
+from hybrid.model.contents import Touching
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.read import one_line
-from hybrid.simulation.self_watch import diameters, least_bending
-from hybrid.solve.joined import JoinedLine, NetworkState
+from hybrid.simulation.lines_contact import diameters, least_bending
+from hybrid.solve.contact import SharedContact, TouchingLine
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.shared_contact import SharedContact, TouchingLine
+from hybrid.solve.stepper import JoinedLine, NetworkState
 
 Floats = NDArray[np.float64]
 WIDTH, STIFF = 0.02, 0.1
@@ -87,7 +86,7 @@ def throw(
         state = model.start.copy()
         state.v[:] = v if turn is None else v @ turn.T
         x = JoinedLine(
-            model.line, model.sea.at(0.0), model.ends.at(0.0), model.length, model.tension_scale, -np.inf, (-1, -1),
+            model.line, model.sea.at_time(0.0), model.ends.at_time(0.0), model.length, model.tension_scale, -np.inf, (-1, -1),
             rides=rides,
         )  # fmt: skip
         models.append(model)

@@ -10,8 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.view import animation, panels
-from hybrid.view.along import along
-from hybrid.view.decimate import kept
+from hybrid.view.curves import along, kept
 from hybrid.view.figure import Line, Panel
 from hybrid.view.summary import Fact, facts_of
 

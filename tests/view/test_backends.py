@@ -15,11 +15,11 @@ from reported import reported
 import hybrid.view
 from hybrid.store.reader import Result
 from hybrid.view import panels, zones
-from hybrid.view.decimate import Store, kept
+from hybrid.view.curves import Store, kept
 from hybrid.view.figure import Area, Axis, Band, Line, Panel, Text
 from hybrid.view.matplotlib_backend import draw_panel, new_axes
 from hybrid.view.plotly_backend import draw, figure_of
-from hybrid.view.svg_graph import draw_graph
+from hybrid.view.report_parts import draw_graph
 
 EVENTS = [(5.5, 40.0, 60.0, "split", "bend <b>1.05</b> > 1"), (7.0, 0.0, 100.0, "snap", "a blow")]
 
@@ -152,7 +152,7 @@ def test_libraries_that_draw_are_known_to_their_back_end_only() -> None:
         if file.name not in (
             "matplotlib_backend.py",
             "quantities.py",
-            "save.py",
+            "figure.py",
             "study_report.py",
         ):  # types of results there
             assert not any(name.startswith("matplotlib") for name in names), file

@@ -37,8 +37,7 @@ from hybrid.view.lines import (
     views_of_lines,
 )
 from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape
-from hybrid.view.report import html
-from hybrid.view.report_tables import _extreme_text
+from hybrid.view.report import _extreme_text, html
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 ENDS = {"start": 0, "end": 11.5}
@@ -359,7 +358,7 @@ def test_a_stopped_run_is_drawn(tmp_path: Path) -> None:
     target = tmp_path / "part.h5"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hybrid.simulation.progress.REPORT_EVERY", -1.0)
-        patch.setattr("hybrid.solve.run.CELL_STEPS", 1)  # a step a call
+        patch.setattr("hybrid.solve.network_steps.CELL_STEPS", 1)  # a step a call
         with pytest.raises(KeyboardInterrupt):
             hybrid.run(spar(), target, progress=stop)
     with hybrid.open(target) as part:

@@ -14,8 +14,7 @@ from reported import reported
 import hybrid
 from hybrid.simulation import progress
 from hybrid.simulation.progress import Progress, StatusLine, listener_of
-from hybrid.view.notebook import MIME, bundle
-from hybrid.view.space import MOST_FRAMES, MOST_POINTS
+from hybrid.view.notebook import MIME, MOST_FRAMES, MOST_POINTS, bundle
 
 CELL = f"""
 import sys

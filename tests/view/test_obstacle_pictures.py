@@ -12,8 +12,7 @@ import hybrid
 from hybrid.live.pictures import around, frames
 from hybrid.view.figure import Area, Axis, Marks, Panel
 from hybrid.view.matplotlib_backend import draw_panel
-from hybrid.view.obstacles import hull, obstacles_at, outlines, surfaces
-from hybrid.view.projections import extent_in, view_named
+from hybrid.view.projections import extent_in, hull, obstacles_at, outlines, surfaces, view_named
 
 BALL = {"kind": "sphere", "at": [0.5, 0.3, -0.4], "radius": 0.1}
 PIPE = {"kind": "cylinder", "at": [1.0, 0.5, -0.6], "axis": [0, 1, 0], "radius": 0.05}

@@ -17,7 +17,7 @@ from reported import reported
 
 import hybrid
 from hybrid.errors import ResultError
-from hybrid.view.decimate import MOST_VALUES, kept, outline
+from hybrid.view.curves import MOST_VALUES, kept, outline
 from hybrid.view.report import html, write_report
 
 

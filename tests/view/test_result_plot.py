@@ -24,7 +24,7 @@ from hybrid.view import figure as look
 from hybrid.view import panels
 from hybrid.view import projections as views
 from hybrid.view import quantities as plot
-from hybrid.view.decimate import stretches_of
+from hybrid.view.curves import stretches_of
 from hybrid.view.figure import Axis, Line, Panel
 from hybrid.view.matplotlib_backend import draw_panel, new_axes
 

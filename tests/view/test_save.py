@@ -15,7 +15,7 @@ import hybrid
 from hybrid.errors import ResultError
 from hybrid.store.tradeoff_table import TradeTable
 from hybrid.view.animation import animate
-from hybrid.view.save import is_ours
+from hybrid.view.figure import is_ours
 from hybrid.view.study_report import plot_trade
 
 Write = Callable[..., Any]

@@ -21,7 +21,7 @@ from hybrid.view import zones as zoneplot
 from hybrid.view.figure import Axis, Map, Panel, Text
 from hybrid.view.matplotlib_backend import draw_panel
 from hybrid.view.quantities import plot_zones
-from hybrid.view.svg_graph import draw_graph
+from hybrid.view.report_parts import draw_graph
 from hybrid.view.zones import WHY, rods_at_start, why_rods, zone_map
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -16,9 +16,9 @@ from problems import Scene, free, pinned, scene, straight
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_transfer import blank_transfer, transfer
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
-from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
+from hybrid.model.mesh import Layout
 from hybrid.scene.read import one_line
 from hybrid.zones.change import transfer_to
 from hybrid.zones.manager import DomainManager

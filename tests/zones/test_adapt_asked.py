@@ -26,8 +26,7 @@ from adapt_scenes import (
 from problems import Scene, clamped, pinned, scene
 
 import hybrid
-from hybrid.kernels.mesh.stiffness_ramp import advance
-from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA
+from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, advance
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO
 from hybrid.kernels.state.state import no_sea
 from hybrid.zones.criteria import NodeState, cell_ratios, of_line

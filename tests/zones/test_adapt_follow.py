@@ -16,13 +16,13 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.machine import binding
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
-from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, take_arcs
+from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, read_arcs
 from hybrid.kernels.state.state import no_sea
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import one_line
 from hybrid.simulation import zones_at_rest
 from hybrid.simulation.cell_changes import CellChanges
-from hybrid.simulation.old_checkpoints import zoning_of_today
+from hybrid.simulation.restart import zoning_of_today
 from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.zones.criteria import shares_asked
@@ -66,7 +66,7 @@ def test_where_tension_is_lost_is_read_on_the_cells_of_now() -> None:
     before, now = (layout(np.linspace(0.0, 10.0, 9), parts, "R" * 8) for parts in (4, 1))
     managers = [DomainManager(what, x, np.zeros(8, int), 1e12, Allowed(1e-2, 0.03), Times(1.0)) for x in (before, now)]
     manager, other = managers
-    manager.take(before, other.zones)  # as a change of cells leaves it
+    manager.use_cells_of(before, other.zones)  # as a change of cells leaves it
     manager.zones.counts.known, manager.zones.past[:], manager.age = 1, 100.0, 1.0
     state = state_on(on(what, now), hanging(0.5, 3.0)[0], lambda s: np.where(abs(s - 4.4) < 0.6, 1.0, 90.0))
     assert manager._losing_tension(state).tolist() == [x == 3 for x in range(8)]
@@ -121,7 +121,7 @@ def test_chords_become_as_long_as_arcs_to_fourth_order(shape: str) -> None:
         manager = DomainManager(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, 0.05), Times(1.0))
         table = Table(blank_zone_job())
         table.bind(line=line, new=state, zones=manager.zones)
-        take_arcs(table.numbers)
+        read_arcs(table.numbers)
         chords = np.linalg.norm(state.e, axis=1)
         inner = slice(2, -2)
         left.append(np.abs(manager.zones.true - chords)[inner].max() / line.h[0])

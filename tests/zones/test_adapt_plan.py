@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA
 from hybrid.kernels.mesh.zone_plan import OFF, widen
-from hybrid.model.layout import edges
+from hybrid.model.mesh import edges
 from hybrid.zones.plan import Rules, planned, spread, wanted
 
 K = len(CRITERIA)

@@ -34,7 +34,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import order
 
-from hybrid.model.layout import edges
+from hybrid.model.mesh import edges
 
 ROUND = 1e-12
 SHAPES = {"hanging": hanging(), "helix": helix()}

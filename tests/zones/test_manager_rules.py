@@ -10,14 +10,14 @@ import pytest
 from adapt_cases import along, cable, even, on, state_on, still
 from problems import pinned, scene
 
-from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.state.state import no_sea
 from hybrid.model.build import build
-from hybrid.model.layout import Layout
+from hybrid.model.mesh import Layout
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import one_line
 from hybrid.scene.schema import AdaptiveModel

@@ -13,11 +13,11 @@ import hybrid
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.mesh import cell_errors as e
-from hybrid.kernels.mesh.wave_lengths import TAU, WAVES, know_new_nodes
+from hybrid.kernels.mesh.cell_errors import TAU, WAVES, know_new_nodes
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, read, watch_waves
 from hybrid.kernels.state.state import no_sea
-from hybrid.simulation.old_checkpoints import zoning_of_today
-from hybrid.store.named_arrays import Tree
+from hybrid.simulation.restart import zoning_of_today
+from hybrid.store.integrity import Tree
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Allowed, Times
 

@@ -20,7 +20,7 @@ from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import one_line
 from hybrid.scene.schema import LineScene
 from hybrid.simulation import run_zones, zones_at_rest
-from hybrid.solve.run import Tried
+from hybrid.solve.network_steps import Tried
 from hybrid.zones.at_start import manager_for, rods_at_winch
 from hybrid.zones.change import ZoneSwitching, on_layout
 from hybrid.zones.criteria import shares_asked
@@ -163,7 +163,7 @@ def test_rounds_of_zones_and_equilibrium_only_add_rod_and_end(monkeypatch: pytes
         return model, rest
 
     monkeypatch.setattr(zones_at_rest, "_with_rods", with_rods)
-    monkeypatch.setattr(zones_at_rest, "_take_rods", lambda *_: None)
+    monkeypatch.setattr(zones_at_rest, "_use_rods", lambda *_: None)
     monkeypatch.setattr(zones_at_rest, "_asked", lambda *_: {0: np.arange(20) == len(made)})
     model = SimpleNamespace(models=[built])
     assert zones_at_rest._within(model, None, {0: found}, 0.0) is None  # type: ignore[arg-type]

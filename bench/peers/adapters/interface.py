@@ -96,9 +96,9 @@ class Line:
 
     def end(self, k: int, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Position, velocity, acceleration (3,) of an end."""
-        q, v = self.ends[k].at(t)[:2]
+        q, v = self.ends[k].at_time(t)[:2]
         before, after = max(t - DIFFERENCE_TIME, 0.0), t + DIFFERENCE_TIME
-        a = (self.ends[k].at(after)[1] - self.ends[k].at(before)[1]) / (after - before)
+        a = (self.ends[k].at_time(after)[1] - self.ends[k].at_time(before)[1]) / (after - before)
         return q + self.shift, v, a
 
     def hanging(self, elements: int) -> np.ndarray:

@@ -12,19 +12,20 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from hybrid.interop.moordyn.options import Options, read_options
 from hybrid.interop.moordyn.rows import (
     LEFT_OUT,
     NOT_NEEDED,
     TAKEN,
     TITLES,
     Note,
+    Options,
     Row,
     Section,
     Source,
     check_names,
     note,
     number,
+    read_options,
     simple,
 )
 from hybrid.interop.moordyn.stretch import OTHER, Past, Stretch, is_word, pasts_of, stretch_of, tables_of

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hybrid.interop.moordyn.rows import DIFFERS, LEFT_OUT, TAKEN, Note, Row, Source, note, number
-from hybrid.scene.stretch import Curve, DynamicStiffness, syrope_of
+from hybrid.scene.section_laws import Curve, DynamicStiffness, syrope_of
 
 # Polyester of a deck: EA = SYROPE:file|alpha|beta, the file with its curves, the rows of SYROPE IC.
 #

@@ -70,7 +70,7 @@ def bracket(x, at, first, last, near):
 
 @kernel
 def linear_rows(x, places, first, last, shift, begin, columns, weights):
-    """Rows (outputs.output_grid.Rows) of linear interpolation along x[first] .. x[last], and beyond, at places (ns,).
+    """Rows (outputs.observed_states.Rows) of linear interpolation along x[first] .. x[last], and beyond, at places (ns,).
 
     shift: (ns,) added to columns; begin: (ns+1,) and columns, weights (2 ns,) written.
     """

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.kept_factors import SWEEP
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
-from hybrid.kernels.contact.self_contact_friction import ARM, GRIP, HOLD
 from hybrid.kernels.contact.self_contact_law import (
+    ARM,
     FIRST,
+    GRIP,
+    HOLD,
     INNER,
     LAST,
     OUTER,
@@ -42,7 +44,7 @@ from hybrid.kernels.contact.self_distance import (
     runs_on,
 )
 from hybrid.kernels.machine.compile import called, inner
-from hybrid.kernels.machine.named_numbers import NamedNumbers
+from hybrid.kernels.machine.references import NamedNumbers
 from hybrid.kernels.state.books import RATES
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.newton import LIMIT, TOUCH
@@ -157,7 +159,7 @@ class Contact(NamedTuple):
     sweep: Floats  # (N+1, SWEEP) of the matrix, as kernels.algebra.kept_factors.sweep takes it
     basis: Floats  # (MOST_PRODUCTS + 1, 3 (N+1)); of spins as well with friction: 4 (N+1)
     hessenberg: Floats  # (MOST_PRODUCTS + 1, MOST_PRODUCTS + 4): columns, rotations (2), right-hand side, solution
-    # with friction (kernels.contact.self_contact_friction); else no rows
+    # with friction (kernels.contact.self_contact_law); else no rows
     holds: Floats  # (C, HOLD) of the points of contact
     arms: Floats  # (C, 4, ARM) how these turn with their cells
     grips: Floats  # (C, GRIP) what has been kept of the last step
@@ -427,7 +429,7 @@ def keep_pair(contact, p, q, room):
 
 
 @called
-def look_at_pair(line, ends, contact, phase, p, q):
+def examine_pair(line, ends, contact, phase, p, q):
     """What there is to do for pieces p < q that may touch: limit what is asked, or keep points of contact."""
     apart, width = hull_distance(contact.kind, contact.at, p, q), 0.5 * (contact.width[p] + contact.width[q])
     if phase == COLLECT:
@@ -447,7 +449,7 @@ def look_at_pair(line, ends, contact, phase, p, q):
 
 
 @called
-def look_at_pairs(line, ends, contact, phase):
+def examine_pairs(line, ends, contact, phase):
     """Look at all pairs of pieces whose boxes are within REACH, in an order that does not depend on anything else.
 
     Pairs that are kept for displacements up to KEEPS are found where no cone of tangents is so narrow that these could
@@ -471,7 +473,7 @@ def look_at_pairs(line, ends, contact, phase):
             for p in range(max(first, 1), min(first + LEAF, n)):
                 for q in range(max(second, p + 1), min(second + LEAF, n)):
                     if contact.kind[p] == WITHIN == contact.kind[q] and may_touch(line, ends, contact, p, q):
-                        look_at_pair(line, ends, contact, phase, p, q)
+                        examine_pair(line, ends, contact, phase, p, q)
             continue
         c, d = 2 * a, 2 * b
         stack[top, 0], stack[top, 1] = c, d
@@ -503,17 +505,17 @@ def keep_pairs(line, ends, contact):
     numbers = contact.numbers
     numbers.keeps = max(2.0 * farthest_from_mean(contact.move), LEAST_KEEPS * numbers.widest)
     numbers.reach, contact.counts.pairs = OUTER * numbers.widest + 2.0 * numbers.keeps, 0
-    look_at_pairs(line, ends, contact, COLLECT)
+    examine_pairs(line, ends, contact, COLLECT)
 
 
 @inner
-def look_at_kept(line, ends, contact, phase, gone):
+def examine_kept(line, ends, contact, phase, gone):
     """Look at the pairs that are kept, or where displacements have gone farther, m, at all."""
     if gone <= contact.numbers.keeps:
         for k in range(contact.counts.pairs):
-            look_at_pair(line, ends, contact, phase, contact.pairs[k, 0], contact.pairs[k, 1])
+            examine_pair(line, ends, contact, phase, contact.pairs[k, 0], contact.pairs[k, 1])
     else:
-        look_at_pairs(line, ends, contact, phase)
+        examine_pairs(line, ends, contact, phase)
 
 
 @called
@@ -525,11 +527,11 @@ def limit(line, ends, contact, gone):
     numbers, far = contact.numbers, farthest_from_mean(contact.move) / SAFE
     numbers.reach = OUTER * numbers.widest + 2.0 * far
     numbers.part = 1.0
-    look_at_kept(line, ends, contact, LIMIT, gone + far)
+    examine_kept(line, ends, contact, LIMIT, gone + far)
 
 
 @inner
-def look_ahead(line, ends, contact, v):
+def foresee_nearness(line, ends, contact, v):
     """How near nodes are to other parts of the line, or will be within HORIZON at the velocities v, m/s."""
     numbers, move = contact.numbers, contact.move
     for i in range(v.shape[0]):
@@ -537,7 +539,7 @@ def look_ahead(line, ends, contact, v):
         for k in range(3):
             move[i, k] = numbers.horizon * v[i, k]
     numbers.reach = FAR / LEAST_NEAR * numbers.widest + 2.0 * farthest_from_mean(move)
-    look_at_pairs(line, ends, contact, WATCH)
+    examine_pairs(line, ends, contact, WATCH)
 
 
 @called
@@ -550,7 +552,7 @@ def find_points(line, ends, contact, gone):
     for l in range(contact.shares.shape[0]):
         contact.shares[l, BETWEEN], contact.shares[l, WITHIN_LINE] = 0.0, 0.0
     numbers.reach = OUTER * numbers.widest
-    look_at_kept(line, ends, contact, TOUCH, gone)
+    examine_kept(line, ends, contact, TOUCH, gone)
     for k in range(counts.points):
         for of in (P, Q):
             p = int(contact.points[k, of])

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.kept_factors import carry_given, prepare_sweep, solve_backward, sweep
-from hybrid.kernels.contact.self_contact_friction import add_held, add_held_product
-from hybrid.kernels.contact.self_contact_law import add_gradient, add_product
+from hybrid.kernels.contact.self_contact_law import add_gradient, add_held, add_held_product, add_product
 from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS
 from hybrid.kernels.laws.sheaves import turn_along
 from hybrid.kernels.machine.compile import called, inner
@@ -159,7 +158,7 @@ def rotate_column(H, k):
 
 
 @inner
-def take_vector(contact, column):
+def load_vector(contact, column):
     """contact.x = the basis vector of a column."""
     x, V, per = contact.x, contact.basis, unknowns(contact)
     for k in range(contact.counts.nodes):
@@ -206,7 +205,7 @@ def find_solution(ends, contact, work, carried, rolling):
             V[0, i] /= s
         left, most = s, enough(s, contact.numbers.widest, per * count)
         while done < min(MOST_PRODUCTS, per * count) and left > most:
-            take_vector(contact, done)
+            load_vector(contact, done)
             if not respond(ends, contact, work, carried, rolling, False, begin):
                 return False
             for k in range(count):

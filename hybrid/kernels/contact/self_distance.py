@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.named_numbers import NamedNumbers
-from hybrid.kernels.machine.references import reader
+from hybrid.kernels.machine.references import NamedNumbers, reader
 from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.state import Ends, Floats, Line, State, blank_line, blank_state, no_ends
 

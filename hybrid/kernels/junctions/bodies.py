@@ -32,8 +32,18 @@ from hybrid.kernels.algebra.rotations import (
     vec_mat,
     vector,
 )
-from hybrid.kernels.laws.members import ALONG, MIDDLE, PIECE, PUSH, WATER, WET, members_change, members_force
-from hybrid.kernels.laws.water import current_at, wave_kinematics
+from hybrid.kernels.laws.water import (
+    ALONG,
+    MIDDLE,
+    PIECE,
+    PUSH,
+    WATER,
+    WET,
+    current_at,
+    members_change,
+    members_force,
+    wave_kinematics,
+)
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.state import Floats, Sea, no_sea
@@ -57,7 +67,7 @@ LEVEL = 76  # height at which it floats, m
 STIFFNESS = 77  # 3, of heave, roll and pitch
 FORCE = 80  # 3, on it (inertial), N
 MOMENT = 83  # 3, on it (inertial), N m
-PIECES = 86  # number of pieces of its members, which follow (kernels.laws.members)
+PIECES = 86  # number of pieces of its members, which follow (kernels.laws.water)
 NUMBERS = 87
 # Numbers that are worked in.
 U = 0  # 3, displacement, m
@@ -409,7 +419,7 @@ read_members = reader(blank_members_job())
 
 
 @kernel
-def stir_members(table):
+def update_members(table):
     """Write how far the pieces of a body are wet, and the water around them."""
     job = read_members(table)
     sea, state, out, dt = job.sea, job.state, job.out, job.dt[0]

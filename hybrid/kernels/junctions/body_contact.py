@@ -57,11 +57,10 @@ from hybrid.kernels.junctions.borders import (
 )
 from hybrid.kernels.junctions.junctions import count_tensions, first_unknown
 from hybrid.kernels.junctions.network_job import read_system
-from hybrid.kernels.laws.obstacle_motion import put_matrix, put_vector, row3, transposed
-from hybrid.kernels.laws.obstacles import force_of_obstacle
+from hybrid.kernels.laws.obstacles import force_of_obstacle, put_matrix, put_vector, row3, transposed
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.state.report import (
     AXIS,
     BEGAN,
     ENDED,
@@ -75,10 +74,9 @@ from hybrid.kernels.state.obstacle_rows import (
     TURNED,
     TURNING,
 )
-from hybrid.kernels.state.obstacle_rows import PLACE as CENTRE
+from hybrid.kernels.state.report import PLACE as CENTRE
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.job import read
-from hybrid.kernels.step.newton import CORRECTION
+from hybrid.kernels.step.newton import CORRECTION, read
 
 # Columns of a node that touches a body.
 OF_LINE = 0

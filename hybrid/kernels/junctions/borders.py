@@ -25,7 +25,7 @@ from hybrid.kernels.junctions.joined_lines import last_block
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.assembly import JOINED
-from hybrid.kernels.step.job import read
+from hybrid.kernels.step.newton import read
 
 START, END = 0, 1
 # Questions, and what a border does then; it answers 1 where nothing else is said.

@@ -47,7 +47,6 @@ from hybrid.kernels.junctions.borders import (
     UPDATE,
     read_border,
 )
-from hybrid.kernels.junctions.carried_frames import TURNS, WITH_POINT, answer_of_end, place_frame, turns
 from hybrid.kernels.junctions.joined_lines import (
     COLUMNS,
     END_TURN,
@@ -55,6 +54,9 @@ from hybrid.kernels.junctions.joined_lines import (
     OF,
     SHIFT,
     TURN,
+    TURNS,
+    WITH_POINT,
+    answer_of_end,
     balance_of_start,
     carry_end_turn,
     carry_functional,
@@ -65,8 +67,10 @@ from hybrid.kernels.junctions.joined_lines import (
     factor_dense,
     last_block,
     moment_of_end,
+    place_frame,
     solve_back,
     substitute_dense,
+    turns,
 )
 from hybrid.kernels.junctions.network_job import read_system
 from hybrid.kernels.machine.compile import inner, kernel
@@ -74,8 +78,7 @@ from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.march.zone_torque import CORRECT, torsional_stiffness
 from hybrid.kernels.state.report import MOMENT_A, NET_A
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.job import read
-from hybrid.kernels.step.newton import CORRECTION, LARGEST_TURN, pass_torque
+from hybrid.kernels.step.newton import CORRECTION, LARGEST_TURN, pass_torque, read
 
 # Columns of S; its rows are as the first of them.
 TENSION = 0  # of the start
@@ -215,7 +218,7 @@ def used_columns(carries, starts, ends):
 
 
 @inner
-def follow(joint, points, arm, clamped, G):
+def end_matrix(joint, points, arm, clamped, G):
     """G (6, 6) of an end; returns how many rows and columns it has."""
     for i in range(6):
         for j in range(6):
@@ -230,7 +233,7 @@ def follow(joint, points, arm, clamped, G):
 
 
 class Followers(NamedTuple):
-    """How both ends of a line follow the points and bodies that they are joined to.
+    """How both ends of a line end_matrix the points and bodies that they are joined to.
 
     at: where the unknowns of those begin; rows, size: how many rows and columns of their G, (2, 6, 6), count.
     """
@@ -265,9 +268,9 @@ def spread(l, job, system, tensions, row, m):
     start, end, report, kb = joints[l, START], joints[l, END], job.work.report, job.line.kb
     rows0, size0, rows1, size1 = 0, 0, 0, 0
     if start >= 0:
-        rows0, size0 = follow(start, points, arms[l, START], turns(seats, l, START), G[START])
+        rows0, size0 = end_matrix(start, points, arms[l, START], turns(seats, l, START), G[START])
     if end >= 0:
-        rows1, size1 = follow(end, points, arms[l, END], turns(seats, l, END), G[END])
+        rows1, size1 = end_matrix(end, points, arms[l, END], turns(seats, l, END), G[END])
     rows, size = (rows0, rows1), (size0, size1)
     at = (first_unknown(max(start, 0), tensions, points), first_unknown(max(end, 0), tensions, points))
     twist_ends(l, seats, job, at, A)
@@ -379,7 +382,7 @@ def gather_right_sides(system, m):
             joint = joints[l, k]
             if joint >= 0:
                 at = first_unknown(joint, tensions, points)
-                rows, size = follow(joint, points, arms[l, k], turns(seats, l, k), G[k])
+                rows, size = end_matrix(joint, points, arms[l, k], turns(seats, l, k), G[k])
                 for j in range(size):
                     for i in range(rows):
                         A[at + j, m] += G[k, i, j] * S[AT[k] + i, RIGHT]

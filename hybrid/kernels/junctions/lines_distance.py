@@ -26,7 +26,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.job import read
+from hybrid.kernels.step.newton import read
 
 BOX = 8  # cells in a box
 # Of the width: way from line to line about a joint on which nothing is looked at; legs that leave it by 10 degrees or
@@ -297,7 +297,7 @@ def closing(one, other):
 
 
 @inner
-def look_at_pair(job, pair, row):
+def examine_pair(job, pair, row):
     """Whether two lines are near, or have met, in the last step, in which their boxes overlap; and note it."""
     moved = job.moved
     a, b, ahead = pair[A], pair[B], 0.0
@@ -339,6 +339,6 @@ def watch_lines(table):
             add_motion(moved[l], line_job.old.r, line_job.new.r)
     for k in range(pairs.shape[0]):
         if pairs[k, CLOSE]:
-            look_at_pair(job, pairs[k], room[k])
+            examine_pair(job, pairs[k], room[k])
         near += pairs[k, HAVE_MET] == NEAR
     return near

@@ -213,7 +213,7 @@ def sliding_power(line, state, i, fast):
 
 
 @kernel
-def follow_law(line, old, new, work, dt, t):
+def linearise_law(line, old, new, work, dt, t):
     """Linearise the laws of all cells about new.T, after a step of dt (s) from `old`.
 
     dt = 0: at rest, new.slow becomes T; dt < 0: new.slow stays as it is.  t: s, the time of `new`.  Writes line.ck, what

@@ -1,4 +1,27 @@
-"""Elements whose moment is no multiple of their bend: tables of moment over curvature, elastic, and the same any way.
+"""Moments that are no multiple of the bend: tables and layers that slip.
+
+Layers of a section that slip on each other: moment over curvature with hysteresis, parallel Jenkins elements.
+
+    symbol   meaning                                                                          unit   frame
+    x        bend of an element from what has no stress, two components                       rad    Ra
+    hn       length that the element stands for                                               m
+    K        stiffness that a layer adds while it sticks, K0 + KT max(T, 0) (Line.slip_law)   N m2
+    p        curvature to which it has slipped: there it has no moment (State.layers)         1/m    Ra
+    m        its moment, K (x/hn - p), of no more than `most` in size                         N m    Ra
+    most     its slip moment, m0 + mT max(T, 0), T of the start of the step                   N m
+
+A step maps x to m by radial return: m = most t/|t| where t = K (x/hn - p) is more than `most`, which has the exact
+derivative K/hn most/|t| (1 - t t^T/|t|^2); then p moves by (t - m)/K.  At rest p = 0: the curve of a first loading.
+A layer whose `most` is below 0 is elastic: m = (|t| + most) t/|t| beyond |t| = -most, and nothing below: what locks at a
+curvature, and the bends of a table of moment over curvature, whose K may be below 0.
+A layer whose `most` has no bound is a stiffness that grows with tension.  A step has the K of its start; behind it K
+changes at that bend, and hn dK |x/hn - p|^2/2 is no work of bending: it is booked beside what is lost.
+
+At a clamp with an angular spring, k = 1/give in series with the half cell and its layers, z is what the half cell bends
+by: with E its stiffness without layers, S = k/(k + E) and c = S/k, the moments balance where z + c m(z) = S x.  Beside
+the spring and E in series, S m is what the layers add to the moment, and m c m/2 to the energy.
+
+Elements whose moment is no multiple of their bend: tables of moment over curvature, elastic, and the same any way.
 
     symbol    meaning                                                                      unit
     x         bend of an element from what has no stress, across its tangent               rad
@@ -14,31 +37,302 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.algebra.plane import row_along_normal, to_space
 from hybrid.kernels.algebra.rotations import (
     add,
     cross,
+    d_double_cross,
     dot,
+    get3,
+    hat,
     inverse_left_jacobian,
     jacobian_functions,
     log_rotation,
     madd,
+    mat_mat,
+    mat_matT,
     mat_vec,
     mscale,
+    msub,
     outer,
     scale,
     vec_mat,
 )
 from hybrid.kernels.laws.axial_law import piece_of
-from hybrid.kernels.laws.bending_slip import beside_spring, give_of_spring, slip_moment, slips
-from hybrid.kernels.laws.element import bending, damped_bending, relative_rotation, turns_freely
+from hybrid.kernels.laws.element import (
+    bending,
+    damped_bending,
+    frames_at,
+    relative_rotation,
+    strain_of_element,
+    swing,
+    swivel,
+    turns_freely,
+)
 from hybrid.kernels.machine.compile import called, inner, kernel
-from hybrid.kernels.state.report import BENDING_LAW, BENDING_SLIP
+from hybrid.kernels.state.report import BENDING_LAW, BENDING_SLIP, LOST_WORK
+
+# Columns of Line.slip_law, EACH of a layer: K0, N m2; m0, N m, below 0 of an elastic one; mT, m; KT, m2.  K0, KT 0: none (as
+# behind the last).  Behind those of a clamp with an angular spring, where there is none, m0 is its give, rad/(N m).
+STIFFNESS, MOMENT, PER_TENSION, STIFFENING, EACH = range(5)
+# Columns of Line.slip_now, EACH of a layer.
+FROM = 0  # 2, p at the start of the step, 1/m
+MOST = 2  # N m
+STIFF = 3  # K, N m2
+KEPT = 2  # columns of a layer in State.layers
+# What `update_slip` is asked for: before a march, in motion or at rest; behind a step, an equilibrium.
+IN_MOTION, LOADED_FIRST, BEHIND_STEP, BEHIND_REST = range(4)
+MOST_TIMES = 60  # iterations of the bend beside a spring
+ROUND_OFF = 1e-15  # part of the bend
+SHORTEST = 1e-6  # step towards it, as a part
+
+
+@inner
+def slips(line, i):
+    """Whether the element at node i has layers that slip, or a stiffness that grows with tension."""
+    return (line.bits & BENDING_SLIP) != 0 and layered(line, i, 0)
+
+
+@inner
+def layered(line, i, j):
+    """Whether there is a layer j (its first column) at node i."""
+    return line.slip_law[i, j + STIFFNESS] != 0.0 or line.slip_law[i, j + STIFFENING] > 0.0
+
+
+@inner
+def trial(line, i, j, x, y, hn):
+    """Moment of layer j at node i under the bend x, y of a length hn, as if it stuck.
+
+    j: its first column.  Two components, their size, and the part of them that friction holds.
+    """
+    K, one = line.slip_now[i, j + STIFF], 1.0 / hn
+    a, b = K * (x * one - line.slip_now[i, j + FROM]), K * (y * one - line.slip_now[i, j + FROM + 1])
+    size, most = math.sqrt(a * a + b * b), line.slip_now[i, j + MOST]
+    if most < 0.0:
+        return a, b, size, (size + most) / size if size > -most else 0.0
+    return a, b, size, most / size if size > most else 1.0
+
+
+@inner
+def give_of_spring(line, i):
+    """How an angular spring in series with the layers at node i turns, rad/(N m); 0: there is none."""
+    for j in range(0, line.slip_law.shape[1], EACH):
+        if not layered(line, i, j):
+            return line.slip_law[i, j + MOMENT]
+    return 0.0
+
+
+@inner
+def parts_of_line(line, i, give):
+    """S and c of both axes of node i, with an angular spring."""
+    a, b = 1.0 - give * line.kb[i, 0], 1.0 - give * line.kb[i, 1]
+    return a, b, give * a, give * b
+
+
+@kernel
+def beside_spring(line, i, x, y):
+    """z (rad), two components: of the bend x, y of node i what is not that of its angular spring."""
+    give, half = give_of_spring(line, i), 0.5 * line.h[min(i, line.h.shape[0] - 1)]
+    s, t, c, d = parts_of_line(line, i, give)
+    p, q = s * x, t * y
+    a, b = p, q
+    mx, my, c11, c12, c22, _ = layers_answer(line, i, a, b, half)
+    u, v = a + c * mx - p, b + d * my - q
+    for _ in range(MOST_TIMES):
+        left = u * u + v * v
+        if not left > ROUND_OFF * ROUND_OFF * (p * p + q * q):
+            break
+        j11, j12, j21, j22 = 1.0 + c * c11, c * c12, d * c12, 1.0 + d * c22
+        one, part = 1.0 / (j11 * j22 - j12 * j21), 1.0
+        da, db = one * (j12 * v - j22 * u), one * (j21 * u - j11 * v)
+        while True:
+            e, f = a + part * da, b + part * db
+            mx, my, c11, c12, c22, _ = layers_answer(line, i, e, f, half)
+            u, v = e + c * mx - p, f + d * my - q
+            if u * u + v * v < left or part < SHORTEST:
+                break
+            part *= 0.5
+        if not u * u + v * v < left:
+            break
+        a, b = e, f
+    return a, b
+
+
+@kernel
+def slip_answer(line, i, x, y):
+    """As `layers_answer` of the element at node i under the bend x, y (rad), also beside an angular spring."""
+    give = give_of_spring(line, i)
+    if give == 0.0:
+        return layers_answer(line, i, x, y, line.hn[i])
+    a, b = beside_spring(line, i, x, y)
+    s, t, c, d = parts_of_line(line, i, give)
+    mx, my, c11, c12, c22, stored = layers_answer(line, i, a, b, 0.5 * line.h[min(i, line.h.shape[0] - 1)])
+    j11, j12, j21, j22 = 1.0 + c * c11, c * c12, d * c12, 1.0 + d * c22
+    one = 1.0 / (j11 * j22 - j12 * j21)
+    k11, k12, k22 = one * (c11 * j22 - c12 * j21), one * (c12 * j11 - c11 * j12), one * (c22 * j11 - c12 * j12)
+    stored += 0.5 * (c * mx * mx + d * my * my)
+    return s * mx, t * my, s * s * k11, s * t * k12, t * t * k22, stored
+
+
+@kernel
+def layers_answer(line, i, x, y, hn):
+    """Of the layers of node i whose length hn bends by x, y (rad).
+
+    Moment, N m, in two components; its derivatives 11, 12, 22, N m/rad; the energy that they store, J.
+    """
+    mx, my, c11, c12, c22, stored = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(0, line.slip_law.shape[1], EACH):
+        if not layered(line, i, j):
+            break
+        K = line.slip_now[i, j + STIFF]
+        a, b, size, part = trial(line, i, j, x, y, hn)
+        mx, my = mx + part * a, my + part * b
+        c = K / hn * part
+        c11, c22 = c11 + c, c22 + c
+        if 0.0 < part < 1.0:
+            c = (c if line.slip_now[i, j + MOST] >= 0.0 else c - K / hn) / (size * size)
+            c11, c12, c22 = c11 - c * a * a, c12 - c * a * b, c22 - c * b * b
+        stored += 0.5 * hn * (part * size) ** 2 / K if K != 0.0 else 0.0
+    return mx, my, c11, c12, c22, stored
+
+
+@kernel
+def slip_moment(line, i, Ra, Rb, k0):
+    """What layers add to M and C of `element.bending`, of the element at node i; nothing of one without."""
+    if not layered(line, i, 0):
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if turns_freely(get3(line.kb, i), k0):
+        return across_swivel(line, i, Ra, Rb)
+    k = log_rotation(relative_rotation(Ra, Rb))
+    mx, my, c11, c12, c22, _ = slip_answer(line, i, k[0] - k0[0], k[1] - k0[1])
+    n = (mx, my, 0.0)
+    g, g1 = jacobian_functions(dot(k, k))
+    P = inverse_left_jacobian(k, g)
+    D = msub(d_double_cross(k, n, g, g1), mscale(0.5, hat(n)))
+    PT = (P[0], P[3], P[6], P[1], P[4], P[7], P[2], P[5], P[8])
+    C = mat_mat(madd(D, mat_mat(PT, (c11, c12, 0.0, c12, c22, 0.0, 0.0, 0.0, 0.0))), P)
+    return mat_vec(Ra, vec_mat(n, P)), mat_matT(mat_mat(Ra, C), Ra)
+
+
+@kernel
+def across_swivel(line, i, Ra, Rb):
+    """The same of an element that turns freely: its bend is without the twist, and its layers turn with the cell before."""
+    x = vec_mat(swing(Ra, Rb), Ra)
+    mx, my, c11, c12, c22, _ = slip_answer(line, i, x[0], x[1])
+    _, turn = swivel(Ra, Rb, 1.0)
+    C = mat_matT(mat_mat(Ra, (c11, c12, 0.0, c12, c22, 0.0, 0.0, 0.0, 0.0)), Ra)
+    return mat_vec(Ra, (mx, my, 0.0)), mat_mat(C, turn)
+
+
+@inner
+def components_about_normal(line, a1, c, d, bend):
+    """A bend (rad) about the normal of the plane, in two components, of sections that lie as in cell c with chord d."""
+    m = to_space(line.plane, (-d[1], d[0]))
+    return bend * row_along_normal(line.plane, a1, c), bend * (a1[c, 0] * m[0] + a1[c, 1] * m[1] + a1[c, 2] * m[2])
+
+
+@kernel
+def slip_about_normal(line, a1, c, d, i, bend):
+    """Of layers of the element at node i of a line in a plane, whose sections lie as in cell c with chord d.
+
+    Moment, N m, about the normal under a bend (rad) about it, its slope, and the stiffness about the other axis, N m/rad.
+    """
+    if not layered(line, i, 0):
+        return 0.0, 0.0, 0.0
+    x, y = components_about_normal(line, a1, c, d, 1.0)
+    mx, my, c11, c12, c22, _ = slip_answer(line, i, bend * x, bend * y)
+    slope = c11 * x * x + 2.0 * c12 * x * y + c22 * y * y
+    return mx * x + my * y, slope, c11 + c22 - slope
+
+
+@inner
+def stored_by_slip(line, i, x, y):
+    """Energy, J, that the layers of the element at node i store under the bend x, y (rad)."""
+    return slip_answer(line, i, x, y)[5] if slips(line, i) else 0.0
+
+
+@inner
+def pull_at(state, i):
+    """Tension at node i, N, on average of the cells beside it, and not below 0."""
+    n = state.T.shape[0]
+    return max(0.5 * (state.T[max(i - 1, 0)] + state.T[min(i, n - 1)]), 0.0)
+
+
+@kernel
+def stiffen_beside_spring(line, new, i, x, y):
+    """Give the layers of a clamp with an angular spring the stiffness of the tension now, at the bend x, y (rad).
+
+    Energy, J, that they have stored less behind it, from where they have slipped to.
+    """
+    law, now, stiffens = line.slip_law, line.slip_now, False
+    for j in range(0, law.shape[1], EACH):
+        stiffens |= layered(line, i, j) and law[i, j + STIFFENING] > 0.0
+    if not stiffens:
+        return 0.0
+    for j in range(0, law.shape[1], EACH):
+        for m in range(KEPT):
+            now[i, j + FROM + m] = new.layers[i, j // EACH * KEPT + m]
+    before = slip_answer(line, i, x, y)[5]
+    for j in range(0, law.shape[1], EACH):
+        if layered(line, i, j):
+            now[i, j + STIFF] = law[i, j + STIFFNESS] + law[i, j + STIFFENING] * pull_at(new, i)
+    return before - slip_answer(line, i, x, y)[5]
+
+
+@kernel
+def update_slip(line, ends, old, new, work, part):
+    """IN_MOTION, LOADED_FIRST: how far layers have slipped before, and what they bear, for the march.
+
+    BEHIND_STEP, BEHIND_REST: how far they have slipped now, into new.layers, and the work that this has lost.
+    """
+    law, now, lost = line.slip_law, line.slip_now, 0.0
+    after = part >= BEHIND_STEP
+    for i in range(law.shape[0]):
+        x, y, hn, whole = 0.0, 0.0, line.hn[i], (0.0, 0.0)
+        give = give_of_spring(line, i)
+        if after and layered(line, i, 0) and line.element[i]:
+            Ra, Rb = frames_at(line, ends, new, i)
+            k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+            x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
+            if give > 0.0:
+                whole, hn = (x, y), 0.5 * line.h[min(i, line.h.shape[0] - 1)]
+                x, y = beside_spring(line, i, x, y)
+        for j in range(0, law.shape[1], EACH):
+            at = j // EACH * KEPT
+            if not layered(line, i, j):
+                break
+            if not after:
+                rest = part == LOADED_FIRST
+                for m in range(KEPT):
+                    now[i, j + FROM + m] = 0.0 if rest else old.layers[i, at + m]
+                    if line.slip_flow.shape[0] > 0 and not rest:
+                        now[i, j + FROM + m] += line.slip_flow[i, at + m]
+                T = pull_at(new, i) if rest else pull_at(old, i)
+                now[i, j + MOST] = law[i, j + MOMENT] + law[i, j + PER_TENSION] * T
+                now[i, j + STIFF] = law[i, j + STIFFNESS] + law[i, j + STIFFENING] * T
+                continue
+            K, p, q = now[i, j + STIFF], 0.0, 0.0
+            a, b, _, left = trial(line, i, j, x, y, hn)
+            if left < 1.0 and now[i, j + MOST] >= 0.0:
+                p, q = (1.0 - left) * a / K, (1.0 - left) * b / K
+                lost += hn * left * (a * p + b * q)
+            new.layers[i, at], new.layers[i, at + 1] = now[i, j + FROM] + p, now[i, j + FROM + 1] + q
+            if part == BEHIND_STEP and law[i, j + STIFFENING] > 0.0 and give == 0.0:
+                now[i, j + STIFF] = law[i, j + STIFFNESS] + law[i, j + STIFFENING] * pull_at(new, i)
+                bent = (x / line.hn[i] - new.layers[i, at]) ** 2 + (y / line.hn[i] - new.layers[i, at + 1]) ** 2
+                lost += 0.5 * line.hn[i] * (K - now[i, j + STIFF]) * bent
+        if give > 0.0 and part == BEHIND_STEP:
+            lost += stiffen_beside_spring(line, new, i, whole[0], whole[1])
+    if part == BEHIND_STEP:
+        work.report[LOST_WORK] = (work.report[LOST_WORK] if line.law_at.shape[0] > 0 else 0.0) - lost
+    return 0
+
 
 # Columns of Line.bend_law: of the half cells before and after a node, their first row in Line.bend_table, the row
 # behind their last, and their length (m; 0: there is none); then the give of an angular spring (rad per N m).
 FIRST_A, LAST_A, HALF_A, FIRST_B, LAST_B, HALF_B, GIVE = range(7)
 # Columns of Line.bend_table: curvature, 1/m; moment, N m; energy per length from the first point on, J/m.
-CURVATURE, MOMENT, ENERGY = range(3)
+CURVATURE, TABLE_MOMENT, ENERGY = range(3)
 # Part of the bend at a clamp that is the line's, above which it has no angular spring.
 RIGID = 1.0 - 1e-9
 # A small change of a bend, as a part of it.
@@ -48,7 +342,7 @@ SMALL = 1e-6
 @inner
 def slope_of(table, j):
     """Curvature by moment, 1/(N m2), of the piece that begins at row j."""
-    return (table[j + 1, CURVATURE] - table[j, CURVATURE]) / (table[j + 1, MOMENT] - table[j, MOMENT])
+    return (table[j + 1, CURVATURE] - table[j, CURVATURE]) / (table[j + 1, TABLE_MOMENT] - table[j, TABLE_MOMENT])
 
 
 @inner
@@ -58,10 +352,10 @@ def half_cell(table, law, i, half, M):
     if not length > 0.0:
         return 0.0, 0.0, 0.0, math.inf
     first, last = int(law[i, half + FIRST_A]), int(law[i, half + LAST_A])
-    j = piece_of(table, first, last, MOMENT, M)
-    c, more = slope_of(table, j), M - table[j, MOMENT]
-    end = table[j + 1, MOMENT] if j + 2 < last else math.inf
-    energy = table[j, ENERGY] + 0.5 * c * more * (M + table[j, MOMENT])
+    j = piece_of(table, first, last, TABLE_MOMENT, M)
+    c, more = slope_of(table, j), M - table[j, TABLE_MOMENT]
+    end = table[j + 1, TABLE_MOMENT] if j + 2 < last else math.inf
+    energy = table[j, ENERGY] + 0.5 * c * more * (M + table[j, TABLE_MOMENT])
     return length * (table[j, CURVATURE] + c * more), length * c, length * energy, end
 
 

@@ -1,6 +1,6 @@
 """The law of drag (Morison) in plain Python: kernels compile it (loads.py), and the first shape calls it with arrays.
 
-Symbols as in kernels.laws.loads; vectors are tuples of numbers or of arrays.  It runs on complex numbers too.
+Symbols as in kernels.laws.water; vectors are tuples of numbers or of arrays.  It runs on complex numbers too.
 """
 
 from __future__ import annotations

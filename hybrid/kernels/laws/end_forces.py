@@ -24,10 +24,9 @@ import math
 from typing import NamedTuple
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
-from hybrid.kernels.laws.bed import bed_under
-from hybrid.kernels.laws.cell import Rates
+from hybrid.kernels.laws.element import Rates
 from hybrid.kernels.laws.node_forces import Z3, Water, body_water
-from hybrid.kernels.laws.seabed import contact, pressure
+from hybrid.kernels.laws.seabed import bed_under, contact, pressure
 from hybrid.kernels.laws.soil import borne_length
 from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel

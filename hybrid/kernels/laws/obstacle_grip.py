@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
-from hybrid.kernels.laws.obstacle_motion import (
+from hybrid.kernels.laws.obstacles import (
     carry_obstacles,
+    grip,
+    half_cell,
+    meets,
+    reach_of,
     row3,
     row9,
     surface_velocity,
@@ -15,15 +19,18 @@ from hybrid.kernels.laws.obstacle_motion import (
     way_along,
     way_with,
 )
-from hybrid.kernels.laws.obstacles import grip, half_cell, meets, reach_of
 from hybrid.kernels.laws.surfaces import Z3, gradient_of_normal, is_far, surface
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.state.report import (
     ANGLE,
+    CONTACT_WORK,
     EACH,
     ENDED,
     FORCE,
+    FRICTION,
+    FRICTION_WORK,
     MU,
+    OBSTACLE_WORK,
     OFFSET,
     ONSET_OF,
     RIDES,
@@ -37,7 +44,6 @@ from hybrid.kernels.state.obstacle_rows import (
     TRAVEL,
     TURNED,
 )
-from hybrid.kernels.state.report import CONTACT_WORK, FRICTION, FRICTION_WORK, OBSTACLE_WORK
 
 
 @inner

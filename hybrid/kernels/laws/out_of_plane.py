@@ -32,12 +32,10 @@ from hybrid.kernels.algebra.plane import (
     vector_in_plane,
 )
 from hybrid.kernels.algebra.rotations import get3, jacobian_functions
-from hybrid.kernels.laws.bed import bed_under
-from hybrid.kernels.laws.bending_law import moment_share
-from hybrid.kernels.laws.bending_slip import slip_about_normal
-from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
+from hybrid.kernels.laws.bending_law import moment_share, slip_about_normal
+from hybrid.kernels.laws.seabed import bed_under
 from hybrid.kernels.laws.soil import left_of, soil_force
-from hybrid.kernels.laws.water import current_at
+from hybrid.kernels.laws.water import body_drag, current_at, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.report import (
     ADDED_MASS,

@@ -22,10 +22,9 @@ import math
 
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
-from hybrid.kernels.laws.obstacle_motion import carry_obstacles, row3, row9, way_along
-from hybrid.kernels.laws.obstacles import normal_force
+from hybrid.kernels.laws.obstacles import carry_obstacles, normal_force, row3, row9, way_along
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.state.report import (
     ALGORITHMIC,
     ALONE,
     ANGLE,
@@ -33,6 +32,7 @@ from hybrid.kernels.state.obstacle_rows import (
     EACH,
     ENDED,
     FREE,
+    FRICTION,
     INERTIA,
     LEFT_OVER,
     MU,
@@ -46,7 +46,6 @@ from hybrid.kernels.state.obstacle_rows import (
     TURNED,
     YIELDING,
 )
-from hybrid.kernels.state.report import FRICTION
 
 
 @kernel

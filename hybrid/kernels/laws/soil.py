@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale
-from hybrid.kernels.laws.bed import bed_under
+from hybrid.kernels.laws.seabed import bed_under
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.report import BREAKOUT, FRICTION, SOIL
 from hybrid.kernels.state.state import Floats, Line, Sea
@@ -196,7 +196,7 @@ def depth_under(soil, D, P):
 
 
 @kernel
-def follow_soil(line, sea, r, soil):
+def update_soil(line, sea, r, soil):
     """What the nodes of a line at r (N+1, 3) m remember of the soil behind a step, or in an equilibrium, into soil (N+1, 6)."""
     if line.bits & SOIL:
         for i in range(soil.shape[0]):
@@ -269,7 +269,7 @@ def soil_at_rest(line, sea, r, past, N, most):
         N[i], _, most[i, 0], most[i, 1], _, _ = soil_force(line, sea, past, i, p)
 
 
-def settle_in_soil(line: Line, sea: Sea, r: Floats, soil: Floats) -> None:
+def rest_in_soil(line: Line, sea: Sea, r: Floats, soil: Floats) -> None:
     """What nodes at rest at r (N+1, 3) m remember, into soil (N+1, 6): those of a line without soil nothing."""
     if soil.size:
-        follow_soil(line, sea, r, soil)
+        update_soil(line, sea, r, soil)

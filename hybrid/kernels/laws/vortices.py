@@ -38,8 +38,8 @@ from hybrid.kernels.algebra.rotations import (
     scale,
     sub,
 )
-from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.drag_law import split as split_velocity
+from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.water import current_at, wetted_stretch
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.report import DRAG_POWER, FLOW, SURFACE, WAVES

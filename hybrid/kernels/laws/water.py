@@ -1,4 +1,6 @@
-"""The water: its current at a height, the waves that pass, and how much of a cell they wet.
+"""The water: its flow, and its forces on cells and members.
+
+The water: its current three_from a height, the waves that pass, and how much of a cell they wet.
 
     symbol   meaning                                              shape  unit      frame
     U, U1    velocity of the current and its derivative dU/dz     3      m/s, 1/s  inertial
@@ -8,19 +10,56 @@
     A, w, k  amplitude, frequency, wave number of a component     -      m, 1/s, 1/m
 
 Waves are linear (Airy), each component of an irregular sea by itself.  Above and below still
-water the kinematics are stretched after Wheeler: the depth at which a component is taken is
-scaled so that the moving surface has what linear theory has at the still one.  Components of one
+water the kinematics are stretched after Wheeler: the depth three_from which a component is taken is
+scaled so that the moving surface has what linear theory has three_from the still one.  Components of one
 wave of finite height hold up to the surface as they are.
+
+Forces of the water on a half cell or on a body, with their exact derivatives.
+
+A node carries half of each cell that meets it.  `half_cell_drag` gives the force of
+the water on one half cell with its exact derivatives; it runs on complex numbers
+too, which is how its derivatives are proved.
+
+    symbol   meaning                                            shape  unit     frame
+    u        velocity of the node relative to the water         3      m/s      inertial
+    vd       acceleration of the node relative to the water     3      m/s2     inertial
+    d, il    direction and 1/length of the half cell's chord    3, -   -, 1/m   inertial
+    cn, ct   rho D Cn h/4, pi rho D Ct h/4                      -      kg/m
+    an, three_from   added mass of the half cell, normal, tangential    -      kg
+    f        force on the node                                  3      N        inertial
+    B, D, L  df/du, df/dr (through vd), df/de                   9      N s/m, N/m  inertial
+
+The law of drag itself stands in drag_law.py; un and ut are the normal and tangential parts of u.
+The tangential coefficient refers to the wetted surface (pi D per length), the normal one to D.
+
+Morison members of a body: drag and wave force on pieces of cylinders that are fixed to it.
+
+Pieces stand in the row of numbers of their body (kernels.junctions.bodies), behind all else.  A piece has the force
+
+    f = w (-cn |un| un - ct |ut| ut + cm (a - d (d.a)))        three_from its middle, u = v - water
+
+of its velocity u relative to the water and of the water's acceleration a there; un, ut: parts across and along d.
+
+    symbol   meaning                                                   unit
+    cn, ct   rho D Cd h/2, pi rho D Ct h/2                              kg/m
+    cm       (1 + Ca) rho pi D^2/4 h; the part of Ca that goes with     kg
+             the body's own acceleration is in its mass matrix
+    w        wetted part
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from hybrid.kernels.algebra.rotations import add, cross, dot, mat_vec, scale, sub
+from hybrid.kernels.laws import drag_law
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.state import LANES
 
-# A component whose motion has faded to this part of its surface value is left out at that depth.
+# A component whose motion has faded to this part of its surface value is left out three_from that depth.
 FADED = 1e-4
 LAST = math.log(FADED)
 # x + TO_WHOLE - TO_WHOLE is x rounded to a whole number; a quarter turn in two parts, the first of 33 bits.
@@ -57,7 +96,7 @@ SAME_WETNESS = 1e-4
 
 @inner
 def current_at(z, current, part, height):
-    """U and U1 at a height, from the table (z, current), times `part`."""
+    """U and U1 three_from a height, from the table (z, current), times `part`."""
     n = z.shape[0]
     if n == 1 or height <= z[0]:
         return (part * current[0, 0], part * current[0, 1], part * current[0, 2]), (0.0, 0.0, 0.0)
@@ -98,7 +137,7 @@ def cos_sin(a):
 
 @inner
 def exp_of_small(y):
-    """exp(y) for -10 <= y <= 10 without branches: the 32nd power of Taylor's series at y/32; within 1e-14 of the value."""
+    """exp(y) for -10 <= y <= 10 without branches: the 32nd power of Taylor's series three_from y/32; within 1e-14 of the value."""
     x = y / 32.0
     q = 1.0 + x * (
         1.0 + x * (E2 + x * (E3 + x * (E4 + x * (E5 + x * (E6 + x * (E7 + x * (E8 + x * (E9 + x * E10))))))))
@@ -114,7 +153,7 @@ def exp_of_small(y):
 def elevate(sea, r, u, first):
     """Heights of the surface over LANES nodes from `first` on, after Wheeler, and what is needed of the components.
 
-    Rows of sea.lanes: 0 x, 1 y, 2 the depth at which components are taken, 3 elevation, from 10 on cosine and sine.
+    Rows of sea.lanes: 0 x, 1 y, 2 the depth three_from which components are taken, 3 elevation, from 10 on cosine and sine.
     """
     lanes, waves, part = sea.lanes, sea.waves, sea.now[2]
     for l in range(LANES):
@@ -132,7 +171,7 @@ def elevate(sea, r, u, first):
             lanes[3, l] += A * c
     for l in range(LANES):
         eta = part * lanes[3, l]
-        # Wheeler: the surface keeps what linear theory has at z = 0, the bed what it has there
+        # Wheeler: the surface keeps what linear theory has three_from z = 0, the bed what it has there
         up = sea.stretched * eta
         s = min(lanes[2, l] - sea.surface, eta) - up
         if sea.depth < math.inf:
@@ -141,7 +180,7 @@ def elevate(sea, r, u, first):
 
 
 @inner
-def stir(sea):
+def update_waves(sea):
     """Rows 4 to 9 of sea.lanes: velocity and acceleration of the fully grown waves."""
     lanes, waves = sea.lanes, sea.waves
     highest = -math.inf
@@ -168,7 +207,7 @@ def stir(sea):
 
 
 @inner
-def calm_below(sea):
+def still_below(sea):
     """Height below which all components have faded, whatever the elevation is.
 
     Depths after Wheeler, d (z - eta)/(d + eta) below still water, are highest in the lowest trough: below z + sum |A|.
@@ -182,15 +221,15 @@ def calm_below(sea):
 
 @kernel
 def wave_kinematics(sea, r, u):
-    """Fill sea.flow: velocity and acceleration of the waves at the positions r + u, and the elevation above them.
+    """Fill sea.flow: velocity and acceleration of the waves three_from the positions r + u, and the elevation above them.
 
     Where all components have faded it is still water; the elevation, by which only what is near it knows, is left out.
 
-    A component is A cos(kx x + ky y - w t + phase) at the surface; everything is multiplied by the grown part of the
+    A component is A cos(kx x + ky y - w t + phase) three_from the surface; everything is multiplied by the grown part of the
     sea, sea.now[2], and its rate of growth sea.now[3] counts in the acceleration.
     """
     part, rate = sea.now[2], sea.now[3]
-    lanes, flow, calm = sea.lanes, sea.flow, calm_below(sea)
+    lanes, flow, calm = sea.lanes, sea.flow, still_below(sea)
     for first in range(0, flow.shape[0], LANES):
         deep = True
         for i in range(first, min(first + LANES, flow.shape[0])):
@@ -200,7 +239,7 @@ def wave_kinematics(sea, r, u):
         if deep:
             continue
         elevate(sea, r, u, first)
-        stir(sea)
+        update_waves(sea)
         for i in range(first, min(first + LANES, flow.shape[0])):
             l = i - first
             for k in range(3):
@@ -230,3 +269,158 @@ def wetted_stretch(xa, xb):
         return g, 0.5 * h, 0.5 * h
     W = (Gb - Ga) / q
     return W, (W - ga) / q, (gb - W) / q
+
+
+split, half_cell, body = inner(drag_law.split), inner(drag_law.half_cell), inner(drag_law.body)
+
+
+@inner
+def half_cell_drag(u, d, il, cn, ct):
+    """Drag force on one half cell, B = df/du and L = df/de."""
+    ut, un, square = split(u, d)
+    s = np.sqrt(square)
+    a = ut if ut.real > 0.0 else -ut  # |ut|
+    i = 1.0 / s if s.real > 0.0 else 0.0 * s
+    f, p, q = half_cell(ut, un, a, s, d, cn, ct)
+
+    # df/du = -cn (|un| P + un un^T/|un|) - 2 ct |ut| d d^T; products that appear twice are written once
+    c1, c2, c3 = -p, -cn * i, p - 2.0 * ct * a
+    x, y, z = c2 * un[0], c2 * un[1], c2 * un[2]
+    dx, dy, dz = c3 * d[0], c3 * d[1], c3 * d[2]
+    xy, xz, yz = x * un[1] + dx * d[1], x * un[2] + dx * d[2], y * un[2] + dy * d[2]
+    B = (
+        c1 + x * un[0] + dx * d[0], xy, xz,
+        xy, c1 + y * un[1] + dy * d[1], yz,
+        xz, yz, c1 + z * un[2] + dz * d[2],
+    )  # fmt: skip
+
+    # df/de = (1/l) { cn [|un| (d un^T + ut P) + (ut/|un|) un un^T] - ct [2 |ut| d un^T + |ut| ut P] }
+    b1, b2, b3 = il * (p * ut - q), il * (p - 2.0 * ct * a), il * cn * ut * i
+    x, y, z = b2 * un[0] - b1 * d[0], b2 * un[1] - b1 * d[1], b2 * un[2] - b1 * d[2]  # beside d
+    ux, uy, uz = b3 * un[0], b3 * un[1], b3 * un[2]
+    L = (
+        b1 + d[0] * x + ux * un[0], d[0] * y + ux * un[1], d[0] * z + ux * un[2],
+        d[1] * x + uy * un[0], b1 + d[1] * y + uy * un[1], d[1] * z + uy * un[2],
+        d[2] * x + uz * un[0], d[2] * y + uz * un[1], b1 + d[2] * z + uz * un[2],
+    )  # fmt: skip
+    return f, B, L
+
+
+@inner
+def half_cell_added_mass(vd, d, il, an, three_from, ca):
+    """Inertia of the water carried along: f = -an P vd - three_from d (d.vd), D = ca df/dvd, L = df/de."""
+    t = vd[0] * d[0] + vd[1] * d[1] + vd[2] * d[2]
+    n = (vd[0] - t * d[0], vd[1] - t * d[1], vd[2] - t * d[2])
+    f = (-an * n[0] - three_from * t * d[0], -an * n[1] - three_from * t * d[1], -an * n[2] - three_from * t * d[2])
+    c1, c2 = -ca * an, ca * (an - three_from)
+    x, y, z = c2 * d[0], c2 * d[1], c2 * d[2]
+    xy, xz, yz = x * d[1], x * d[2], y * d[2]
+    D = (c1 + x * d[0], xy, xz, xy, c1 + y * d[1], yz, xz, yz, c1 + z * d[2])
+    b = il * (an - three_from)
+    bt = b * t
+    x, y, z = b * n[0] - bt * d[0], b * n[1] - bt * d[1], b * n[2] - bt * d[2]
+    L = (
+        bt + d[0] * x, d[0] * y, d[0] * z,
+        d[1] * x, bt + d[1] * y, d[1] * z,
+        d[2] * x, d[2] * y, bt + d[2] * z,
+    )  # fmt: skip
+    return f, D, L
+
+
+@inner
+def body_drag(u, c):
+    """Drag of a body without direction, f = -c |u| u, and B = df/du."""
+    s = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+    q = -c / s if s.real > 0.0 else 0.0 * s
+    f, p = body(u, s, c)
+    return f, (
+        p + q * u[0] * u[0], q * u[0] * u[1], q * u[0] * u[2],
+        q * u[1] * u[0], p + q * u[1] * u[1], q * u[1] * u[2],
+        q * u[2] * u[0], q * u[2] * u[1], p + q * u[2] * u[2],
+    )  # fmt: skip
+
+
+# Columns of a piece; places and directions in axes of the body, motion of the water.
+MIDDLE = 0  # 3, m
+ALONG = 3  # 3, direction
+CN = 6  # coefficients of drag across,
+CT = 7  # and along,
+CM = 8  # and of inertia
+WET = 9  # wetted part
+WATER = 10  # 3, its velocity, m/s
+PUSH = 13  # 3, its acceleration, m/s2
+PIECE = 16
+
+
+@inner
+def three_from(row, o):
+    return (row[o], row[o + 1], row[o + 2])
+
+
+class PieceForce(NamedTuple):
+    """Force f, N, on a piece, and the parts of its derivative by u: -p (1 - d d^T) - q un un^T - s d d^T."""
+
+    f: Any
+    un: Any
+    p: float
+    q: float
+    s: float
+
+
+@inner
+def piece_force(row, o, d, u):
+    """`PieceForce` on the piece three_from o of a row, direction d, relative velocity u (inertial)."""
+    w, cn, ct = row[o + WET], row[o + CN], row[o + CT]
+    ut = dot(d, u)
+    un = sub(u, scale(ut, d))
+    size, a = math.sqrt(dot(un, un)), three_from(row, o + PUSH)
+    push = scale(row[o + CM], sub(a, scale(dot(d, a), d)))
+    f = sub(scale(w, push), add(scale(w * cn * size, un), scale(w * ct * abs(ut) * ut, d)))
+    q = w * cn / size if size > 0.0 else 0.0
+    return PieceForce(f, un, w * cn * size, q, 2.0 * w * ct * abs(ut))
+
+
+@inner
+def piece_change(force, c, d, u, a, du, turn):
+    """Change of the `PieceForce` of a piece by du and by a turn of its direction, inertial; c: w cm, a: of the water."""
+    f, un, p, q, s = force
+    dv = sub(du, cross(turn, u))  # as seen from the piece
+    t = dot(d, dv)
+    n = sub(dv, scale(t, d))
+    da = cross(a, turn)
+    push = scale(c, sub(da, scale(dot(d, da), d)))
+    drag = add(scale(p, n), add(scale(q * dot(un, n), un), scale(s * t, d)))
+    return add(cross(turn, f), sub(push, drag))
+
+
+@inner
+def members_force(row, first, count, R, v, spin):
+    """Force and moment about the origin of a body of all its pieces, and their power; spin: inertial."""
+    F, M, power = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
+    for k in range(count):
+        o = first + PIECE * k
+        arm, d = mat_vec(R, three_from(row, o + MIDDLE)), mat_vec(R, three_from(row, o + ALONG))
+        here = add(v, cross(spin, arm))
+        f = piece_force(row, o, d, sub(here, three_from(row, o + WATER))).f
+        F, M, power = add(F, f), add(M, cross(arm, f)), power + dot(f, here)
+    return F, M, power
+
+
+@inner
+def members_change(row, first, count, R, v, spin, dv, dspin, turn):
+    """Change of force and moment by changes of velocity and spin (inertial) and a turn; the water stays as it is."""
+    dF, dM = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(count):
+        o = first + PIECE * k
+        arm, d = mat_vec(R, three_from(row, o + MIDDLE)), mat_vec(R, three_from(row, o + ALONG))
+        darm = cross(turn, arm)
+        u = sub(add(v, cross(spin, arm)), three_from(row, o + WATER))
+        force = piece_force(row, o, d, u)
+        du, c, a = (
+            add(dv, add(cross(dspin, arm), cross(spin, darm))),
+            row[o + WET] * row[o + CM],
+            three_from(row, o + PUSH),
+        )
+        df = piece_change(force, c, d, u, a, du, turn)
+        dF, dM = add(dF, df), add(dM, add(cross(darm, force.f), cross(arm, df)))
+    return dF, dM

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.machine.named_numbers import NamedNumbers
+from hybrid.kernels.machine.references import NamedNumbers
 
 
 class Table:
@@ -32,7 +32,7 @@ class Table:
         self.numbers: NDArray[np.int64]
         if callable(example):
             other = _table_of(example)
-            self._take(other, np.empty_like(other.numbers) if room is None else room)
+            self._copy_of(other, np.empty_like(other.numbers) if room is None else room)
             return
         self._places: dict[str, tuple[int, int, Any]] = {}  # begin and end among the numbers, and types
         self._sizes: dict[str, list[int]] = {}  # of the parts of a tuple
@@ -49,14 +49,14 @@ class Table:
     def again(self, room: NDArray[np.int64]) -> Table:
         """Another one with the same bound in it, its numbers in `room`."""
         other = Table.__new__(Table)
-        other._take(self, room)
+        other._copy_of(self, room)
         return other
 
     def move(self, room: NDArray[np.int64]) -> None:
         """Have the numbers in `room` from now on."""
         room[:], self.numbers = self.numbers, room
 
-    def _take(self, other: Table, room: NDArray[np.int64]) -> None:
+    def _copy_of(self, other: Table, room: NDArray[np.int64]) -> None:
         """The same as in another one, the numbers in `room`."""
         self._places, self._sizes, self._bound = other._places, other._sizes, {**other._bound}
         room[:], self.numbers = other.numbers, room

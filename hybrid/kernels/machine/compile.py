@@ -96,7 +96,7 @@ class Entry(_Function):
 
     @property
     def signatures(self) -> list[Any]:
-        """Of the machine code in this process: keys of the types of the arguments (kernels.machine.argument_types)."""
+        """Of the machine code in this process: keys of the types of the arguments (kernels.machine.references)."""
         return self._code.signatures
 
     @property

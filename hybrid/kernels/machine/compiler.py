@@ -251,7 +251,7 @@ class Made(NamedTuple):
 
 
 def compile_entry(function: Callable[..., Any], key: tuple[Any, ...], inlined: bool) -> Made:
-    """key: of the types of its arguments (kernels.machine.argument_types); inlined: all that it calls."""
+    """key: of the types of its arguments (kernels.machine.references); inlined: all that it calls."""
     entry = _njit(pipeline_class=_EntryCompiler if inlined else _LooseCompiler, **_OPTIONS)(function)
     entry.__class__ = _Kernel
     sig = tuple(map(reference_types.type_for, key))

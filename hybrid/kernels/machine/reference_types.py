@@ -17,9 +17,7 @@ from numba.core.imputils import lower_getattr_generic, lower_setattr_generic
 from numba.core.typing.templates import AttributeTemplate, make_intrinsic_template
 from numba.extending import NativeValue, infer_getattr, models, register_model, typeof_impl, unbox
 
-from hybrid.kernels.machine.argument_types import is_array, key_of, layout_of
-from hybrid.kernels.machine.named_numbers import NamedNumbers
-from hybrid.kernels.machine.references import Intrinsic, examples
+from hybrid.kernels.machine.references import Intrinsic, NamedNumbers, examples, is_array, key_of, layout_of
 
 _WORD = ir.IntType(64)
 
@@ -46,7 +44,7 @@ def type_of(value: Any) -> Any:
 
 
 def type_for(key: Any) -> Any:
-    """numba's type for a key of kernels.machine.argument_types."""
+    """numba's type for a key of kernels.machine.references."""
     if is_array(key):
         dtype, dimensions, flags = key
         layout, readonly, aligned = layout_of(flags)
@@ -210,7 +208,7 @@ def _name(context: Any, builder: Any, sig: Any, args: Any, name: str) -> None:
 
 @unbox(Names)
 def _unboxed_numbers(kind: Any, value: Any, c: Any) -> NativeValue:
-    """From Python; of which class they are has been looked at before (kernels.machine.argument_types)."""
+    """From Python; of which class they are has been looked at before (kernels.machine.references)."""
     of = types.Array(kind.dtype, 1, "C")
     native = c.unbox(of, value)
     return NativeValue(c.context.make_array(of)(c.context, c.builder, native.value).data, is_error=native.is_error)

@@ -1,7 +1,7 @@
 """Block rows of nodes in space: geometry, laws and balance of one node after the other, for the march (kernels.march.march).
 
 The layout of a block row and its elimination are in kernels.algebra.block_elimination; symbols as in
-kernels.laws.cell, kernels.laws.element and kernels.laws.loads.
+kernels.laws.element, kernels.laws.element and kernels.laws.water.
 """
 
 from __future__ import annotations
@@ -34,8 +34,19 @@ from hybrid.kernels.algebra.rotations import (
 )
 from hybrid.kernels.laws.axial_law import LOSS, SHIFT
 from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at
-from hybrid.kernels.laws.cell import Chord, chord, damped_stretch, moment_force, pull, rotary_force, stretch, turning
-from hybrid.kernels.laws.element import after, angular_velocity, before
+from hybrid.kernels.laws.element import (
+    Chord,
+    after,
+    angular_velocity,
+    before,
+    chord,
+    damped_stretch,
+    moment_force,
+    pull,
+    rotary_force,
+    stretch,
+    turning,
+)
 from hybrid.kernels.laws.end_forces import note_end
 from hybrid.kernels.laws.node_forces import Z3, Z9, node_loads
 from hybrid.kernels.laws.tension_torque import (

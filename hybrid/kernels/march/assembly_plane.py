@@ -1,7 +1,11 @@
-"""The march along s for a cable in a plane: three unknowns per node instead of five, and no rotations of space.
+"""The march of a line in a plane, and what its equations leave over.
+
+The march along s for a cable in a plane: three unknowns per node instead of five, and no rotations of space.
 
 States, ends and sea stay what they are, vectors of space: their components
 across the plane are neither read nor written.  Symbols as in kernels.algebra.plane; docs/theory.md, 5.
+
+What the equations of a configuration in a plane leave over (kernels.march.march).
 """
 
 from __future__ import annotations
@@ -9,11 +13,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from hybrid.kernels.algebra.block_elimination import ROW, Length
-from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE, WIDE, eliminate2, eliminate_chain
 from hybrid.kernels.algebra.plane import (
+    KEPT,
+    TRIPLE,
+    WIDE,
     angle_between,
     chord2,
     dot2,
+    eliminate2,
+    eliminate_chain,
     end_chord,
     madd2,
     mscale2,
@@ -27,12 +35,11 @@ from hybrid.kernels.algebra.plane import (
     turning2,
 )
 from hybrid.kernels.laws.axial_law import LOSS, SHIFT
-from hybrid.kernels.laws.bending_law import has_bend_law, shares_of_stiffness
-from hybrid.kernels.laws.bending_slip import slip_about_normal
-from hybrid.kernels.laws.cell import Chord, Rates
+from hybrid.kernels.laws.bending_law import has_bend_law, shares_of_stiffness, slip_about_normal
+from hybrid.kernels.laws.element import Chord, Rates
 from hybrid.kernels.laws.end_forces import note_end
-from hybrid.kernels.laws.node_forces_plane import node_loads2
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.laws.node_forces import node_loads2
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.state.report import (
     ASSEMBLED,
     AXIAL_LAW,
@@ -328,3 +335,34 @@ def store_block_row(rows, i, node, force_before):
         rows[i, o + 4], rows[i, o + 5], rows[i, o + 6], rows[i, o + 7] = back[j], D[k], D[k + 1], ahead[j]
         rows[i, o + 8], rows[i, o + 9], rows[i, o + 10], rows[i, o + 11] = U[k], U[k + 1], V[k], V[k + 1]
         rows[i, o + 12] = b[j]
+
+
+@called
+def left_over_in_plane(line, sea, ends, r, state, cv, ca, work, b):
+    """As `left_over_in_space`, of a right-hand side of `block_elimination_plane.solve_again_planar`."""
+    n, plane = line.h.shape[0], line.plane
+    report, rates = work.report, Rates(cv, ca)
+    for j in range(ASSEMBLED):
+        report[j] = 0.0
+    report[RESIDUAL_NODE] = -1.0
+    cell_before = Cell(Chord(Z2, 0.0, 0.0), Z2, Z2, 0.0, Z2, 0.0)
+    force_before = Force(Z2, Z4, Z4, Z4, Z2, -1.0, 0.0)
+    cell = cell_at(line, state, 0, cv)
+    here = element_at_start(line, ends, state, cell, report)
+    for k in range(3):
+        report[MOMENT_A + k] = here.M * plane[2, k]
+    for i in range(n + 1):
+        following = cell_at(line, state, i + 1, cv)
+        there = element_after(line, ends, state, i, cell, following, report)
+        bent = i < n and (line.element[i] != 0 or line.element[i + 1] != 0 or line.spin[i] != 0)
+        force = cell_force(line, state, i, cell, here, there, bent, rates, work)
+        before, after = LoadedCell(cell_before, force_before), LoadedCell(cell, force)
+        node = balance(line, sea, ends, r, state, i, before, after, rates, work)
+        b[i, 0], b[i, 1], b[i, 2], b[i, 3], b[i, 4] = force_before.gap, 0.0, 0.0, 0.0, 0.0
+        if not ((i == 0 and ends.held[0]) or (i == n and ends.held[1])):
+            b[i, 1], b[i, 2], b[i, 3] = to_space(plane, node.b)
+        if i == n - 1:
+            for k in range(3):
+                report[MOMENT_B + k] = there.M * plane[2, k]
+        cell_before, force_before = cell, force
+        cell, here = following, there

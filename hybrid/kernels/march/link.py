@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get9, scale, sub
-from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import chord
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import get3
 from hybrid.kernels.march.zone_torque import FIRST, LAST, TURN

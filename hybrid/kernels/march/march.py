@@ -1,16 +1,30 @@
-"""The march along s: each block row is eliminated as it is born (docs/theory.md, 5).
+"""The march along s, its corrections, and what equations leave over.
+
+The march along s: each block row is eliminated as it is born (docs/theory.md, 5).
 
 Nodes between two catenary cells, which are most of them, take a loop of their own: what the other nodes carry along for
 bending, some 150 numbers, would be most of what they cost.
+
+What a correction does to the configuration: positions, chords, tensions, directors and rates.
+
+`plane` is the plane of a line that is computed in one, else None; `space` is None for such a line, else 1.  numba
+drops what stands behind `is not None` of the one that is None, so what the other kind needs is not compiled.
+
+What the equations of a configuration in space leave over, without their derivatives and their elimination.
+
+The same functions as in kernels.march.march: what only derivatives need is not compiled.
 """
 
 from __future__ import annotations
 
+import math
+
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, Length, NarrowBalance, eliminate_narrow
-from hybrid.kernels.algebra.rotations import add, get3, madd, mscale, msub, scale, sub
-from hybrid.kernels.laws.cell import Chord, Rates, chord, pull, stretch
+from hybrid.kernels.algebra.plane import carried, chord2, vector_in_plane
+from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mscale, msub, scale, spin_about, sub, transport
+from hybrid.kernels.laws.element import Chord, Rates, chord, pull, stretch
 from hybrid.kernels.laws.node_forces import Z3, Z9, node_loads
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.march.assembly import (
     Cell,
     Element,
@@ -34,6 +48,7 @@ from hybrid.kernels.state.report import (
     MOMENT_B,
     RESIDUAL,
     RESIDUAL_NODE,
+    ROTARY,
     STIFFNESS_DAMPING,
 )
 
@@ -159,3 +174,166 @@ def march(line, sea, ends, r, state, cv, ca, work):
         cell, here = following, there
         i += 1
     return -1
+
+
+@inner
+def carry_director(plane, space, a, e, en):
+    """Director a of a cell whose chord turns from e to en, without spin about it."""
+    out = a
+    if space is not None:
+        d, _, _ = chord(e)
+        dn, _, _ = chord(en)
+        out = transport(a, d, dn)
+    if plane is not None:
+        p, _, _ = chord2(vector_in_plane(plane, e))
+        q, _, _ = chord2(vector_in_plane(plane, en))
+        out = carried(plane, a, p, q)
+    return out
+
+
+@inner
+def measure(e, T, x):
+    """Size of a Newton correction x, and the largest tension.
+
+    Largest shift, largest turn of a chord or spin and its cell, largest change of tension.
+    """
+    n = e.shape[0]
+    shift, turn, pull, big, where = 0.0, 0.0, 0.0, 0.0, -1
+    for i in range(n + 1):
+        shift = max(shift, abs(x[i, 1]) + abs(x[i, 2]) + abs(x[i, 3]))
+        pull = max(pull, abs(x[i, 0]))
+        if i < n:
+            de = (x[i + 1, 1] - x[i, 1], x[i + 1, 2] - x[i, 2], x[i + 1, 3] - x[i, 3])
+            ei = (e[i, 0], e[i, 1], e[i, 2])
+            t = max(math.sqrt(dot(de, de) / dot(ei, ei)), abs(x[i, 4]))
+            big = max(big, abs(T[i]))
+            if t > turn:
+                turn, where = t, i
+    return shift, turn, where, pull, big
+
+
+@inner
+def turned_chord(e, de):
+    """The chord e turned and stretched by de: the same as e + de to first order, but no turn stretches it."""
+    d, l, il = chord(e)
+    along = dot(d, de)
+    across = (de[0] - along * d[0], de[1] - along * d[1], de[2] - along * d[2])
+    q = math.sqrt(dot(across, across))
+    if not q > 0.0:
+        return (e[0] + de[0], e[1] + de[1], e[2] + de[2])
+    c, s = (l + along) * math.cos(q * il), (l + along) * math.sin(q * il) / q
+    return (c * d[0] + s * across[0], c * d[1] + s * across[1], c * d[2] + s * across[2])
+
+
+@kernel
+def update(plane, space, line, state, cv, ca, part, turning, work):
+    """Apply `part` of the correction work.x to everything that depends on it.
+
+    With `turning` chords are turned and stretched by the correction instead of shifted:
+    the same to first order, but a large turn does not stretch the line.  Positions then
+    follow from the start along the chords, and a held end is met again by the next correction.
+    """
+    u, x, e, a1 = work.u, work.x, state.e, state.a1
+    n = e.shape[0]
+    drift = (0.0, 0.0, 0.0)
+    for i in range(n):
+        ei = get3(e, i)
+        de = (part * (x[i + 1, 1] - x[i, 1]), part * (x[i + 1, 2] - x[i, 2]), part * (x[i + 1, 3] - x[i, 3]))
+        en = (ei[0] + de[0], ei[1] + de[1], ei[2] + de[2])
+        if turning:
+            turned = turned_chord(ei, de)
+            drift = (drift[0] + turned[0] - en[0], drift[1] + turned[1] - en[1], drift[2] + turned[2] - en[2])
+            en = turned
+            u[i + 1, 0] += drift[0]
+            u[i + 1, 1] += drift[1]
+            u[i + 1, 2] += drift[2]
+        state.T[i] += part * x[i + 1, 0]
+        e[i, 0], e[i, 1], e[i, 2] = en
+        if line.spin[i]:
+            a = carry_director(plane, space, get3(a1, i), ei, en)
+            if space is not None:
+                dpsi = part * x[i, 4]
+                if dpsi != 0.0:
+                    dn, _, _ = chord(en)
+                    a = spin_about(a, dn, dpsi)
+                state.w[i] += cv * dpsi
+                state.wd[i] += ca * dpsi
+            a1[i, 0], a1[i, 1], a1[i, 2] = a
+    for i in range(n + 1):
+        for k in range(3):
+            dr = part * x[i, k + 1]
+            u[i, k] += dr
+            state.v[i, k] += cv * dr
+            state.vd[i, k] += ca * dr
+
+
+@inner
+def first_bad(x, e):
+    """The first cell that is not finite: its chord, or else its correction (substitution goes backwards)."""
+    for i in range(e.shape[0]):
+        if not abs(e[i, 0]) + abs(e[i, 1]) + abs(e[i, 2]) < math.inf:
+            return i
+    for i in range(x.shape[0] - 1, -1, -1):
+        if not abs(x[i, 0]) + abs(x[i, 1]) + abs(x[i, 2]) + abs(x[i, 3]) + abs(x[i, 4]) < math.inf:
+            return i
+    return -1
+
+
+@inner
+def catenaries_left_over(line, sea, r, state, i, cv, ca, work, b):
+    """Fill b from node i on as long as the cells on both sides are catenaries; the next node, and the force before it."""
+    u, report, gaps, n, rates = work.u, work.report, work.gaps, line.h.shape[0], Rates(cv, ca)
+    before, f, N, hck, gap = catenary_cell(line, state, i - 1, gaps)
+    while i < n and not is_bent(line, i):
+        after, fa, Na, hcka, gapa = catenary_cell(line, state, i, gaps)
+        F, _, _, _ = node_loads(line, sea, i, r, u, state, before, after, rates, report)
+        F = add(F, sub(fa, f))
+        b[i, 0], b[i, 1], b[i, 2], b[i, 3], b[i, 4] = gap, -F[0], -F[1], -F[2], 0.0
+        before, f, N, hck, gap = after, fa, Na, hcka, gapa
+        i += 1
+    return i, Force(f, Z9, Z3, N, Z3, Z9, Z3, before.d, hck, gap)
+
+
+@called
+def left_over_in_space(line, sea, ends, r, state, cv, ca, work, b):
+    """Fill b (N+1, 5), a right-hand side of `kept_factors.solve_again`; of a held node it is nothing.
+
+    The rest as of `kernels.march.march.march`, and the report as from there.  No torque passes through catenary zones.
+    """
+    n = line.h.shape[0]
+    report, couple, rates = work.report, work.couple, Rates(cv, ca)
+    for j in range(ASSEMBLED):
+        report[j] = 0.0
+    report[RESIDUAL_NODE] = -1.0
+    cell_before = Cell(Chord(Z3, 0.0, 0.0), Z3, Z3, Z9, Z9)
+    force_before = Force(Z3, Z9, Z3, Z9, Z3, Z9, Z3, Z3, -1.0, 0.0)
+    cell = cell_at(line, ends, state, 0, cv)
+    here = element_at_start(line, ends, state, cell, cv, couple, report)
+    report[MOMENT_A], report[MOMENT_A + 1], report[MOMENT_A + 2] = here.M
+    report[MOMENT_B], report[MOMENT_B + 1], report[MOMENT_B + 2] = get3(ends.moment, 1)
+    bent_before, i = False, 0
+    simple = couple.shape[0] == 0 and not line.bits & (STIFFNESS_DAMPING | AXIAL_LAW)
+    while i <= n:
+        if simple and 0 < i < n and not bent_before and not is_bent(line, i):
+            i, force_before = catenaries_left_over(line, sea, r, state, i, cv, ca, work, b)
+            cell_before, cell = cell_at(line, ends, state, i - 1, cv), cell_at(line, ends, state, i, cv)
+            here = Element(Z3, Z9, Z3, Z9, Z3)
+        following = cell_at(line, ends, state, i + 1, cv)
+        there = element_after(line, ends, state, i, cell, following, cv, couple, report)
+        bent = i < n and is_bent(line, i)
+        force = cell_force(line, state, i, cell, here, there, bent, rates, work)
+        before, after = LoadedCell(cell_before, force_before), LoadedCell(cell, force)
+        node = balance(line, sea, ends, r, state, i, before, after, rates, work)
+        b[i, 0], b[i, 1], b[i, 2], b[i, 3], b[i, 4] = force_before.gap, 0.0, 0.0, 0.0, 0.0
+        if not node.held:
+            b[i, 1], b[i, 2], b[i, 3] = node.rhs
+        if i < n and line.spin[i]:
+            left = dot(cell.chord.d, sub(there.M, here.M))
+            if line.bits & ROTARY:
+                left -= line.polar[i] * state.wd[i]
+            b[i, 4] = -left
+        if i == n - 1:
+            report[MOMENT_B], report[MOMENT_B + 1], report[MOMENT_B + 2] = there.M
+        cell_before, force_before, bent_before = cell, force, bent
+        cell, here = following, there
+        i += 1

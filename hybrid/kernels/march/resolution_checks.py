@@ -6,17 +6,18 @@ import math
 
 from hybrid.kernels.algebra.plane import angle_between, chord2, end_chord, row_in_plane, stiffness_about_normal
 from hybrid.kernels.algebra.rotations import frame, get3, get9
-from hybrid.kernels.laws.bending_law import RIGID, moment_share, parts_without_spring
-from hybrid.kernels.laws.bending_slip import (
+from hybrid.kernels.laws.bending_law import (
+    RIGID,
     beside_spring,
     components_about_normal,
     give_of_spring,
+    moment_share,
+    parts_without_spring,
     slip_about_normal,
     slip_answer,
     slips,
 )
-from hybrid.kernels.laws.cell import chord
-from hybrid.kernels.laws.element import strain_of_element
+from hybrid.kernels.laws.element import chord, strain_of_element
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
 

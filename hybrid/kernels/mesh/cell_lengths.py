@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import dot, get3, scale, sub
-from hybrid.kernels.laws.bed import bed_under
+from hybrid.kernels.laws.seabed import bed_under
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.mesh.cell_errors import (
     CURVATURE,
@@ -26,13 +26,13 @@ from hybrid.kernels.mesh.cell_errors import (
     layer_length,
     longest_behind_hinge,
     longest_cell,
+    lower_by_waves,
     lowest_beside,
     node_curvature,
     over_shares,
     second_slope,
     tension_beside,
 )
-from hybrid.kernels.mesh.wave_lengths import lower_by_waves
 from hybrid.kernels.mesh.zone_criteria import EDGE, FORESEEN, depth, raise_ratio
 from hybrid.kernels.state.report import SEABED
 
@@ -417,7 +417,7 @@ def arc_less_chord(line, state, zones, c):
 
 
 @inner
-def follow_arcs(line, state, zones):
+def relax_arcs(line, state, zones):
     """True lengths come nearer to those that make chords as long as the arcs they stand for."""
     for c in range(line.h.shape[0]):
         aim = line.s[c + 1] - line.s[c] - arc_less_chord(line, state, zones, c)

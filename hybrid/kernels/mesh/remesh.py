@@ -1,4 +1,6 @@
-"""Other cells for a line in the middle of a run: one road for cells that follow, kinds of cells and nodes at a winch.
+"""Other cells for a line in the middle of a run.
+
+Other cells for a line in the middle of a run: one road for cells that follow, kinds of cells and nodes at a winch.
 
 Two sets of arrays with room for the most cells, the sides, take turns: a change goes from one to the other, and the
 tables of the run get the numbers of the other one.  A planner says whether a change is due and how many cells there will
@@ -7,22 +9,30 @@ be; the parts of a change fill the new line, carry the state to it, and book wha
 Steps, planners and parts are kernels of their own and called by address: a kernel takes a table of addresses as constant
 (kernels.machine.references), so what writes to tables must not be one that reads them.  Tables differ with the side, the
 parity of the state and the number of cells: each is fixed numbers plus numbers per old and new cell.
+
+The fields of a line, of what its cells are made of per length; how they are copied and moved.
+
+What a cell is made of is a row: weight, stiffness and curvature of rods, then by FIELDS whatever cells and nodes have
+in proportion to length.  A cell that grows at a winch has the means of all that it consists of.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_distance import boxes_of
+from hybrid.kernels.laws.element import put_spring
+from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.named_numbers import NamedNumbers
-from hybrid.kernels.machine.references import caller, reader
+from hybrid.kernels.machine.references import NamedNumbers, caller, reader, rows
+from hybrid.kernels.mesh.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds, blank_kinds
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import FIELDS, HALF, MEAN, POINT, ROD, SHARED, Field, Floats, Line, blank_line
 from hybrid.kernels.step.newton import ASSEMBLY, RUN
 
 Numbers = NDArray[np.int64]
@@ -65,7 +75,7 @@ class RemeshPlaces(NamedNumbers, number=np.int64):
 
 
 # Columns of `waiting`, and of `parts`.
-OFFSET, COUNT, OF_CELLS = range(3)
+OFFSET, COUNT, IS_OF_CELLS = range(3)
 ADDRESS, BEGIN, END = range(3)
 
 
@@ -183,7 +193,7 @@ def keep_rows(job):
     at, some = job.at, job.counts.samples - job.at.used
     if some > 0:
         row = job.waiting[at.waiting]
-        row[OFFSET], row[COUNT], row[OF_CELLS] = at.used, some, at.cells
+        row[OFFSET], row[COUNT], row[IS_OF_CELLS] = at.used, some, at.cells
         at.placed += call_count(job.calls.keep, job.planners[at.side])
         at.used += some
         at.waiting += 1
@@ -229,3 +239,263 @@ def change_cells(table):
     begin_change(job)
     end_change(job)
     return 1
+
+
+# Columns of a row.
+WEIGHT = 0
+B_1 = 1  # first of three
+KAPPA_1 = 4  # first of three
+FIRST = 7
+# Fields that follow from one number per length of the same name, column FIRST on; and those of bodies.
+PER_LENGTH = tuple(name for name, field in FIELDS.items() if field.rule in (MEAN, HALF, ROD, SHARED))
+OF_POINTS = tuple(name for name, field in FIELDS.items() if field.rule == POINT)
+COLUMNS = FIRST + len(PER_LENGTH)
+COMPLIANCE = FIRST + PER_LENGTH.index("ck")
+
+_at = places(blank_line(1))
+
+
+def _table(names: Iterable[str]) -> NDArray[np.int64]:
+    """Of fields: where in the table of a line; column of a row; rule."""
+    found = [(_at[x], FIRST + PER_LENGTH.index(x) if x in PER_LENGTH else -1, FIELDS[x].rule) for x in names]
+    return np.array(found, np.int64)
+
+
+def _numbers(of_node: bool) -> NDArray[np.int64]:
+    """Of fields of float64 of nodes, or of cells: where in the table of a line, and columns."""
+
+    def wanted(field: Field) -> bool:
+        return field.of_node == of_node and field.kind is np.float64
+
+    return np.array([(_at[x], max(y.columns, 1)) for x, y in FIELDS.items() if wanted(y)], np.int64)
+
+
+CELLS = _table(x for x in PER_LENGTH if not FIELDS[x].of_node)
+NODES = _table(x for x in PER_LENGTH if FIELDS[x].of_node)
+POINTS = _table(OF_POINTS)
+OF_NODES, OF_CELLS = _numbers(True), _numbers(False)
+array = rows(blank_line(1))
+
+
+@inner
+def fill_cell(line, c, made, j, h):
+    """What cell c has, of length h, that is made of row j."""
+    for k in range(CELLS.shape[0]):
+        x, rule = made[j, CELLS[k, 1]], CELLS[k, 2]
+        if rule == HALF:
+            x = 0.5 * h * x
+        elif rule == ROD:
+            x = h * line.spin[c] * x
+        array(line, CELLS[k, 0], 1)[c, 0] = x
+
+
+@inner
+def fill_node(line, i, made, a, ha, b, hb):
+    """What node i has between a cell of length ha, of row a, and one of hb, of row b; 0: there is no cell."""
+    for k in range(NODES.shape[0]):
+        x = NODES[k, 1]
+        array(line, NODES[k, 0], 1)[i, 0] = 0.5 * (ha * made[a, x]) + 0.5 * (hb * made[b, x])
+    line.mass[i] += line.point_mass[i]
+    line.force[i, 0], line.force[i, 1] = 0.0, 0.0
+    line.force[i, 2] = -0.5 * (ha * made[a, WEIGHT]) - 0.5 * (hb * made[b, WEIGHT]) + line.point_lift[i]
+    line.hn[i] = 0.5 * ha + 0.5 * hb
+
+
+@inner
+def fill_point(line, i, points, j, blank):
+    """The body at node i, of column j of `points`; -1: there is none."""
+    for k in range(POINTS.shape[0]):
+        array(line, POINTS[k, 0], 1)[i, 0] = points[k, j] if j >= 0 else blank[k]
+
+
+@inner
+def round_and_straight(line, i):
+    """The element at node i of a swivel, whose sides have no direction in common: it bends as on average of its axes."""
+    line.k0[i, 0], line.k0[i, 1] = 0.0, 0.0
+    if line.kb[i, 0] != line.kb[i, 1]:
+        bends = 2.0 / (1.0 / line.kb[i, 0] + 1.0 / line.kb[i, 1])
+        line.kb[i, 0], line.kb[i, 1] = bends, bends
+
+
+@inner
+def fill_element(line, i, made, a, ha, b, hb, turns):
+    """The element at node i, two halves in series; lengths: as of `fill_node`; turns: whether it lets go the twist."""
+    one, two = 0.5 * ha, 0.5 * hb
+    for k in range(3):
+        B, kappa = B_1 + k, KAPPA_1 + k
+        if hb == 0.0:
+            line.kb[i, k], line.k0[i, k] = made[a, B] / one, one * made[a, kappa]
+        elif ha == 0.0:
+            line.kb[i, k], line.k0[i, k] = made[b, B] / two, two * made[b, kappa]
+        else:
+            line.kb[i, k] = 1.0 / (one / made[a, B] + two / made[b, B])
+            line.k0[i, k] = one * made[a, kappa] + two * made[b, kappa]
+    if turns:
+        line.kb[i, 2] = 0.0
+        if ha > 0.0 and hb > 0.0:
+            round_and_straight(line, i)
+
+
+@inner
+def no_element(line, i):
+    """A line without an element at node i."""
+    for k in range(3):
+        line.kb[i, k], line.k0[i, k] = 0.0, 0.0
+
+
+@inner
+def copy_items(line, i, out, j, fields):
+    """Node or cell i of a line as j of another one; fields: OF_NODES or OF_CELLS."""
+    for k in range(fields.shape[0]):
+        x, y = array(line, fields[k, 0], fields[k, 1]), array(out, fields[k, 0], fields[k, 1])
+        if y.shape[0] > 0:  # else it has none of it
+            for column in range(y.shape[1]):
+                y[j, column] = x[i, column]
+
+
+@inner
+def copy_node(line, i, out, j):
+    """Node i of a line as node j of another one."""
+    copy_items(line, i, out, j, OF_NODES)
+    out.element[j] = line.element[i]
+
+
+@inner
+def copy_cell(line, i, out, j):
+    """Cell i of a line as cell j of another one."""
+    copy_items(line, i, out, j, OF_CELLS)
+    out.spin[j] = line.spin[i]
+
+
+@inner
+def came_from(k, n, m, forward, cut, step):
+    """Item k of m, counted from the far end, and the one of n that it comes from: numbers in their lines."""
+    j = k if k < cut else max(k - step, 0)
+    return (k, j) if forward else (m - 1 - k, n - 1 - j)
+
+
+@kernel
+def move_line(line, out, forward, cut, step):
+    """Cells and nodes that stay; those that are new have the values of their neighbours (kernels.reel.payout_nodes.move_row)."""
+    n, m = line.h.shape[0], out.h.shape[0]
+    for k in range(m + 1):
+        to, of = came_from(k, n + 1, m + 1, forward, cut, step)
+        copy_node(line, of, out, to)
+    for k in range(m):
+        to, of = came_from(k, n, m, forward, cut, step)
+        copy_cell(line, of, out, to)
+
+
+# The line of a material on cells, and what criteria know of it, for any cells on the same base cells.  Sections, modules
+# and points begin and end at base nodes, so a base cell has one of everything per length.
+
+
+class Cable(NamedTuple):
+    """A material on n base cells, and points at the n+1 base nodes."""
+
+    made: Floats  # (n, COLUMNS) as of kernels.mesh.remesh
+    EI: Floats  # N m2, mean of both axes
+    w: Floats  # N/m, weight in water
+    points: Floats  # (P, n+1) of bodies, as OF_POINTS has them
+    blank: Floats  # (P,) of nodes without a body
+    load: NDArray[np.int8]  # (n+1,) 1 where there is one
+    turns: NDArray[np.int8]  # (n+1,) 1 where there is a swivel
+    held: NDArray[np.int8]  # (2, 2) whether an element sits at the ends of a rod, and resists twist
+    springs: Floats  # (2,) N m/rad, angular springs between held tangents and a rod; infinite: rigid
+
+
+def blank_cable(n: int) -> Cable:
+    """A cable of nothing on n base cells."""
+    z, points = np.zeros, len(OF_POINTS)
+    return Cable(
+        z((n, COLUMNS)), z(n), z(n), z((points, n + 1)), z(points), z(n + 1, np.int8), z(n + 1, np.int8),
+        z((2, 2), np.int8), np.full(2, np.inf),
+    )  # fmt: skip
+
+
+class LineJob(NamedTuple):
+    """A cable, its cells, and the line of these (written)."""
+
+    cable: Cable
+    nodes: Floats  # (N+1,) m
+    base_of_cell: NDArray[np.int64]  # (N,)
+    rod: NDArray[np.bool_]  # (N,)
+    line: Line
+
+
+class KindsJob(NamedTuple):
+    """A cable, its cells, and what criteria know of them (written)."""
+
+    cable: Cable
+    base_of_cell: NDArray[np.int64]  # (N,)
+    kinds: NodeKinds
+    floor_part: float  # of (EI w^2)^(1/3) that a tension must have
+    least: float  # N, that it must have whatever the cable
+
+
+def blank_line_job() -> LineJob:
+    return LineJob(blank_cable(1), np.zeros(2), np.zeros(1, np.int64), np.zeros(1, bool), blank_line(1))
+
+
+def blank_kinds_job() -> KindsJob:
+    return KindsJob(blank_cable(1), np.zeros(1, np.int64), blank_kinds(1, 1), 0.0, 0.0)
+
+
+read_line, read_kinds = reader(blank_line_job()), reader(blank_kinds_job())
+
+
+@inner
+def base_node(of, i):
+    """The base node that node i is; -1: it lies between two."""
+    n = of.shape[0]
+    if i == n:
+        return of[n - 1] + 1
+    return of[i] if i == 0 or of[i] != of[i - 1] else -1
+
+
+@kernel
+def fill_line(table):
+    """The line of a LineJob."""
+    job = read_line(table)
+    cable, of, line, s, rod = job.cable, job.base_of_cell, job.line, job.nodes, job.rod
+    made, n = cable.made, job.line.h.shape[0]
+    for c in range(n):
+        line.h[c], line.spin[c] = s[c + 1] - s[c], rod[c]
+        fill_cell(line, c, made, of[c], line.h[c])
+    for i in range(n + 1):
+        b, e, j = max(i - 1, 0), min(i, n - 1), base_node(of, i)
+        hb = line.h[b] if i > 0 else 0.0
+        he = line.h[e] if i < n else 0.0
+        line.s[i] = s[i]
+        fill_point(line, i, cable.points, j, cable.blank)
+        fill_node(line, i, made, of[b], hb, of[e], he)
+        no_element(line, i)
+        inside = 0 < i < n
+        end = 1 if i == n else 0
+        line.element[i] = line.spin[b] and line.spin[e] and (inside or cable.held[end, 0])
+        if line.element[i]:
+            turns = (j >= 0 and cable.turns[j]) if inside else not cable.held[end, 1]
+            fill_element(line, i, made, of[b], hb, of[e], he, turns)
+            if not inside and cable.springs[end] < np.inf:
+                put_spring(cable.springs[end], line, i)
+
+
+@kernel
+def fill_kinds(table):
+    """What the criteria know of the nodes of a KindsJob."""
+    job = read_kinds(table)
+    cable, of, kinds, made = job.cable, job.base_of_cell, job.kinds, job.cable.made
+    n, X, Y = of.shape[0], KAPPA_1, KAPPA_1 + 1
+    for i in range(n + 1):
+        a, b = of[max(i - 1, 0)], of[min(i, n - 1)]
+        kinds.EI[i], kinds.w[i] = max(cable.EI[a], cable.EI[b]), max(cable.w[a], cable.w[b])
+        kinds.GJ[i] = min(made[a, B_1 + 2], made[b, B_1 + 2])
+        bent = max(made[a, X] ** 2 + made[a, Y] ** 2, made[b, X] ** 2 + made[b, Y] ** 2)
+        kinds.bent[i] = bent**0.5
+        kinds.node[i] = STEP if cable.EI[a] != cable.EI[b] else SMOOTH
+        at_base = i == 0 or i == n or a != b
+        if at_base and cable.load[b if i < n else b + 1]:
+            kinds.node[i] = LOAD
+        kinds.floor[i] = max(job.floor_part * (kinds.EI[i] * kinds.w[i] ** 2) ** (1.0 / 3.0), job.least)
+        if i < n:
+            kinds.base_of_cell[i] = of[i]

@@ -166,7 +166,7 @@ class ReviewJob(NamedTuple):
     base: Floats  # (n+1,) m
     given: NDArray[np.int64]  # (n,)
     calm_since: Floats  # (n,) s
-    calmed: Floats  # (2, n) of rods on their way out: which criterion was the loudest, and its ratio
+    calmed: Floats  # (2, n) of rods on their way out: which criterion was the leading_criterion, and its ratio
     patience: Floats  # (n,)
     seen: Floats  # (criteria, n), largest ratios since the last output
     buffer: Floats  # (n,) m (written)
@@ -198,7 +198,7 @@ read, read_zones = reader(blank_review_job()), reader(z.blank_zone_job())
 
 
 @inner
-def loudest(ratios, off, j):
+def leading_criterion(ratios, off, j):
     """The criterion of base cell j whose ratio is the largest part of its threshold."""
     which = 0
     for c in range(1, off.shape[0]):
@@ -224,7 +224,7 @@ def let_go(job, zones):
         if goes:
             going, wait = 1, min(wait, zones.grown[j])
             if not zones.leaving[j]:
-                c = loudest(ratios, job.off, j)
+                c = leading_criterion(ratios, job.off, j)
                 job.calmed[0, j], job.calmed[1, j] = c, ratios[c, j]
         zones.leaving[j] = goes
     zones.counts.going = going

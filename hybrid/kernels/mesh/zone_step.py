@@ -1,6 +1,6 @@
 """What zones that move ask of every step, compiled: lengths and stiffness before it, criteria and energy after it.
 
-A run calls `follow_zones` by its address (kernels.run.network_run), so that scenes whose zones stay compile none of it; Python calls
+A run calls `advance_zones` by its address (kernels.run.network_run), so that scenes whose zones stay compile none of it; Python calls
 the same functions where a criterion or joints of its own take part (zones.change).
 """
 
@@ -14,28 +14,30 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import dot, get3, sub
 from hybrid.kernels.laws.axial_law import has_law, stretch_work
-from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.end_motion import end_turn
-from hybrid.kernels.laws.obstacle_motion import surface_velocity
+from hybrid.kernels.laws.obstacles import surface_velocity
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.named_numbers import NamedNumbers
-from hybrid.kernels.machine.references import caller, reader
+from hybrid.kernels.machine.references import NamedNumbers, caller, reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_errors import (
     CURVATURE,
     MOMENT,
     POSITION,
     QUANTITIES,
+    QUIET,
+    TAU,
     TENSION,
+    WAVES,
     lack_of_moment,
     lack_of_torque,
+    note_waves,
     over_shares,
+    spread_of_velocity,
 )
-from hybrid.kernels.mesh.cell_lengths import FADE, arc_less_chord, follow_arcs, foresee_edges, plan_cells
-from hybrid.kernels.mesh.stiffness_ramp import advance, freed, length_defect, shares, soften
-from hybrid.kernels.mesh.wave_lengths import QUIET, TAU, WAVES, follow_waves, spread_of_velocity
+from hybrid.kernels.mesh.cell_lengths import FADE, arc_less_chord, foresee_edges, plan_cells, relax_arcs
 from hybrid.kernels.mesh.zone_criteria import (
     CLAMP,
     CONTACT,
@@ -44,18 +46,22 @@ from hybrid.kernels.mesh.zone_criteria import (
     TORSION,
     TWISTED,
     NodeKinds,
+    advance,
     blank_kinds,
     find_curvature,
     find_turns,
+    freed,
     largest_ratio,
+    length_defect,
     raise_ratio,
     raise_ratios,
+    shares,
+    soften,
     twist_of_rods,
 )
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import WORKS, Clock, Counts
-from hybrid.kernels.state.obstacle_rows import STRAND
-from hybrid.kernels.state.report import OBSTACLES
+from hybrid.kernels.state.report import OBSTACLES, STRAND
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 
 # How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
@@ -416,7 +422,7 @@ def watch_waves(line, state, zones, dt):
     z.fastest = max(z.fastest * math.exp(-dt / (FADE * z.pace)), spread_of_velocity(state.v))
     fast = max(z.fastest, QUIET * z.tolerance / z.pace)
     error = WAVES * z.share * fast / (z.fineness * z.fineness)
-    follow_waves(line, state, zones, error, dt / (TAU * z.pace), z.fineness)
+    note_waves(line, state, zones, error, dt / (TAU * z.pace), z.fineness)
 
 
 @inner
@@ -449,7 +455,7 @@ def evaluate_criteria(table):
 
 
 @kernel
-def take_arcs(table):
+def read_arcs(table):
     """True lengths that make chords of the state `new` of a job as long as arcs."""
     job = read(table)
     for c in range(job.line.h.shape[0]):
@@ -474,7 +480,7 @@ def plan_next(table):
 
 
 @kernel
-def follow_zones(table):
+def advance_zones(table):
     """What zones do in the present phase of a run, before a try, after it, after a step; 1: Python must look at it."""
     job = read(table)
     line, ends, zones, clock, count = job.line, job.ends, job.zones, job.clock, job.counts
@@ -493,7 +499,7 @@ def follow_zones(table):
         zones.largest[k] *= math.exp(-clock.last_dt / zones.clock.memory)
     job.work[0, b.ZONES] += book(line, ends, before, state, clock.last_dt, zones)
     if zones.clock.share > 0.0:
-        follow_arcs(line, state, zones)
+        relax_arcs(line, state, zones)
         watch_waves(line, state, zones, clock.last_dt)
         zones.counts.cells_due = other_cells(line, job.sea, state, zones, clock.last_dt)
     ramping = zones.counts.going or zones.counts.coming

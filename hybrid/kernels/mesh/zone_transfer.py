@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, spin_about, sub, transport
-from hybrid.kernels.laws.cell import chord
-from hybrid.kernels.laws.element import turns_freely
+from hybrid.kernels.laws.element import chord, turns_freely
 from hybrid.kernels.laws.soil import remember_between
 from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
 from hybrid.kernels.laws.vortices import PHASE

@@ -32,10 +32,9 @@ from hybrid.kernels.algebra.rotations import (
     sub,
     vec_mat,
 )
-from hybrid.kernels.laws.cell import chord, turning
-from hybrid.kernels.laws.element import frames_at, relative_rotation
+from hybrid.kernels.laws.element import chord, frames_at, relative_rotation, turning
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.mesh.fill_line import FIRST, PER_LENGTH
+from hybrid.kernels.mesh.remesh import FIRST, PER_LENGTH
 from hybrid.kernels.reel.paid_length import cell, flows, growing, lack_rate, node, shift_layers
 from hybrid.kernels.reel.reel import FLOW, LENGTH_OF, STRAIN_OF, TURN_FLOW
 from hybrid.kernels.state.report import FORCE_A, MOMENT_A, NET_A, STIFFNESS_DAMPING_POWER

@@ -15,8 +15,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_changes import begin_anew, clear
-from hybrid.kernels.mesh.fill_line import copy_cell, copy_node, move_line
-from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RemeshPlaces
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RemeshPlaces, copy_cell, copy_node, move_line
 from hybrid.kernels.reel.paid_length import cell, node, prepare
 from hybrid.kernels.reel.payout_nodes import CarryJob, blank_carry_job, move_row, place_reel
 from hybrid.kernels.reel.reel import Reel, blank_reel
@@ -110,15 +109,15 @@ def fold(job, n, forward):
     books, columns = job.before, job.bounds.shape[2]
     at = 0 if forward else columns - job.before.extremes.shape[2]
     for i in range(n + 1):
-        take_in(books.extremes, job.bounds, i, at)
+        join_column(books.extremes, job.bounds, i, at)
         at += 1
         if books.right[i] != i:
-            take_in(books.extremes, job.bounds, books.right[i], at)
+            join_column(books.extremes, job.bounds, books.right[i], at)
             at += 1
 
 
 @kernel
-def take_in(extremes, bounds, column, at):
+def join_column(extremes, bounds, column, at):
     """Extremes of one column into those at a place."""
     for row in range(bounds.shape[1]):
         x, y = extremes[0, row, column], extremes[1, row, column]

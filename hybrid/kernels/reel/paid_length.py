@@ -1,4 +1,6 @@
-"""How long a line that is paid out is, and what its length makes of the cells that it changes (docs/theory.md, 19).
+"""How long a line that is paid out is, and what its length makes.
+
+How long a line that is paid out is, and what its length makes of the cells that it changes (docs/theory.md, 19).
 
 symbol  meaning                                                    unit
 L       unstretched length that is out                             m
@@ -6,25 +8,77 @@ c       its rate, positive where line is paid out                  m/s
 p       place of the last material node                            m
 
 Places, nodes and cells count from the far end towards the fairlead; `node` and `cell` give their numbers in the line.
+
+The forces that balance the nodes around one that has just entered a line at its winch, or left it.
+
+The discrete line is in balance on cells of unequal lengths with places that lie on no smooth curve: where the lengths
+of neighbours jump, so do second differences.  A node that is put on the curve through them, or left out, unbalances its
+neighbours, which would send waves of bending along the line.  The forces across the line that are missing are put on the
+nodes and taken off slowly (paid_length.eased), as the new cells get their lengths (docs/theory.md, 19).
+
+Layers that slip of a line that is paid out: how far they have slipped goes with the material (docs/theory.md, 19).
+
+    symbol   meaning                                                                             unit
+    p        curvature to which a layer has slipped, on average over a volume (State.layers)     1/m
+    volume   the material of an element, from the middle of the cell before it to that of the cell behind it
+
+Volumes of nodes that ride, and the end of that of the last material node, move through the material.  p of one is the
+mean over it of what the volumes of before had: constant there plus a limited slope, so that nothing is lost however far
+they move.  Where a node enters or leaves they are divided otherwise.  Line comes off the reel straight, with p = 0, and
+slips in the half cell at a clamp as that bends it; at a pin, over its half cell, p = 0.  What goes on the reel is
+forgotten.  Nodes, cells and volumes count from the far end.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from hybrid.kernels.algebra.rotations import add, dot, frame, get3, get9, scale, sub
 from hybrid.kernels.laws.axial_law import has_law
-from hybrid.kernels.laws.bending_law import HALF_A, HALF_B, LAST_A, LAST_B
-from hybrid.kernels.laws.bending_slip import EACH, FROM, KEPT, give_of_spring, layered
-from hybrid.kernels.laws.element import put_spring
+from hybrid.kernels.laws.bending_law import (
+    EACH,
+    FROM,
+    HALF_A,
+    HALF_B,
+    KEPT,
+    LAST_A,
+    LAST_B,
+    MOMENT,
+    MOST,
+    STIFF,
+    STIFFENING,
+    STIFFNESS,
+    bending_at,
+    beside_spring,
+    give_of_spring,
+    layered,
+    pull_at,
+    slips,
+)
+from hybrid.kernels.laws.element import (
+    Chord,
+    Rates,
+    chord,
+    frames_at,
+    moment_force,
+    put_spring,
+    rotary_force,
+    strain_of_element,
+    turning,
+)
+from hybrid.kernels.laws.node_forces import Z9, node_loads
 from hybrid.kernels.laws.tension_torque import couples
 from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B
-from hybrid.kernels.machine.compile import called, inner
-from hybrid.kernels.mesh.fill_line import B_1, COLUMNS, fill_cell, fill_element, fill_node
+from hybrid.kernels.machine.compile import called, inner, kernel
+from hybrid.kernels.mesh.remesh import B_1, COLUMNS, fill_cell, fill_element, fill_node
 from hybrid.kernels.reel.reel import (
     LENGTH_OF,
     STRAIN_OF,
 )
-from hybrid.kernels.state.report import BENDING_LAW, VORTICES
+from hybrid.kernels.state.report import BENDING_LAW, ROTARY, VORTICES
+from hybrid.kernels.watch.extremes import moment_at
 
 
 @inner
@@ -115,7 +169,7 @@ def fill_table(line, i, half):
 
 @inner
 def fill_between(line, reel, i, a, ha, b, hb):
-    """Node i between cells of rows a and b of `reel.made`; lengths: as of kernels.mesh.fill_line.fill_node."""
+    """Node i between cells of rows a and b of `reel.made`; lengths: as of kernels.mesh.remesh.fill_node."""
     fill_node(line, i, reel.made, a, ha, b, hb)
     if line.element[i]:
         fill_element(line, i, reel.made, a, ha, b, hb, line.kb[i, 2] == 0.0)
@@ -192,7 +246,7 @@ def find_length(reel, t):
 
 @inner
 def flows(line):
-    """Whether layers slip of a line that is paid out (kernels.reel.payout_layers)."""
+    """Whether layers slip of a line that is paid out (kernels.reel.paid_length)."""
     return line.slip_flow.shape[0] > 0
 
 
@@ -211,7 +265,7 @@ def shift_layers(line, flow, i, sign):
 
 
 @inner
-def take_flow_off(line, reel):
+def remove_flow(line, reel):
     """The line without it, to the last bit."""
     flow = reel.flow
     for i in range(line.h.shape[0]):
@@ -225,11 +279,11 @@ def take_flow_off(line, reel):
 
 
 @inner
-def take_riding_off(line, reel):
+def remove_riding(line, reel):
     """The forces on the line without those by which nodes that ride have more; the line without the flow of damping."""
     if reel.stage.riding_on > 0.0:
         if reel.flow.shape[0] > 0:
-            take_flow_off(line, reel)
+            remove_flow(line, reel)
         first = growing(line, reel) + 1
         for k in range(reel.layer.shape[0]):
             i = node(line, reel, first + k)
@@ -260,7 +314,7 @@ def put_balance_on(line, reel, t):
 
 
 @inner
-def take_balance_off(line, reel):
+def remove_balance(line, reel):
     """The forces on the line without them, to the last bit; those on nodes that ride are off."""
     if reel.stage.balance_on > 0.0:
         for i in range(line.h.shape[0] + 1):
@@ -272,9 +326,275 @@ def take_balance_off(line, reel):
 @inner
 def prepare(line, reel, t):
     """The line with the length of now at t."""
-    take_riding_off(line, reel)
-    take_balance_off(line, reel)
+    remove_riding(line, reel)
+    remove_balance(line, reel)
     fill_cells(line, reel)
     for k in range(growing(line, reel), line.h.shape[0]):
         line.h[cell(line, reel, k)] = reel.true[k]
     set_lengths(line, reel, t)
+
+
+# Nodes before the cell that grows, and behind it, whose elements and cells are others than before; one to spare.
+AROUND = 3
+
+
+@called
+def moment_of(line, ends, state, j):
+    """Moment at node j: of its element, or what acts on an end."""
+    n = line.h.shape[0]
+    if 0 < j < n:
+        return moment_at(line, state, j)
+    k = 0 if j == 0 else 1
+    if not line.element[j]:
+        return scale(2.0 * k - 1.0, get3(ends.moment, k))
+    c = 0 if j == 0 else n - 1
+    d, _, _ = chord(get3(state.e, c))
+    held, beside = get9(ends.frame, k), frame(get3(state.a1, c), d)
+    before, after = (held, beside) if j == 0 else (beside, held)
+    M, _ = bending_at(line, j, before, after, get3(line.kb, j), get3(line.k0, j))
+    return M
+
+
+@called
+def force_in(line, ends, state, c):
+    """Force in cell c."""
+    d, _, il = chord(get3(state.e, c))
+    f = scale(state.T[c], d)
+    if line.element[c] or line.element[c + 1]:
+        Q = sub(moment_of(line, ends, state, c + 1), moment_of(line, ends, state, c))
+        if line.bits & ROTARY:
+            e1 = sub(get3(state.v, c + 1), get3(state.v, c))
+            e2 = sub(get3(state.vd, c + 1), get3(state.vd, c))
+            d1, D1 = turning(d, il, e1, 0.0)
+            Q = sub(Q, scale(line.polar[c] * state.w[c], d1))
+            more, _ = rotary_force(d, il, e1, e2, d1, D1, line.rotary[c], 0.0, 0.0)
+            f = add(f, more)
+        V, _ = moment_force(d, il, Q, Z9)
+        f = add(f, V)
+    return f
+
+
+@inner
+def find_balance(line, sea, ends, state, reel):
+    """The forces that balance the nodes around the cell that grows; those on nodes that ride are on."""
+    n, g = line.h.shape[0], growing(line, reel)
+    for i in range(n + 1):
+        for j in range(3):
+            reel.balance[i, j], reel.plain[i, j] = 0.0, 0.0
+    for k in range(max(g - AROUND, 1), min(g + AROUND, n - 1) + 1):
+        i = node(line, reel, k)
+        da, la, ia = chord(get3(state.e, i - 1))
+        db, lb, ib = chord(get3(state.e, i))
+        before, after = Chord(da, la, ia), Chord(db, lb, ib)
+        F, _, _, _ = node_loads(line, sea, i, state.r, reel.plain, state, before, after, Rates(0.0, 0.0), reel.report)
+        F = add(F, sub(force_in(line, ends, state, i), force_in(line, ends, state, i - 1)))
+        both = add(da, db)
+        F = sub(F, scale(dot(F, both) / max(dot(both, both), 1e-300), both))  # tensions balance the rest
+        for j in range(3):
+            reel.balance[i, j] = -F[j]
+
+
+# Columns of Reel.volumes: where a volume begins, m from the far end; p of all layers, then its slopes, 1/m2.
+BEGINS, MEAN = 0, 1
+# Volumes before the cell that grows whose p counts: that of the last but two nodes for a slope.
+BEFORE = 2
+
+
+@inner
+def begins_at(line, reel, k):
+    """Where volume k begins now; that behind the last node is on the reel."""
+    n = line.h.shape[0]
+    return place_of(line, reel, n) if k > n else 0.5 * (place_of(line, reel, k - 1) + place_of(line, reel, k))
+
+
+@inner
+def bend_of(line, ends, state, i):
+    """Bend, rad, of the element at node i of the line, in two components; beside an angular spring of the half cell."""
+    Ra, Rb = frames_at(line, ends, state, i)
+    k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+    x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
+    return beside_spring(line, i, x, y) if give_of_spring(line, i) > 0.0 else (x, y)
+
+
+@inner
+def stick(line, state, i):
+    """Let the layers at node i bear what they have in a state, and not slip."""
+    law, now, T = line.slip_law, line.slip_now, pull_at(state, i)
+    for j in range(0, law.shape[1], EACH):
+        if not layered(line, i, j):
+            break
+        for m in range(KEPT):
+            now[i, j + FROM + m] = state.layers[i, j // EACH * KEPT + m]
+        now[i, j + MOST] = math.inf if law[i, j + MOMENT] >= 0.0 else law[i, j + MOMENT]
+        now[i, j + STIFF] = law[i, j + STIFFNESS] + law[i, j + STIFFENING] * T
+
+
+# --- how it flows -----------------------------------------------------------------------------------
+
+
+@inner
+def limited(a, b, c, d):
+    """The slope between two, (a, b) and (c, d), the same about any axis; none where they go against each other."""
+    one, other = a * a + b * b, c * c + d * d
+    if not a * c + b * d > 0.0:
+        return 0.0, 0.0
+    return (a * other + c * one) / (one + other), (b * other + d * one) / (one + other)
+
+
+@called
+def find_volumes(line, state, reel, back):
+    """Where the volumes near the fairlead begin of a line that is shorter by `back`, m, and their p, into reel.volumes."""
+    n, g, volumes, columns = line.h.shape[0], growing(line, reel), reel.volumes, state.layers.shape[1]
+    first = max(g - BEFORE, 1)
+    held = line.element[node(line, reel, n)] != 0
+    for k in range(first, n + 2):
+        volumes[k, BEGINS] = begins_at(line, reel, k)
+        if k > g:
+            volumes[k, BEGINS] -= back if k > g + 1 else 0.5 * back
+        for j in range(columns):
+            volumes[k, MEAN + j] = 0.0
+            volumes[k, MEAN + columns + j] = 0.0
+            if k < n or (k == n and held):
+                volumes[k, MEAN + j] = state.layers[node(line, reel, k), j]
+    last = n if held else n - 1
+    end = volumes[n + 1, BEGINS]
+    for k in range(first + 1, last + 1):
+        middle = 0.5 * (volumes[k, BEGINS] + volumes[k + 1, BEGINS])
+        before = middle - 0.5 * (volumes[k - 1, BEGINS] + volumes[k, BEGINS])
+        after = end - middle if k == last else 0.5 * (volumes[k + 1, BEGINS] + volumes[k + 2, BEGINS]) - middle
+        for j in range(MEAN, MEAN + columns, KEPT):
+            a, b = volumes[k, j] - volumes[k - 1, j], volumes[k, j + 1] - volumes[k - 1, j + 1]
+            a, b = a / before, b / before
+            c, d = a, b
+            if k < last or not held or back > 0.0:  # else what goes on the reel does not count
+                other = n + 1 if k == last and held else k + 1
+                c, d = (volumes[other, j] - volumes[k, j]) / after, (volumes[other, j + 1] - volumes[k, j + 1]) / after
+            volumes[k, columns + j], volumes[k, columns + j + 1] = limited(a, b, c, d)
+
+
+@called
+def mean_between(reel, begin, end, first, j):
+    """The mean of column j of p between two places, m, that lie in the volumes from `first` on."""
+    volumes, last = reel.volumes, reel.volumes.shape[0] - 1
+    columns, found = (volumes.shape[1] - MEAN) // 2, 0.0
+    for k in range(first, last + 1):
+        a, z = max(volumes[k, BEGINS], begin), end
+        middle = volumes[k, BEGINS]
+        if k < last:
+            z, middle = min(volumes[k + 1, BEGINS], end), 0.5 * (volumes[k, BEGINS] + volumes[k + 1, BEGINS])
+        if z > a:
+            slope = volumes[k, MEAN + columns + j]
+            found += (z - a) * (volumes[k, MEAN + j] + (0.5 * (a + z) - middle) * slope)
+    return found / (end - begin)
+
+
+@kernel
+def let_layers_flow(line, before, reel):
+    """By how much p of volumes is another at the end of a try because material flows through them, into line.slip_flow.
+
+    before: the state at the start of the try.
+    """
+    n, g, more, columns = line.h.shape[0], growing(line, reel), length_that_came(reel), line.slip_flow.shape[1]
+    if more != 0.0:
+        find_volumes(line, before, reel, more)
+    for k in range(g, n + 1):
+        i = node(line, reel, k)
+        for j in range(columns):
+            line.slip_flow[i, j] = 0.0
+            if more != 0.0 and line.element[i]:
+                begin, end = begins_at(line, reel, k), begins_at(line, reel, k + 1)
+                p = mean_between(reel, begin, end, max(g - BEFORE, 1), j)
+                line.slip_flow[i, j] = p - before.layers[i, j]
+
+
+@kernel
+def stop_flow(line, reel):
+    """Between steps nothing flows."""
+    for k in range(growing(line, reel), line.h.shape[0] + 1):
+        for j in range(line.slip_flow.shape[1]):
+            line.slip_flow[node(line, reel, k), j] = 0.0
+
+
+@kernel
+def carry_layers(line, target, state, out, reel, new):
+    """p on the volumes of a line (target) that a node has entered or left, near the fairlead; its layers stick.
+
+    state, reel: of the line before.
+    """
+    g, m, columns = growing(line, reel), target.h.shape[0], state.layers.shape[1]
+    first = max(g - BEFORE, 1)
+    find_volumes(line, state, reel, 0.0)
+    for k in range(first + 1, m + 1):
+        i = node(target, new, k)
+        if target.element[i]:
+            begin, end = begins_at(target, new, k), begins_at(target, new, k + 1)
+            for j in range(columns):
+                out.layers[i, j] = mean_between(reel, begin, end, first, j)
+    for i in range(m + 1):
+        stick(target, out, i)
+
+
+# --- energy -----------------------------------------------------------------------------------------
+
+
+@called
+def remember_bend(line, ends, state, reel):
+    """The bend at a clamp that is the fairlead, for the books of the next step."""
+    i = node(line, reel, line.h.shape[0])
+    if line.element[i] and slips(line, i):
+        stick(line, state, i)
+        reel.bent[0], reel.bent[1] = bend_of(line, ends, state, i)
+
+
+@inner
+def length_of(reel, k):
+    """Length, m, of volume k before the step."""
+    return reel.volumes[k + 1, BEGINS] - reel.volumes[k, BEGINS]
+
+
+@inner
+def squared(x, y, h, p, q):
+    """Length times the square of what a layer is bent by, 1/m, that has slipped to p, q, and h by x, y."""
+    return h * ((x / h - p) ** 2 + (y / h - q) ** 2)
+
+
+@inner
+def bend_before(line, ends, old, reel, k):
+    """Bend, rad, of the element at node k before a step, with the strain without stress of then."""
+    i = node(line, reel, k)
+    if k == line.h.shape[0]:
+        return reel.bent[0], reel.bent[1]
+    x, y = bend_of(line, ends, old, i)
+    return x + line.k0[i, 0] - reel.before[i, 6], y + line.k0[i, 1] - reel.before[i, 7]
+
+
+@kernel
+def layers_that_came(line, ends, old, new, reel):
+    """Energy, J, of layers that came in with material through an accepted step.
+
+    As the stiffness of elements (kernels.reel.payout_work): what lengths and p that flow change of it at the bend
+    before, and at that behind the step, on average.
+    """
+    n, g, law, came = line.h.shape[0], growing(line, reel), line.slip_law, 0.0
+    if length_that_came(reel) == 0.0:
+        return 0.0
+    for k in range(g, n + 1):
+        i = node(line, reel, k)
+        if not (line.element[i] and slips(line, i)):
+            continue
+        h, was = begins_at(line, reel, k + 1) - begins_at(line, reel, k), length_of(reel, k)
+        x, y = bend_before(line, ends, old, reel, k)
+        u, v = bend_of(line, ends, new, i)
+        dx, dy, T = line.k0[i, 0] - reel.before[i, 6], line.k0[i, 1] - reel.before[i, 7], pull_at(old, i)
+        for j in range(0, law.shape[1], EACH):
+            if not layered(line, i, j):
+                break
+            if law[i, j + MOMENT] < 0.0:
+                continue
+            at, K = j // EACH * KEPT, law[i, j + STIFFNESS] + law[i, j + STIFFENING] * T
+            p, q, f, w = old.layers[i, at], old.layers[i, at + 1], line.slip_flow[i, at], line.slip_flow[i, at + 1]
+            more = squared(x - dx, y - dy, h, p + f, q + w) - squared(x, y, was, p, q)
+            p, q = new.layers[i, at], new.layers[i, at + 1]
+            more += squared(u, v, h, p, q) - squared(u + dx, v + dy, was, p - f, q - w)
+            came += 0.25 * K * more
+    return came

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
-from hybrid.kernels.laws.cell import Chord, Rates, chord
+from hybrid.kernels.laws.element import Chord, Rates, chord
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.march.assembly import JOINED
@@ -32,25 +32,31 @@ from hybrid.kernels.reel.damping import (
 from hybrid.kernels.reel.paid_length import (
     cell,
     eased,
+    find_balance,
     find_length,
     flows,
     growing,
+    layers_that_came,
     length_at,
+    let_layers_flow,
     node,
     prepare,
     put_balance_on,
-    take_balance_off,
-    take_riding_off,
-)
-from hybrid.kernels.reel.payout_balance import find_balance
-from hybrid.kernels.reel.payout_contact import let_material_rub, rubs
-from hybrid.kernels.reel.payout_layers import (
-    layers_that_came,
-    let_layers_flow,
     remember_bend,
+    remove_balance,
+    remove_riding,
     stop_flow,
 )
-from hybrid.kernels.reel.payout_work import book, book_contact, end_of, leave_to_reel, remember, work_of_balance
+from hybrid.kernels.reel.payout_work import (
+    book,
+    book_contact,
+    end_of,
+    leave_to_reel,
+    let_material_rub,
+    remember,
+    rubs,
+    work_of_balance,
+)
 from hybrid.kernels.reel.reel import (
     FEWEST_STEPS,
     MOVES,
@@ -281,8 +287,8 @@ def pay_out(table):
         return 0
     if phase == b.JUDGE:
         tried = job.old if count.parity else job.new
-        take_riding_off(line, reel)
-        take_balance_off(line, reel)
+        remove_riding(line, reel)
+        remove_balance(line, reel)
         pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report, clock.try_end)
         if reel.flow.shape[0] > 0:
             numbers.flux += power_of_flow(line, job.ends, tried, reel)
@@ -341,7 +347,7 @@ def ride_and_wind(job, waits):
         return 0
     if reel.flow.shape[0] > 0:
         correct_damping_power(line, job.ends, state, reel, job.report, True)
-    take_riding_off(line, reel)
+    remove_riding(line, reel)
     if t <= winch.begin or not winch.tension > 0.0:
         return 0
     at, n, g = last_change(line), line.h.shape[0], growing(line, reel)
@@ -388,7 +394,7 @@ def iterate(table):
 def iterate_with_others(table):
     """The same of a line that one Newton solves with others.
 
-    The length is corrected with all of these (kernels.junctions.joined_winches), and then changes.
+    The length is corrected with all of these (kernels.junctions.sheaves_and_winches), and then changes.
     """
     return ride_and_wind(read(table), True)
 
@@ -439,11 +445,11 @@ def put_forces_on(table):
 
 
 @kernel
-def take_forces_off(table):
+def remove_forces(table):
     """The line without them."""
     job = read(table)
-    take_riding_off(job.line, job.reel)
-    take_balance_off(job.line, job.reel)
+    remove_riding(job.line, job.reel)
+    remove_balance(job.line, job.reel)
 
 
 @inner
@@ -461,7 +467,7 @@ def stand(job):
             correct_damping_power(job.line, job.ends, state, job.reel, job.report, was_on)
         if damped and not was_on:
             correct_end(job.line, job.ends, state, job.reel, job.report)
-        take_riding_off(job.line, job.reel)
+        remove_riding(job.line, job.reel)
         job.reel.stage.unbalanced, job.reel.stage.flow_known = 0.0, 0.0
     pull = correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report, t)
     if damped:

@@ -19,11 +19,11 @@ from hybrid.kernels.laws.soil import remember_between
 from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.mesh.fill_line import COMPLIANCE
+from hybrid.kernels.mesh.remesh import COMPLIANCE
 from hybrid.kernels.reel.damping import strain_at
 from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node, place_of
 from hybrid.kernels.reel.payout import slope_at, velocity_at
-from hybrid.kernels.reel.payout_contact import put_travels
+from hybrid.kernels.reel.payout_work import put_travels
 from hybrid.kernels.reel.reel import (
     ENTERS,
     FEWEST_STEPS,
@@ -35,7 +35,7 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
-from hybrid.kernels.step.generalized_alpha import lead
+from hybrid.kernels.step.step_control import lead
 
 
 class CarryJob(NamedTuple):

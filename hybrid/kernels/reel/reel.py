@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.machine.named_numbers import NamedNumbers
-from hybrid.kernels.machine.references import reader
-from hybrid.kernels.mesh.fill_line import COLUMNS
+from hybrid.kernels.machine.references import NamedNumbers, reader
+from hybrid.kernels.mesh.remesh import COLUMNS
 from hybrid.kernels.reel.winch import Winch
 from hybrid.kernels.state.books import WORKS, Clock, Counts
 from hybrid.kernels.state.report import REPORT_SIZE
@@ -57,7 +56,7 @@ class ReelStage(NamedNumbers):
     balance_on: float
     unbalanced: float
     flow_known: float
-    # Of a winch that holds a tension, of a line with a joined end (kernels.junctions.joined_winches): what is asked of it;
+    # Of a winch that holds a tension, of a line with a joined end (kernels.junctions.sheaves_and_winches): what is asked of it;
     # the block row of the cell that grows, and what its length puts there per m; the block row with the tension before the
     # fairlead; N out of balance at the rotor, and how that grows with the length, N/m, by itself and with the answer of all
     # lines, points and bodies.
@@ -86,7 +85,7 @@ class Reel(NamedTuple):
 
     numbers: ReelNumbers
     law: Floats  # (K, 8) s, from which on a row holds; coefficients of L in the time since then, highest power first
-    pieces: Floats  # (P, 1 + COLUMNS) m, where a piece of the material begins; its row (kernels.mesh.fill_line)
+    pieces: Floats  # (P, 1 + COLUMNS) m, where a piece of the material begins; its row (kernels.mesh.remesh)
     rest: Floats  # (1, COLUMNS) of the cell before the last material node
     rest_length: Floats  # (1,) m, its length
     true: Floats  # (N,) m, lengths of cells
@@ -115,7 +114,7 @@ class Reel(NamedTuple):
     flow: Floats
     columns: Floats  # (3, N+1, 5) that such a winch at the start, or at a clamp, works in; else empty
     volumes: (
-        Floats  # (N+2, 1 + 4 L) of a line with L layers that slip (kernels.reel.payout_layers), else empty: of elements
+        Floats  # (N+2, 1 + 4 L) of a line with L layers that slip (kernels.reel.paid_length), else empty: of elements
     )
     bent: Floats  # (2,) rad, bend at a clamp of such a line before the last step, without its spring
 

@@ -13,23 +13,23 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.block_elimination import ROW, SPAN, substitute
-from hybrid.kernels.algebra.block_elimination_plane import (
+from hybrid.kernels.algebra.kept_factors import add_to_right, solve_backward, solve_forward
+from hybrid.kernels.algebra.plane import (
     COLUMNS,
     TRIPLE,
     add_to_right_planar,
+    row_in_plane,
     solve_backward_planar,
     solve_forward_planar,
     substitute_planar,
 )
-from hybrid.kernels.algebra.kept_factors import add_to_right, solve_backward, solve_forward
-from hybrid.kernels.algebra.plane import row_in_plane
 from hybrid.kernels.algebra.rotations import get3
 from hybrid.kernels.laws.axial_law import SHIFT, has_law
-from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import chord
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.machine.named_numbers import NamedNumbers
+from hybrid.kernels.machine.references import NamedNumbers
 from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
-from hybrid.kernels.step.generalized_alpha import radius_of_step, scheme
+from hybrid.kernels.step.step_control import radius_of_step, scheme
 
 
 class Winch(NamedNumbers):

@@ -12,14 +12,13 @@ import threading
 import numpy as np
 
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH
-from hybrid.kernels.algebra.block_elimination_plane import WIDE
+from hybrid.kernels.algebra.plane import WIDE
 from hybrid.kernels.laws.tension_torque import COUPLES
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
-from hybrid.kernels.state.obstacle_rows import FREE
-from hybrid.kernels.state.report import PLANAR, REMEMBERS, REPORT_SIZE
+from hybrid.kernels.state.report import FREE, PLANAR, REMEMBERS, REPORT_SIZE
 from hybrid.kernels.state.state import (
     Ends,
     Floats,
@@ -33,7 +32,6 @@ from hybrid.kernels.state.state import (
     remembers,
     slip_size,
 )
-from hybrid.kernels.step.job import blank_job, read
 from hybrid.kernels.step.newton import (
     ASSEMBLY,
     CORRECTION,
@@ -44,6 +42,8 @@ from hybrid.kernels.step.newton import (
     Calls,
     Limits,
     Task,
+    blank_job,
+    read,
     solve,
 )
 from hybrid.kernels.step.step import States
@@ -55,7 +55,7 @@ ONE_MARCH = Limits(1.0, 1.0, 1)
 
 @inner
 def solve_job(plane, space, job):
-    """Do the task of a job for one kind of line (kernels.march.configuration); of a run, the step that it tries.
+    """Do the task of a job for one kind of line (kernels.march.march); of a run, the step that it tries.
 
     Returns as kernels.step.newton.solve.
     """

@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, UNBENT, is_bent
 from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK, read_members
-from hybrid.kernels.junctions.lone_lines import is_grouped_otherwise, is_touched_alone
-from hybrid.kernels.junctions.network_job import read_system
+from hybrid.kernels.junctions.network_job import is_grouped_otherwise, is_touched_alone, read_system
 from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
-from hybrid.kernels.march.powers import pull
-from hybrid.kernels.run.network import error_ratio
-from hybrid.kernels.run.network_sampling import BODY_SAMPLE, is_due, keep_bodies, sample_now, sample_within
+from hybrid.kernels.march.energies import pull
+from hybrid.kernels.run.network import BODY_SAMPLE, error_ratio, is_due, keep_bodies, sample_now, sample_within
 from hybrid.kernels.state.books import (
     ASK_BEFORE,
     ASK_STEPS,
@@ -53,10 +51,22 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.accept import note_cuts, settle, watch_push
-from hybrid.kernels.step.job import call_follower, call_itself, call_solver, read
-from hybrid.kernels.step.newton import ADDRESS, CUT_SHORT, GAIN, OK, SLACK, STEP, TURNED_TOO_FAR, ask_contact
-from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, passes, take_past
+from hybrid.kernels.step.accept import note_cuts, renew_accelerations, watch_push
+from hybrid.kernels.step.newton import (
+    ADDRESS,
+    CUT_SHORT,
+    GAIN,
+    OK,
+    SLACK,
+    STEP,
+    TURNED_TOO_FAR,
+    ask_contact,
+    call_follower,
+    call_itself,
+    call_solver,
+    read,
+)
+from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, note_past, passes
 
 # Of `lines`: the line (-1: a body) where the last try was worst, and of the last try that was given up; whose end turned
 # too far in a step last; and which was slack in one.
@@ -109,20 +119,20 @@ class StepsJob(NamedTuple):
     reels: NDArray[np.int64]  # (W,) 1 where there is one
     beside: NDArray[np.int64]  # of a kernels.run.network_tangents.NetworkTangents
     solver: int = 0  # address of kernels.run.network.solve_system
-    leader: int = 0  # of kernels.junctions.lone_lines.lead_lone; 0: no line can come near what is free
+    leader: int = 0  # of kernels.junctions.network_job.lead_lone; 0: no line can come near what is free
     finder: int = 0  # and of find_near
     book: int = 0  # of book_system_step
     sampler: int = 0  # of sample_system
-    stirrer: int = 0  # of kernels.junctions.bodies.stir_members; 0: no body has members
+    stirrer: int = 0  # of kernels.junctions.bodies.update_members; 0: no body has members
     watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
-    follower: int = 0  # of kernels.mesh.zone_step.follow_zones; 0: no zones move, or Python follows them
+    follower: int = 0  # of kernels.mesh.zone_step.advance_zones; 0: no zones move, or Python follows them
     runner: int = 0  # of run_system, and of kernels.mesh.remesh.ask_cells and change_cells; 0: Python changes cells
     asker: int = 0
     changer: int = 0
     payer: int = 0  # of kernels.reel.payout.pay_out; 0: lines keep their lengths
     node_asker: int = 0  # of kernels.mesh.remesh likewise; 0: Python lets nodes enter and leave
     reeler: int = 0
-    tangents: int = 0  # of kernels.run.network_tangents.follow_system; 0: none are followed
+    tangents: int = 0  # of kernels.run.network_tangents.advance_joined; 0: none are followed
 
 
 def no_loads() -> tuple[Floats, Floats]:
@@ -188,7 +198,7 @@ def load_bodies(bodies, loads, history, t):
 
 
 @inner
-def stir_water(steps, system):
+def renew_water(steps, system):
     """The water around members of bodies at the end of the try, where they go on from the state of now."""
     clock = steps.clock
     for m in range(steps.members.shape[0] if steps.stirrer != 0 else 0):
@@ -286,7 +296,7 @@ def touches_free(steps, system):
 
 
 @inner
-def follow_lines(steps):
+def advance_lines(steps):
     """What zones of all lines do in the present phase (kernels.mesh.zone_step); 1: Python must look at them."""
     clock, due, allowed = steps.clock, 0, math.inf
     if steps.follower == 0:
@@ -318,7 +328,7 @@ def pay_lines(steps):
     if steps.payer == 0:
         return 0
     if steps.counts.phase == SOLVE:
-        take_past(steps.clock, steps.counts)
+        note_past(steps.clock, steps.counts)
     for k in range(steps.paid.shape[0]):
         steps.nodes_due[k] = call_follower(steps.payer, steps.paid[k])
         due |= steps.nodes_due[k]
@@ -429,7 +439,7 @@ def accept(steps, system):
         call_watch(steps.tangents, steps.beside)
     counts.rows += 1
     counts.wasted, counts.phase = 0, SAMPLE
-    if follow_lines(steps) != 0:
+    if advance_lines(steps) != 0:
         flags |= ZONES_DUE
     if pay_lines(steps) != 0:
         flags |= NODES_DUE
@@ -437,7 +447,7 @@ def accept(steps, system):
 
 
 @inner
-def settle_ended(steps):
+def renew_ended(steps):
     """After a step that was shortened: accelerations of lines that share no end with others, as of one line."""
     clock, counts = steps.clock, steps.counts
     if counts.repeats > 0:
@@ -448,7 +458,7 @@ def settle_ended(steps):
                 state = job.old
                 if counts.parity:
                     state = job.new
-                settle(job.line, state, clock.until - clock.begin)
+                renew_accelerations(job.line, state, clock.until - clock.begin)
 
 
 @inner
@@ -475,7 +485,7 @@ def between_steps(steps, table):
             return PAUSED
         counts.phase = TRY
         if counts.controlled or clock.now >= clock.until:
-            settle_ended(steps)
+            renew_ended(steps)
             counts.phase = BEGIN_STEP
     if counts.phase == BEGIN_STEP:
         if not clock.now < clock.stop:
@@ -527,11 +537,11 @@ def run_system(table):
             own = steps.odd
         system = read_system(own)
         if counts.phase == SOLVE:
-            follow_lines(steps)
+            advance_lines(steps)
             if not counts.asks & ASK_BEFORE:
                 move_lines(system, steps.clock.try_end)
                 load_bodies(system.bodies, steps.loads, steps.history, steps.clock.try_end)
-                stir_water(steps, system)
+                renew_water(steps, system)
             pay_lines(steps)
             try_step(steps, system)
             counts.phase = JUDGE
@@ -541,7 +551,7 @@ def run_system(table):
                 return REGROUP
             if counts.asks & ASK_TRIES:
                 return TRIED
-            if steps.follower != 0 and (counts.outcome != OK or follow_lines(steps) != 0):
+            if steps.follower != 0 and (counts.outcome != OK or advance_lines(steps) != 0):
                 return TRIED
         verdict = judge(steps, system)
         if verdict < 0:

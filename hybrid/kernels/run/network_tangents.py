@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, SPAN
-from hybrid.kernels.algebra.block_elimination_plane import solve_again_planar
 from hybrid.kernels.algebra.kept_factors import carry_block, solve_with
+from hybrid.kernels.algebra.plane import solve_again_planar
 from hybrid.kernels.algebra.rotations import (
     add,
     cross,
@@ -60,7 +60,7 @@ from hybrid.kernels.junctions.network_job import read_system, task_of
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.march.left_over import left_over_in_space
+from hybrid.kernels.march.march import left_over_in_space
 from hybrid.kernels.run.network_run import load_bodies
 from hybrid.kernels.state.books import (
     HEAD,
@@ -70,10 +70,13 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.report import NET_A, WAVES
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.generalized_alpha import scheme
 from hybrid.kernels.step.newton import with_radius
-from hybrid.kernels.watch.tangent_job import ALONE, SECOND_R, SECOND_T, STEPS, read_job, read_other
+from hybrid.kernels.step.step_control import scheme
 from hybrid.kernels.watch.tangents import (
+    ALONE,
+    SECOND_R,
+    SECOND_T,
+    STEPS,
     begin_other,
     carry_spins,
     correct_rates,
@@ -86,6 +89,8 @@ from hybrid.kernels.watch.tangents import (
     needs_two,
     note_left,
     put_other,
+    read_job,
+    read_other,
     stay_held,
 )
 
@@ -119,7 +124,7 @@ class OtherBodies(NamedTuple):
 
 
 class NetworkTangents(NamedTuple):
-    """Arguments of `follow_system`, `follow_in_plane` and `correct_beside`."""
+    """Arguments of `advance_joined`, `advance_in_plane` and `correct_beside`."""
 
     even: NDArray[np.int64]  # of a NetworkJob of the lines that are joined to what moves with them, as of StepsJob
     odd: NDArray[np.int64]
@@ -368,7 +373,7 @@ def answer(plane, space, system, net, p):
 
 
 @inner
-def settle(system):
+def hold_ends(system):
     """Ends go nowhere by themselves, and arms are those of bodies as they are."""
     points = system.net.shape[0]
     for j in range(system.joints.shape[0]):
@@ -482,7 +487,7 @@ def advance(plane, space, system, net, p, s):
 
 
 @inner
-def follow(plane, space, net):
+def advance_tangents(plane, space, net):
     """Tangents of all lines and bodies through the last step of their run."""
     own = net.even
     if net.counts.parity == 0:
@@ -492,7 +497,7 @@ def follow(plane, space, net):
     task = with_radius(task, task.rho)
     s = scheme(task.rho, task.before, task.rho_before, task.dt)
     if space is not None:
-        settle(system)
+        hold_ends(system)
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         keep_own(plane, space, job, s, old_of(job, job), new_of(job, job))
@@ -502,16 +507,16 @@ def follow(plane, space, net):
 
 
 @kernel
-def follow_system(table):
+def advance_joined(table):
     """The same of lines in space; table: of NetworkTangents.  Returns 0."""
-    return follow(None, 1, read_tangents(table))
+    return advance_tangents(None, 1, read_tangents(table))
 
 
 @kernel
-def follow_in_plane(table):
+def advance_in_plane(table):
     """The same of lines in one plane that are joined to nothing that moves with them.  Returns 0."""
     net = read_tangents(table)
-    return follow(read_job(net.lines[0]).line.plane, None, net)
+    return advance_tangents(read_job(net.lines[0]).line.plane, None, net)
 
 
 @kernel
@@ -524,7 +529,7 @@ def correct_beside(table):
     net = read_tangents(table)
     system, p, cv, ca = read_system(net.even), net.asked[0], net.by[0], net.by[1]
     if p < 0:
-        settle(system)
+        hold_ends(system)
         for l in range(net.lines.shape[0]):
             job = read_job(net.lines[l])
             left_over_in_space(job.line, job.sea, job.ends, job.even.r, job.even, cv, ca, job.own, job.left)

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.machine.named_numbers import NamedNumbers
-from hybrid.kernels.state.obstacle_rows import SEEN
-from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.machine.references import NamedNumbers
+from hybrid.kernels.state.report import REPORT_SIZE, SEEN
 from hybrid.kernels.state.state import Floats
 
 
@@ -185,13 +184,15 @@ class Books(NamedTuple):
     reached: Floats  # (Q, REACHED) lowest and highest values of all steps
     path: Floats  # (P, PATH_ROW) chords that clearances are to, m
     radii: Floats  # (S, 2) m, where the sections of the line end, and their outer radii
-    walls: Floats  # (S, WALL) of sections, in a line that has pipes (kernels.watch.pipes); empty: it has none
+    walls: (
+        Floats  # (S, WALL) of sections, in a line that has pipes (kernels.watch.named_quantities); empty: it has none
+    )
 
 
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
 # work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); turns (K, 3)
 # of zones that a torque passes through; of a line that touches itself, the force of that (N+1); of obstacles of which one
-# moves, SEEN of each (kernels.state.obstacle_rows); how far layers have slipped (N+1, 2 L); what nodes remember of soil (N+1, 6).
+# moves, SEEN of each (kernels.state.report); how far layers have slipped (N+1, 2 L); what nodes remember of soil (N+1, 6).
 SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
     1,
     5,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.machine.references import by_reference
-from hybrid.kernels.state.obstacle_rows import (
+from hybrid.kernels.state.report import (
     CARRIED,
     EACH,
     ENDED,
@@ -21,10 +21,11 @@ from hybrid.kernels.state.obstacle_rows import (
     NO_FACETS,
     OBSTACLE,
     OFFSET,
+    REMEMBERS,
+    REPORT_SIZE,
     SEEN,
     TURNED,
 )
-from hybrid.kernels.state.report import REMEMBERS, REPORT_SIZE
 
 # What a field of a line is: one for every node or cell, and how it follows from what the material has per length.
 #
@@ -37,7 +38,7 @@ HALF = 1  # h x/2, of half the cell
 ROD = 2  # h x where the cell is of a rod, else 0
 SHARED = 3  # of a node: h x/2 of the cells beside it, and what a body there has
 POINT = 4  # of a node: of the body there
-OWN = 5  # by a rule of its own (kernels.mesh.fill_line)
+OWN = 5  # by a rule of its own (kernels.mesh.remesh)
 
 
 class Field(NamedTuple):
@@ -91,7 +92,7 @@ WORKING = 5  # the column that says which cells remember their highest mean tens
 NO_TABLE: Floats = np.zeros((0, 3))
 # Of a line whose moments are multiples of curvature (kernels.laws.bending_law has the columns).
 NO_BEND_LAW: Floats = np.zeros((0, 7))
-# Of a line without layers that slip (kernels.laws.bending_slip has the columns).
+# Of a line without layers that slip (kernels.laws.bending_law has the columns).
 NO_SLIP: Floats = np.zeros((0, 4))
 NO_SLIP_FLOW: Floats = np.zeros((0, 2))
 NO_LAYERS: Floats = np.zeros((0, 0))
@@ -102,7 +103,7 @@ NO_SLOW: Floats = np.zeros(0)
 NO_PEAK: Floats = np.zeros(0)
 NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
 NO_OBSTACLES: Floats = np.zeros((0, OBSTACLE))
-# Of a scene in which no obstacle moves (kernels.state.obstacle_rows has the columns).
+# Of a scene in which no obstacle moves (kernels.state.report has the columns).
 NO_CARRIED: Floats = np.zeros((0, CARRIED))
 NO_OBSTACLES_SEEN: Floats = np.zeros((0, 0, SEEN))
 NO_GRIP: Floats = np.zeros((0, 0))
@@ -167,7 +168,7 @@ class Line(NamedTuple):
     law: Annotated[Floats, cell(columns=14, optional=True)] = NO_LAW
     law_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: strain, tension (N), energy per length (J/m)
     law_at: NDArray[np.int64] = (
-        NO_ADDRESS  # (1,) address of kernels.laws.axial_law.follow_law; empty: there is no such cell
+        NO_ADDRESS  # (1,) address of kernels.laws.axial_law.linearise_law; empty: there is no such cell
     )
     # (N,) of sections in which tension makes a torque (kernels.laws.tension_torque): torque by tension, N m per N; twist of half
     # a cell by tension, rad/N; empty: there are none
@@ -178,13 +179,13 @@ class Line(NamedTuple):
     bend_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: curvature (1/m), moment (N m), energy per length
     # (N+1, 8) of nodes with vortices (kernels.laws.vortices); empty: there are none
     wake_law: Annotated[Floats, node(columns=8, optional=True)] = NO_WAKE_LAW
-    # (N+1, 4 L) of elements with up to L layers that slip (kernels.laws.bending_slip), and how far they have, written before
+    # (N+1, 4 L) of elements with up to L layers that slip (kernels.laws.bending_law), and how far they have, written before
     # every march; empty: there are none
     slip_law: Annotated[Floats, node(columns=4, optional=True)] = NO_SLIP
     slip_now: Annotated[Floats, node(columns=4, optional=True)] = NO_SLIP
-    slip_at: NDArray[np.int64] = NO_ADDRESS  # (1,) address of kernels.laws.bending_slip.follow_slip; empty: none
+    slip_at: NDArray[np.int64] = NO_ADDRESS  # (1,) address of kernels.laws.bending_law.update_slip; empty: none
     # (N+1, 2 L) 1/m, by how much State.layers is another in a step because material flows past nodes
-    # (kernels.reel.payout_layers); empty: the line is not paid out
+    # (kernels.reel.paid_length); empty: the line is not paid out
     slip_flow: Annotated[Floats, node(columns=2, optional=True)] = NO_SLIP_FLOW
     # (N+1,) m, diameter with which nodes lie in soil (kernels.laws.soil); empty: there is none
     bed_width: Annotated[Floats, node(optional=True)] = NO_PEAK
@@ -268,7 +269,7 @@ class Sea(NamedTuple):
     ramps: Floats  # (2,) s, over which the current and the waves grow from nothing; 0: there from the start
     normal: Floats  # (3,) unit normal of the seabed, upwards
     offset: float  # m, normal . x on the seabed
-    bed_x: Floats  # (K,) m, increasing: of a bed of depths on a grid (kernels.laws.bed); empty: the bed is a plane
+    bed_x: Floats  # (K,) m, increasing: of a bed of depths on a grid (kernels.laws.seabed); empty: the bed is a plane
     bed_y: Floats  # (M,) m, increasing
     bed_heights: Floats  # (K M, 4) z (m), its slopes along x and y, and the rate of these along the other, 1/m
     stiffness: float  # N/m per m
@@ -276,9 +277,7 @@ class Sea(NamedTuple):
     onset: float  # m, penetration over which contact sets in
     friction: Floats  # (2,) axial and lateral coefficient
     slip_length: float  # m, elastic travel before a touching cable slides
-    obstacles: (
-        Floats  # (M, OBSTACLE) obstacles (kernels.state.obstacle_rows), where they are now; empty: there are none
-    )
+    obstacles: Floats  # (M, OBSTACLE) obstacles (kernels.state.report), where they are now; empty: there are none
     flow: Floats  # (N+1, 7) velocity and acceleration of the waves at the nodes, and their elevation there
     lanes: Floats  # (10 + 2 W, LANES) what kernels.laws.water needs for LANES nodes at a time
     axis: Floats  # (N+1, 3) direction of the cable in the plane of the seabed
@@ -286,10 +285,10 @@ class Sea(NamedTuple):
     slid: Floats  # (N+1, 3) m, at its end
     bed: Floats  # (N+1, 3) N, force of the seabed and of obstacles on the nodes
     courses: Moves  # how obstacles move, a row each; empty: none does
-    carried: Floats  # (M, CARRIED) how far they have (kernels.laws.obstacle_motion); empty: none does
+    carried: Floats  # (M, CARRIED) how far they have (kernels.laws.obstacles); empty: none does
     grip: Floats  # (N+1, 6 M) as `State.grip`, at the start of the step; empty: no obstacle moves
     rolling: Floats  # (3 K, N+1, 5) room for answers to K sheaves that turn freely (kernels.laws.sheaves)
-    boxes: Floats = NO_BOXES  # (B, BOX_ROW) boxes over facets (kernels.state.obstacle_rows); empty: no obstacle has any
+    boxes: Floats = NO_BOXES  # (B, BOX_ROW) boxes over facets (kernels.state.report); empty: no obstacle has any
     facets: Floats = NO_FACETS  # (F, FACET) of surfaces of triangles, in axes of their obstacles
     soil: Floats = NO_SLOW  # of a bed that remembers (kernels.laws.soil); empty: it does not
 
@@ -389,7 +388,7 @@ def batch_of_one(
 
 
 def obstacles_now(sea: Sea, state: State) -> Floats:
-    """Where obstacles are that move, and what the line does to them: (M, SEEN) of kernels.state.obstacle_rows."""
+    """Where obstacles are that move, and what the line does to them: (M, SEEN) of kernels.state.report."""
     turned = sea.carried[:, TURNED : TURNED + 9]
     # the middle of what bodies carry
     offset = np.einsum("kij,kj->ki", turned.reshape(-1, 3, 3), sea.carried[:, OFFSET : OFFSET + 3])

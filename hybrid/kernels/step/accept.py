@@ -6,7 +6,7 @@ import math
 
 from hybrid.kernels.algebra.rotations import get3
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.march.powers import pull
+from hybrid.kernels.march.energies import pull
 from hybrid.kernels.march.zone_torque import POWER
 from hybrid.kernels.state.books import (
     BENT,
@@ -202,16 +202,16 @@ def watch_push(clock, report):
 
 
 @inner
-def settle(line, state, dt):
+def renew_accelerations(line, state, dt):
     """After a step of dt that was shortened: accelerations that would undo or multiply what a line has of speeds."""
     if line.bits & TOUCHES:
-        settle_impact(state, dt)
+        damp_impact(state, dt)
     if line.bits & SELF_FRICTION:
-        settle_spins(state, dt)
+        damp_spins(state, dt)
 
 
 @inner
-def settle_spins(state, dt):
+def damp_spins(state, dt):
     """After shortened steps: friction of the line on itself leaves spin accelerations that would multiply all spins."""
     fastest = 0.0
     for c in range(state.w.shape[0]):
@@ -222,7 +222,7 @@ def settle_spins(state, dt):
 
 
 @inner
-def settle_impact(state, dt):
+def damp_impact(state, dt):
     """After shortened steps: an impact on the seabed leaves accelerations that would undo all velocity at once."""
     fastest = 0.0
     for i in range(state.v.shape[0]):

@@ -1,9 +1,13 @@
-"""Newton's method for one step (in time, or one static solve): the only nonlinear loop of the package.
+"""Newton's method for one step, and what it works on.
+
+Newton's method for one step (in time, or one static solve): the only nonlinear loop of the package.
 
 Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
-tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.march.configuration).
+tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.march.march).
 
 `solve` is inlined in the one entry to all that needs the march (kernels.run.network_run): a second one would compile it once more.
+
+All that steps of a line need, by reference: what an entry of kernels.run.entry gets as its table.
 """
 
 from __future__ import annotations
@@ -15,18 +19,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.block_elimination import substitute
-from hybrid.kernels.algebra.block_elimination_plane import substitute_planar
-from hybrid.kernels.laws.bending_slip import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST
+from hybrid.kernels.algebra.plane import substitute_planar
+from hybrid.kernels.laws.bending_law import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST
 from hybrid.kernels.laws.sheaves import roll_on, turn_with
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.machine.references import caller, caller_of_six
+from hybrid.kernels.machine.references import caller, caller_of_six, reader
 from hybrid.kernels.march.assembly_plane import march_planar
-from hybrid.kernels.march.configuration import first_bad, measure, update
-from hybrid.kernels.march.march import march
+from hybrid.kernels.march.march import first_bad, march, measure, update
 from hybrid.kernels.march.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
+from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FRICTION, RESIDUAL, RESIDUAL_NODE, SELF_CONTACT_ENERGY
-from hybrid.kernels.step.generalized_alpha import Scheme, before_fixed, radius_of_step, scheme
+from hybrid.kernels.state.state import (
+    Ends,
+    Floats,
+    Line,
+    Moves,
+    Sea,
+    State,
+    Work,
+    blank_line,
+    blank_state,
+    no_ends,
+    no_moves,
+    no_sea,
+    no_work,
+)
 from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
+from hybrid.kernels.step.step_control import Scheme, before_fixed, radius_of_step, scheme
 
 # The same of a step of a line that may touch itself: longer ones feed the vibrations that contact leaves.
 LARGEST_CONTACT_TURN = 0.3
@@ -119,7 +138,7 @@ def pass_torque(space, line, ends, state, work, part, cv):
 
 
 @inner
-def follow_law(line, sea, old, new, work, dt, cv, ca):
+def linearise_law(line, sea, old, new, work, dt, cv, ca):
     """Linearise the law of length where tension is no multiple of strain (kernels.laws.axial_law); dt: s, of a step, else 0."""
     if line.law_at.shape[0] != 0:
         if not dt > 0.0 and not (cv == 0.0 and ca < AT_REST):
@@ -129,7 +148,7 @@ def follow_law(line, sea, old, new, work, dt, cv, ca):
 
 @inner
 def begin_slip(line, ends, old, new, work, dt, cv, ca):
-    """Before a march: how far layers have slipped that slip on each other (kernels.laws.bending_slip), if there are any."""
+    """Before a march: how far layers have slipped that slip on each other (kernels.laws.bending_law), if there are any."""
     if line.slip_at.shape[0] != 0:
         part = IN_MOTION if dt > 0.0 or cv != 0.0 or ca >= AT_REST else LOADED_FIRST
         call_slip(line.slip_at[0], line, ends, old, new, work, part)
@@ -243,7 +262,7 @@ def solve(plane, space, task, line, sea, ends, states, work, strains, calls):
         it += 1
         bad, good = -1, True
         pass_torque(space, line, ends, new, work, BEFORE_MARCH, cv)
-        follow_law(line, sea, old, new, work, task.dt, cv, ca)
+        linearise_law(line, sea, old, new, work, task.dt, cv, ca)
         begin_slip(line, ends, old, new, work, task.dt, cv, ca)
         if reel != 0:
             call_reel(reel, reel_table)
@@ -303,7 +322,7 @@ def solve(plane, space, task, line, sea, ends, states, work, strains, calls):
     if task.what == STEP:
         find_rates(space, line, sea, old, new, work.u, s)
     if task.what != ASSEMBLY or work.couple.shape[0] > 0:  # rates of twist are known now
-        follow_law(line, sea, old, new, work, task.dt, cv, ca)
+        linearise_law(line, sea, old, new, work, task.dt, cv, ca)
     if task.what == STEP or task.what == EQUILIBRIUM:
         end_slip(line, ends, old, new, work, BEHIND_STEP if task.what == STEP else BEHIND_REST)
     pass_torque(space, line, ends, new, work, AFTER_STEP, cv)
@@ -317,3 +336,48 @@ def solve(plane, space, task, line, sea, ends, states, work, strains, calls):
             elif cut_short:
                 outcome = CUT_SHORT
     return outcome, it, left, where
+
+
+class Job(NamedTuple):
+    """Arguments of the entry."""
+
+    task: Task
+    line: Line
+    sea: Sea
+    ends: Ends
+    moves: Moves
+    old: State  # of a run: two states in turn, the one of even parity first
+    new: State
+    was: Floats  # (N+1, 4) a push out of the plane before a step; empty where there is none; likewise
+    now: Floats  # (N+1, 4) and after it
+    work: Work
+    books: Books
+    itself_table: NDArray[
+        np.int64
+    ]  # of a kernels.contact.self_distance.ItselfJob, of a line that could come near itself
+    contact: NDArray[
+        np.int64
+    ]  # (3,) of kernels.contact.self_contact: address, 0: no contact; what is asked; whether it is near
+    contact_table: NDArray[np.int64]  # of a kernels.contact.self_contact.ContactJob
+    reel_table: NDArray[np.int64]  # of a kernels.reel.payout.ReelJob, of a line that is paid out
+    itself: int = 0  # address of kernels.contact.self_distance.watch_itself; UNBENT: until the line is bent; 0: never
+    solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
+    reel: int = 0  # address of kernels.reel.payout.pay_out, of a line of several stand_among; 0: its length stays
+    iterated: int = 0  # of a run: address of kernels.reel.payout.iterate; 0: iterations need nothing of it
+    quantities: int = 0  # address of kernels.watch.named_quantities.note_quantities; 0: none are asked for
+
+
+def blank_job() -> Job:
+    """A job of one cell with the types that every job has."""
+    state = blank_state(1)
+    limits, none = Limits(1.0, 1.0, 1), np.zeros((0, 4))
+    task = Task(0, limits=limits)
+    return Job(
+        task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books(),
+        np.zeros(0, np.int64), np.zeros(3, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64),
+    )  # fmt: skip
+
+
+read = reader(blank_job())
+call_solver, call_follower, call_itself = caller((0, 0, 0.0, 0)), caller(0), caller(0)
+call_quantities = caller(0)

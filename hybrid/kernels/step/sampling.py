@@ -25,12 +25,11 @@ from hybrid.kernels.algebra.rotations import (
     sub,
     vec_mat,
 )
-from hybrid.kernels.laws.cell import chord
-from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.laws.element import chord, relative_rotation
 from hybrid.kernels.laws.end_motion import sea_at, turn_by_vector
 from hybrid.kernels.laws.obstacle_grip import sample_obstacles
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.march.configuration import carry_director
+from hybrid.kernels.march.march import carry_director
 from hybrid.kernels.state.books import (
     HEAD,
     RATES,
@@ -44,8 +43,7 @@ from hybrid.kernels.state.books import (
     SAMPLE_WORK,
     WORKS,
 )
-from hybrid.kernels.state.obstacle_rows import SEEN
-from hybrid.kernels.state.report import ASSEMBLED, LENGTH_OUT, PAYOUT_RATE, PLANAR, REPORT_SIZE
+from hybrid.kernels.state.report import ASSEMBLED, LENGTH_OUT, PAYOUT_RATE, PLANAR, REPORT_SIZE, SEEN
 
 # Of the step: an output so near to its end is its end.
 SAME_TIME = 1e-9

@@ -6,26 +6,25 @@ import math
 from typing import NamedTuple
 
 from hybrid.kernels.algebra.block_elimination import ROW
-from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE
+from hybrid.kernels.algebra.plane import KEPT, TRIPLE
 from hybrid.kernels.algebra.rotations import dot, get3, spin_about, sub
-from hybrid.kernels.laws.bed import bed_under
-from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.obstacle_grip import book_obstacles, grip_obstacles, mean_force
-from hybrid.kernels.laws.obstacle_motion import carry_obstacles
-from hybrid.kernels.laws.obstacles import normal_at, passes, stored_in_contact
+from hybrid.kernels.laws.obstacles import carry_obstacles, normal_at, passes, stored_in_contact
 from hybrid.kernels.laws.out_of_plane import step_out_of_plane
+from hybrid.kernels.laws.seabed import bed_under
 from hybrid.kernels.laws.sheaves import find_rates_of_sheaves, predict_sheaves
-from hybrid.kernels.laws.soil import follow_soil, slide_on
+from hybrid.kernels.laws.soil import slide_on, update_soil
 from hybrid.kernels.laws.vortices import advance_wake
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.march.configuration import carry_director
+from hybrid.kernels.march.march import carry_director
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space
-from hybrid.kernels.state.obstacle_rows import EACH
 from hybrid.kernels.state.report import (
     BEND,
     BEND_NODE,
     CONTACT_WORK,
+    EACH,
     FRICTION,
     FRICTION_WORK,
     LOCAL_ERROR,
@@ -47,7 +46,7 @@ from hybrid.kernels.state.report import (
     WRONG_PIVOTS,
 )
 from hybrid.kernels.state.state import Floats, State
-from hybrid.kernels.step.generalized_alpha import weights
+from hybrid.kernels.step.step_control import weights
 
 # A step in which a chord turns (or is predicted to turn) by more than this, in rad, is repeated in parts; so is one in
 # which a cell spins by more against the next one.
@@ -204,7 +203,7 @@ def contact_work(line, sea, old, new, u, report):
             report[FRICTION_WORK] += dot(b, ui) - along
         new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
     if line.bits & REMEMBERS:
-        follow_soil(line, sea, new.r, new.soil)
+        update_soil(line, sea, new.r, new.soil)
         slide_on(line, sea, old, new, u)
     report[SEABED_ENERGY] = stored_in_contact(line, sea, new.r)
 

@@ -1,13 +1,114 @@
-"""Lengths of steps in a compiled run: equal parts up to a stop, or by the error of the steps before (step_law)."""
+"""Lengths of steps, and the weights of generalized-alpha for them.
+
+Weights of generalized-alpha for steps that change (docs/theory.md, 2).
+
+Lengths of steps in a compiled run: equal parts up to a stop, or by the error of the steps before (step_law).
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from hybrid.kernels.laws.end_motion import turn_between
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.step import step_law
-from hybrid.kernels.step.generalized_alpha import SAME, before_fixed
+
+# Least distance in time, in steps, between the moments that the algorithmic accelerations of a step and of the one
+# before stand for: the weights grow as its inverse.
+LEAST_SPAN = 0.5
+# A step shorter than the one before by more than this is weighted as if by this: where a load turns in it, what the
+# longer one would hand over has nothing to do with the shorter.
+STEEPEST = 2.0
+# By how much of rho_inf the radius grows again from step to step after one that changed its length.
+RECOVERY = 0.25
+# The radius of a step whose length differs a little from that of the one before is this at most.
+LARGEST_RADIUS = 0.8
+# Part of a step by which lengths of steps may differ that are the same but for round-off of the time.
+SAME = 1e-6
+# A fixed step after a shorter part of it than this begins as after a start.
+LEAST_PART = 0.5
+
+
+@inner
+def lead(rho):
+    """theta: by how many steps the moment that the algorithmic acceleration stands for is later than the step's end."""
+    return (2.0 * rho - 1.0) / (rho + 1.0) - rho / (rho + 1.0)
+
+
+@inner
+def radius_of_step(rho, before, rho_before, dt):
+    """Spectral radius at infinity of a step of dt after one of `before` with the radius rho_before; rho: on equal steps.
+
+    The more the length changes, the smaller it may be at most: what steps that change in turn would otherwise excite is
+    damped.  A step twice or half as long has 0, where the moments of both accelerations are far enough apart.
+    """
+    least = LEAST_SPAN - 1.0
+    if before > 0.0:
+        ratio = before / dt
+        least += lead(rho_before) * min(ratio, STEEPEST)
+        change = abs(math.log2(ratio))
+        rho = min(rho, rho_before + RECOVERY * rho)
+        if change > SAME:
+            rho = min(rho, LARGEST_RADIUS * max(0.0, 1.0 - change))
+    least = min(least, 0.0)
+    return rho if lead(rho) >= least else (1.0 + least) / (1.0 - least)
+
+
+@inner
+def before_fixed(dt, last, last_rho, rho):
+    """Length, s, and spectral radius of the step before one of dt, as the weights of fixed steps take them.
+
+    last, last_rho: those of the step before; 0 s: there is none.  rho: the radius of equal steps.  A start has the
+    weights of equal steps, and so has a step that follows parts of less than half its length: with what they hand over
+    it would feed vibrations that it does not resolve.  So has one of radius 0, as near contact, where forces turn
+    within a step and the step before says nothing of them.
+    """
+    if rho == 0.0 or last < LEAST_PART * dt * (1.0 - SAME):
+        return dt, rho
+    return (dt if abs(last - dt) <= SAME * dt else last), last_rho
+
+
+@inner
+def weights(rho, rho_before, ratio):
+    """am, af, ga, be of a step that is 1/ratio as long as the one before, and the constant of its local error.
+
+    At equal steps a stands for the acceleration theta dt later, and v is delta dt^2 a' off, both by the radius of the
+    step; the weights carry over those of the step before to those of this one (docs/theory.md, 2), so that tension does
+    not feel the change.  ratio 0: a and v are exact, as after a start.  The error of a step is then error dt^2 |a' - a|.
+    """
+    am = (2.0 * rho - 1.0) / (rho + 1.0)
+    af = rho / (rho + 1.0)
+    theta = am - af
+    theta_before = (2.0 * rho_before - 1.0) / (rho_before + 1.0) - rho_before / (rho_before + 1.0)
+    delta = (1.0 - 3.0 * theta) / 6.0 - 0.25 * (1.0 - theta) ** 2
+    ratio = min(ratio, STEEPEST)
+    early = theta_before * ratio
+    off = ((1.0 - 3.0 * theta_before) / 6.0 - 0.25 * (1.0 - theta_before) ** 2) * ratio * ratio
+    span = 1.0 + (theta - early)  # between the moments that a and a' stand for, in dt
+    be = (1.0 / 6.0 - off - 0.5 * early) / span
+    ga = (0.5 + (delta - off) - early) / span
+    return am / span, af, ga, be, abs(delta) / span
+
+
+class Scheme(NamedTuple):
+    """Weights of a step of dt, and dv'/dr', dvd'/dr'."""
+
+    dt: float  # s
+    am: float
+    af: float
+    ga: float
+    be: float
+    cv: float  # 1/s
+    ca: float  # 1/s2
+
+
+@inner
+def scheme(rho, before, rho_before, dt):
+    """Scheme of a step of dt with the radius rho (`radius_of_step`), after one of `before` with the radius rho_before."""
+    am, af, ga, be, _ = weights(rho, rho_before, before / dt)
+    return Scheme(dt, am, af, ga, be, ga / (be * dt), (1.0 - am) / ((1.0 - af) * be * dt * dt))
+
 
 # A fixed step that fails is halved so often: a factor of 1000 separates a hard moment from a hopeless one.
 HALVINGS = 10
@@ -46,7 +147,7 @@ def end_of_try(clock, moves):
 
 
 @inner
-def take_past(clock, count):
+def note_past(clock, count):
     """Tell the scheme of the step before a try: its length, s, and its radius."""
     length, radius = clock.last_dt, clock.last_rho
     if not count.controlled:

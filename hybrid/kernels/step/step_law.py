@@ -12,7 +12,7 @@ SAFETY = 0.8
 # Exponents on tolerance/error and on the error before over the error now, for an error of order 3 (Gustafsson).
 INTEGRAL, PROPORTIONAL = 0.7 / 3.0, 0.4 / 3.0
 # Bounds on the change from step to step: beyond them a step is damped as much as it can be
-# (kernels.step.generalized_alpha.radius_of_step).
+# (kernels.step.step_control.radius_of_step).
 LEAST, MOST = 0.5, 2.0
 # Times the tolerance at which a step is taken back: below, repeating it costs more than it mends.
 REFUSED = 2.0

@@ -1,4 +1,25 @@
-"""What the states of a batch of outputs mean, in one call: moments, strains, energies, bends of catenaries."""
+"""What the states of a batch of outputs mean, in one call.
+
+The balance across the bed beside edges of contact is solved anew on parts of cells.
+
+    (T w')' - (EI w'')'' + q + P(-w, -dw/dt) = 0
+
+over some cells about the edge, each cut into parts, by Newton's method (outputs.edge_errors says what for).  Loads q are
+those that balance the nodes.  Heights of the first and last node stay, with the curvature there; at a clamp the first
+part turns against its direction.  Without the bed and for T > 0 minus the derivative of the balance is symmetric and
+positive definite, and the bed adds to its diagonal: A = L D L^T with two diagonals below the main one, without pivoting.
+
+    symbol  meaning                                                      unit
+    w       height above where contact begins, at nodes                  m
+    sinks   -dw/dt                                                       m/s
+    k       w'', its curvature across the bed                            1/m
+    T, h    tension, length of cells or parts                            N, m
+    EI      bending stiffness, 0 of catenaries                           N m2
+    q       load per length that is not of the bed                       N/m
+    a, b, c main diagonal of A, without the bed, first and second below  N/m
+
+What the states of a batch of outputs mean, in one call: moments, strains, energies, bends of catenaries.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +32,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import cross, dot, get3
-from hybrid.kernels.laws.bending_slip import EACH, FROM, KEPT, MOMENT, MOST, STIFF, STIFFENING, STIFFNESS
-from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.bending_law import EACH, FROM, KEPT, MOMENT, MOST, STIFF, STIFFENING, STIFFNESS
+from hybrid.kernels.laws.element import chord
+from hybrid.kernels.laws.seabed import interval, pressure
 from hybrid.kernels.machine.binding import Series
-from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.state import (
@@ -28,6 +50,276 @@ from hybrid.kernels.state.state import (
     blank_line,
     no_ends,
 )
+
+# Points of a cell at which the bed presses, where its load on nodes is found.
+POINTS = 12
+# Newton's method:
+CHANGE = 1e-9  # it ends where w changes by less than this part of its range, which shows in no curvature
+HALF = 6  # every so many rounds it goes half the way, since beside a hard bed it may swing between two answers
+ROUNDS = 40  # at most
+# Rows of work, and how many.
+W, SINKS, TENSION, BED_STIFFNESS, LOAD, MAIN, BELOW, SECOND, PER_LENGTH, PER_PIVOT, FIRST, RIGHT, WORK = range(13)
+
+
+class Windows(NamedTuple):
+    """Some cells of outputs, or parts of cells of one, as in the table above."""
+
+    s: Floats  # (windows, nodes) m
+    w: Floats  # (windows, nodes)
+    sinks: Floats  # (windows, nodes)
+    T: Floats  # (windows, cells)
+    EI: Floats  # (windows, nodes)
+
+
+class LineEnd(NamedTuple):
+    """What an end of the line is, at the first nodes of windows; empty arrays: they do not reach to one."""
+
+    k: Floats  # (windows,) 1/m, curvature across the bed of the moment there; of catenaries as of `beyond`
+    hn: Floats  # (windows,) m, of the element at a clamp; infinite where the moment is given
+    EI: Floats  # (windows,) N m2, of catenaries without moment, whose curvature results take away there; else 0
+
+
+class Cuts(NamedTuple):
+    """Parts of the cells of a window: their ends."""
+
+    cell: NDArray[np.int64]
+    part: Floats  # of that cell, from its first node on
+
+
+class Refined(NamedTuple):
+    """What is found of windows."""
+
+    s: Floats  # (windows, nodes of parts) m
+    k: Floats  # (windows, nodes of parts) 1/m
+    settled: NDArray[np.bool_]  # (windows,) whether it is known
+
+
+class Bed(NamedTuple):
+    """Law of contact with the bed."""
+
+    stiffness: float  # N/m2
+    damping: float  # N s/m2
+    onset: float  # m
+
+
+class Clamp(NamedTuple):
+    """Curvature at the first node over the slope of the first part of a cell: k + (slope - `slope`) * `per`."""
+
+    k: float  # 1/m
+    slope: float  # 1
+    per: float  # 1/m; 0 where the moment is given
+
+
+@inner
+def between(x, cell, part):
+    """Value on the straight line between the nodes of a cell."""
+    return x[cell] + (x[cell + 1] - x[cell]) * part
+
+
+@inner
+def node_tension(T, i):
+    """Mean of the tensions of the cells beside node i, at an end what they lead to."""
+    n = T.shape[0]
+    before = T[i - 1] if i > 0 else 2.0 * T[0] - T[1]
+    after = T[i] if i < n else 2.0 * T[n - 1] - T[n - 2]
+    return 0.5 * (before + after)
+
+
+@inner
+def pull(x, k, c):
+    """T w' - (EI w'')' of cell c, N."""
+    return (x.T[c] * (x.w[c + 1] - x.w[c]) - (x.EI[c + 1] * k[c + 1] - x.EI[c] * k[c])) / (x.s[c + 1] - x.s[c])
+
+
+@inner
+def put_loads(x, k, bed, q):
+    """q at nodes: with the bed under straight cells it balances them."""
+    cells, far, before = x.T.shape[0], 0.0, 0.0
+    for c in range(cells):
+        h, near, next_far = x.s[c + 1] - x.s[c], 0.0, 0.0
+        for m in range(POINTS):
+            part = (m + 0.5) / POINTS
+            p, _, _ = pressure(
+                part, -x.w[c], -x.w[c + 1], x.sinks[c], x.sinks[c + 1], bed.stiffness, bed.damping, bed.onset
+            )
+            near += (1.0 - part) * p
+            next_far += part * p
+        after = pull(x, k, c)
+        if c > 0:
+            q[c] = -(after - before + far + near * h / POINTS) / (0.5 * (x.s[c + 1] - x.s[c - 1]))
+        before, far = after, next_far * h / POINTS
+    q[0], q[cells] = q[1], q[cells - 1]
+
+
+@inner
+def put_parts(x, EI, cuts, y):
+    """Nodes of the parts of the cells of a window x; EI: N m2, at its first node and beyond if positive.
+
+    What changes the tension is spread over parts, not in the nodes, where it would be a load.
+    """
+    tension = 0.0
+    for j in range(y.s.shape[0]):
+        c, part = cuts.cell[j], cuts.part[j]
+        y.s[j], y.w[j], y.sinks[j] = between(x.s, c, part), between(x.w, c, part), between(x.sinks, c, part)
+        y.EI[j] = EI if EI > 0.0 else between(x.EI, c, part)
+        T, before = node_tension(x.T, c), tension
+        tension = T + (node_tension(x.T, c + 1) - T) * part
+        if j > 0:
+            y.T[j - 1] = 0.5 * (before + tension)
+
+
+@inner
+def clamp_of(x, y, k, hn):
+    """At a clamp the first part of a cell turns against the direction that is held, as the cell does.
+
+    x: cells, y: their parts; k: 1/m, at the clamp; hn: m, infinite where the moment is given.
+    """
+    h, slope = x.s[1] - x.s[0], (x.w[1] - x.w[0]) / (x.s[1] - x.s[0])
+    if not hn < math.inf:
+        return Clamp(k, slope, 0.0)
+    length = hn - 0.5 * h + 0.5 * (y.s[1] - y.s[0])
+    return Clamp(k, slope + k * (length - hn), 1.0 / length)
+
+
+@inner
+def put_curvature(x, clamp, p, k):
+    """w'' at nodes; that at the last one stays; p: 1/h."""
+    before = (x.w[1] - x.w[0]) * p[0]
+    k[0] = clamp.k + (before - clamp.slope) * clamp.per
+    for i in range(1, x.T.shape[0]):
+        after = (x.w[i + 1] - x.w[i]) * p[i]
+        k[i], before = (after - before) / (0.5 * (x.s[i + 1] - x.s[i - 1])), after
+
+
+@inner
+def put_band(x, clamp, p, a, b, c):
+    """1/h, and A without the bed, of inner nodes; curvature is given at the ends, and bends there nothing."""
+    n = x.T.shape[0]
+    for i in range(n + 1):
+        a[i], b[i], c[i] = 0.0, 0.0, 0.0
+    for i in range(n):
+        p[i] = 1.0 / (x.s[i + 1] - x.s[i])
+        a[i] += x.T[i] * p[i]
+        a[i + 1] += x.T[i] * p[i]
+        b[i] -= x.T[i] * p[i]
+        if i > 0:
+            l, r = p[i - 1], p[i]
+            each = x.EI[i] * 2.0 / (1.0 / l + 1.0 / r)
+            a[i - 1] += each * l * l
+            a[i] += each * (l + r) * (l + r)
+            a[i + 1] += each * r * r
+            b[i - 1] -= each * l * (l + r)
+            b[i] -= each * r * (l + r)
+            c[i - 1] = each * l * r
+    a[1] += x.EI[0] * clamp.per * p[0] * p[0]
+
+
+@inner
+def correct(x, k, bed, work, part):
+    """Go a part of a step of Newton's method; the largest change of w, m, of all of it."""
+    n = x.T.shape[0]
+    q, a, b, c, h, G, L, z = (
+        work[LOAD],
+        work[MAIN],
+        work[BELOW],
+        work[SECOND],
+        work[PER_LENGTH],
+        work[PER_PIVOT],
+        work[FIRST],
+        work[RIGHT],
+    )  # G: 1/D
+    bent = x.EI[1] * k[1]
+    before = (x.T[0] * (x.w[1] - x.w[0]) - (bent - x.EI[0] * k[0])) * h[0]
+    e = second = z[0] = L[0] = 0.0
+    for i in range(1, n):
+        bent, beside = x.EI[i + 1] * k[i + 1], bent
+        after, half = (x.T[i] * (x.w[i + 1] - x.w[i]) - (bent - beside)) * h[i], 0.5 * (x.s[i + 1] - x.s[i - 1])
+        w, sinks = -x.w[i], x.sinks[i]
+        p, stiff, _ = pressure(0.0, w, w, sinks, sinks, bed.stiffness, bed.damping, bed.onset)
+        pivot, right = a[i] + half * stiff - e * L[i - 1], after - before + half * (q[i] + p) - L[i - 1] * z[i - 1]
+        if i > 2:
+            second = c[i - 2] * G[i - 2]
+            pivot -= c[i - 2] * second
+            right -= second * z[i - 2]
+        e = b[i] - (c[i - 1] * L[i - 1] if i > 1 else 0.0)
+        G[i], z[i], before = 1.0 / pivot, right, after
+        L[i] = e * G[i]
+    most = next_one = next_two = 0.0
+    for j in range(1, n):
+        i = n - j
+        change = z[i] * G[i]
+        if j > 1:
+            change -= L[i] * next_one
+        if j > 2:
+            change -= c[i] * G[i] * next_two
+        x.w[i] += part * change
+        if not abs(change) <= most:
+            most = abs(change)
+        next_one, next_two = change, next_one
+    return most
+
+
+@inner
+def balanced(x, clamp, bed, work, k):
+    """Find heights in balance, and the curvature; whether they are."""
+    low = high = x.w[0]
+    for i in range(x.w.shape[0]):
+        low, high = min(low, x.w[i]), max(high, x.w[i])
+    put_band(x, clamp, work[PER_LENGTH], work[MAIN], work[BELOW], work[SECOND])
+    put_curvature(x, clamp, work[PER_LENGTH], k)
+    for count in range(ROUNDS):
+        change = correct(x, k, bed, work, 0.5 if count % HALF == HALF - 1 else 1.0)
+        put_curvature(x, clamp, work[PER_LENGTH], k)
+        if change <= CHANGE * (high - low):
+            return True
+    return False
+
+
+@inner
+def beyond(k, s):
+    """Value at the first node that the two beside it lead to."""
+    return k[1] - (k[2] - k[1]) * (s[1] - s[0]) / (s[2] - s[1])
+
+
+@kernel
+def refine_windows(windows, k, end, bed, cuts, work, out):
+    """Curvature at nodes of parts of cells into `out`; k: of cells, (windows, nodes); work: (WORK, nodes of parts)."""
+    last = k.shape[1] - 1
+    for n in range(k.shape[0]):
+        x = Windows(windows.s[n], windows.w[n], windows.sinks[n], windows.T[n], windows.EI[n])
+        bends, EI, hn = out.k[n], 0.0, math.inf
+        if end.EI.shape[0] > 0:
+            EI, hn = end.EI[n], end.hn[n]
+        y = Windows(out.s[n], work[W], work[SINKS], work[TENSION][1:], work[BED_STIFFNESS])
+        put_loads(x, k[n], bed, work[RIGHT])
+        put_parts(x, EI, cuts, y)
+        for j in range(y.s.shape[0]):
+            work[LOAD, j] = between(work[RIGHT], cuts.cell[j], cuts.part[j])
+        clamp = clamp_of(x, y, 0.0 if EI > 0.0 else k[n, 0], hn)
+        bends[bends.shape[0] - 1] = k[n, last]
+        out.settled[n] = balanced(y, clamp, bed, work, bends)
+        if end.EI.shape[0] > 0 and not y.EI[0] > 0.0:
+            bends[0] = beyond(bends, y.s)
+
+
+@kernel
+def put_largest(s, missed, points, rows, columns, out):
+    """Sizes of what windows miss, at output points, where they are larger than those in `out` (quantities, ns, nb).
+
+    s: (windows, n) m; missed: (quantities, windows, n); points: (ns, nb or 1) m; rows: (windows, 2) first point and that
+    after the last one that may lie in a window; columns: (windows,) outputs.
+    """
+    for n in range(s.shape[0]):
+        j = columns[n]
+        at = j if points.shape[1] > 1 else 0
+        for i in range(rows[n, 0], rows[n, 1]):
+            x = points[i, at]
+            if s[n, 0] <= x <= s[n, s.shape[1] - 1]:
+                c = interval(s[n], x)
+                part = (x - s[n, c]) / (s[n, c + 1] - s[n, c])
+                for q in range(out.shape[0]):
+                    out[q, i, j] = max(out[q, i, j], abs(between(missed[q, n], c, part)))
+
 
 FOLDED = 1e-12  # 1 + cos(x) of cells that are as good as folded onto each other
 

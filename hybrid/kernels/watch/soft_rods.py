@@ -9,7 +9,7 @@ Hence w^ = p w + M/K, where M is what its neighbours bear of what an element lac
 
     (T/K)_i M_i - D(M)_i = T_i (1 - p_i) w_i
 
-A joint has p = 0; of the catenary behind it the curvature of its next node goes on, as in kernels.laws.hinge_layer.
+A joint has p = 0; of the catenary behind it the curvature of its next node goes on, as in kernels.laws.closed_forms.
 Beyond a clamp there is no cell, and an end without a clamp has M = 0.  It is exact for small turns at rest.
 
     symbol  meaning                                                                             unit
@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale
-from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import chord
 from hybrid.kernels.machine.compile import inner, kernel
 
 # Columns of books.strains.

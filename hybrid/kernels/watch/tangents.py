@@ -1,4 +1,18 @@
-"""What the motion of a line answers to numbers of its scene: tangents along the steps of a run (docs/theory.md, 22).
+"""What the motion of a line answers to numbers of its scene.
+
+How the kinematics of waves differ a little beside a place: their slopes, for lines beside that of a run.
+
+    symbol   meaning                                                                      unit
+    L, U     A w cosh and A w sinh of k(d + S), by sinh kd, of a component                m/s
+    S        depth at which components are taken, stretched after Wheeler (laws.water)    m
+    theta    phase of a component                                                         rad
+
+Velocity is (kx/k L cos, ky/k L cos, U sin) of theta, acceleration (w kx/k L sin, w ky/k L sin, -w U cos).  By x, y and S
+both are symmetric and without trace: five sums each; S and the elevation follow from those of the surface.
+
+What tangents along the steps of a run work with (kernels.watch.tangents).
+
+What the motion of a line answers to numbers of its scene: tangents along the steps of a run (docs/theory.md, 22).
 
 A step solves R(new, old; p) = 0.  With x' the tangent of what is known of its end (`old`, predicted), another line, of
 a scene with a little more of p, stands at new + h x'; what its equations leave over, less what those of the line leave
@@ -13,31 +27,241 @@ over, by h, is the right-hand side of the correction of x', whose matrix is the 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, spin_about, sub
-from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.end_motion import ends_at, sea_at
-from hybrid.kernels.laws.water import wave_kinematics
-from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.march.configuration import carry_director
-from hybrid.kernels.march.left_over import left_over_in_space
-from hybrid.kernels.march.left_over_plane import left_over_in_plane
+from hybrid.kernels.laws.water import LAST, cos_sin, exp_of_small, still_below, wave_kinematics
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.march.assembly_plane import left_over_in_plane
+from hybrid.kernels.march.march import carry_director, left_over_in_space
+from hybrid.kernels.state.books import Books, Clock, Counts, blank_books
 from hybrid.kernels.state.report import ASSEMBLED, ROTARY, STIFFNESS_DAMPING, WAVES
+from hybrid.kernels.state.state import (
+    LANES,
+    Ends,
+    Floats,
+    Line,
+    Moves,
+    Sea,
+    State,
+    Work,
+    blank_line,
+    blank_state,
+    no_ends,
+    no_moves,
+    no_sea,
+    no_work,
+)
 from hybrid.kernels.step.accept import keep_past
 from hybrid.kernels.step.sampling import sample_step
-from hybrid.kernels.watch.tangent_job import (
-    ALONE,
-    BROKEN,
-    FOLLOWED,
-    LARGEST_R,
-    LARGEST_T,
-    LEFT_R,
-    LEFT_T,
-    SECOND_R,
-    SECOND_T,
-    STEPS,
-)
-from hybrid.kernels.watch.wave_slopes import wave_slopes, waves_beside
+
+# Columns of slopes.
+VELOCITY = 0  # 5, of velocity, 1/s: xx, xy, yy, xz, yz
+ACCELERATION = 5  # 5, of acceleration, 1/s2, the same
+DEPTH = 10  # 3, of S by x, y, z
+ELEVATION = 13  # 2, of the elevation by x and y
+SLOPES = 15
+# Rows of the room for LANES nodes: x, y, S, elevation, its slopes, the ten sums; then cosine and sine of each component.
+SUMS, PHASES = 6, 16
+
+
+@inner
+def surface_beside(sea, r, first, lanes):
+    """The first six rows of the room, and phases."""
+    waves = sea.waves
+    for l in range(LANES):
+        i = min(first + l, r.shape[0] - 1)
+        lanes[0, l], lanes[1, l], lanes[2, l] = r[i, 0], r[i, 1], r[i, 2]
+        for k in range(3, PHASES):
+            lanes[k, l] = 0.0
+    for j in range(waves.shape[0]):
+        A, kx, ky = waves[j, 0], waves[j, 2], waves[j, 3]
+        phase = waves[j, 4] - waves[j, 1] * sea.now[0]
+        for l in range(LANES):
+            c, s = cos_sin(kx * lanes[0, l] + ky * lanes[1, l] + phase)
+            lanes[PHASES + 2 * j, l], lanes[PHASES + 1 + 2 * j, l] = c, s
+            lanes[3, l] += A * c
+            lanes[4, l] -= A * kx * s
+            lanes[5, l] -= A * ky * s
+
+
+@inner
+def stretch_beside(sea, lanes, l):
+    """S of lane l, in place of the height, and its slopes by x, y, z."""
+    part = sea.now[2]
+    eta, slope_x, slope_y = part * lanes[3, l], part * lanes[4, l], part * lanes[5, l]
+    height, up = lanes[2, l] - sea.surface, sea.stretched * eta
+    follows, by_z = -sea.stretched, 1.0
+    if height >= eta:
+        height, follows, by_z = eta, 1.0 - sea.stretched, 0.0
+    S, x, y = height - up, follows * slope_x, follows * slope_y
+    if sea.depth < math.inf:
+        q = sea.depth / (sea.depth + up)
+        less = S * q / (sea.depth + up) * sea.stretched
+        S, x, y, by_z = S * q, q * x - less * slope_x, q * y - less * slope_y, q * by_z
+        if sea.depth + S < 0.0:
+            S, x, y, by_z = -sea.depth, 0.0, 0.0, 0.0
+    lanes[2, l] = S
+    return x, y, by_z
+
+
+@inner
+def sum_slopes(sea, lanes):
+    """The ten sums of the fully grown waves."""
+    waves, highest = sea.waves, -math.inf
+    for l in range(LANES):
+        highest = max(highest, lanes[2, l])
+    for j in range(waves.shape[0]):
+        w, kx, ky, k = waves[j, 1], waves[j, 2], waves[j, 3], waves[j, 5]
+        if k * highest < LAST:
+            continue
+        q = math.exp(-2.0 * k * sea.depth) if sea.depth < math.inf else 0.0
+        speed, xx, xy, yy = sea.orbits[j] / (1.0 - q), kx * kx / k, kx * ky / k, ky * ky / k
+        for l in range(LANES):
+            y = k * lanes[2, l]
+            fade = exp_of_small(max(y, LAST))
+            here = speed if y >= LAST else 0.0
+            level, up = here * (fade + q / fade), here * (fade - q / fade)
+            c, s = lanes[PHASES + 2 * j, l], lanes[PHASES + 1 + 2 * j, l]
+            lanes[6, l] -= xx * level * s
+            lanes[7, l] -= xy * level * s
+            lanes[8, l] -= yy * level * s
+            lanes[9, l] += kx * up * c
+            lanes[10, l] += ky * up * c
+            lanes[11, l] += w * xx * level * c
+            lanes[12, l] += w * xy * level * c
+            lanes[13, l] += w * yy * level * c
+            lanes[14, l] += w * kx * up * s
+            lanes[15, l] += w * ky * up * s
+
+
+@kernel
+def wave_slopes(sea, r, lanes, slopes):
+    """Fill slopes (N+1, 15) at the positions r (N+1, 3), of the sea of `kernels.laws.water.wave_kinematics`.
+
+    lanes: room (16 + 2 W, LANES).
+    """
+    part, rate, calm, n = sea.now[2], sea.now[3], still_below(sea), r.shape[0]
+    for first in range(0, n, LANES):
+        deep = True
+        for i in range(first, min(first + LANES, n)):
+            deep = deep and r[i, 2] < calm
+            for k in range(SLOPES):
+                slopes[i, k] = 0.0
+        if deep:
+            continue
+        surface_beside(sea, r, first, lanes)
+        for l in range(LANES):
+            x, y, z = stretch_beside(sea, lanes, l)
+            if first + l < n:
+                i = first + l
+                slopes[i, DEPTH], slopes[i, DEPTH + 1], slopes[i, DEPTH + 2] = x, y, z
+                slopes[i, ELEVATION], slopes[i, ELEVATION + 1] = part * lanes[4, l], part * lanes[5, l]
+        sum_slopes(sea, lanes)
+        for i in range(first, min(first + LANES, n)):
+            for k in range(5):
+                slow = lanes[SUMS + k, i - first]
+                slopes[i, VELOCITY + k] = part * slow
+                slopes[i, ACCELERATION + k] = part * lanes[SUMS + 5 + k, i - first] + rate * slow
+
+
+@inner
+def along_slopes(row, at, x, y, z):
+    """What five slopes from a column on make of (x, y, z), z along S."""
+    xx, xy, yy, xz, yz = row[at], row[at + 1], row[at + 2], row[at + 3], row[at + 4]
+    return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y - (xx + yy) * z
+
+
+@kernel
+def waves_beside(flow, slopes, h, rates, beside):
+    """Fill the flow (N+1, 7) at h times rates (N+1, 3) from places where it is `flow`."""
+    for i in range(flow.shape[0]):
+        row = slopes[i]
+        x, y = h * rates[i, 0], h * rates[i, 1]
+        S = row[DEPTH] * x + row[DEPTH + 1] * y + row[DEPTH + 2] * h * rates[i, 2]
+        u, v, w = along_slopes(row, VELOCITY, x, y, S)
+        beside[i, 0], beside[i, 1], beside[i, 2] = flow[i, 0] + u, flow[i, 1] + v, flow[i, 2] + w
+        u, v, w = along_slopes(row, ACCELERATION, x, y, S)
+        beside[i, 3], beside[i, 4], beside[i, 5] = flow[i, 3] + u, flow[i, 4] + v, flow[i, 5] + w
+        beside[i, 6] = flow[i, 6] + row[ELEVATION] * x + row[ELEVATION + 1] * y
+
+
+# What is counted: steps that were followed; those that did not begin where the one before had ended.
+FOLLOWED, BROKEN = range(2)
+# Sizes of tangents of positions, m, and of tensions, N, by the number: the largest of all steps, their largest second
+# corrections, the most that is left behind the last one; steps; whether the last one had one correction alone.
+LARGEST_R, SECOND_R, LEFT_R, LARGEST_T, SECOND_T, LEFT_T, STEPS, ALONE = range(8)
+TANGENT_SIZES = 8
+
+
+class OtherLine(NamedTuple):
+    """The line of a scene with more of a number, beside the line of a run."""
+
+    line: Line
+    sea: Sea
+    ends: Ends
+    moves: Moves
+    even: State  # which take turns, as those of the run
+    odd: State
+    rates: State  # tangents, of the last step's end; e and a1 are not used
+    spin: Floats  # (N,) rad
+    before: State  # the same before the step
+    spin_before: Floats  # (N,)
+    work: Work
+    books: Books  # the clock is that of the run; what is sampled is the other line
+    left: Floats  # (N+1, 5) what its equations leave over
+    sizes: Floats  # (8,) named above
+    same_waves: int  # 1 where its waves are those of the run
+    h: float
+
+
+class TangentJob(NamedTuple):
+    """A line of a run and those beside it (kernels.run.network_tangents)."""
+
+    line: Line
+    sea: Sea  # that of the run, but with room of its own for what an assembly writes
+    ends: Ends
+    even: State  # of the run
+    odd: State
+    work: Work  # of the run, whose last matrix is kept in X
+    own: Work  # the same with a report of what the equations of the line leave over
+    clock: Clock
+    counts: Counts
+    left: Floats  # (N+1, 5) what the equations of the line leave over
+    last: Floats  # (N+1, 3) m/s2, a of the state that the last step led to
+    ahead: Floats  # (N+1, 3) m, where the prediction of a step leads nodes
+    slopes: Floats  # (N+1, 15) of waves there (kernels.watch.tangents); empty: none are needed
+    lanes: Floats  # (16 + 2 W, LANES) room for them
+    found: NDArray[np.int64]  # (2,) named above
+    tables: NDArray[np.int64]  # (P, size) of an OtherLine each
+
+
+def blank_other() -> OtherLine:
+    """With the types that every one has."""
+    state, z = blank_state(1), np.zeros
+    return OtherLine(
+        blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, state, z(1), state, z(1), no_work(),
+        blank_books(), z((2, 5)), z(TANGENT_SIZES), 0, 1.0,
+    )  # fmt: skip
+
+
+def blank_tangent_job() -> TangentJob:
+    """With the types that every one has."""
+    state, z = blank_state(1), np.zeros
+    return TangentJob(
+        blank_line(1), no_sea(1), no_ends(), state, state, no_work(), no_work(), Clock(), Counts(), z((2, 5)),
+        z((2, 3)), z((2, 3)), z((0, SLOPES)), z((PHASES, LANES)), z(2, np.int64), z((1, 1), np.int64),
+    )  # fmt: skip
+
+
+read_other, read_job = reader(blank_other()), reader(blank_tangent_job())
+
 
 # A second correction that is less than this part of all tangents is left out, behind so many steps that have two.
 ENOUGH, JUDGED = 4e-7, 10
@@ -159,7 +383,7 @@ def find_tangent_rates(space, line, s, was, now):
 
 
 @inner
-def look_ahead(job, s, old):
+def foresee_slopes(job, s, old):
     """Slopes of waves where the prediction of the step leads the line of the run."""
     ahead = job.ahead
     for i in range(ahead.shape[0]):
@@ -358,7 +582,7 @@ def keep_own(plane, space, job, s, old, new):
             job.last[i, k] = new.a[i, k]
     found[FOLLOWED] += 1
     if job.slopes.shape[0] > 0:
-        look_ahead(job, s, old)
+        foresee_slopes(job, s, old)
     if space is not None:
         left_over_in_space(job.line, job.sea, job.ends, old.r, new, s.cv, s.ca, job.own, job.left)
     if plane is not None:
