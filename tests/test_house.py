@@ -268,9 +268,9 @@ def test_files_are_as_long_as_a_subject() -> None:
 
 # Rules of writing, and in how many places each is broken: only less.
 BROKEN = {
-    "docstring whose first line is no whole sentence": 9,
+    "docstring whose first line is no whole sentence": 0,
     "name from the list of banned words": 0,
-    "more than two constants in a line": 16,
+    "more than two constants in a line": 0,
     "constructor above 40 lines": 3,
     "function above 60 lines": 14,
     "fmt: skip": 429,

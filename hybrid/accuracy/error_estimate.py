@@ -61,9 +61,10 @@ from hybrid.store.integrity import Tree, matched
 # Errors by mesh and time step add with their signs, as in the difference of two runs that they follow from; the sum is
 # this much larger, and this part of it is that of their sizes.  docs/evidence/accuracy.md has what it was worth.
 SAFETY, OF_SIZES = 1.2, 0.2
-# Equilibria whose positions differ by more than this part of what those of coarser cells differed by, and of the
-# largest coordinate, are different solutions; and the event that says so.
-OTHER_SOLUTION, VISIBLE, SEVERAL = 0.75, 2e-3, "several equilibria"
+# Equilibria whose positions differ by more than these parts are different solutions; and the event that says so.
+OTHER_SOLUTION = 0.75  # of what those of coarser cells differed by
+VISIBLE = 2e-3  # of the largest coordinate
+SEVERAL = "several equilibria"
 # A quantity that finer runs change by more than this part of what coarser ones did does not converge; unless it is by
 # less than a part of its largest value that nobody asks for.
 NOT_CONVERGED, NOTHING = 0.9, 0.005

@@ -30,7 +30,9 @@ from hybrid.simulation.run_sample import END_FORCES, RunSample, beyond_outputs, 
 # The order of convergence where three runs do not show it, and the bounds of what they may show.  A smooth motion has
 # 2, contact and impact have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.  Below 1.5 it
 # is most often the coarsest run that is too coarse to say: errors are bounded, however coarse a run.
-ORDER, ORDERS, MOST_ORDER = 1.5, (1.5, 2.0), 3.0
+ORDER = 1.5
+ORDERS = (ORDER, 2.0)
+MOST_ORDER = 3.0
 # The same of forces at the ends where a motion begins from what is no equilibrium.  At its first output the half cell
 # at a held end bears the load that the line beside it falls with, w h/2, which is of order 1; and the waves that begin
 # there have all lengths, of which finer cells carry shorter ones (docs/errors.md): more than ORDER is shown by runs
@@ -50,7 +52,9 @@ CONFIRMED = 0.6
 # A force of ORDER or less that a clearly finer run changes by more than so many times what was foretold, on average and
 # at most, converges with the order that comes last: three times as fine, order 1 makes 1.5 times what ORDER foretells.
 # What runs that are hardly finer differ by is mostly something else (`blended`).
-EXCEEDED, CLEARLY_FINER, LEAST_FORCE_ORDER = 1.4, 1.5, 1.0
+EXCEEDED = 1.4
+CLEARLY_FINER = 1.5  # ratio of cells or steps
+LEAST_FORCE_ORDER = 1.0
 # Cells and steps of a coarser run are so many times as long.
 COARSER = 2.0
 # Numbers of a quantity that are compared at a time, so that the memory of a long run stays flat.
@@ -210,8 +214,10 @@ def around(known: np.ndarray, a: int, b: int) -> tuple[np.ndarray, slice]:
 
 
 def at_all_outputs(error: np.ndarray, known: np.ndarray, a: int, b: int) -> np.ndarray:
-    """Errors at the outputs `known` at all of them from a to b; in between the larger of the two beside it: peaks are
-    not averaged out."""
+    """Errors at the outputs from a to b, by those at `known`.
+
+    In between it is the larger of the two beside it: peaks are not averaged out.
+    """
     if known.size == b - a and known[0] == a and known[-1] == b - 1:
         return error
     right = np.clip(np.searchsorted(known, np.arange(a, b)), 1, known.size - 1)
@@ -223,11 +229,11 @@ def at_all_outputs(error: np.ndarray, known: np.ndarray, a: int, b: int) -> np.n
 
 
 def blended(shown: np.ndarray, expected: np.ndarray, finer: float, p: float) -> np.ndarray:
-    """Errors of a run that is so many times finer than the one before: as their difference shows, and as expected from
+    """Errors of a run so many times finer than the last, as shown and as expected.
 
-    the errors of that one.  Of a run that is hardly finer the first would be mostly what else differs between the two,
-    such as when zones change, times 1/(finer^p - 1): it counts as far as that is no more than in the first estimate.
-    But no error is smaller than the difference.
+    shown: by the difference of both; expected: from the errors of the last.  Of a run that is hardly finer the first is
+    mostly what else differs, such as when zones change, times 1/(finer^p - 1): it counts as far as that is no more than
+    in the first estimate.  But no error is smaller than the difference.
     """
     part = (finer**p - 1.0) / (COARSER**p - 1.0)
     if part >= 1.0:

@@ -202,9 +202,9 @@ def known(
     scene: LineScene, control: LineErrors, result: RunSample, errors: Errors | None, happened: Happened,
     vibrations: Callable[[], LostBy],
 ) -> tuple[dict[str, float | str], list[tuple[str, str]]]:  # fmt: skip
-    """The largest errors, as attributes, and events of a result; happened: its events until now; vibrations: finds what
+    """The largest errors, as attributes, and events of a result.
 
-    steps lose of free ones, by quantity.
+    happened: its events until now; vibrations: finds what steps lose of free ones, by quantity.
     """
     undersampled: list[tuple[str, str]] = []
     if errors is not None and control.moves:

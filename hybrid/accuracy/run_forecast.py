@@ -37,8 +37,10 @@ from hybrid.simulation.run_sample import RunSample
 from hybrid.solve.stepper import LineFailed
 from hybrid.store.stored_rows import ComparisonRecorder
 
-# s of processor time that the pre-run and the first steps of the result may take, and a pre-run that chooses the model.
-PRE_RUN, FIRST_STEPS, CHOICE = 0.2, 0.1, 1.0
+# s of processor time that parts of a forecast may take.
+PRE_RUN = 0.2
+FIRST_STEPS = 0.1  # of the result
+CHOICE = 1.0  # a pre-run that chooses the model
 # Of a run whose number of steps is known: so many show what one costs.
 ENOUGH_STEPS = 400
 # Cells of a line whose equilibrium, which comes before its first steps, takes no longer than these.
@@ -129,8 +131,10 @@ class _Probe(Case):
         return self.run
 
     def first_steps(self, resolution: NetworkResolution) -> tuple[Run, float, float]:
-        """A result after its first steps; s of processor time before them, and of so many without what is done
-        once."""
+        """A result after its first steps, and what they took.
+
+        s of processor time before them, and of so many steps without what is done once.
+        """
         begin = begun = clock.process_time()
         self.allow(np.inf)
         run = self._network_run(resolution, None, Recording(touches=self.touches_itself))
@@ -292,8 +296,10 @@ def _grown(system: Network) -> float:
 # It goes by steps, cells and outputs, not by a clock, so that a run that is resumed is refined as often as one that was
 # not stopped.
 
-# s of processor time of a cell in a step, and of an output and one of its points (bench/test_bench_plan.py).
-CELL, OUTPUT, POINT = 1e-6, 0.06e-3, 0.6e-6
+# s of processor time (bench/test_bench_plan.py).
+CELL = 1e-6  # in a step
+OUTPUT = 0.06e-3
+POINT = 0.6e-6  # of an output
 # Of the steps of the first result, what the runs to compare with take, and, on average, the finer results.
 COMPARISONS, FINER = 0.9, 0.5
 # All may take so many times what was foretold; less than so much, in s, is not worth a result that misses.

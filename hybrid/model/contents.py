@@ -109,9 +109,9 @@ def payouts(scene: LineScene) -> list[Payout]:
 
 
 def slack_of(scene: LineScene) -> float:
-    """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may, is set from
+    """Length, m, by which the line is longer than its ends are apart.
 
-    outside, breaks or is let go, or it is paid out.
+    Infinite where an end moves or may, is set from outside, breaks or is let go, or the line is paid out.
     """
     a, b = (end.held_position for end in scene.ends.both)
     if a is None or b is None or payouts(scene) or scene.contact.ends_are_set:

@@ -265,17 +265,20 @@ MORE = {
 MORE_OF_RODS = {ROTARY: (0.025e-6, 0.005e-6)}
 # s per node, step and wave: sines and exponentials; of nodes that are not below all motion of the water.
 COST_WAVE = 10e-9
-# s of a run, a step, an output.
-COST_RUN, COST_STEP, COST_OUTPUT = 0.02, 12e-6, 0.1e-3
+# s, whatever the cells.
+COST_RUN = 0.02
+COST_STEP = 12e-6
+COST_OUTPUT = 0.1e-3
 # s of a step of zones that move, and of each of their cells: criteria, and the joints of a rod.
 COST_MANAGER, COST_CRITERIA = 3e-6, 0.03e-6
 COST_AS_RODS = 0.23e-6  # s per cell and step, of rods beside catenaries: by what choices of 1.0 were tried
 USUAL_ITERATIONS = 2.1
 # Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.
 ROD_SHARE = 0.38
-# Moments at which the motion of the ends is looked at to foretell its steps, spread as multiples of this part of its
-# duration, which no period shares; m/s3, less of which counts as none.
-LOOKS, GOLDEN, TINY_RATE = 48, 0.6180339887498949, 1e-12
+# Moments at which the motion of the ends is evaluated to foretell its steps.
+MOMENTS = 48
+GOLDEN = 0.6180339887498949  # of the duration: they are multiples of this part, which no period shares
+TINY_RATE = 1e-12  # m/s3, less of which counts as none
 # Steps that follow the motion, of the least number there may be, and of those that the motion of its ends asks for: a
 # line moves more sharply.
 MORE_STEPS, SHARPER = 1.5, 2.2
@@ -297,7 +300,7 @@ def foretold_steps(scene: LineScene, model: Model, resolution: Resolution, least
     if not model.ends.motions:
         return round(more)
     apart = 0.25 * longest
-    moments = np.maximum((np.arange(LOOKS) * GOLDEN % 1.0) * time.duration, 2.0 * apart)
+    moments = np.maximum((np.arange(MOMENTS) * GOLDEN % 1.0) * time.duration, 2.0 * apart)
     found = [model.ends.acceleration(t + apart, apart) - model.ends.acceleration(t - apart, apart) for t in moments]
     model.ends.at_time(0.0)
     rate = np.linalg.norm(found, axis=2).max(axis=1) / (2.0 * apart)

@@ -41,19 +41,25 @@ STEP_OF_POSITION = 0.05
 # Steps to the shortest period that the scene names: fewer cannot show it, whatever the error control thinks.
 PER_PERIOD = 12
 # A vibration that a ramp sets off is shown where its force is more than this part of what is asked (ordinary ramps:
-# 4e-4 of it), in steps so many times as short: the coarsest of the runs that errors are estimated by, with steps four
-# times as long, then has PER_PERIOD to the period.  Of runs of more than so many steps an event speaks of it.
-OF_VIBRATION, SHOWN_WHEN_COARSE, MOST_VIBRATION_STEPS = 0.5, 4, 10_000
+# 4e-4 of it).
+OF_VIBRATION = 0.5
+# Its steps are so many times as short: the coarsest of the runs that errors are estimated by, with steps four times as
+# long, then has PER_PERIOD to the period.
+SHOWN_WHEN_COARSE = 4
+# Of runs of more steps an event names it instead.
+MOST_VIBRATION_STEPS = 10_000
 # An end may turn so far in a step (rad), in runs of longer steps twice as far: with LARGEST_TWIST of
 # simulation.diagnostics, an element can then not pass half a turn, where its twist would be taken for the opposite one.
 TURN, MOST_TURN = 1.0, 2.0
-# Refinements that may follow the first result where an accuracy is asked; of an irregular motion, in which chance is
-# soon more than cells and steps are; of an equilibrium, whose errors need not fall evenly.
-MOST_REFINEMENTS, IRREGULAR_REFINEMENTS, REFINEMENTS_AT_REST = 3, 1, 6
-# Part of the force, the moment and the curvature typical of a scene below which an error is one of round-off: parts of
-# a force that is nothing are not asked for.  The same of the tension that would stretch a line by its length, and of a
-# length that inertia must account for in a step (kernels.step.newton, by which a step with more does not converge).
-ROUND_OFF, OF_STRETCH, OF_LENGTH, MOST_NOISE = 1e-12, 1e-15, 2.5e-16, 1e-3
+# Refinements that may follow the first result where an accuracy is asked.
+MOST_REFINEMENTS = 3
+IRREGULAR_REFINEMENTS = 1  # of an irregular motion, in which chance is soon more than cells and steps are
+REFINEMENTS_AT_REST = 6  # of an equilibrium, whose errors need not fall evenly
+# Parts below which an error is one of round-off: parts of a force that is nothing are not asked for.
+ROUND_OFF = 1e-12  # of the force, the moment and the curvature typical of a scene
+OF_STRETCH = 1e-15  # of the tension that would stretch a line by its length
+OF_LENGTH = 2.5e-16  # of a length that inertia must account for in a step ..
+MOST_NOISE = 1e-3  # .. but at most this part of the force: a step with more does not converge (kernels.step.newton)
 # Half the diameter of a line that gives none, as a part of its length: no position is asked finer by a part of motion.
 SLENDER = 1e-4
 # Least steps to a run, and the shortest step, as a part of the longest, before a step counts as failed.
@@ -508,12 +514,13 @@ def vibration_step(scene: LineScene, want: RequestedAccuracy | None) -> tuple[fl
 # stiffness k and frequency w whose end moves by u(t), jumps J_n of the n-th derivatives leave a free vibration of
 # k |sum J_n (i/w)^n|: the solution u - u''/w^2 + u''''/w^4 - .. of q''/w^2 + q = u has to be met in value and rate.
 # A small motion is a large force there: steps that follow the motion in metres damp it, and so do the longer steps of
-# the
-# runs that errors are estimated by.
+# the runs that errors are estimated by.
 
 # Derivatives of the ramp by x where it begins and where it ends, by their order, and the highest that counts.  Of a
 # ramp that is shorter than the period the sum may be too large, which makes steps shorter than they need to be.
-AT_BEGIN, AT_END, HIGHEST = {3: 60.0, 4: -360.0, 5: 720.0}, {3: 60.0, 4: 360.0, 5: 720.0}, 6
+AT_BEGIN = {3: 60.0, 4: -360.0, 5: 720.0}
+AT_END = {3: 60.0, 4: 360.0, 5: 720.0}
+HIGHEST = 6
 
 
 class Vibration(NamedTuple):

@@ -159,10 +159,10 @@ class LineResult:
         self, number: int, name: str, scene: LineScene, model: Model, found: LinesAtRest | None, state: State,
         outputs: int, wanted: Wanted = WANTED, paying: PayingOut | None = None,
     ) -> None:  # fmt: skip
-        """number: of the line in its system; found: the equilibrium that it starts from, None: it has none; state: from
+        """number: of the line in its network; found: the equilibrium that it starts from, or None.
 
-        which displacements count; outputs: after the first, 0 of an equilibrium; paying: the length of a line that is
-        paid out.
+        state: from which displacements count; outputs: after the first, 0 of an equilibrium; paying: the length of a
+        line that is paid out.
         """
         self.number, self.name, self.model, self.scene = number, name, model, scene
         self.events, self.paying = EventLog(), paying

@@ -167,9 +167,9 @@ def of_line(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 
 def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
-    """The zones of a checkpoint, of an older version too: that had no cells that follow, or one largest curvature, or
+    """The zones of a checkpoint, also of an older version.
 
-    did not look at velocities, or said nothing of kinks.
+    Those had no cells that follow, one largest curvature, no velocities, or nothing of kinks.
     """
     saved = {"following": None} | saved
     following, manager, largest = saved["following"], saved.get("manager"), np.zeros(QUANTITIES)

@@ -167,10 +167,9 @@ def reach_of(position: Outputs) -> Reach:
 
 
 def compared_cells(model: Model, fineness: float = 0.0, cells: float = np.inf) -> int:
-    """Cells by which meshes of one scene are compared: of zones that move, their base cells; at the start, of a line
+    """Cells by which meshes of one scene are compared.
 
-    that is paid out.
-
+    Of zones that move, their base cells; of a line that is paid out, those at the start.
     fineness: of cells that follow the curvature, 0: they do not.  All that sets their lengths goes with it, and their
     number with the steps as well, over which contact edges go: it counts as `OF_FOLLOWING` at fineness 1.  cells: how
     many there are in most outputs; where nearly all are base cells, which stay, a finer run is

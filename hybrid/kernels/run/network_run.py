@@ -78,7 +78,7 @@ REGROUP = 16
 CELLS_DUE = 32
 # Of `limits`: the reach of Newton's method, m; its iterations at most; the arm by which moments on bodies are compared
 # with forces, m; the tolerance of Newton's method.
-OF_REACH, OF_ITERATIONS, OF_ARM, OF_TOLERANCE = 0, 1, 2, 3
+OF_REACH, OF_ITERATIONS, OF_ARM, OF_TOLERANCE = range(4)
 
 
 class StepsJob(NamedTuple):

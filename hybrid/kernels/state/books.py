@@ -108,19 +108,31 @@ class Counts(NamedNumbers, number=np.int64):
 
 # Phases.
 BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(6)
-ASK_BEFORE, ASK_TRIES, ASK_STEPS = 1, 2, 4
+# Bits of Counts.asks.
+ASK_BEFORE = 1  # before every try
+ASK_TRIES = 2  # after every try
+ASK_STEPS = 4  # after every step
 # What a call returns: at STOP; a buffer is full or the quota is used up; a try to come; one to be judged; a step to be
 # looked at; a step that fails however small.
 AT_STOP, PAUSED, TRYING, TRIED, STEPPED, FAILED = range(6)
 # Bits of Counts.notices.
-STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SLACK = 1, 2, 4, 8, 16, 32, 64, 128
-IS_BENT, MEETS_ITSELF = 512, 1024
-LETS_GO = 2048
-ITERATIONS_CUT = 4096
+STRETCHED = 1  # a cell bears another length than it may
+BENT = 2  # an element, beyond its limits of bend or twist
+JUMPED = 4  # the largest tension of a line that does not stretch
+SLACKENED = 8  # a catenary
+LEAVES_PLANE = 16  # a push out of the plane has grown
+PUSH_DIED = 32
+STEPS_CUT = 64  # as something turned too far
+STEPS_SLACK = 128  # as a cell was slack
+IS_BENT = 512  # so far that the line may come near itself
+MEETS_ITSELF = 1024
+LETS_GO = 2048  # at an end whose tension is above its limit
+ITERATIONS_CUT = 4096  # a try was taken that had not converged
 NEARS_PLANE = 8192
 NEARS_ITSELF = 16384
-PARTS_ITSELF, HIDES_ITSELF = 32768, 65536
-COLLAPSES = 131072
+PARTS_ITSELF = 32768
+HIDES_ITSELF = 65536
+COLLAPSES = 131072  # many steps are tiny
 ZONES_DUE = 262144  # of a system: zones of a line are to be looked at
 NODES_DUE = 524288  # of a system: a node enters or leaves at a winch
 LINES_NEAR = 1048576  # of a system: two lines are near each other, between which contact begins
@@ -128,8 +140,8 @@ LINES_NEAR = 1048576  # of a system: two lines are near each other, between whic
 # --- powers and work --------------------------------------------------------------------------------
 
 RATES = 8  # by their rates: start, end, applied, drag, mass damping, stiffness damping, added mass, waves
-CONTACT, FRICTION, ZONES, OBSTACLE, HYSTERESIS = 8, 9, 10, 11, 12  # by steps
-WORKS = 13
+CONTACT, FRICTION, ZONES, OBSTACLE, HYSTERESIS = range(RATES, RATES + 5)  # by steps
+WORKS = RATES + 5
 # Columns of the step log.
 LOG = ("t", "dt", "iterations", "correction", "residual", "repeats", "error", "end_force_start", "end_force_end")
 # Steps of which the worst is remembered, with (left, t, dt, node).
@@ -193,15 +205,13 @@ class Books(NamedTuple):
 # work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); turns (K, 3)
 # of zones that a torque passes through; of a line that touches itself, the force of that (N+1); of obstacles of which one
 # moves, SEEN of each (kernels.state.report); how far layers have slipped (N+1, 2 L); what nodes remember of soil (N+1, 6).
-SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
-    1,
-    5,
-    11,
-    29,
-    35,
-    41,
-    47,
-)
+SAMPLE_SEA = 1
+SAMPLE_POSITION = SAMPLE_SEA + 4
+SAMPLE_FRAME = SAMPLE_POSITION + 6
+SAMPLE_SPIN = SAMPLE_FRAME + 18
+SAMPLE_FORCE = SAMPLE_SPIN + 6
+SAMPLE_MOMENT = SAMPLE_FORCE + 6
+SAMPLE_REPORT = SAMPLE_MOMENT + 6
 SAMPLE_WORK = SAMPLE_REPORT + REPORT_SIZE
 HEAD = SAMPLE_WORK + WORKS
 
@@ -209,9 +219,10 @@ HEAD = SAMPLE_WORK + WORKS
 def sample_size(
     cells: int, varies: bool = False, zones: int = 0, touches: bool = False, obstacles: int = 0, layers: int = 0
 ) -> int:  # fmt: skip
-    """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness; zones: with turns; touches:
+    """Numbers of a sample of a line of so many cells.
 
-    with the force of contact with itself; obstacles: of which one moves; layers: numbers of a node of what slips, and soil.
+    varies: with lengths and stiffness; zones: with turns; touches: with the force of contact with itself; obstacles: of
+    which one moves; layers: numbers of a node of what slips, and soil.
     """
     return (
         HEAD
