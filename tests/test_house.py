@@ -271,7 +271,7 @@ BROKEN = {
     "docstring whose first line is no whole sentence": 0,
     "name from the list of banned words": 0,
     "more than two constants in a line": 0,
-    "constructor above 40 lines": 3,
+    "constructor above 40 lines": 1,
     "function above 60 lines": 14,
     "fmt: skip": 429,
 }

@@ -85,6 +85,18 @@ PULLS = (*END_FORCES, "tension", "right/tension")
 MODEL_OF = "cells", "every", "catenary"
 
 
+def _halved_falls(
+    name: str, result: RunSample, coarse: RunSample, rough: RunSample | None, coarsest: RunSample | None
+) -> Falls:
+    """What a halving of cells and steps leaves of the difference to the run before; NaN where it is not known."""
+    found = falls(name, result, coarse, coarsest)
+    cells, steps = refinement(result.resolution, coarse.resolution)
+    finer = cells, steps if steps > 1.0 else COARSER  # there may be no steps
+    if coarsest is None or finer == (COARSER, COARSER):
+        return found
+    return as_halved(found, finer, step_share(name, coarse, rough, coarsest))
+
+
 class Estimate:
     """Errors of the last of several runs, by what finer cells and steps have changed.
 
@@ -111,38 +123,31 @@ class Estimate:
         """
         self._include(result)
         self.shares_mixed = set[str]()
-        both = [name for name in result.values if name in coarse.values]
         self._from_rest, self._rubs = from_rest, rubs
+        both = [name for name in result.values if name in coarse.values]
+        fall = {name: _halved_falls(name, result, coarse, rough, coarsest) for name in both}
         own = [name for name in both if name in END_FORCES and not from_rest]  # with an order at the start
-        # What a halving of cells and steps leaves of the difference to the run before; NaN where it is not known.
-        fall = {name: falls(name, result, coarse, coarsest) for name in both}
-        cells, steps = refinement(result.resolution, coarse.resolution)
-        finer = cells, steps if steps > 1.0 else COARSER  # there may be no steps
-        if coarsest is not None and finer != (COARSER, COARSER):
-            for name, found in fall.items():
-                fall[name] = as_halved(found, finer, step_share(name, coarse, rough, coarsest))
+        cells, _ = refinement(result.resolution, coarse.resolution)
         self.falls = {name: found.mean for name, found in fall.items()}
         self.order = {name: order(max(x.mean, x.largest), self._bounds(name, x)) for name, x in fall.items()}
         # Orders of the error by the mesh at the first output, where it has one of its own.
         self.at_start = {x: min(start_order(x, result, coarse, coarsest, cells), self.order[x]) for x in own}
-        # Root mean square of the last change of each output, and of that before.
-        self.changes = {name: (found.change, found.before) for name, found in fall.items()}
+        self.changes = {name: (x.change, x.before) for name, x in fall.items()}  # of each output, root mean square
         self.start = start_change(result, coarse), start_change(coarse, coarsest)
         self.set_model_errors(coarse)
         self._coarse, self._of_steps = coarse, self._pair(rough, coarse)
-        self.by_step: dict[str, np.ndarray] | None = (
-            None  # errors by the time step, with their sign, once they are kept
-        )
-        self.by_mesh: dict[str, np.ndarray] | None = None  # the same by the mesh
+        # Errors by the time step and by the mesh, with their sign, once they are kept.
+        self.by_step: dict[str, np.ndarray] | None = None
+        self.by_mesh: dict[str, np.ndarray] | None = None
         self.has_step = self._of_steps is not None
         self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
         # Steps of the result are shorter than those of the coarser run, and what that does is not known.
         self.share_unknown = not self.has_step and coarse.steps > 0 and self._shorter(result, coarse) >= LEAST_RATIO
         # Outputs of which the runs with longer steps do not show it either (docs/errors.md).  Forces at ends after a
         # shock are of order 1 to 1.5 whatever lasts: their slow fall is in their order.
-        slow = {name for name, x in fall.items() if name not in own and max(x.mean, x.largest) > SLOWLY_CONVERGES}
-        mixed = {name for name in slow if step_share(name, coarse, rough, coarsest) > MOST_BY_STEPS}
-        self.shares_mixed = mixed if self.has_step and self.cancels else set[str]()
+        if self.has_step and self.cancels:
+            slow = {x for x, y in fall.items() if x not in own and max(y.mean, y.largest) > SLOWLY_CONVERGES}
+            self.shares_mixed = {x for x in slow if step_share(x, coarse, rough, coarsest) > MOST_BY_STEPS}
 
     def _mixes(self, name: str) -> bool:
         """Whether what cells and steps make of an output is not known apart."""

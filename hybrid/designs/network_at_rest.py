@@ -59,7 +59,7 @@ from hybrid.linear.touching import stiffness_between
 from hybrid.model.bodies import BodyModel, loads_of
 from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, nearby_clamped, same_nodes, seats_know_no_shape, shaped_anew
-from hybrid.model.network import NetworkModel, bodies_of, with_surfaces
+from hybrid.model.network import NetworkModel, NetworkResolution, bodies_of, with_surfaces
 from hybrid.model.sections import merged_sections, tension_scale
 from hybrid.scene.analysis import Output
 from hybrid.scene.base import dotted
@@ -72,6 +72,7 @@ from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.lines_contact import strand_in
 from hybrid.simulation.new_run import static_system
+from hybrid.simulation.run import Run
 from hybrid.solve.contact import TouchingLine
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
@@ -288,6 +289,12 @@ Places = Mapping[str, tuple[float, ...]]
 NO_PLACES: Places = MappingProxyType({})
 
 
+def _with_lines_of(solver: NetworkSolver, models: Sequence[Model]) -> NetworkSolver:
+    """The solver of an equilibrium, with the lines of models."""
+    joined = [x._replace(line=model.line) for x, model in zip(solver.lines, models, strict=True)]
+    return NetworkSolver(joined, len(solver.net), solver.bodies)
+
+
 class _Changed(NamedTuple):
     """A scene with another number: its lines, arms (L, 2, 3) m of their ends at bodies, what acts on these (B, 6)."""
 
@@ -299,55 +306,60 @@ class _Changed(NamedTuple):
 class NetworkAtRest(OfScene):
     """The equilibrium on one mesh, its factors, and the values of results."""
 
-    def __init__(self, scene: Scene, cells: float, of: Sequence[str], places: Places = NO_PLACES) -> None:
-        """cells: their lengths over the usual, 0.5 or more; of: results; places: of an equilibrium with these cells.
-
-        SceneError, ComputationError: as of `hybrid.sensitivity`.
-        """
-        wanted = [parse_wanted(scene, x, moves=False) for x in of]
-        self.scene, resolution = first_at_rest(scene.without_friction())
-        system, self._form = self.scene, self.scene.form
-        refuse_use(self.scene.written, "derivatives", given="hybrid sensitivity")
-        finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
-        resolution = replace(resolution, lines=finely)
-        with self._form.in_words():
-            run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
+    def __init__(self, scene: Scene, resolution: NetworkResolution, run: Run, wanted: Sequence[Wanted]) -> None:
+        """run: the equilibrium on cells of resolution; wanted: results, of lines as the scene names them."""
         assert run.found is not None
-        self._system, self._names, self._outputs = system, run.model.names, dict[str, Output]()
-        self._scenes = {name: self._scene_of(system, name) for name in self._names}
+        self.scene, self._model, self._names = scene, run.model, run.model.names
+        self._outputs = dict[str, Output]()
+        self._scenes = {name: self._scene_of(scene, name) for name in self._names}
         of_lines = zip(self._names, run.model.models, strict=True)
         self.places = {name: places_of(model, self._scenes[name]) for name, model in of_lines}
-        finely = {name: replace(x, places=self.places[name], parts=1) for name, x in finely.items()}
-        self._resolution = replace(resolution, lines=finely)
-        joined = [
-            x._replace(line=model.line) for x, model in zip(run.found.solver.lines, run.model.models, strict=True)
-        ]
-        self._free = [[k for k in (0, 1) if x.joints[k] >= 0] for x in joined]
+        placed = {k: replace(x, places=self.places[k], parts=1) for k, x in resolution.lines.items()}
+        self._resolution = replace(resolution, lines=placed)
+        solver = _with_lines_of(run.found.solver, run.model.models)
+        self._free = [[k for k in (0, 1) if x.joints[k] >= 0] for x in solver.lines]
         called = dict(zip(scene.asked_lines, self._names, strict=True))
-        self._order = [(name, k) for name in self._names for k, x in enumerate(wanted) if called[x.line] == name]
-        solver = NetworkSolver(joined, len(run.found.solver.net), run.found.solver.bodies)
-        self._bodies, self._model = BodiesAtRest(solver, run.state, run.model), run.model
+        own = [[k for k, x in enumerate(wanted) if called[x.line] == name] for name in self._names]
+        self._order = [k for of_line in own for k in of_line]
+        self._bodies = BodiesAtRest(solver, run.state, run.model)
         self._network = linear_network(solver, run.state, self._names, sticks=False, quick=False)
-        rows = zip(self._names, run.model.models, run.state.lines, self._free, strict=True)
+        self._first_body = self._network.size - 6 * self._bodies.count  # of the unknowns
         self.lines = [
             LineAtRest(
-                self._scenes[name], model, state, [x for x in wanted if called[x.line] == name], free,
+                self._scenes[name], run.model.models[l], run.state.lines[l], [wanted[k] for k in own[l]], self._free[l],
                 self._bodies.frames(l, solver.lines[l].seats),
             )
-            for l, (name, model, state, free) in enumerate(rows)
+            for l, name in enumerate(self._names)
         ]  # fmt: skip
-        A = sparse.csc_array(self._network.stiffness + self._network.skew)
         self.contact = self._contact(run.found, run.state, wanted)
+        self._matrix = self._stiffness()
+        self._factors = Factors(self._matrix)
+        self._here = self._arms(run.model), self._loads(run.model, [x.here for x in self.lines])
+        self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])
+        self.gradients = {l: Gradients(x, self._bodies.turns(l)) for l, x in enumerate(self.lines) if x.wanted}
+
+    @classmethod
+    def of_scene(cls, asked: Scene, of: Sequence[str], cells: float, places: Places) -> NetworkAtRest:
+        """The equilibrium of a scene; arguments and errors: as of `sensitivity.at_rest`."""
+        wanted = [parse_wanted(asked, x, moves=False) for x in of]
+        scene, resolution = first_at_rest(asked.without_friction())
+        refuse_use(scene.written, "derivatives", given="hybrid sensitivity")
+        finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
+        resolution = replace(resolution, lines=finely)
+        with scene.form.in_words():
+            run = static_system(scene, None, lambda: scene_text(scene), resolution=resolution)
+        return cls(scene, resolution, run, wanted)
+
+    def _stiffness(self) -> sparse.csc_array:
+        """The matrix of all unknowns, with what contact and bodies add to that of the lines."""
+        A = sparse.csc_array(self._network.stiffness + self._network.skew)
         if self.contact is not None:
             A = A + self._of_unknowns(self.contact.stiffness)
-        self._matrix = A + self._bodies.stiffness_besides(A) if self._bodies.count else A
-        self._factors = Factors(self._matrix)
-        self._first_body = self._network.size - 6 * self._bodies.count  # of the unknowns
-        own = self._bodies.loads_besides_lines(run.model) + self._bodies.pressed([x.here for x in self.lines])
-        self._here = self._arms(run.model), own
-        self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])
-        wanted_of = (l for l, x in enumerate(self.lines) if x.wanted)
-        self.gradients = {l: Gradients(self.lines[l], self._bodies.turns(l)) for l in wanted_of}
+        return A + self._bodies.stiffness_besides(A) if self._bodies.count else A
+
+    def _loads(self, model: NetworkModel, lines: Sequence[Beside]) -> Floats:
+        """(B, 6) N, N m, on bodies but for the forces of their lines; ValueError: the model has other members."""
+        return self._bodies.loads_besides_lines(model) + self._bodies.pressed(lines)
 
     def _contact(self, found: LinesAtRest, states: NetworkState, of: Sequence[Wanted]) -> ContactAtRest | None:
         """Contact of lines with each other, if they have any, in states at rest.  SceneError: a result is of it."""
@@ -483,7 +495,7 @@ class NetworkAtRest(OfScene):
         """(.., W) results in the order in which they are wanted, of those of each line."""
         every = np.concatenate(of_lines, axis=-1)
         out = np.empty_like(every)
-        for place, (_, k) in enumerate(self._order):
+        for place, k in enumerate(self._order):
             out[..., k] = every[..., place]
         return out
 
@@ -501,11 +513,11 @@ class NetworkAtRest(OfScene):
 
     def _key_in(self, key: str) -> str:
         """The key of the network that a key of the scene is."""
-        pairs = [(dotted(there), dotted(here)) for there, here in self._form.pairs]
+        pairs = [(dotted(there), dotted(here)) for there, here in self.scene.form.pairs]
         for there, here in sorted(pairs, key=lambda x: -len(x[1])):
             if re.match(rf"{re.escape(here)}\b", key):
                 with suppress(SceneError):
-                    number_in(self._system, there + key.removeprefix(here))
+                    number_in(self.scene, there + key.removeprefix(here))
                     return there + key.removeprefix(here)
         return key
 
@@ -517,7 +529,7 @@ class NetworkAtRest(OfScene):
             try:
                 if number == 0.0:  # what it switches on
                     refuse_use(with_number(self.scene, key, d).written, "derivatives", given=key)
-                scene = with_number(self._system, there, number + d)
+                scene = with_number(self.scene, there, number + d)
                 changed = self._changed(scene, key)
             except ValueError:
                 raise at_a_bound(key, number) from None
@@ -531,17 +543,17 @@ class NetworkAtRest(OfScene):
 
     def _hangs_on(self, system: Network, name: str) -> bool:
         """Whether a line hangs on what a changed scene has changed."""
-        if any(getattr(system, x) is not getattr(self._system, x) for x in OF_ALL):
+        if any(getattr(system, x) is not getattr(self.scene, x) for x in OF_ALL):
             return True
         line = system.lines[name]
-        if line is not self._system.lines[name]:
+        if line is not self.scene.lines[name]:
             return True
-        changed = {body for body, x in system.bodies.items() if _moves_lines(x, self._system.bodies[body])}
+        changed = {body for body, x in system.bodies.items() if _moves_lines(x, self.scene.bodies[body])}
         if any(getattr(system.bodies[x], "shape", None) is not None for x in changed):
             return True  # it is a surface for all lines
         for point in (line.start, line.end):
             at = system.points[point]
-            if at is not self._system.points[point] or (isinstance(at, Fairlead) and at.body in changed):
+            if at is not self.scene.points[point] or (isinstance(at, Fairlead) and at.body in changed):
                 return True
         return False
 
@@ -550,9 +562,9 @@ class NetworkAtRest(OfScene):
         anew = [self._hangs_on(system, name) for name in self._names]
         for new, name in zip(anew, self._names, strict=True):
             if new:
-                system.know_scene(name, self._system.scene_of(name))
+                system.know_scene(name, self.scene.scene_of(name))
         built = None
-        if self._bodies.count and any(getattr(system, x) is not getattr(self._system, x) for x in OF_BODIES):
+        if self._bodies.count and any(getattr(system, x) is not getattr(self.scene, x) for x in OF_BODIES):
             built = with_bodies(self._model, system)
         bodies = (self._model if built is None else built).bodies
         clamped = [x for l, (x, new) in enumerate(zip(self._names, anew, strict=True)) if new and self._bodies.turns(l)]
@@ -582,7 +594,7 @@ class NetworkAtRest(OfScene):
             return _Changed(out, *self._here)
         whole = self._model if built is None else built
         try:
-            return _Changed(out, self._arms(whole), self._bodies.loads_besides_lines(whole) + self._bodies.pressed(out))
+            return _Changed(out, self._arms(whole), self._loads(whole, out))
         except ValueError:
             raise _other_cells(key) from None
 

@@ -112,4 +112,4 @@ def at_rest(asked: Scene, of: Sequence[str], cells: float = 1.0, places: Places 
     cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.
     SceneError: what has no derivative; ComputationError: there is no equilibrium.
     """
-    return NetworkAtRest(asked, cells, of, places)
+    return NetworkAtRest.of_scene(asked, of, cells, places)
