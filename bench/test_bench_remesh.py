@@ -65,7 +65,7 @@ def forced(scene: dict[str, Any], seed: int | None) -> tuple[hybrid.Result, list
         inside = OnlyLine(simulation)
         while simulation.t < scene["time"]["duration"] - 1e-9:
             zones = inside.zones.switching.zones
-            zones.calm[:] = -1000  # no cells join by themselves
+            zones.idle_steps[:] = -1000  # no cells join by themselves
             zones.clock.share = 1e9  # nor are any halved, for the layers of the pinned ends, which are 2 cm long
             simulation.step()
             steps += 1

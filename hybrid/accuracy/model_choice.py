@@ -54,7 +54,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.mesh_survey import CELLS, STEPS, Survey, lack_along, layered, shown, with_survey
 from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample, Samples
 from hybrid.zones.at_start import HOLD
-from hybrid.zones.change import LONGEST_IN_PACE, READY
+from hybrid.zones.change import LONGEST_IN_RAMP, READY
 
 Stretches = Collection[tuple[float, float]]  # m, of s
 ROD_CELLS = 4.0  # of rods to a length sqrt(EI/T) beside point loads and clamps: the curvature there is 1 % off
@@ -294,7 +294,7 @@ def choice_of(
 
 def _steps_of_zones(scene: LineScene, model: Model, resolution: Resolution) -> float:
     """Steps of zones that move for one of rods: those that follow the motion are no longer than zones let them be."""
-    time, longest = scene.require_time(), LONGEST_IN_PACE * READY * HOLD * model.time_scale
+    time, longest = scene.require_time(), LONGEST_IN_RAMP * READY * HOLD * model.time_scale
     if resolution.local is None or isinf(longest):
         return 1.0
     rods = foretold_steps(scene, model, resolution, ceil(time.duration / resolution.step))

@@ -166,10 +166,24 @@ def of_line(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     return line if isinstance(line, Mapping) else {}
 
 
+# What older versions called what a checkpoint has of zones.
+OLDER_NAMES = {
+    "calm": "idle_steps",
+    "calm_since": "below_since",
+    "calmed": "release_cause",
+    "haste": "ramp_factor",
+    "patience": "wait_factor",
+}
+
+
+def _renamed(saved: dict[str, Any]) -> dict[str, Any]:
+    return {OLDER_NAMES.get(name, name): x for name, x in saved.items()}
+
+
 def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
     """The zones of a checkpoint, also of an older version.
 
-    Those had no cells that follow, one largest curvature, no velocities, or nothing of kinks.
+    Those had no cells that follow, one largest curvature, no velocities, nothing of kinks, or other names.
     """
     saved = {"following": None} | saved
     following, manager, largest = saved["following"], saved.get("manager"), np.zeros(QUANTITIES)
@@ -177,10 +191,12 @@ def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
         largest[CURVATURE] = following["peak"]
         saved["following"] = {name: x for name, x in following.items() if name != "peak"}
     following = saved["following"]
-    if isinstance(following, dict) and isinstance(following.get("calm"), np.ndarray):
-        saved["following"] = {"waves": np.zeros(following["calm"].shape)} | following
+    if isinstance(following, dict):
+        following = saved["following"] = _renamed(following)
+        if isinstance(idle := following.get("idle_steps"), np.ndarray):
+            saved["following"] = {"waves": np.zeros(idle.shape)} | following
     if isinstance(manager, dict):
-        saved["manager"] = {"largest": largest, "fastest": 0.0, "kinked": False} | manager
+        saved["manager"] = {"largest": largest, "fastest": 0.0, "kinked": False} | _renamed(manager)
     return saved
 
 

@@ -150,7 +150,7 @@ class PaidZones:
     def _change_base(self, model: Model, source: np.ndarray, cells: np.ndarray, anew: bool = False) -> None:
         assert model.layout is not None and model.on_base is not None
         paying, manager = self.paying, self.manager
-        given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.pace, paying.foreseen)
+        given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.ramp_time, paying.foreseen)
         given[[0, -1]] = np.where(self._turning, 1, given[[0, -1]])
         manager.cable = paying.plan.held_as(model.cable)
         change_base(manager, model.layout, source, cells, given, model.on_base, anew)

@@ -46,7 +46,7 @@ from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps, Tried
 from hybrid.store.integrity import matched
-from hybrid.zones.change import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, on_layout
+from hybrid.zones.change import LETTING_GO, LONGEST_IN_RAMP, READY, ZoneSwitching, on_layout
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Change
 
@@ -97,9 +97,9 @@ class _LineZones:
     def __init__(self, number: int, model: Model, manager: DomainManager, every: int) -> None:
         self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager, followed=True)
         self.clock, self.counts = b.Clock(), Counts()
-        longest, clock = LONGEST_IN_PACE * manager.pace * every, manager.zones.clock
-        clock.ramp_step, clock.calm_step = longest, longest * READY
-        clock.letting_go = LETTING_GO * manager.pace
+        longest, clock = LONGEST_IN_RAMP * manager.ramp_time * every, manager.zones.clock
+        clock.ramp_step, clock.steady_step = longest, longest * READY
+        clock.letting_go = LETTING_GO * manager.ramp_time
         self.pending: Change | None = None
         self.paid: PaidZones | None = None  # of a line that is paid out
         self.cells: CellChanges | None = None  # what changes its cells without Python
@@ -200,7 +200,7 @@ class RunZones(Part):
     def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Criteria know how near lines come to themselves and each other, by the contact that the solver has now."""
         run = self._run
-        horizons = {x.number: LOOKAHEAD * x.switching.manager.pace for x in self.lines}
+        horizons = {x.number: LOOKAHEAD * x.switching.manager.ramp_time for x in self.lines}
         shared = solver.shared
         near = {} if shared is None else shared.watch_nearness(max(horizons.values()))
         for x in self.lines:
@@ -238,7 +238,7 @@ class RunZones(Part):
     def longest(self) -> float:
         """Longest step (s) that what is ramped allows."""
         return min(
-            float(x.ramp_step if ramps else x.calm_step)
+            float(x.ramp_step if ramps else x.steady_step)
             for x, ramps in ((x.switching.zones.clock, x.switching.manager.ramping) for x in self.lines)
         )  # fmt: skip
 

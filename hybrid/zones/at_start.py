@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.march.zone_torque import carry_torque
-from hybrid.kernels.mesh.cell_lengths import CALM_STEPS
+from hybrid.kernels.mesh.cell_lengths import IDLE_STEPS
 from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, Line, State
@@ -80,10 +80,10 @@ def planned_cells(model: Model, manager: DomainManager, state: State, t: float) 
     manager.set_layout(model.layout)
     manager.evaluate_criteria(model.line, sea, ends, state, 0.0)
     switching = ZoneSwitching(model, manager)
-    for _ in range(CALM_STEPS):  # for which cells must have been too short
+    for _ in range(IDLE_STEPS):  # for which cells must have been too short
         here = switching.plan(model.layout.rod, sea, ends, state)
     manager.reset()
-    manager.zones.calm[:] = 0
+    manager.zones.idle_steps[:] = 0
     assert here is not None
     return here
 
@@ -95,11 +95,11 @@ def manager_for(
     wanted = scene.model
     assert isinstance(wanted, AdaptiveModel) and model.layout is not None
     step = resolution.step if resolution.local is None else 0.0
-    pace = max(HOLD * model.time_scale, LEAST_STEPS_HELD * step)
+    shortest = max(HOLD * model.time_scale, LEAST_STEPS_HELD * step)
     period = longest_period(scene)
-    hold, ramp = max(pace, min(PERIODS_HELD * period, MOST_HELD * pace)), pace
+    hold, ramp = max(shortest, min(PERIODS_HELD * period, MOST_HELD * shortest)), shortest
     if wanted.hold_time is not None:
-        hold, ramp = wanted.hold_time, min(max(wanted.hold_time, FASTEST * step), SLOWEST * pace)
+        hold, ramp = wanted.hold_time, min(max(wanted.hold_time, FASTEST * step), SLOWEST * shortest)
     curvature_error = wanted.curvature_error if follows_curvature(scene) else None
     foreseen = min(ramp, STRAIGHT * period) if period and curvature_error is None else ramp
     if curvature_error is not None and wanted.hold_time is None and model.payout is None:
@@ -108,7 +108,7 @@ def manager_for(
     allowed = Allowed(resolution.zones * model.length, curvature_error, asked, resolution.fineness)
     times = Times(hold, ramp, foreseen, period if curvature_error is None else 0.0)
     given = _given(scene, model, ramp)
-    manager = DomainManager(
+    manager = DomainManager.on_layout(
         model.cable, model.layout, given, model.tension_scale, allowed, times, criterion, model.on_base
     )
     manager.load(model.ends.moments)
@@ -119,25 +119,25 @@ def manager_for(
     return manager
 
 
-def rods_at_winch(scene: LineScene, plan: PayoutPlan, model: Model, count: int, pace: float, rate: float) -> np.ndarray:
+def rods_at_winch(scene: LineScene, plan: PayoutPlan, model: Model, count: int, ramp: float, rate: float) -> np.ndarray:
     """(N,) of base cells: 1 rod, -1 catenary, 0 adaptive, where the winch may reach them soon.
 
-    count: material nodes that are out; pace: s; rate: m/s.
+    count: material nodes that are out; ramp: s, ramp time of bending stiffness; rate: m/s.
     """
     assert model.layout is not None
     given = given_zones(scene, model.layout)
-    near = plan.at_winch(count, AHEAD * pace * abs(rate))
+    near = plan.at_winch(count, AHEAD * ramp * abs(rate))
     given[near & (given == 0)] = 1
     return given
 
 
-def _given(scene: LineScene, model: Model, pace: float) -> np.ndarray:
-    """(n,) of base cells: 1 rod, -1 catenary, 0 adaptive; pace: s, ramp time of bending stiffness."""
+def _given(scene: LineScene, model: Model, ramp: float) -> np.ndarray:
+    """(n,) of base cells: 1 rod, -1 catenary, 0 adaptive; ramp: s, ramp time of bending stiffness."""
     assert model.layout is not None
     if model.payout is None:
         return given_zones(scene, model.layout)
     paid = model.payout
-    return rods_at_winch(scene, paid, model, paid.count(paid.first), pace, fastest(paid.law))
+    return rods_at_winch(scene, paid, model, paid.count(paid.first), ramp, fastest(paid.law))
 
 
 def zones_without_equilibrium(model: Model, manager: DomainManager) -> Model:

@@ -38,10 +38,10 @@ from hybrid.store.integrity import matched
 from hybrid.zones.manager import OF_BASE, DomainManager
 from hybrid.zones.plan import Change
 
-# A stretch that has become chords, or arcs, is let go to its true length over this many paces.
+# A stretch that has become chords, or arcs, is let go to its true length over this many ramp times.
 LETTING_GO = 1.0
 NONE, NO_STRAIN = np.zeros(0, int), np.zeros((0, 3))
-LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
+LONGEST_IN_RAMP = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
 READY = 2.0  # times as long may it be before: a step that is much shorter than the one before is damped much
 # What a checkpoint holds of cells on their way to true lengths.
 RELAXING = ("lack", "rate", "since", "keeps")
@@ -155,7 +155,7 @@ class ZoneSwitching:
     def limit_steps(self, of_run: Clock) -> None:
         """Steps are as long as what is ramped allows."""
         clock = self.zones.clock
-        of_run.allowed = clock.ramp_step if self.manager.ramping else clock.calm_step
+        of_run.allowed = clock.ramp_step if self.manager.ramping else clock.steady_step
 
     def torque(self) -> float:
         """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
@@ -167,7 +167,7 @@ class ZoneSwitching:
         relaxing = {name: getattr(zones, name) for name in RELAXING} if zones.counts.relaxing else None
         following = None
         if zones.clock.share > 0.0:
-            following = {"true": zones.true, "calm": zones.calm, "waves": zones.waves}
+            following = {"true": zones.true, "idle_steps": zones.idle_steps, "waves": zones.waves}
         return {
             "following": following,
             "manager": self.manager.checkpoint(), "h": line.h, "kb": line.kb, "force": line.force,
@@ -190,11 +190,11 @@ class ZoneSwitching:
             getattr(zones, name)[:] = x
         zones.counts.relaxing = relaxing is not None
         if (following := saved["following"]) is not None:
-            needs = {"true": zones.true, "calm": zones.calm, "waves": zones.waves}
+            needs = {"true": zones.true, "idle_steps": zones.idle_steps, "waves": zones.waves}
             found = matched(following, needs, "following")
             if not (found["true"].min() > 0.0 and found["waves"].min() >= 0.0):
                 raise ValueError("lengths that no line has")
-            zones.true[:], zones.calm[:], zones.waves[:] = found["true"], found["calm"], found["waves"]
+            zones.true[:], zones.idle_steps[:], zones.waves[:] = found["true"], found["idle_steps"], found["waves"]
         self.let_review()  # whether rods may go is another matter now
         line.h[:], line.kb[:], line.force[:] = saved["h"], saved["kb"], saved["force"]
         zones.lengths[:] = line.h
@@ -205,7 +205,7 @@ class ZoneSwitching:
         self.manager.reset()
         self.evaluate_criteria(0.0, 0.0, ends, state)
         zones = self.zones
-        if zones.clock.share > 0.0:  # chords become as long as arcs within a pace
+        if zones.clock.share > 0.0:  # chords become as long as arcs within a ramp time
             self._plan_table.bind(line=self.model.line, ends=ends, new=state, zones=zones)
             read_arcs(self._plan_table.numbers)
             zones.lack[:], zones.since[:] = zones.true - self.model.line.h, 0.0
@@ -225,7 +225,7 @@ class ZoneSwitching:
             self._update_criteria()
             if manager.user is not None:
                 manager.ask_user(line, tried, end)
-            cells = manager.cells_to_reject if manager.loudest > REJECT_RATIO else NONE
+            cells = manager.cells_to_reject if manager.highest_ratio > REJECT_RATIO else NONE
             why = "a step would have left it a catenary far beyond its criterion; the step is repeated"
         elif how.outcome == Outcome.SLACK:
             cells = np.flatnonzero((line.spin == 0) & (self.model.slack_floor >= tried.T))
@@ -336,7 +336,7 @@ class ZoneSwitching:
 
 # Arrays of `Zones` that have no base cells; of base cells; of cells.
 OF_LINE = ("clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits")
-CARRIED = ("leaving", "grown", "haste")
+CARRIED = ("leaving", "grown", "ramp_factor")
 OF_CELLS = ("past", "recent", "lack", "rate", "since", "keeps")
 
 
@@ -347,12 +347,14 @@ def change_base(
     """Let a manager go on with base cells of which some have come or gone, where they are one cell each.
 
     source, of_cell: which of the old base cells (n,), and cells (N,), a new one is, or has come from; given: (n,) 1
-    rod, -1 catenary, 0 adaptive; anew: how long nodes have been calm is not known.
+    rod, -1 catenary, 0 adaptive; anew: for how many steps nodes could have gone is not known.
     """
     old, n, places = manager.zones, layout.rod.size, layout.starts[-1] + 1
-    calm = np.zeros(places, np.int64) if anew else on_other_parts(manager.layout, old.calm, source, layout.parts)
+    idle = np.zeros(places, np.int64) if anew else on_other_parts(manager.layout, old.idle_steps, source, layout.parts)
     waves = np.zeros(places) if anew else on_other_parts(manager.layout, old.waves, source, layout.parts)
-    blank = blank_zones(1, n)._replace(here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=calm, waves=waves)
+    blank = blank_zones(1, n)._replace(
+        here=np.zeros(places, bool), plan=np.zeros(places, bool), idle_steps=idle, waves=waves
+    )
     kept = {name: getattr(old, name) for name in OF_LINE} | {"ratios": old.ratios[:, source].copy()}
     kept |= {name: getattr(old, name)[source] for name in CARRIED}
     assert set(kept) <= set(OF_BASE)
@@ -360,9 +362,9 @@ def change_base(
     known, relaxing = old.counts.known, old.counts.relaxing
     age, recent_age = manager.age, manager.recent_age
     manager.zones = blank._replace(**kept)
-    for name in ("calm_since", "patience", "released", "buffer"):
+    for name in ("below_since", "wait_factor", "released", "buffer"):
         setattr(manager, name, getattr(manager, name)[source])
-    manager.calmed, manager.seen = manager.calmed[:, source].copy(), manager.seen[:, source].copy()
+    manager.release_cause, manager.seen = manager.release_cause[:, source].copy(), manager.seen[:, source].copy()
     manager.given, manager.free, manager.on_base = given, (given >= 0).astype(np.int8), on_base
     manager.measure(layout)
     manager.set_layout(layout)

@@ -7,6 +7,7 @@ thresholds, and earlier tensions.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
@@ -41,7 +42,8 @@ SHORTEST = 2  # cells that make a zone
 
 # What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.
 CHECKPOINTED = (
-    "tolerance", "held", "ratios", "seen", "grown", "leaving", "haste", "calm_since", "calmed", "patience", "released",
+    "tolerance", "held", "ratios", "seen", "grown", "leaving", "ramp_factor", "below_since", "release_cause",
+    "wait_factor", "released",
     "going", "next_review", "total_twist", "past", "recent", "age", "recent_age", "largest", "fastest",
     "kinked",
 )  # fmt: skip
@@ -68,11 +70,33 @@ def _flag(name: str, text: str) -> Any:
 # Arrays of `Zones` that are the same for every layout.
 OF_BASE = (
     "clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits", "ratios", "rod",
-    "leaving", "grown", "haste", "parts", "H", "next_rod", "here", "plan", "calm", "waves",
+    "leaving", "grown", "ramp_factor", "parts", "H", "next_rod", "here", "plan", "idle_steps", "waves",
 )  # fmt: skip
 
 
 all_zones = Packed(lambda n: blank_zones(n, 1), given=(*OF_BASE, "kinds"))
+
+
+def first_zones(cable: Material, layout: Layout, allowed: Allowed, times: Times) -> Zones:
+    """What the compiled run knows of zones before the first step; cells are still to be set."""
+    places = layout.starts[-1] + 1
+    zones = blank_zones(1, layout.rod.size)._replace(
+        here=np.zeros(places, bool),
+        plan=np.zeros(places, bool),
+        idle_steps=np.zeros(places, np.int64),
+        waves=np.zeros(places),
+    )
+    clock = zones.clock
+    clock.share, clock.fineness, clock.tolerance = allowed.curvature_error or 0.0, allowed.fineness, allowed.tolerance
+    clock.left, clock.ramp_time = 1.0, times.ramp or times.hold
+    clock.edge_time = clock.ramp_time if times.edge is None else times.edge
+    clock.memory = FADE * max(clock.ramp_time, times.period)
+    for quantity, part in allowed.asked.items():
+        zones.asked[quantity] = part
+    zones.clamped[:] = cable.held_tangent
+    # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
+    zones.counts.holds_twist = cable.passes_torque
+    return zones
 
 
 class DomainManager:
@@ -80,6 +104,35 @@ class DomainManager:
 
     def __init__(
         self,
+        zones: Zones,
+        cable: Material,
+        layout: Layout,
+        given: np.ndarray,
+        scale: float,
+        user: UserCriterion | None,
+        on_base: LineOnBase,
+    ) -> None:
+        """As of `on_layout`; zones: what the compiled run knows of them, as of `first_zones`."""
+        n = layout.rod.size
+        self.zones, self.cable, self.layout, self.given, self.scale = zones, cable, layout, given, scale
+        self.user, self.on_base = user, on_base
+        self.dwell, self.ramp_time = math.inf, math.inf
+        self.held, self.weightless = False, False
+        self.kinked = False  # whether it has been said that kinks of joints count as bends
+        self.free = (given >= 0).astype(np.int8)
+        self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
+        self.foreseen = np.zeros(n)  # what catenaries will lack, by a pre-run, over what is allowed
+        self.first = np.zeros((len(CRITERIA), n))  # largest ratios by which the first rods were chosen
+        self.near: Floats = np.zeros(0)  # (N+1,) of a line that touches itself: how near it is to itself
+        self.below_since, self.buffer = np.full(n, np.inf), np.zeros(n)
+        self.release_cause = np.zeros((2, n))  # of rods on their way out: criterion, and its ratio
+        self.wait_factor, self.released = np.ones(n), np.full(n, -np.inf)
+        self._review_room = np.zeros(0), np.zeros(0), np.zeros((4, 0), bool)  # what compiled reviews write
+        self._table = Table(blank_zone_job)
+
+    @classmethod
+    def on_layout(
+        cls,
         cable: Material,
         layout: Layout,
         given: np.ndarray,
@@ -88,50 +141,22 @@ class DomainManager:
         times: Times,
         user: UserCriterion | None = None,
         on_base: LineOnBase | None = None,
-    ) -> None:
+    ) -> DomainManager:
         """given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N; on_base: of the model."""
-        n = layout.rod.size
-        self.cable, self.layout, self.dwell, self.given = cable, layout, times.hold, given
-        self.pace, self.held = times.ramp or times.hold, False
-        self.kinked = False  # whether it has been said that kinks of joints count as bends
-        self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
-        places = layout.starts[-1] + 1
-        self.zones = blank_zones(1, n)._replace(  # what the compiled run knows of them
-            here=np.zeros(places, bool),
-            plan=np.zeros(places, bool),
-            calm=np.zeros(places, np.int64),
-            waves=np.zeros(places),
-        )
-        self.zones.clock.share, self.zones.clock.fineness = allowed.curvature_error or 0.0, allowed.fineness
-        self.tolerance, self.zones.clock.left = allowed.tolerance, 1.0
-        for quantity, part in allowed.asked.items():
-            self.zones.asked[quantity] = part
-        self.zones.clock.pace = self.pace
-        self.zones.clock.edge_time = self.pace if times.edge is None else times.edge
-        self.zones.clock.memory = FADE * max(self.pace, times.period)
-        self.zones.clamped[:] = cable.held_tangent
-        self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
-        self.foreseen = np.zeros(n)  # what catenaries will lack, by a pre-run, over what is allowed
-        self.first = np.zeros((len(CRITERIA), n))  # largest ratios by which the first rods were chosen
-        self.near: Floats = np.zeros(0)  # (N+1,) of a line that touches itself: how near it is to itself
-        self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
-        self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
-        self.patience, self.released = np.ones(n), np.full(n, -np.inf)
-        self._review_room = np.zeros(0), np.zeros(0), np.zeros((4, 0), bool)  # what compiled reviews write
-        self._table, self.on_base = Table(blank_zone_job), on_base or LineOnBase(cable, layout.base)
-        self.measure(layout)
-        weight = np.abs(cable.submerged_weight)
-        floor = tension_floor(cable.mean_bending, weight, scale)
-        self.weightless = bool((floor < WEIGHTLESS * scale).any())
-        # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
-        self.zones.counts.holds_twist = cable.passes_torque
-        self.set_layout(layout)
+        zones = first_zones(cable, layout, allowed, times)
+        manager = cls(zones, cable, layout, given, scale, user, on_base or LineOnBase(cable, layout.base))
+        manager.dwell, manager.ramp_time = times.hold, times.ramp or times.hold
+        floor = tension_floor(cable.mean_bending, np.abs(cable.submerged_weight), scale)
+        manager.weightless = bool((floor < WEIGHTLESS * scale).any())
+        manager.measure(layout)
+        manager.set_layout(layout)
+        return manager
 
     # --- what the compiled run knows ----------------------------------------------------------------
 
     tolerance = _number("tolerance", "Error of position, m.")
     next_review = _number("next_review", "When the next review is due, s.")
-    loudest = _number("loudest", "Largest ratio among catenaries at the last evaluation.")
+    highest_ratio = _number("highest_ratio", "Largest ratio among catenaries at the last evaluation.")
     torque = _number("torque", "Torque, N m, that a rod from end to end would carry, where there is none.")
     total_twist = _number("total_twist", "Turn of the ends against each other, rad.")
     compliance = _number("compliance", "Turn per torque of all the line, rad per N m.")
@@ -203,22 +228,22 @@ class DomainManager:
     def adopt_rods(self, rod: np.ndarray, change: Change, t: float) -> None:
         """Base cells (n,) that are rod from t on: what is new begins to be blended in, faster where it is urgent.
 
-        What comes back soon after it was let go must be calm much longer from then on, and else half as long.
+        What comes back soon after it was let go must be below its thresholds longer from then on, else half as long.
         """
         fresh, gone, urgent = rod & ~self.layout.rod, self.layout.rod & ~rod, change.urgent
-        soon = t - self.released < RETURN_WINDOW * self.dwell * self.patience
-        self.patience[fresh] = np.where(soon, LONGEST_WAIT, np.maximum(0.5 * self.patience, 1.0))[fresh]
+        soon = t - self.released < RETURN_WINDOW * self.dwell * self.wait_factor
+        self.wait_factor[fresh] = np.where(soon, LONGEST_WAIT, np.maximum(0.5 * self.wait_factor, 1.0))[fresh]
         self.released[gone] = t
         self.grown[change.stiff], self.leaving[change.stiff] = 1.0, False
-        self.grown[fresh], self.leaving[fresh], self.calm_since[fresh] = 0.0, False, np.inf
-        self.zones.haste[fresh] = np.where(urgent[fresh], FAST_RAMP, 1.0)
+        self.grown[fresh], self.leaving[fresh], self.below_since[fresh] = 0.0, False, np.inf
+        self.zones.ramp_factor[fresh] = np.where(urgent[fresh], FAST_RAMP, 1.0)
         self.grown[~rod], self.leaving[~rod] = 1.0, False
         self.zones.rod[:], self.zones.counts.all_rod = rod, bool(rod.all())
 
     def checkpoint(self) -> dict[str, Any]:
         """State besides the layout."""
         zones = self.zones
-        of_zones = {name: getattr(zones, name) for name in ("ratios", "grown", "leaving", "haste", "largest")}
+        of_zones = {name: getattr(zones, name) for name in ("ratios", "grown", "leaving", "ramp_factor", "largest")}
         known = {name: getattr(zones, name) if self.past.size else np.zeros(0) for name in ("past", "recent")}
         return {name: getattr(self, name) for name in CHECKPOINTED if name not in of_zones | known} | of_zones | known
 
@@ -226,8 +251,8 @@ class DomainManager:
         """Restore a checkpoint; ValueError: it is invalid."""
         allowed, cells, zones = self.tolerance, self.base_of_cell.size, self.zones
         good = 0.0 < saved["tolerance"] <= allowed and saved["past"].shape == saved["recent"].shape in ((0,), (cells,))
-        loudest, grown = saved["calmed"][0], saved["grown"]
-        if not (good and 0.0 <= loudest.min(initial=0.0) <= loudest.max(initial=0.0) < len(CRITERIA)):
+        criterion, grown = saved["release_cause"][0], saved["grown"]
+        if not (good and 0.0 <= criterion.min(initial=0.0) <= criterion.max(initial=0.0) < len(CRITERIA)):
             raise ValueError("invalid checkpoint of the domain manager")
         least = min(saved["age"], saved["recent_age"], saved["fastest"], *saved["largest"])
         if not (0.0 <= grown.min() <= grown.max() <= 1.0 and least >= 0.0):
@@ -247,7 +272,7 @@ class DomainManager:
     # --- watching ------------------------------------------------------------------------------
 
     def evaluate_criteria(self, line: Line, sea: Sea, ends: Ends, state: State, dt: float, t: float = 0.0) -> float:
-        """Raise the ratios since the last review to those of a state, dt after the last one; the loudest of catenaries.
+        """Raise the ratios since the last review to those of a state, dt after the last one; the highest of catenaries.
 
         dt = 0: there was none, or it was on other nodes.
         """
@@ -257,7 +282,7 @@ class DomainManager:
         evaluate_criteria(self._table.numbers)
         if self.user is not None:
             self.ask_user(line, state, t)
-        return float(self.loudest)
+        return float(self.highest_ratio)
 
     def release(self, k: int, cable: Material) -> None:
         """End k holds its tangent and its twist no longer; cable: as that leaves it."""
@@ -272,13 +297,13 @@ class DomainManager:
         cells = cell_ratios(self.user, nodes)
         np.maximum.at(self.ratios[GIVEN], self.base_of_cell, cells)
         quiet = self.layout.rod | (self.given < 0)
-        self.loudest = max(self.loudest, float(np.max(self.ratios[GIVEN], where=~quiet, initial=0.0)))
+        self.highest_ratio = max(self.highest_ratio, float(np.max(self.ratios[GIVEN], where=~quiet, initial=0.0)))
 
     @property
     def cells_to_reject(self) -> np.ndarray:
         """Cells of catenaries above REJECT_RATIO since the last review."""
-        loud = ~(self.ratios <= REJECT_RATIO).all(axis=0) & ~self.layout.rod & (self.given >= 0)
-        return np.flatnonzero(loud[self.base_of_cell])
+        above = ~(self.ratios <= REJECT_RATIO).all(axis=0) & ~self.layout.rod & (self.given >= 0)
+        return np.flatnonzero(above[self.base_of_cell])
 
     def cells_near_threshold(self, cell: int) -> np.ndarray:
         """Cells near one where a step failed and a criterion is above its `off`: more rod may help."""
@@ -291,7 +316,7 @@ class DomainManager:
 
     def review_due(self, t: float) -> bool:
         """Whether a review is due: a catenary asks, a rod has been blended out, or some time has passed."""
-        return self.loudest > 1.0 or t >= self.next_review
+        return self.highest_ratio > 1.0 or t >= self.next_review
 
     def same_zones(self) -> Change:
         """A change of cells alone."""
@@ -303,8 +328,8 @@ class DomainManager:
         rod = self.layout.rod
         self._add_global_ratios()
         rules = self.rules(state)
-        next_, self.calm_since[:] = planned(
-            self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving, self.patience
+        next_, self.below_since[:] = planned(
+            self.ratios, rod, self.below_since, t, self.layout.base, rules, self.leaving, self.wait_factor
         )
         next_ = (next_ | (rod & self.held)) & (self.given >= 0)
         back, before = self.going, self.leaving.copy()
@@ -313,13 +338,13 @@ class DomainManager:
         if back or self.going:
             self._update_ramping()  # perhaps one that was on its way out
             now = self.leaving & ~before
-            self.calmed[0, now] = loudest = np.argmax(self.ratios[:, now] / OFF[:, None], axis=0)
-            self.calmed[1, now] = np.take_along_axis(self.ratios[:, now], loudest[None], axis=0)[0]
+            self.release_cause[0, now] = leading = np.argmax(self.ratios[:, now] / OFF[:, None], axis=0)
+            self.release_cause[1, now] = np.take_along_axis(self.ratios[:, now], leading[None], axis=0)[0]
         wait, new = 1.0 / REVIEWS, next_
         if self.going:
             wait = max(min(float(self.grown[self.leaving].min()), wait), 0.0)
             new = next_ | (self.leaving & (self.grown > 0.0))
-        self.next_review = t + (wait - ROUND_TIME) * self.pace
+        self.next_review = t + (wait - ROUND_TIME) * self.ramp_time
         change = None
         if (new != rod).any():
             urgent = spread((self.ratios[SLACK] > 1.0) | self._losing_tension(state), self.layout.base, rules.buffer)
@@ -332,13 +357,14 @@ class DomainManager:
         n = self.given.size
         if self._review_room[0].size != n:
             self._review_room = np.zeros(n), np.zeros(n), np.zeros((4, n), bool)
-        calm, wait, flags = self._review_room
+        next_below, wait, flags = self._review_room
         table.bind(
             zone_table=zone_table, base=self.layout.base, given=self.given.astype(np.int64),
-            calm_since=self.calm_since, calmed=self.calmed, patience=self.patience, seen=self.seen, buffer=self.buffer,
-            off=OFF, calm=calm, wait=wait, flags=flags, shortest=SHORTEST,
+            below_since=self.below_since, release_cause=self.release_cause, wait_factor=self.wait_factor,
+            seen=self.seen, buffer=self.buffer,
+            off=OFF, next_below=next_below, wait=wait, flags=flags, shortest=SHORTEST,
             dwell=float(self.dwell), parts=BUFFER, light=1e-9 * self.scale, forced=FORCED_RATIO,
-            pace=float(self.pace), pause=1.0 / REVIEWS, held=int(self.held),
+            ramp_time=float(self.ramp_time), pause=1.0 / REVIEWS, held=int(self.held),
         )  # fmt: skip
 
     def initial_rods(self, state: State) -> np.ndarray:
@@ -377,10 +403,10 @@ class DomainManager:
         return Change(new, tuple(reasons), new, stiff)
 
     def _losing_tension(self, state: State) -> np.ndarray:
-        """Base cells (n,) without weight, hence without a floor, that lose most of their tension within a pace."""
+        """Base cells (n,) without weight, hence without a floor, that lose most of their tension within a ramp time."""
         if not (self.weightless and self.age > 0.0 and self.past.size):
             return np.zeros(self.layout.rod.size, bool)
-        T = state.T + self.pace / self.age * (state.T - self.past)
+        T = state.T + self.ramp_time / self.age * (state.T - self.past)
         falls = (T < LOST_TENSION * state.T) & (self.past > state.T) & (self.floor[:-1] < WEIGHTLESS * self.scale)
         # not by `layout`, which cells that follow leave behind between two reviews
         return np.asarray(np.bincount(self.zones.kinds.base_of_cell, falls, self.layout.rod.size) > 0.0)
@@ -423,14 +449,14 @@ class DomainManager:
         """Runs of base cells that change, and for each what asks for it, or had held it until now."""
         out = []
         base = self.layout.base
-        loud = self.ratios.max(axis=0)
+        highest = self.ratios.max(axis=0)
         for a, b in pairwise(edges(np.where(rod == new, 0, np.where(new, 1, -1)))):
             if rod[a] == new[a]:
                 continue
             beside = (a > 0 and rod[a - 1] and new[a - 1]) or (b < rod.size and rod[b] and new[b])
             if new[a]:
                 kind = "grow" if beside else "split"
-                asks = np.flatnonzero(loud > 1.0)
+                asks = np.flatnonzero(highest > 1.0)
                 if why:
                     out.append(Reason(a, b, kind, why))
                 elif asks.size:
@@ -442,12 +468,12 @@ class DomainManager:
                 else:
                     out.append(Reason(a, b, kind, "closes a gap"))
             else:
-                which, ratios = self.calmed[0, a:b].astype(int), self.calmed[1, a:b]
+                which, ratios = self.release_cause[0, a:b].astype(int), self.release_cause[1, a:b]
                 j = a + int(np.argmax(ratios / OFF[which]))
-                c, value = int(self.calmed[0, j]), float(self.calmed[1, j])
+                c, value = int(self.release_cause[0, j]), float(self.release_cause[1, j])
                 name, off = CRITERIA[c].name, float(OFF[c])
-                calm = f"calm for {self.dwell * self.patience[j]:.3g} s and blended out"
-                text = f"{calm}; {name} {value:.3g}, threshold {off:g}"
+                time = f"calm for {self.dwell * self.wait_factor[j]:.3g} s and blended out"
+                text = f"{time}; {name} {value:.3g}, threshold {off:g}"
                 out.append(Reason(a, b, "shrink" if beside else "merge", text, name, value, off))
         return out
 
@@ -460,11 +486,11 @@ class DomainManager:
     def stiffness_shares(self, dt: float = 0.0) -> Floats:
         """Part of its bending stiffness that each node has (N+1,), dt from now; overwritten by the next call.
 
-        Over a pace: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.  Where
+        Over a ramp time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.  Where
         tension goes there is less time, and nothing that could ring.
         """
         zones = self.zones
-        shares(self.grown, self.leaving, zones.haste, dt / self.pace, zones.kinds.base_of_cell, zones.share)
+        shares(self.grown, self.leaving, zones.ramp_factor, dt / self.ramp_time, zones.kinds.base_of_cell, zones.share)
         return zones.share
 
     def _update_ramping(self) -> None:

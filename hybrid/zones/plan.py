@@ -68,7 +68,7 @@ class Rules(NamedTuple):
     """How zones are made of what is asked.
 
     buffer: (n,) m, rod on either side of what asks for it; shortest: least cells of a zone; dwell: s, how long a rod
-    must have been calm before it goes.
+    must have been below its thresholds before it goes.
     """
 
     buffer: Floats
@@ -100,24 +100,24 @@ def tidied(flags: np.ndarray, rod: np.ndarray, shortest: int) -> np.ndarray:
 def planned(
     ratios: Floats,
     rod: np.ndarray,
-    calm_since: Floats,
+    below_since: Floats,
     t: float,
     base: Floats,
     rules: Rules,
     leaving: np.ndarray | None = None,
-    patience: Floats | None = None,
+    wait_factor: Floats | None = None,
 ) -> tuple[np.ndarray, Floats]:
-    """What the base cells should be, and since when (s) each rod has been calm (infinity: it is not).
+    """What the base cells should be, and since when (s) each rod is below its thresholds (infinity: it is not).
 
-    rod: (n,) what they are; calm_since: (n,) from the last review; leaving: (n,) rods that are being blended out,
-    whose curvature rises for that reason alone: they are kept only above BACK; patience: (n,) dwell times that each
-    cell must be calm, 1 if not given.
+    rod: (n,) what they are; below_since: (n,) from the last review; leaving: (n,) rods that are being blended out,
+    whose curvature rises for that reason alone: they are kept only above BACK; wait_factor: (n,) dwell times that each
+    cell must be below them, 1 if not given.
     """
     n = rod.size
-    calm = calm_since.copy()
+    below = below_since.copy()
     flags = np.zeros((4, n), bool)
     if leaving is not None:
         flags[0] = leaving
-    wait = np.full(n, float(rules.dwell)) if patience is None else rules.dwell * patience
-    make_plan(ratios, OFF, rod, calm, float(t), base, rules.buffer, rules.shortest, wait, flags)
-    return flags[3], calm
+    wait = np.full(n, float(rules.dwell)) if wait_factor is None else rules.dwell * wait_factor
+    make_plan(ratios, OFF, rod, below, float(t), base, rules.buffer, rules.shortest, wait, flags)
+    return flags[3], below

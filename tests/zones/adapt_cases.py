@@ -202,7 +202,9 @@ def weighed(
     scale: float = 1.0, line: Line | None = None,
 ) -> Floats:  # fmt: skip
     """The ratios (criteria, base cells) of a state; before: the state a step dt ago."""
-    manager = DomainManager(what, zones, np.zeros(zones.rod.size, int), scale, Allowed(tolerance), Times(dwell))
+    manager = DomainManager.on_layout(
+        what, zones, np.zeros(zones.rod.size, int), scale, Allowed(tolerance), Times(dwell)
+    )
     line = line or on(what, zones, bits)
     sea, ends = sea or no_sea(line.h.size), ends or still()
     if before is not None:

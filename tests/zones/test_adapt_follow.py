@@ -50,7 +50,7 @@ def planned(curvature_error, shape, n=8, parts=64, length=10.0, twist=None, rod=
         d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
         angle = np.append(0.0, np.cumsum(twist))[:, None]
         state.a1[:] = np.cos(angle) * state.a1 + np.sin(angle) * np.cross(d, state.a1)
-    manager = DomainManager(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, curvature_error), Times(1.0))
+    manager = DomainManager.on_layout(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, curvature_error), Times(1.0))
     manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
     manager.zones.next_rod[:] = rod
     table = Table(blank_zone_job())
@@ -64,7 +64,9 @@ def test_where_tension_is_lost_is_read_on_the_cells_of_now() -> None:
     """Cells that follow change between two reviews, and the manager knows the layout of the last one."""
     what = cable(10.0)
     before, now = (layout(np.linspace(0.0, 10.0, 9), parts, "R" * 8) for parts in (4, 1))
-    managers = [DomainManager(what, x, np.zeros(8, int), 1e12, Allowed(1e-2, 0.03), Times(1.0)) for x in (before, now)]
+    managers = [
+        DomainManager.on_layout(what, x, np.zeros(8, int), 1e12, Allowed(1e-2, 0.03), Times(1.0)) for x in (before, now)
+    ]
     manager, other = managers
     manager.use_cells_of(before, other.zones)  # as a change of cells leaves it
     manager.zones.counts.known, manager.zones.past[:], manager.age = 1, 100.0, 1.0
@@ -118,7 +120,7 @@ def test_chords_become_as_long_as_arcs_to_fourth_order(shape: str) -> None:
         what, zones = cable(), layout(np.linspace(0, 10, n + 1), 1, "R" * n)
         line = on(what, zones)
         state = state_on(line, curve)
-        manager = DomainManager(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, 0.05), Times(1.0))
+        manager = DomainManager.on_layout(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, 0.05), Times(1.0))
         table = Table(blank_zone_job())
         table.bind(line=line, new=state, zones=manager.zones)
         read_arcs(table.numbers)
@@ -406,9 +408,14 @@ def test_what_is_asked_along_the_line_is_a_share_of_the_rule(asked: str, share: 
 
 def test_zones_of_an_older_checkpoint() -> None:
     """It had one largest curvature, or none; that it did not look at velocities is tested with them."""
-    rest = {"true": np.ones(3), "calm": np.zeros(4), "waves": np.zeros(4)}
+    rest = {"true": np.ones(3), "idle_steps": np.zeros(4), "waves": np.zeros(4)}
     found = zoning_of_today({"manager": {"ratios": 1}, "following": rest | {"peak": 0.2}})
     assert found["following"] == rest and found["manager"]["largest"].tolist() == [0, 0, 0.2, 0]
     assert zoning_of_today({"manager": {"ratios": 1}})["following"] is None
     own = {"largest": np.ones(4)}
     assert zoning_of_today({"manager": own, "following": rest})["manager"]["largest"].tolist() == [1, 1, 1, 1]
+    names = {"haste": "ramp_factor", "calm_since": "below_since", "calmed": "release_cause", "patience": "wait_factor"}
+    assert (
+        zoning_of_today({"manager": {x: x for x in names}})["manager"].items()
+        >= {y: x for x, y in names.items()}.items()
+    )

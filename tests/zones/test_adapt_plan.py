@@ -50,10 +50,10 @@ class Course:
         n = self.rod.size
         self.base = np.arange(n + 1.0) if base is None else base
         self.rules = rules_ or rules(n)
-        self.calm = np.full(n, np.inf)
+        self.below = np.full(n, np.inf)
 
     def at(self, t, ratios):
-        self.rod, self.calm = planned(ratios, self.rod, self.calm, t, self.base, self.rules)
+        self.rod, self.below = planned(ratios, self.rod, self.below, t, self.base, self.rules)
         return words(self.rod)
 
 

@@ -31,7 +31,7 @@ HOLD = 2.0  # s
 def manager(rod: str, given: Any = None, **times: Any) -> DomainManager:
     """Of ten base cells of 1 m."""
     zones = np.zeros(len(rod), int) if given is None else np.asarray(given)
-    return DomainManager(cable(), even(len(rod), rod), zones, 1.0, Allowed(0.01), Times(HOLD, **times))
+    return DomainManager.on_layout(cable(), even(len(rod), rod), zones, 1.0, Allowed(0.01), Times(HOLD, **times))
 
 
 def becomes(found: DomainManager, rod: str, t: float, urgent: bool = False) -> None:
@@ -46,13 +46,13 @@ def test_a_rod_that_comes_back_soon_waits_longer_and_a_later_one_half_as_long_ag
     found, waits = manager("RRRR"), []
     becomes(found, "RCCR", 0.0)
     becomes(found, "RRCR", 4.0)
-    waits.append(found.patience.tolist())
+    waits.append(found.wait_factor.tolist())
     t = 4.0
     for _ in range(5):
         becomes(found, "RCCR", t)
         t += 1000.0  # much later than four holds, eight times as long
         becomes(found, "RRCR", t)
-        waits.append(found.patience.tolist())
+        waits.append(found.wait_factor.tolist())
     assert [x[1] for x in waits] == [8.0, 4.0, 2.0, 1.0, 1.0, 1.0]
     assert all(x[0] == x[2] == x[3] == 1.0 for x in waits), "of those that did not come back nothing changes"
 
@@ -62,15 +62,15 @@ def test_soon_is_within_four_holds(after: float, wait: float) -> None:
     found = manager("RRRR")
     becomes(found, "RCCR", 100.0)
     becomes(found, "RRRR", 100.0 + after)
-    assert found.patience.tolist() == [1.0, wait, wait, 1.0]
+    assert found.wait_factor.tolist() == [1.0, wait, wait, 1.0]
 
 
 def test_what_becomes_rod_begins_without_stiffness_and_faster_where_it_is_urgent() -> None:
     for urgent, speed in ((False, 1.0), (True, 16.0)):
         found = manager("RCCC")
         becomes(found, "RRCC", 1.0, urgent)
-        assert found.grown.tolist()[:2] == [1.0, 0.0] and found.zones.haste[1] == speed
-        assert np.isinf(found.calm_since[1]) and not found.leaving.any()
+        assert found.grown.tolist()[:2] == [1.0, 0.0] and found.zones.ramp_factor[1] == speed
+        assert np.isinf(found.below_since[1]) and not found.leaving.any()
 
 
 def test_what_a_pre_run_foresees_begins_as_rod() -> None:
@@ -138,7 +138,7 @@ def test_rods_are_two_lengths_of_bending_wider_than_what_asks() -> None:
     assert found.rules(state_on(line, along(), tension=50.0)).buffer == pytest.approx(2.0 * np.sqrt(2.0 / 50.0))
     assert found.rules(state_on(line, along(), tension=2.0)).buffer == pytest.approx(2.0 * (2.0 / 10.0) ** (1.0 / 3.0))
     allowed = Allowed(0.01, asked={CURVATURE: 0.05})
-    found = DomainManager(cable(), even(10, "C" * 10), np.zeros(10, int), 1.0, allowed, Times(HOLD))
+    found = DomainManager.on_layout(cable(), even(10, "C" * 10), np.zeros(10, int), 1.0, allowed, Times(HOLD))
     assert (found.rules(state_on(line, along(), tension=50.0)).buffer >= 1.0).all()
 
 
@@ -151,14 +151,14 @@ def test_a_rod_on_its_way_out_comes_back_above_half_of_what_makes_a_rod() -> Non
 
 
 def test_the_user_speaks_for_catenaries_that_may_be_rods() -> None:
-    for rod, given, loudest in (("C" * 10, 0, 3.0), ("R" * 10, 0, 0.0), ("C" * 10, -1, 0.0)):
+    for rod, given, highest_ratio in (("C" * 10, 0, 3.0), ("R" * 10, 0, 0.0), ("C" * 10, -1, 0.0)):
         zones = np.full(10, given)
-        found = DomainManager(
+        found = DomainManager.on_layout(
             cable(), even(10, rod), zones, 1.0, Allowed(0.01), Times(HOLD), lambda nodes: np.full(nodes.s.size, 3.0)
         )
         line = on(found.cable, found.layout)
         found.ask_user(line, state_on(line, along(), tension=1e6), 0.0)
-        assert found.loudest == loudest
+        assert found.highest_ratio == highest_ratio
 
 
 def test_a_joint_is_passed_where_a_rod_grows_and_not_where_one_appears() -> None:
@@ -190,7 +190,7 @@ def review_of(found: DomainManager, t: float = 0.0, tension: float = 1e6) -> Cha
 def test_zones_that_are_held_let_no_rod_go_and_what_is_given_as_catenary_becomes_none() -> None:
     for held in (True, False):
         found = manager("RRRRCCCCCC", [0] * 7 + [-1] * 3)
-        found.held, found.calm_since[:] = held, -100.0
+        found.held, found.below_since[:] = held, -100.0
         found.ratios[BEND, 8] = 2.0
         change = review_of(found)
         assert change is None or not change.rod[7:].any()
@@ -199,10 +199,10 @@ def test_zones_that_are_held_let_no_rod_go_and_what_is_given_as_catenary_becomes
 
 def test_rods_go_when_they_have_no_stiffness_left_and_the_next_review_is_when_one_may_have_gone() -> None:
     found = manager("RRRRCCCCCC", ramp=1.0)
-    found.calm_since[:] = -100.0
+    found.below_since[:] = -100.0
     found.leaving[:4], found.grown[:4] = True, 0.1
     assert review_of(found) is None and found.next_review == pytest.approx(0.1)
-    found.grown[:4], found.calm_since[:] = 0.0, -100.0
+    found.grown[:4], found.below_since[:] = 0.0, -100.0
     change = review_of(found)
     assert change is not None and not change.rod.any()
 
@@ -231,7 +231,7 @@ def test_rods_are_urgent_where_a_line_without_weight_loses_tension(
     """From `before` (N) a ramp time ago to 50 now: 14 in a ramp time are less than 0.3 of that, 16 are not."""
     floor = float(manager("C" * 10).floor.max())  # N, of 10 N/m: without weight where it is below 1e-3 of the scale
     scale = 1e3 * floor * (1.01 if weightless else 0.99)
-    found = DomainManager(cable(), even(10, "C" * 10), np.zeros(10, int), scale, Allowed(0.01), Times(HOLD))
+    found = DomainManager.on_layout(cable(), even(10, "C" * 10), np.zeros(10, int), scale, Allowed(0.01), Times(HOLD))
     found.zones.past[:], found.zones.counts.known, found.age = before, 1, HOLD
     found.ratios[BEND, 7] = 1.5
     change = review_of(found, tension=50.0)
@@ -247,12 +247,12 @@ def reviewed(rod: str, ratios: Any, twisted: bool, wait: float, compiled: bool) 
     All were calm for 5 s, and are to be so for `wait` holds.
     """
     found = manager(rod)
-    found.calm_since[:], found.patience[:] = -5.0, wait
+    found.below_since[:], found.wait_factor[:] = -5.0, wait
     line = on(found.cable, found.layout)
     state, sea = state_on(line, along(), tension=1e6), no_sea(line.h.size)
     found.evaluate_criteria(line, sea, still(), state, 0.0)
     found.twisted = twisted
-    found.loudest = 0.0
+    found.highest_ratio = 0.0
     found.ratios[:] = ratios
     if compiled:
         table = Table(blank_review_job)
@@ -272,8 +272,8 @@ def test_a_compiled_review_decides_as_one_in_python(twisted: bool, wait: float) 
     ratios[BEND, 1], ratios[TORSION] = 0.95, 0.0
     ratios[TORSION, 4] = 0.95
     both = [reviewed("RRCCRRCCRR", ratios, twisted, wait, compiled) for compiled in (True, False)]
-    for name in ("calm_since", "leaving", "calmed", "next_review", "seen", "going"):
+    for name in ("below_since", "leaving", "release_cause", "next_review", "seen", "going"):
         one, other = (np.asarray(getattr(x, name), float) for x in both)
         np.testing.assert_allclose(one, other, rtol=1e-12, err_msg=name)
-    assert np.isinf(both[0].calm_since[8:]).all() == twisted
+    assert np.isinf(both[0].below_since[8:]).all() == twisted
     assert both[0].leaving[8:].all() == (not twisted and wait == 1.0)

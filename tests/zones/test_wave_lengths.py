@@ -49,7 +49,9 @@ def watched(velocity, fineness=1.0, tolerance=1e-3):
     line = on(what, zones)
     state = state_on(line, along((1.0, 0.0, 0.0)), 1e4)
     state.v[:, 2] = velocity(line.s)
-    manager = DomainManager(what, zones, np.ones(8, int), 1.0, Allowed(tolerance, SHARE, fineness=fineness), Times(1.0))
+    manager = DomainManager.on_layout(
+        what, zones, np.ones(8, int), 1.0, Allowed(tolerance, SHARE, fineness=fineness), Times(1.0)
+    )
     manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
     manager.zones.next_rod[:] = True
     table = Table(blank_zone_job())
@@ -227,5 +229,5 @@ def test_waves_are_not_known_in_an_older_checkpoint() -> None:
     older: Tree = {"manager": {"ratios": 1}, "following": {"true": np.ones(3), "calm": np.zeros(4)}}
     found = zoning_of_today(older)
     assert found["manager"]["fastest"] == 0.0 and not found["following"]["waves"].any()
-    own = {"true": np.ones(3), "calm": np.zeros(4), "waves": np.ones(4)}
+    own = {"true": np.ones(3), "idle_steps": np.zeros(4), "waves": np.ones(4)}
     assert zoning_of_today({"manager": {"fastest": 2.0}, "following": own})["following"]["waves"].all()

@@ -47,7 +47,7 @@ def managed(period: float = 0.0, step: float = 0.001, rods: Any = (), **model: A
 
 def times(found: DomainManager) -> tuple[float, float, float, float]:
     """Hold and ramp time, s, for how long an edge is foreseen, and for how long the largest values count."""
-    return found.dwell, found.pace, float(found.zones.clock.edge_time), float(found.zones.clock.memory)
+    return found.dwell, found.ramp_time, float(found.zones.clock.edge_time), float(found.zones.clock.memory)
 
 
 def test_times_of_a_line_without_periods() -> None:
@@ -88,9 +88,9 @@ def test_steps_while_bending_comes_and_goes() -> None:
     """A tenth of the ramp time; twice that before; lengths are let go within a ramp time."""
     built, found = managed()
     clock = run_zones._LineZones(0, built, found, 1).switching.zones.clock
-    assert clock.ramp_step == pytest.approx(0.1 * found.pace)
-    assert clock.calm_step == pytest.approx(0.2 * found.pace)
-    assert clock.letting_go == pytest.approx(found.pace)
+    assert clock.ramp_step == pytest.approx(0.1 * found.ramp_time)
+    assert clock.steady_step == pytest.approx(0.2 * found.ramp_time)
+    assert clock.letting_go == pytest.approx(found.ramp_time)
 
 
 def test_what_a_pre_run_foresees_is_kept_by_base_cells() -> None:
@@ -180,7 +180,7 @@ def rescued(outcome: Outcome, rescues: int, slack: int = -1) -> list[int]:
     model = on_layout(built, built.layout._replace(rod=np.zeros(built.layout.rod.size, bool)))
     assert model.layout is not None
     found.set_layout(model.layout)
-    found.ratios[BEND, 10], found.loudest, tried = 5.0, 5.0, state_for(model.line)
+    found.ratios[BEND, 10], found.highest_ratio, tried = 5.0, 5.0, state_for(model.line)
     tried.T[:] = model.slack_floor + 1.0
     if slack >= 0:
         tried.T[slack] = model.slack_floor

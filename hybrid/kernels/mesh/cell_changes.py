@@ -139,7 +139,7 @@ def cells_due(table):
     zones = job.zone_clock
     if job.at.alone == 0 or job.zone_counts.cells_due == 0:
         return 0
-    return 0 if zones.loudest > 1.0 or job.clock.now >= zones.next_review else 1
+    return 0 if zones.highest_ratio > 1.0 or job.clock.now >= zones.next_review else 1
 
 
 @kernel
@@ -379,7 +379,7 @@ def energy(line, sea, ends, state, zones):
 @inner
 def make_stiffness(line, zones):
     """Stiffness of elements as ramps have it now."""
-    shares(zones.grown, zones.leaving, zones.haste, 0.0, zones.kinds.base_of_cell, zones.share)
+    shares(zones.grown, zones.leaving, zones.ramp_factor, 0.0, zones.kinds.base_of_cell, zones.share)
     soften(zones.share, zones.stiff, line.kb)
 
 

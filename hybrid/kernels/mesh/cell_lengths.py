@@ -54,7 +54,7 @@ STEEPEST = 0.8  # by which W may grow with s: cells beside each other differ by 
 AHEAD = 0.75  # of W from which cells are halved where others must be: changes become fewer
 MERGE = 0.5  # of W that two cells made one may be long
 STEADY = 2.0  # times the curvature error of lengths: by so much may curvature change along two cells made one
-CALM_STEPS = 4  # for which two cells must have been so short and so evenly bent
+IDLE_STEPS = 4  # for which two cells must have been so short and so evenly bent
 FADE = 10.0  # ramp times over which the largest curvature of earlier is forgotten
 SAVED = 0.12  # of all cells: so many must go before any goes
 KAPPA, BENDS = range(2)  # columns of the work array `moment` of zones: curvature, 1/m, and |kappa''|, 1/m^3, of nodes
@@ -330,13 +330,13 @@ def halves(zones, p, a, size, unit):
     """Whether the part of `size` finest cells of length `unit` from place a on is halved."""
     W, middle, h = least_wanted(zones, p, a + size), a + size // 2, size * unit
     if h > W * AHEAD:
-        zones.calm[middle] = 0
+        zones.idle_steps[middle] = 0
         return True
     if not zones.here[middle]:
         return False
-    calm = h <= MERGE * W and is_steady(zones, p, a + size)
-    zones.calm[middle] = zones.calm[middle] + 1 if calm else 0
-    return zones.calm[middle] < CALM_STEPS
+    idle = h <= MERGE * W and is_steady(zones, p, a + size)
+    zones.idle_steps[middle] = zones.idle_steps[middle] + 1 if idle else 0
+    return zones.idle_steps[middle] < IDLE_STEPS
 
 
 @inner

@@ -15,8 +15,8 @@ curvature and moment.  Slack, a torque near to a loop and contact have no bound 
 
 Bending on its way in and out: how much of its stiffness every node has, and the energy that a change of it frees.
 
-grown: (n,) of base cells, 0 to 1; leaving: (n,) those on their way out; haste: (n,) times as fast as the others
-that some come in.  Times in paces of the manager.
+grown: (n,) of base cells, 0 to 1; leaving: (n,) those on their way out; ramp_factor: (n,) times as fast as the others
+that some come in.  Times in ramp times of the manager.
 """
 
 from __future__ import annotations
@@ -431,13 +431,13 @@ def raise_ratios(line, sea, state, past, ahead, shares, layers, kinds, ratios):
 @inner
 def largest_ratio(line, kinds, ratios):
     """The largest ratio among base cells that are catenary and free."""
-    loudest = 0.0
+    highest_ratio = 0.0
     for i in range(line.spin.shape[0]):
         j = kinds.base_of_cell[i]
         if not line.spin[i] and kinds.free[j]:
             for c in range(ratios.shape[0]):
-                loudest = max(loudest, ratios[c, j])
-    return loudest
+                highest_ratio = max(highest_ratio, ratios[c, j])
+    return highest_ratio
 
 
 @kernel
@@ -461,26 +461,26 @@ FIRST = 1e-3
 
 
 @inner
-def moved(x, leaving, haste, dt):
-    x += -dt if leaving else dt * haste
+def moved(x, leaving, ramp_factor, dt):
+    x += -dt if leaving else dt * ramp_factor
     return min(max(x, 0.0), 1.0)
 
 
 @kernel
-def advance(grown, leaving, haste, dt):
+def advance(grown, leaving, ramp_factor, dt):
     """Move all on by dt."""
     for j in range(grown.size):
-        grown[j] = moved(grown[j], leaving[j], haste[j], dt)
+        grown[j] = moved(grown[j], leaving[j], ramp_factor[j], dt)
 
 
 @kernel
-def shares(grown, leaving, haste, dt, base_of_cell, out):
+def shares(grown, leaving, ramp_factor, dt, base_of_cell, out):
     """Parts of the stiffness (N+1,) of nodes, dt from now: smooth in time, of the softer cell beside a node."""
     n = base_of_cell.size
     before = 1.0
     for i in range(n):
         j = base_of_cell[i]
-        x = moved(grown[j], leaving[j], haste[j], dt)
+        x = moved(grown[j], leaving[j], ramp_factor[j], dt)
         part = max(x * x * (3.0 - 2.0 * x), FIRST)
         out[i] = min(before, part) if i > 0 else part
         before = part

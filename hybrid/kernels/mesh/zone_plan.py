@@ -137,8 +137,8 @@ def tidy(flags, rod, shortest, before):
 
 
 @kernel
-def make_plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
-    """wait: (n,) s that rods must be calm; flags: (4, n) leaving, two to work in, what the base cells should be."""
+def make_plan(ratios, off, rod, below_since, t, base, buffer, shortest, wait, flags):
+    """wait: (n,) s that rods must be below their thresholds; flags: (4, n) leaving, two to work in, what the base cells should be."""
     leaving, asks, near, out = flags[0], flags[1], flags[2], flags[3]
     n = rod.size
     for j in range(n):
@@ -148,11 +148,11 @@ def make_plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
             asks[j] = _asks(ratios, off, j) if rod[j] else _over(ratios, 1.0, j)
     mark_spread(asks, base, buffer, near)
     for j in range(n):
-        calm[j] = min(calm[j], t) if rod[j] and not near[j] else np.inf
+        below_since[j] = min(below_since[j], t) if rod[j] and not near[j] else np.inf
         asks[j] = _over(ratios, 1.0, j)
     mark_spread(asks, base, buffer, near)
     for j in range(n):
-        out[j] = near[j] or (rod[j] and t - calm[j] < wait[j])
+        out[j] = near[j] or (rod[j] and t - below_since[j] < wait[j])
     tidy(out, rod, shortest, asks)
 
 
@@ -165,13 +165,13 @@ class ReviewJob(NamedTuple):
     zone_table: NDArray[np.int64]  # of a kernels.mesh.zone_step.ZoneJob
     base: Floats  # (n+1,) m
     given: NDArray[np.int64]  # (n,)
-    calm_since: Floats  # (n,) s
-    calmed: Floats  # (2, n) of rods on their way out: which criterion was the leading_criterion, and its ratio
-    patience: Floats  # (n,)
+    below_since: Floats  # (n,) s, since when rods are below their thresholds
+    release_cause: Floats  # (2, n) of rods on their way out: the criterion of `leading_criterion`, and its ratio
+    wait_factor: Floats  # (n,) dwell times that each must be below
     seen: Floats  # (criteria, n), largest ratios since the last output
     buffer: Floats  # (n,) m (written)
     off: Floats  # (criteria,)
-    calm: Floats  # (n,) s, as a plan would have it (written)
+    next_below: Floats  # (n,) s, `below_since` as a plan would have it (written)
     wait: Floats  # (n,) s (written)
     flags: NDArray[np.bool_]  # (4, n) (written)
     shortest: int  # cells
@@ -179,7 +179,7 @@ class ReviewJob(NamedTuple):
     parts: float  # of the buffer
     light: float  # N/m
     forced: float  # ratio of what is given as rod
-    pace: float  # s, ramp time of bending stiffness
+    ramp_time: float  # s, of bending stiffness
     pause: float  # of that, until the next review
     held: int  # 1 where rods may not go
 
@@ -216,7 +216,7 @@ def stays(job, zones, j):
 
 @inner
 def let_go(job, zones):
-    """Rods that are not planned are on their way out; the part of the pace until one of them may have gone."""
+    """Rods that are not planned are on their way out; the part of the ramp time until one of them may have gone."""
     ratios, wait, going, any_before = zones.ratios, job.pause, 0, zones.counts.going
     for j in range(zones.rod.shape[0]):
         planned = (job.flags[3, j] or job.held != 0) and job.given[j] >= 0
@@ -225,7 +225,7 @@ def let_go(job, zones):
             going, wait = 1, min(wait, zones.grown[j])
             if not zones.leaving[j]:
                 c = leading_criterion(ratios, job.off, j)
-                job.calmed[0, j], job.calmed[1, j] = c, ratios[c, j]
+                job.release_cause[0, j], job.release_cause[1, j] = c, ratios[c, j]
         zones.leaving[j] = goes
     zones.counts.going = going
     if going or any_before:
@@ -240,7 +240,7 @@ def quiet_review(table):
     run = read_zones(job.zone_table)
     zones, clock = run.zones, run.zones.clock
     kinds, ratios, n = zones.kinds, zones.ratios, zones.rod.shape[0]
-    if clock.loudest > 1.0:
+    if clock.highest_ratio > 1.0:
         return 0
     if zones.counts.holds_twist or zones.counts.loaded:  # torque needs rods from end to end
         most = 0.0
@@ -251,21 +251,21 @@ def quiet_review(table):
     for j in range(n):
         if job.given[j] > 0:
             ratios[GIVEN, j] = job.forced
-        job.flags[0, j], job.calm[j] = zones.leaving[j], job.calm_since[j]
-        job.wait[j] = job.dwell * job.patience[j]
+        job.flags[0, j], job.next_below[j] = zones.leaving[j], job.below_since[j]
+        job.wait[j] = job.dwell * job.wait_factor[j]
     state = run.new if run.counts.parity else run.old
     reach(state.T, kinds.base_of_cell, kinds.EI, kinds.w, kinds.floor, job.parts, job.light, job.buffer)
     if z.asks_layers(zones):
         widen(job.buffer, zones.H)
     now = run.clock.now
-    make_plan(ratios, job.off, zones.rod, job.calm, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
+    make_plan(ratios, job.off, zones.rod, job.next_below, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
     for j in range(n):
         if not stays(job, zones, j):
             return 0
     wait = let_go(job, zones)
     for j in range(n):
-        job.calm_since[j] = job.calm[j]
+        job.below_since[j] = job.next_below[j]
         for c in range(ratios.shape[0]):
             job.seen[c, j], ratios[c, j] = max(job.seen[c, j], ratios[c, j]), 0.0
-    clock.next_review = now + (max(wait, 0.0) - ROUND_TIME) * job.pace
+    clock.next_review = now + (max(wait, 0.0) - ROUND_TIME) * job.ramp_time
     return 1

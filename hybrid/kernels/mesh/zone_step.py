@@ -75,18 +75,18 @@ class ZoneClock(NamedNumbers):
     """What zones that move know of times, in s, and of the line as a whole."""
 
     dt: float  # since the last evaluation
-    pace: float  # ramp time of bending stiffness
+    ramp_time: float  # of bending stiffness
     age: float  # of the tensions `past` and `recent`
     recent_age: float
     next_review: float
     tolerance: float  # m, of position
-    loudest: float  # largest ratio among catenaries, at the last evaluation
+    highest_ratio: float  # largest ratio among catenaries, at the last evaluation
     torque: float  # N m, that a rod from end to end would carry, where there is none
     total_twist: float  # rad, of the ends against each other
     compliance: float  # of all the line: rad per N m; rad
     free_twist: float
     letting_go: float  # over which lengths become true
-    calm_step: float  # longest steps: while nothing is ramped, and else
+    steady_step: float  # longest steps: while nothing is ramped, and else
     ramp_step: float
     share: float  # of the largest curvature that the length of cells may make it wrong by, where they follow it; 0: they stay
     left: float  # part of what catenaries leave out that remains in results: 1, but for results that are corrected
@@ -131,14 +131,14 @@ class Zones(NamedTuple):
     rod: NDArray[np.bool_]  # (n,)
     leaving: NDArray[np.bool_]  # (n,) rods whose stiffness is ramped down
     grown: Floats  # (n,) part of its stiffness that each rod has
-    haste: Floats  # (n,) by how much faster it is ramped up
+    ramp_factor: Floats  # (n,) by how much faster it is ramped up
     # Of cells that follow the curvature (kernels.mesh.cell_lengths); K cells of the finest mesh:
     parts: NDArray[np.int64]  # (n,) finest cells of base cells
     H: Floats  # (n,) m, lengths of base cells
     next_rod: NDArray[np.bool_]  # (n,) what is rod where nodes are planned
     here: NDArray[np.bool_]  # (K+1,) places of nodes now
     plan: NDArray[np.bool_]  # (K+1,) and where they should be
-    calm: NDArray[np.int64]  # (K+1,) steps for which a node could have gone
+    idle_steps: NDArray[np.int64]  # (K+1,) steps for which a node could have gone
     waves: Floats  # (K+1,) m^2, squares of the longest cells that waves allow; 0: no node, or not known yet
     place: NDArray[np.int64]  # (N+1,) places of nodes
     wanted: Floats  # (N+1,) m, longest cells that the curvature allows
@@ -163,8 +163,8 @@ def blank_zones(cells: int, base: int) -> Zones:
         kinds=blank_kinds(cells, base),
         clamped=z(2), tangents=z((2, 3)), moments=z((2, 3)), past=z(cells), recent=z(cells),
         asked=z(QUANTITIES), largest=z(QUANTITIES), shares=z(QUANTITIES), limits=z(QUANTITIES), ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
-        haste=np.ones(base), parts=np.ones(base, np.int64), H=np.ones(base), next_rod=z(base, bool),
-        here=z(base + 1, bool), plan=z(base + 1, bool), calm=z(base + 1, np.int64),
+        ramp_factor=np.ones(base), parts=np.ones(base, np.int64), H=np.ones(base), next_rod=z(base, bool),
+        here=z(base + 1, bool), plan=z(base + 1, bool), idle_steps=z(base + 1, np.int64),
         waves=z(base + 1), place=z(nodes, np.int64),
         wanted=z(nodes), share=z(nodes), stiff=z((nodes, 3)), true=z(cells), lengths=z(cells), lack=z(cells),
         rate=z(cells), since=np.full(cells, -np.inf), keeps=z(cells, bool), strain=z((2, nodes, 3)),
@@ -231,7 +231,7 @@ def prepare(line, zones, end, dt):
             zones.lack, zones.rate, zones.since, zones.keeps, end, z.letting_go, zones.true, line.h
         )
     if flags.going or flags.coming:
-        shares(zones.grown, zones.leaving, zones.haste, dt / z.pace, zones.kinds.base_of_cell, zones.share)
+        shares(zones.grown, zones.leaving, zones.ramp_factor, dt / z.ramp_time, zones.kinds.base_of_cell, zones.share)
         soften(zones.share, zones.stiff, line.kb)
 
 
@@ -339,7 +339,7 @@ def asks_layers(zones):
 
 @inner
 def evaluate(line, sea, ends, state, zones, near, dt):
-    """Raise the ratios since the last review to those of a state, dt after the last one; the loudest of catenaries.
+    """Raise the ratios since the last review to those of a state, dt after the last one; the highest of catenaries.
 
     dt = 0: there was none, or it was on other nodes.
     """
@@ -349,7 +349,7 @@ def evaluate(line, sea, ends, state, zones, near, dt):
         copy(state.T, zones.recent)
         z.age, z.recent_age, flags.known = 0.0, 0.0, 1
     z.age, z.recent_age = z.age + dt, z.recent_age + dt
-    ahead = min(LOOKAHEAD * z.pace / z.age, LONGEST_LOOKAHEAD) if z.age > 0.0 else 0.0
+    ahead = min(LOOKAHEAD * z.ramp_time / z.age, LONGEST_LOOKAHEAD) if z.age > 0.0 else 0.0
     z.torque = torque_of_ends(line, ends, state, zones) if flags.holds_twist else 0.0
     for k in range(2):
         for j in range(3):
@@ -364,8 +364,8 @@ def evaluate(line, sea, ends, state, zones, near, dt):
         weigh_moments(state, zones)
     weigh_contact(near, zones)
     if line.bits & OBSTACLES:
-        weigh_obstacles(line, sea, state, zones, LOOKAHEAD * z.pace)
-    z.loudest = largest_ratio(line, zones.kinds, zones.ratios)
+        weigh_obstacles(line, sea, state, zones, LOOKAHEAD * z.ramp_time)
+    z.highest_ratio = largest_ratio(line, zones.kinds, zones.ratios)
 
 
 # --- after a step -----------------------------------------------------------------------------------
@@ -402,13 +402,13 @@ def book(line, ends, before, state, dt, zones):
         else:
             find_strain(line, ends, before, zones, 0)
         find_strain(line, ends, state, zones, 1)
-        shares(zones.grown, zones.leaving, zones.haste, 0.0, zones.kinds.base_of_cell, zones.share)
+        shares(zones.grown, zones.leaving, zones.ramp_factor, 0.0, zones.kinds.base_of_cell, zones.share)
         booked += freed(line, zones.share, zones.stiff, zones.strain[0], zones.strain[1])
-        advance(zones.grown, zones.leaving, zones.haste, dt / z.pace)
+        advance(zones.grown, zones.leaving, zones.ramp_factor, dt / z.ramp_time)
         flags.strained, flags.coming = 1, is_coming(zones)
     else:
         flags.strained = 0
-    if z.recent_age * SAMPLES >= z.pace:  # tensions to extrapolate from
+    if z.recent_age * SAMPLES >= z.ramp_time:  # tensions to extrapolate from
         copy(zones.recent, zones.past)
         copy(state.T, zones.recent)
         z.age, z.recent_age = z.recent_age, 0.0
@@ -419,10 +419,10 @@ def book(line, ends, before, state, dt, zones):
 def watch_waves(line, state, zones, dt):
     """What the velocities after a step of dt ask of lengths."""
     z = zones.clock
-    z.fastest = max(z.fastest * math.exp(-dt / (FADE * z.pace)), spread_of_velocity(state.v))
-    fast = max(z.fastest, QUIET * z.tolerance / z.pace)
+    z.fastest = max(z.fastest * math.exp(-dt / (FADE * z.ramp_time)), spread_of_velocity(state.v))
+    fast = max(z.fastest, QUIET * z.tolerance / z.ramp_time)
     error = WAVES * z.share * fast / (z.fineness * z.fineness)
-    note_waves(line, state, zones, error, dt / (TAU * z.pace), z.fineness)
+    note_waves(line, state, zones, error, dt / (TAU * z.ramp_time), z.fineness)
 
 
 @inner
@@ -490,7 +490,7 @@ def advance_zones(table):
         return 0
     if phase == b.JUDGE:
         evaluate(line, job.sea, ends, job.old if count.parity else job.new, zones, job.near, dt)
-        return 1 if zones.clock.loudest > REJECT_RATIO else 0
+        return 1 if zones.clock.highest_ratio > REJECT_RATIO else 0
     # a step is accepted, and the states have changed places
     state, before = job.old, job.new
     if count.parity:
@@ -503,8 +503,8 @@ def advance_zones(table):
         watch_waves(line, state, zones, clock.last_dt)
         zones.counts.cells_due = other_cells(line, job.sea, state, zones, clock.last_dt)
     ramping = zones.counts.going or zones.counts.coming
-    clock.allowed = zones.clock.ramp_step if ramping else zones.clock.calm_step
-    if zones.clock.loudest > 1.0:
+    clock.allowed = zones.clock.ramp_step if ramping else zones.clock.steady_step
+    if zones.clock.highest_ratio > 1.0:
         return 1
     if clock.now >= zones.clock.next_review and (job.review == 0 or call_review(job.review, job.review_table) == 0):
         return 1
