@@ -33,8 +33,7 @@ def scene_at_rest(seed: int) -> tuple[str, dict[str, Any]]:
     if kind.startswith("bed"):
         depth = L * rng.uniform(0.25, 0.4)
         one[:], two[:] = [0.0, 0.0, -depth], [float(0.93 * np.sqrt(L**2 - depth**2)), across, 0.0]
-        # an end at the very edge of the bed has a force that jumps by rounding (kernels.laws.end_forces)
-        around["seabed"] = {"z": -1.0005 * depth, "stiffness": float(w / (0.1 * section["diameter"]))}
+        around["seabed"] = {"z": -depth, "stiffness": float(w / (0.1 * section["diameter"]))}
     if kind in ("clamped", "zones"):
         start = {"kind": "clamped", "position": one, "tangent": [1.0, 0.0, float(rng.uniform(-0.5, 0.5))]}
     if kind == "zones":

@@ -32,7 +32,10 @@ from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.report import BODIES, CONTACT_FORCE, FLOW, FORCE_A, NET_A, SEABED, SOIL, SURFACE, WAVES
 
-HALVINGS = 52  # of the last cell, which find where a line leaves the bed: to round-off, as derivatives need it
+HALVINGS = 52  # of the last cell, which find where a rod leaves the bed: to round-off, as derivatives need it
+MOST_BRACKETS = 60  # of Ridders' method, for the same of all lines: 5 in the mean, as many where hardly anything lies
+SHORTEST = 1e-18  # of the cell, that lies: less is nothing, and more than nothing is needed to divide by
+ROUND_OFF = 2.3e-16  # of the cell, to which the length that lies is known
 FAR = 40.0  # layers to a cell from which on the two ends of the cell do not know of each other
 LEAST_TENSION = 0.125  # of the weight of a cell: with less it would hang deeper than it is long
 SMALL_TENSION = 1e-3  # of sqrt(k EI), below which it does not change how a rod lies
@@ -105,7 +108,45 @@ def edge_force(layer, length, near, far):
 @inner
 def free_length(layer, V, p):
     """Length from a node at a depth p down to the bed, on which the line presses there with V."""
-    return (math.sqrt(V * V - 2.0 * layer.w * layer.T * p) - V) / layer.w if p < 0.0 else 0.0
+    if not p < 0.0:
+        return 0.0
+    root = math.sqrt(V * V - 2.0 * layer.w * layer.T * p)
+    return -2.0 * layer.T * p / (root + V) if V > 0.0 else (root - V) / layer.w
+
+
+@inner
+def excess_length(layer, lies, p0, p1):
+    """Length of a cell of which so much lies, with what hangs from its nodes at depths p0 and p1."""
+    a0, a1 = max(p0, 0.0), max(p1, 0.0)
+    free = free_length(layer, edge_force(layer, lies, a0, a1), p0)
+    return lies + free + free_length(layer, edge_force(layer, lies, a1, a0), p1)
+
+
+@inner
+def lying_length(layer, p0, p1, h):
+    """Length of a cell of h (m) that lies, by Ridders' method (IEEE Trans. Circuits Syst. 26, 1979)."""
+    if p0 >= 0.0 and p1 >= 0.0:
+        return h
+    low, high = SHORTEST * h, h
+    under, over = excess_length(layer, low, p0, p1) - h, excess_length(layer, high, p0, p1) - h
+    if not under < 0.0:
+        return low
+    for _ in range(MOST_BRACKETS):
+        middle = 0.5 * (low + high)
+        half = excess_length(layer, middle, p0, p1) - h
+        y = middle - (middle - low) * half / math.sqrt(half * half - under * over)
+        rest = excess_length(layer, y, p0, p1) - h
+        if rest == 0.0 or high - low <= ROUND_OFF * h:
+            return y
+        if half < 0.0:
+            low, under = middle, half
+        else:
+            high, over = middle, half
+        if rest < 0.0 and y > low:
+            low, under = y, rest
+        elif rest > 0.0 and y < high:
+            high, over = y, rest
+    return 0.5 * (low + high)
 
 
 @inner
@@ -140,19 +181,18 @@ def force_of_beam(layer, p0, slope, h):
 def force_of_layer(layer, p0, p1, slope, h):
     """Force at a support at a depth p0, with the next node at p1, and the part of its layer.
 
-    The part is from 0, where the line leaves the bed at the support, to 1.
+    The part is from 0, where the line leaves the bed at the support, to 1.  Where less than half of the cell lies, its
+    force is what the free part leaves of it: round-off of a length that hardly lies would be all of its own force.
     """
     w, a0, a1 = layer.w, max(p0, 0.0), max(p1, 0.0)
-    low, high, lies, free, V = 0.0, h, h, 0.0, 0.0
-    for _ in range(HALVINGS):
-        lies = 0.5 * (low + high)
-        V = edge_force(layer, lies, a0, a1)
-        free = free_length(layer, V, p0)
-        if lies + free + free_length(layer, edge_force(layer, lies, a1, a0), p1) < h:
-            low = lies
-        else:
-            high = lies
-    part, force = math.tanh(2.0 * lies / layer.L) ** 2, V + w * free
+    lies = lying_length(layer, p0, p1, h)
+    V = edge_force(layer, lies, a0, a1)
+    part, force, free = math.tanh(2.0 * lies / layer.L) ** 2, V + w * free_length(layer, V, p0), h - lies
+    if free > lies and p0 < 0.0 and p1 >= 0.0:
+        force = 0.5 * w * free - layer.T * p0 / free
+    elif free > lies and p0 >= 0.0 and p1 < 0.0:
+        force = layer.k * layer.L * (2.0 * w / layer.k - a0) * math.tanh(0.5 * lies / layer.L)
+        force += layer.T * p1 / free + 0.5 * w * free
     if layer.EI > 0.0:
         turn = layer.EI * layer.P * layer.held
         force -= part * turn * slope
