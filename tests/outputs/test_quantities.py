@@ -11,8 +11,11 @@ import pytest
 from scipy.optimize import brentq
 
 import hybrid
+from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.state import no_sea
+from hybrid.kernels.watch import named_quantities as k
 from hybrid.outputs.probes import PROBES
-from hybrid.outputs.quantities import FEW, Walls, between, largest_stress, nearest
+from hybrid.outputs.quantities import chords_of, nothing
 from hybrid.scene.quantities import TAKEN
 from hybrid.scene.read import read_text
 from hybrid.store.limits import held_of
@@ -120,6 +123,18 @@ def test_clearances_of_a_straight_line() -> None:
     assert result.part[0] == pytest.approx(math.hypot(begin, 1.0) - 0.01, abs=1e-6)
 
 
+def distances(a: np.ndarray, b: np.ndarray, ra: np.ndarray, rb: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Clearances (nb,) m of lines a (nb, n+1, 3) m and b (nb, m+1, 3) m, and places on a, in chords from its first on."""
+    nb, n = len(a), a.shape[1] - 1
+    asked, found = np.zeros(k.ASKED), np.empty((2, nb))
+    asked[k.KIND], asked[k.PATH_END], asked[k.FIRST] = k.CLEARANCE, b.shape[1] - 1, np.nan
+    radii, held, s = np.stack([np.arange(1.0, n + 1), ra], axis=1), np.zeros((nb, 2), np.int8), np.arange(n + 1.0)[None]
+    report = np.zeros((nb, REPORT_SIZE))
+    seen = k.Seen(s, a, np.diff(a, axis=1), no_sea(n), held, held[0], report, radii, chords_of(b, rb))
+    k.observe_quantity(seen, asked, nothing(1)[0], found)
+    return found[0], found[1]
+
+
 def test_distances_of_chords() -> None:
     """Never more than between any two of many points of them, and attained; many pairs give what all give."""
     rng = np.random.default_rng(1)
@@ -127,7 +142,7 @@ def test_distances_of_chords() -> None:
     b1[:20] = b0[:20] + (a1 - a0)[:20]  # parallel
     b1[20:30] = b0[20:30]  # points
     a1[30:35] = a0[30:35]
-    distance, part = between(a0, a1, b0, b1)
+    distance, part = distances(np.stack([a0, a1], axis=1), np.stack([b0, b1], axis=1), np.zeros(1), np.zeros(1))
     x = np.linspace(0.0, 1.0, 101)
     first, second = (p[:, None] + x[:, None] * (q - p)[:, None] for p, q in ((a0, a1), (b0, b1)))
     sampled = np.linalg.norm(first[:, :, None] - second[:, None], axis=3)
@@ -137,11 +152,13 @@ def test_distances_of_chords() -> None:
     assert np.linalg.norm(there[:, None] - second, axis=2).min(axis=1) == pytest.approx(distance, abs=0.02)
     a, b = (np.cumsum(rng.normal(size=(150, 3)), axis=0) + shift for shift in (0.0, 15.0))
     ra, rb = rng.uniform(0.0, 0.3, 149), rng.uniform(0.0, 0.3, 149)
-    assert FEW < 149**2
     i, j = (k.ravel() for k in np.indices((149, 149)))
-    every = between(a[i], a[i + 1], b[j], b[j + 1])[0] - ra[i] - rb[j]
-    found, cell, _ = nearest(a, b, ra, rb)
-    assert found == pytest.approx(every.min(), rel=1e-12) and cell == i[every.argmin()]
+    pairs = np.stack([a[i], a[i + 1]], axis=1), np.stack([b[j], b[j + 1]], axis=1)
+    apart, parts = distances(*pairs, np.zeros(1), np.zeros(1))
+    every, (found, place) = apart - ra[i] - rb[j], distances(a[None], b[None], ra, rb)
+    nearest = every.argmin()
+    assert found == pytest.approx(every[nearest], rel=1e-12)
+    assert place == pytest.approx(i[nearest] + parts[nearest], abs=1e-12)
 
 
 # --- pipes ---------------------------------------------------------------------------------------------
@@ -195,10 +212,16 @@ def test_a_section_without_pipe_has_no_stress_and_the_limit_is_judged() -> None:
 
 
 def stress(**given: float) -> float:
-    one = np.ones((1, 1))
-    walls = Walls(OUTER * one, INNER * one, 2e11 * one, 0 * one, 0 * one, 0 * one)
+    """Largest stress, Pa, of the pipe of above under pressures, a force in the wall, curvature and torque."""
     values = {"outside": 0.0, "inside": 0.0, "force": 0.0, "curvature": 0.0, "torque": 0.0} | given
-    return float(largest_stress(walls, **{name: x * one for name, x in values.items()})[0, 0])
+    wall, one, found = np.zeros((1, k.WALL)), np.ones((1, 1)), np.empty((2, 1, 1))
+    wall[0, [k.OUTER, k.INNER, k.MODULUS, k.INSIDE]] = OUTER, INNER, 2e11, values["inside"]
+    wall[0, [k.WATER, k.SURFACE]] = values["outside"], 1.0
+    T = values["force"] - values["inside"] * BORE + values["outside"] * (BORE + STEEL_AREA)
+    bend = np.array([values["curvature"], values["torque"]]).reshape(2, 1, 1)
+    k.observe_pipes(wall, np.zeros((1, 1), np.int64), 0.0 * one, T * one, bend, *found)
+    assert found[0, 0, 0] == pytest.approx(values["force"], abs=1e-8)
+    return float(found[1, 0, 0])
 
 
 def test_von_mises_of_single_loads() -> None:
@@ -302,11 +325,12 @@ def test_clearance_of_two_lines(tmp_path: Path) -> None:
     moving = _system(SYSTEM + "time: {duration: 2, step: 0.05}\n")
     result = hybrid.run(moving, tmp_path / "two.h5")
     one, two = result.lines["one"], result.lines["two"]
-    for k in (1, len(result.times) - 1):
+    for at in (1, len(result.times) - 1):
         i, j = (x.ravel() for x in np.indices((100, 100)))
-        a, b = one.position[k], two.position[k]
-        every = between(a[i], a[i + 1], b[j], b[j + 1])[0]
-        assert result.gap[k] == pytest.approx(every.min() - 0.15, abs=5e-4)
+        a, b = one.position[at], two.position[at]
+        pairs = np.stack([a[i], a[i + 1]], axis=1), np.stack([b[j], b[j + 1]], axis=1)
+        every, _ = distances(*pairs, np.zeros(1), np.zeros(1))
+        assert result.gap[at] == pytest.approx(every.min() - 0.15, abs=5e-4)
     assert {x.name for x in hybrid.listed_outputs(moving)} >= {"gap", "gap_at", "pull", "lines/one/tension"}
 
 

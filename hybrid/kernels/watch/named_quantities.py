@@ -29,6 +29,10 @@ both have: that one has a row of its own (CHORDS), by which it puts them there.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, log_rotation, scale, sub
 from hybrid.kernels.laws.bending_law import curvature_under, has_bend_law, parts_without_spring, slips
@@ -40,6 +44,7 @@ from hybrid.kernels.march.zone_torque import LAST as LAST_NODE
 from hybrid.kernels.march.zone_torque import TORQUE as PASSED
 from hybrid.kernels.state.books import SEAM, VON_MISES, WALL_TENSION
 from hybrid.kernels.state.report import FORCE_A
+from hybrid.kernels.state.state import Floats, Sea
 from hybrid.kernels.step.newton import RUN, read
 from hybrid.kernels.watch.extremes import (
     BENT,
@@ -51,6 +56,21 @@ from hybrid.kernels.watch.extremes import (
     is_smooth,
     widen,
 )
+
+
+class Seen(NamedTuple):
+    """What the quantities of a line follow from: one state, or outputs of it."""
+
+    s: Floats  # (N+1,) m
+    r: Floats  # (N+1, 3) m
+    e: Floats  # (N, 3) m
+    sea: Sea
+    held: NDArray[np.int8]  # (2,)
+    loaded: NDArray[np.int8]  # (2,) 1 where there is a load at the end
+    report: Floats  # (REPORT_SIZE,)
+    radii: Floats  # (S, 2) as of `Books`
+    path: Floats  # (P, PATH_ROW)
+
 
 # Columns of `walls`: where the section ends, m; outer and inner diameter, m, Young's modulus, Pa, 0: no pipe; pressure
 # inside, Pa, at the height PRESSURE_Z, m; specific weight of the content and of the water, N/m3; surface of the water, m;
@@ -147,6 +167,13 @@ def pressures(wall, z):
 
 
 @inner
+def tension_of_wall(wall, outside, inside, T):
+    """F of a pipe under the tension T."""
+    bore, full = 0.25 * math.pi * wall[INNER] ** 2, 0.25 * math.pi * wall[OUTER] ** 2
+    return T + inside * bore - outside * full
+
+
+@inner
 def largest_stress(wall, outside, inside, F, curvature, torque):
     """Largest von Mises stress, Pa: at both surfaces of the wall, on both sides of the bend."""
     o2, i2 = wall[OUTER] ** 2, wall[INNER] ** 2
@@ -188,8 +215,7 @@ def note_pipes(line, ends, state, books, t):
                 continue
             wall, column = walls[section], i if side < 0 else books.right[i]
             outside, inside = pressures(wall, state.r[i, 2])
-            bore, full = 0.25 * math.pi * wall[INNER] ** 2, 0.25 * math.pi * wall[OUTER] ** 2
-            F = tension_at(line, ends, state, books, i, side) + inside * bore - outside * full
+            F = tension_of_wall(wall, outside, inside, tension_at(line, ends, state, books, i, side))
             stress = 0.0
             if wall[MODULUS] > 0.0:
                 if wall[NATURAL] > 0.0:
@@ -199,6 +225,22 @@ def note_pipes(line, ends, state, books, t):
                 stress = largest_stress(wall, outside, inside, F, curvature, torque)
             widen(books.extremes, WALL_TENSION, column, F, t)
             widen(books.extremes, VON_MISES, column, stress, t)
+
+
+@kernel
+def observe_pipes(walls, sections, z, T, bend, force, stress):
+    """Wall tension and stress (ns, nb) of outputs, at heights z under tensions T; stress is NaN where there is no pipe.
+
+    sections: (ns, nb) rows of `walls`; bend: (2, ns, nb) curvature and torque.
+    """
+    for i in range(T.shape[0]):
+        for j in range(T.shape[1]):
+            wall = walls[sections[i, j]]
+            outside, inside = pressures(wall, z[i, j])
+            force[i, j] = tension_of_wall(wall, outside, inside, T[i, j])
+            stress[i, j] = math.nan
+            if wall[MODULUS] > 0.0:
+                stress[i, j] = largest_stress(wall, outside, inside, force[i, j], bend[0, i, j], bend[1, i, j])
 
 
 # Kinds, by their names in a scene (scene.quantities.KINDS).
@@ -247,30 +289,29 @@ def row3(row, k):
 
 
 @inner
-def pull_at(job, k):
+def pull_at(seen, k):
     """f at end k, and whether anything takes it."""
-    if not (job.ends.held[k] or job.books.loaded[k]):
+    if not (seen.held[k] or seen.loaded[k]):
         return (0.0, 0.0, 0.0), False
-    report, at = job.books.report, FORCE_A + 3 * k
-    return (report[0, at], report[0, at + 1], report[0, at + 2]), True
+    return row3(seen.report, FORCE_A + 3 * k), True
 
 
 @inner
-def touch_at(job, state, k):
+def touch_at(seen, k):
     """Arc length and place of the first point in contact from end k on; NaN: none."""
-    line, sea, n = job.line, job.sea, job.line.h.shape[0]
+    s, r, n = seen.s, seen.r, seen.e.shape[0]
     step = 1 - 2 * k
     i = k * n
-    _, here = bed_under(sea, get3(state.r, i))
+    _, here = bed_under(seen.sea, get3(r, i))
     for _ in range(n):
         j = i + step
-        _, there = bed_under(sea, get3(state.r, j))
+        _, there = bed_under(seen.sea, get3(r, j))
         if max(here, there) > 0.0:
             x = 0.0
             if here <= 0.0:
                 x = min(max(-here / (there - here), 0.0), 1.0)
-            a, b = get3(state.r, i), get3(state.r, j)
-            return line.s[i] + x * (line.s[j] - line.s[i]), add(a, scale(x, sub(b, a)))
+            a, b = get3(r, i), get3(r, j)
+            return s[i] + x * (s[j] - s[i]), add(a, scale(x, sub(b, a)))
         i, here = j, there
     return math.nan, (math.nan, math.nan, math.nan)
 
@@ -327,27 +368,27 @@ def radius_at(radii, s):
 
 
 @inner
-def over_plane(job, state, asked, first, last):
+def over_plane(seen, asked, first, last):
     """Least height over a plane of the cells from node `first` to `last`, and its arc length."""
-    line, n, b = job.line, row3(asked, DIRECTION), row3(asked, POINT)
+    s, r, n, b = seen.s, seen.r, row3(asked, DIRECTION), row3(asked, POINT)
     least, where = math.inf, math.nan
-    here = dot(n, sub(get3(state.r, first), b))
+    here = dot(n, sub(get3(r, first), b))
     for c in range(first, last):
-        there = dot(n, sub(get3(state.r, c + 1), b))
-        height = min(here, there) - radius_at(job.books.radii, 0.5 * (line.s[c] + line.s[c + 1]))
+        there = dot(n, sub(get3(r, c + 1), b))
+        height = min(here, there) - radius_at(seen.radii, 0.5 * (s[c] + s[c + 1]))
         if height < least:
-            least, where = height, line.s[c + 1] if there < here else line.s[c]
+            least, where = height, s[c + 1] if there < here else s[c]
         here = there
     return least, where
 
 
 @inner
-def from_path(job, state, asked, reached, first, last):
+def from_path(seen, asked, reached, first, last):
     """Least clearance of the cells from node `first` to `last` from a path, and its arc length.
 
     Along the line a distance changes at most by the length that is passed, so that most cells need no distance.
     """
-    line, radii, path = job.line, job.books.radii, job.books.path
+    s, radii, path = seen.s, seen.radii, seen.path
     begin, end = int(asked[PATH]), int(asked[PATH_END])
     if asked[COUNTED] != 0.0:
         begin, end = begin + 1, begin + 1 + int(path[begin, 0])
@@ -358,17 +399,17 @@ def from_path(job, state, asked, reached, first, last):
     least, where, ahead = math.inf, math.nan, -math.inf
     for k in range(first - 1, last):  # the cell that was nearest last comes first
         c = nearest if k < first else k
-        u = get3(state.e, c)
+        u = get3(seen.e, c)
         if k >= first:
             ahead -= math.sqrt(dot(u, u))
             if ahead > least + widest:
                 continue
-        distance, x, there = nearest_on(get3(state.r, c), u, path, begin, end)
-        found = distance - radius_at(radii, 0.5 * (line.s[c] + line.s[c + 1]))
+        distance, x, there = nearest_on(get3(seen.r, c), u, path, begin, end)
+        found = distance - radius_at(radii, 0.5 * (s[c] + s[c + 1]))
         if k >= first:
             ahead = distance
         if found < least:
-            least, where, nearest = found, line.s[c] + x * (line.s[c + 1] - line.s[c]), c
+            least, where, nearest = found, s[c] + x * (s[c + 1] - s[c]), c
             if asked[OF_PATH] != 0.0:
                 where = there
     reached[NEAREST] = nearest
@@ -387,42 +428,42 @@ def nodes_of(s, asked):
 
 
 @inner
-def put_chords(job, state, asked):
+def put_chords(seen, asked):
     """Put chords of the part that counts where a later line finds them."""
-    s, path, begin = job.line.s, job.books.path, int(asked[PATH])
+    s, path, begin = seen.s, seen.path, int(asked[PATH])
     first, last = nodes_of(s, asked)
     path[begin, 0] = last - first
     if last - first > int(asked[PATH_END]) - begin - 1:
         path[begin, 0], last = -1.0, first
     for c in range(first, last):
-        row, r, u = path[begin + 1 + c - first], get3(state.r, c), get3(state.e, c)
+        row, r, u = path[begin + 1 + c - first], get3(seen.r, c), get3(seen.e, c)
         for k in range(3):
             row[k], row[CHORD + k] = r[k], u[k]
-        row[SQUARE], row[RADIUS] = dot(u, u), radius_at(job.books.radii, 0.5 * (s[c] + s[c + 1]))
+        row[SQUARE], row[RADIUS] = dot(u, u), radius_at(seen.radii, 0.5 * (s[c] + s[c + 1]))
         row[BEGINS], row[SPANS] = s[c], s[c + 1] - s[c]
 
 
 @inner
-def clearance(job, state, asked, reached):
+def clearance(seen, asked, reached):
     """Least clearance, m, and its arc length."""
-    first, last = nodes_of(job.line.s, asked)
+    first, last = nodes_of(seen.s, asked)
     if asked[IS_PLANE] != 0.0:
-        return over_plane(job, state, asked, first, last)
-    return from_path(job, state, asked, reached, first, last)
+        return over_plane(seen, asked, first, last)
+    return from_path(seen, asked, reached, first, last)
 
 
 @inner
-def on_bed(job, state, asked, reached, k, begins):
+def on_bed(seen, asked, reached, k, begins):
     """Touchdown, its excursion, or layback at end k; begins: whether the state is the first of all."""
     kind = asked[KIND]
     if kind == LAYBACK and asked[TO_TOUCHDOWN] == 0.0:
-        x = get3(state.r, (1 - k) * job.line.h.shape[0])
+        x = get3(seen.r, (1 - k) * seen.e.shape[0])
     else:
-        s, x = touch_at(job, state, k)
+        s, x = touch_at(seen, k)
         if kind == TOUCHDOWN:
             return s
     if kind == LAYBACK:
-        here = get3(state.r, k * job.line.h.shape[0])
+        here = get3(seen.r, k * seen.e.shape[0])
         return math.hypot(x[0] - here[0], x[1] - here[1])
     if begins and math.isnan(reached[REFERENCE]):
         reached[REFERENCE], reached[REFERENCE + 1] = x[0], x[1]
@@ -439,12 +480,12 @@ def azimuth(f, reached):
 
 
 @inner
-def of_pull(job, state, asked, reached, k):
+def of_pull(seen, asked, reached, k):
     """What follows from the pull at end k; angles in degrees, NaN where there is no pull."""
     kind = asked[KIND]
     f, taken = (0.0, 0.0, 0.0), False
     if asked[IDLE] == 0.0:
-        f, taken = pull_at(job, k)
+        f, taken = pull_at(seen, k)
     if kind == HORIZONTAL_FORCE:
         return math.hypot(f[0], f[1])
     if kind == VERTICAL_FORCE:
@@ -453,7 +494,7 @@ def of_pull(job, state, asked, reached, k):
     if kind == FORCE_ALONG:
         return dot(along, f)
     if UPLIFT <= kind <= UPLIFT_ANGLE:
-        n, _ = bed_under(job.sea, get3(state.r, k * job.line.h.shape[0]))
+        n, _ = bed_under(seen.sea, get3(seen.r, k * seen.e.shape[0]))
         up = dot(n, f)
         aside = sub(f, scale(up, n))
         up = max(up, 0.0)
@@ -466,6 +507,30 @@ def of_pull(job, state, asked, reached, k):
         return azimuth(f, reached)
     aside = cross(f, along)
     return math.degrees(math.atan2(math.sqrt(dot(aside, aside)), dot(along, f)))
+
+
+@inner
+def value_of(seen, asked, reached, begins):
+    """Value of a quantity, and where a clearance is; begins: whether references that are not known are those of now."""
+    kind, k = asked[KIND], int(asked[END])
+    if kind == CLEARANCE:
+        return clearance(seen, asked, reached)
+    if kind >= TOUCHDOWN:
+        return on_bed(seen, asked, reached, k, begins), math.nan
+    return of_pull(seen, asked, reached, k), math.nan
+
+
+@kernel
+def observe_quantity(seen, asked, reached, found):
+    """Values and places (2, nb) of a quantity of outputs; all arrays of `seen` but those of the line have outputs first.
+
+    s and path may have one row for all outputs.
+    """
+    for j in range(found.shape[1]):
+        s, path = seen.s[min(j, seen.s.shape[0] - 1)], seen.path[min(j, seen.path.shape[0] - 1)]
+        one = Seen(s, seen.r[j], seen.e[j], seen.sea, seen.held[j], seen.loaded, seen.report[j], seen.radii, path)
+        reached[NEAREST] = 0.0  # an output by itself has the same place
+        found[0, j], found[1, j] = value_of(one, asked, reached, True)
 
 
 @kernel
@@ -481,21 +546,19 @@ def note_quantities(table):
     t, begins = books.clock.now, books.counts.steps == 0
     if books.walls.shape[0] > 0:
         note_pipes(job.line, job.ends, state, books, t)
+    seen = Seen(
+        job.line.s, state.r, state.e, job.sea, job.ends.held, books.loaded, books.report[0], books.radii, books.path
+    )
     for q in range(books.asked.shape[0]):
         asked, reached = books.asked[q], books.reached[q]
-        kind, k, place = asked[KIND], int(asked[END]), math.nan
+        kind = asked[KIND]
         if kind == CHORDS:
-            put_chords(job, state, asked)
+            put_chords(seen, asked)
             continue
         if kind == CLEARANCE and asked[COUNTED] != 0.0 and books.path[int(asked[PATH]), 0] < 0.0:
             reached[SMALLEST], reached[LARGEST] = -math.inf, math.inf  # nobody knows
             continue
-        if kind == CLEARANCE:
-            x, place = clearance(job, state, asked, reached)
-        elif kind >= TOUCHDOWN:
-            x = on_bed(job, state, asked, reached, k, begins)
-        else:
-            x = of_pull(job, state, asked, reached, k)
+        x, place = value_of(seen, asked, reached, begins)
         if x < reached[SMALLEST]:
             reached[SMALLEST], reached[TIMES], reached[PLACES] = x, t, place
         if x > reached[LARGEST]:
