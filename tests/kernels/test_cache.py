@@ -190,7 +190,7 @@ def test_an_edit_means_new_code_of_the_kernels_that_it_reaches_and_of_no_others(
     anew = changed("kernels/algebra/rotations.py", VECTOR, TWICE)
     assert reaches <= anew and len(anew) < len(before) - 10
     assert not changed("kernels/algebra/rotations.py", VECTOR, f"    # as a tuple\n{VECTOR}")
-    assert not changed("kernels/run/run_module.py", '"""Steps of all lines until', '"""Steps of lines until')
+    assert not changed("kernels/run/network_run.py", '"""Steps of all lines until', '"""Steps of lines until')
     constant = changed("kernels/state/books.py", "FAILED = range(6)", "FAILED = range(50, 56)")
     assert (
         "hybrid.kernels.run.network_run.run_system" in constant and "hybrid.kernels.run.entry.in_plane" not in constant
