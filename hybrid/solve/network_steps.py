@@ -154,6 +154,8 @@ class NetworkSteps:
         self._waves = 0
         self._is_new = True  # whether nobody knows which lines are near what is free in the state of now
         self._followed = np.zeros((0, 0), np.int64)  # jobs of zones
+        # lines whose cells, or nodes at a winch, are to change after the outputs within the step, which may fill buffers
+        self._due, self._nodes_due = np.zeros(0, np.int64), np.zeros(0, np.int64)
         self._changes = self._winds = False  # whether cells of some line, or nodes at a winch, change in compiled steps
         clock = self.clock
         clock.rho, clock.allowed, clock.tolerance, clock.error_ratio = rho, np.inf, 1.0, 1.0
@@ -246,8 +248,8 @@ class NetworkSteps:
             self._job.bind(followed=np.zeros((0, 0), np.int64), follower=0)
             return
         self.hold_zones(zones)
-        due = np.zeros(len(zones), np.int64)
-        self._job.bind(followed=self._followed, follower=advance_zones.address(self._followed[0]), due=due)
+        self._due = self._due if len(self._due) == len(zones) else np.zeros(len(zones), np.int64)
+        self._job.bind(followed=self._followed, follower=advance_zones.address(self._followed[0]), due=self._due)
 
     def change_cells(self, lines: Sequence[NDArray[np.int64] | None]) -> None:
         """These tables of kernels.mesh.remesh change cells of lines that `follow` has, where there is one."""
@@ -257,7 +259,8 @@ class NetworkSteps:
 
     def pay(self, lines: np.ndarray, payer: int) -> None:
         """These tables (W, ..) of kernels.reel.reel change the lengths of lines from now on, by pay_out at `payer`."""
-        self._job.bind(paid=lines, payer=payer, nodes_due=np.zeros(len(lines), np.int64))
+        self._nodes_due = self._nodes_due if len(self._nodes_due) == len(lines) else np.zeros(len(lines), np.int64)
+        self._job.bind(paid=lines, payer=payer, nodes_due=self._nodes_due)
 
     def change_nodes(self, lines: Sequence[NDArray[np.int64] | None]) -> None:
         """These tables of kernels.mesh.remesh let nodes of lines that `pay` has enter and leave, where there is one."""

@@ -54,19 +54,27 @@ def asks_at_once(look: hybrid.NodeState) -> np.ndarray:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["touchdown", "s_tether", "repeated"])
+@pytest.mark.parametrize("name", ["touchdown", "s_tether", "repeated", "cells", "nodes"])
 def test_outputs_wait_for_nothing_that_changes(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Zones that move: the same bits with outputs that wait in batches, and with a buffer of one."""
     settings = ["time={duration: 14, step: 0.1}", "output={every: 0.05, errors: false}"]
     file, criterion = name, None
     if name == "repeated":
         file, settings, criterion = "touchdown", ["time={duration: 2, step: 0.1}", *settings[1:]], asks_at_once
+    if name == "cells":  # which follow the curvature
+        model = "model={kind: adaptive, curvature_error: 0.05}"
+        file, settings = "s_tether", ["time={duration: 3, step: 0.1}", settings[1], model]
+    if name == "nodes":  # which enter at a winch
+        file, settings = "laying_winch", ["time={duration: 9, step: 0.1}", settings[1]]
     scene = hybrid.load_scene(Path(__file__).parents[2] / "examples" / f"{file}.yaml", settings)
     batches = hybrid.run(scene, criterion=criterion)
     monkeypatch.setattr(run_module, "WAITING", 1)
     monkeypatch.setattr(line_result, "WAITING", 1)
     one_by_one = hybrid.run(scene, criterion=criterion)
-    assert (name if criterion else "bend") in " ".join(e.text for e in batches.events)
+    if name == "cells":
+        assert len({x.s.size for x in batches.mesh}) > 1
+    elif name != "nodes":
+        assert (name if criterion else "bend") in " ".join(e.text for e in batches.events)
     for field in batches.names:
         if "t" in batches.dims(field)[:1]:
             assert np.array_equal(batches[field], one_by_one[field], equal_nan=True), field
