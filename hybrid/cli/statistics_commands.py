@@ -1,9 +1,4 @@
-"""The commands response and stats.
-
-The command response: what a stationary sea does to a scene, linear about its equilibrium.
-
-The command stats: what the histories of a result amount to.
-"""
+"""The commands response, modes and stats: the linear answer to a sea, natural periods, statistics of a result."""
 
 from __future__ import annotations
 
@@ -32,6 +27,7 @@ from hybrid.cli.app import (
     window,
     words,
 )
+from hybrid.cli.console import Console
 from hybrid.errors import ResultError
 from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse, Response
 from hybrid.statistics.fatigue import life_in_years
@@ -145,8 +141,8 @@ def _response_table(found: Response, rows: list[dict[str, Any]], hours: float) -
 
 # The command modes: natural periods of a scene about its equilibrium.
 
-SHOWN = 3  # parts of the energy of a mode, and the least of them
-LEAST_SHARE = 0.05
+SHOWN = 3  # parts of the energy of a mode
+LEAST_SHARE = 0.05  # of the energy, the least part that is shown
 
 
 @app.command()
@@ -208,7 +204,22 @@ def _modes_table(found: Modes) -> Any:
     return table
 
 
-HOUR = 3600.0
+HOUR = 3600.0  # s
+
+# Options of fatigue and of mooring lines, which only `stats` has.
+Strength = Annotated[float | None, typer.Option(metavar="N", help=".. of tension over this strength (N), or ..")]
+Section = Annotated[
+    Any, typer.Option(metavar="A,D,E", parser=numbers, help=".. of stress: area (m2), diameter (m), modulus (Pa).")
+]
+Mooring = Annotated[
+    float | None, typer.Option(metavar="N", help="Utilisation by DNV-OS-E301 of this strength (N), with ..")
+]
+LoadFactors = Annotated[
+    Any, typer.Option(metavar="A,B", parser=numbers, help=".. load factors of pretension and environment, and ..")
+]
+Pretension = Annotated[
+    str | None, typer.Option(metavar="N|REST.h5", help=".. a pretension (N), or the equilibrium that has it.")
+]
 
 
 @app.command()
@@ -229,21 +240,8 @@ def stats(
         float | None, typer.Option(metavar="X", help="Also the part of the time below X, in the unit of the quantity.")
     ] = None,
     curve: Annotated[str | None, typer.Option(metavar="NAME", help="Fatigue damage by this curve ..")] = None,
-    strength: Annotated[
-        float | None, typer.Option(metavar="N", help=".. of tension over this strength (N), or ..")
-    ] = None,
-    section: Annotated[
-        Any, typer.Option(metavar="A,D,E", parser=numbers, help=".. of stress: area (m2), diameter (m), modulus (Pa).")
-    ] = None,
-    mooring: Annotated[
-        float | None, typer.Option(metavar="N", help="Utilisation by DNV-OS-E301 of this strength (N), with ..")
-    ] = None,
-    factors: Annotated[
-        Any, typer.Option(metavar="A,B", parser=numbers, help=".. load factors of pretension and environment, and ..")
-    ] = None,
-    pretension: Annotated[
-        str | None, typer.Option(metavar="N|REST.h5", help=".. a pretension (N), or the equilibrium that has it.")
-    ] = None,
+    strength: Strength = None, section: Section = None,
+    mooring: Mooring = None, factors: LoadFactors = None, pretension: Pretension = None,
     line: LineName = None, quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Statistics of a result, where each quantity is largest or at the places of --at.
@@ -254,63 +252,86 @@ def stats(
         raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
     _refuse_alone(curve, strength, section, (mooring, factors, pretension))
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
-        from hybrid.store.histories import component_of, usual_names
+        from hybrid.store.statistics_table import rows_of
 
-        if opened.lines and (names is None or not all(component_of(opened, name)[0] in opened for name in names)):
-            first, *others = opened.lines
-            if others:
-                own = ",".join(usual_names(opened))
-                fix = f"--line {first}" + (f", or --names {own}" if own else "")
-                raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      {fix}")
-            opened = opened.lines[first]
-        from hybrid.store.envelope import stored_window
-        from hybrid.store.statistics_table import rows_of, values_of
-
+        opened = _asked_line(opened, result, names)
         if len(opened.times) == 1 and opened.status == "complete" and (above, below, curve, mooring) == (None,) * 4:
-            values = values_of(opened, names, at)
-            for row in values:
-                console.json("statistics", **row)
-            console.show(lambda: _values_table(values))
-            console.note("note: of an equilibrium, which has values and no statistics")
+            _show_values(console, opened, names, at)
             console.json("done", file=str(result), status=opened.status)
             return
-
         facts = {} if curve is None else _fatigue(opened, curve, strength, section, times, at)
-        for key, value in (("--above", above), ("--below", below)):
-            if value is not None and (names is None or len(names) > 1):
-                fix = f"hybrid stats RUN.h5 --names end_force_end {key} 5e4"
-                raise ResultError(f"{key} is of one quantity\n    try:      {fix}")
+        _refuse_several(names, above, below)
         rows = rows_of(opened, names, at, times, hours * HOUR, above, below)
-        used = {} if opened.lines else {name: found._asdict() for name, found in opened.utilisation().items()}
-        for row in rows:
-            console.json("statistics", **row)
-        console.show(lambda: _statistics_table(rows, hours))
-        if opened.status != "complete":
-            stored = f"{opened.status_text}; stored is {stored_window(opened)}"
-            console.note(f"note: of a run that has not come to its end; {stored}")
-        elif opened.pending:
-            console.note(f"note: {opened.pending}")
-        without: dict[str, dict[str, None]] = {}
-        for row in rows:
-            if "no_extreme" in row:
-                without.setdefault(row["no_extreme"], {})[row["quantity"]] = None
-        for text, of in without.items():
-            console.note(f"note: no MPM in {hours:g} h of {', '.join(of)}: {text}")
-        if any(row["extreme"] for row in rows):
-            console.note(f"note: MPM: most probable maximum of {hours:g} h; P90: what it does not exceed with 90 %")
-        for text in [row["beyond_outputs"] for row in rows if "beyond_outputs" in row]:
-            console.note(f"note: {text}")
-        lines = [*_parts_of_time(rows, above, below), *_limit_lines(opened)]
-        if lines:
+        more = _show_rows(console, opened, rows, hours)
+        if lines := [*_parts_of_time(rows, above, below), *_limit_lines(opened)]:
             console.show(lambda: "\n".join(lines))
         if curve is not None:
             console.show(lambda: _fatigue_lines(curve, facts))
-        moored = {} if mooring is None else _moored(opened, mooring, tuple(factors), str(pretension), line)
-        if moored:
+        if mooring is not None:
+            moored = _moored(opened, mooring, tuple(factors), str(pretension), line)
             console.show(lambda: moored["text"])
-        more: dict[str, Any] = {"mooring": moored} if moored else {}
-        more |= {"stored": stored_window(opened)} if opened.status != "complete" else {}
+            more["mooring"] = moored
+        used = {} if opened.lines else {name: found._asdict() for name, found in opened.utilisation().items()}
         console.json("done", file=str(result), status=opened.status, fatigue=facts, utilisation=used, **more)
+
+
+def _asked_line(opened: Result, result: Path, names: Any) -> Result:
+    """The only line of a result, where quantities are of lines; ResultError: it has several."""
+    from hybrid.store.histories import component_of, usual_names
+
+    if not opened.lines or (names is not None and all(component_of(opened, name)[0] in opened for name in names)):
+        return opened
+    first, *others = opened.lines
+    if others:
+        own = ",".join(usual_names(opened))
+        fix = f"--line {first}" + (f", or --names {own}" if own else "")
+        raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      {fix}")
+    return opened.lines[first]
+
+
+def _show_values(console: Console, opened: Result, names: Any, at: Any) -> None:
+    """Values of an equilibrium."""
+    from hybrid.store.statistics_table import values_of
+
+    values = values_of(opened, names, at)
+    for row in values:
+        console.json("statistics", **row)
+    console.show(lambda: _values_table(values))
+    console.note("note: of an equilibrium, which has values and no statistics")
+
+
+def _refuse_several(names: Any, above: float | None, below: float | None) -> None:
+    """ResultError: parts of the time above or below a value, of several quantities."""
+    for key, value in (("--above", above), ("--below", below)):
+        if value is not None and (names is None or len(names) > 1):
+            fix = f"hybrid stats RUN.h5 --names end_force_end {key} 5e4"
+            raise ResultError(f"{key} is of one quantity\n    try:      {fix}")
+
+
+def _show_rows(console: Console, opened: Result, rows: list[dict[str, Any]], hours: float) -> dict[str, Any]:
+    """Statistics, and notes of what limits them; returned: which part of the run is stored, if it is not whole."""
+    from hybrid.store.envelope import stored_window
+
+    for row in rows:
+        console.json("statistics", **row)
+    console.show(lambda: _statistics_table(rows, hours))
+    stored = {} if opened.status == "complete" else {"stored": stored_window(opened)}
+    if stored:
+        text = f"{opened.status_text}; stored is {stored['stored']}"
+        console.note(f"note: of a run that has not come to its end; {text}")
+    elif opened.pending:
+        console.note(f"note: {opened.pending}")
+    without: dict[str, dict[str, None]] = {}
+    for row in rows:
+        if "no_extreme" in row:
+            without.setdefault(row["no_extreme"], {})[row["quantity"]] = None
+    for text, of in without.items():
+        console.note(f"note: no MPM in {hours:g} h of {', '.join(of)}: {text}")
+    if any(row["extreme"] for row in rows):
+        console.note(f"note: MPM: most probable maximum of {hours:g} h; P90: what it does not exceed with 90 %")
+    for text in [row["beyond_outputs"] for row in rows if "beyond_outputs" in row]:
+        console.note(f"note: {text}")
+    return stored
 
 
 def _refuse_alone(curve: str | None, strength: float | None, section: Any, moored: tuple[Any, Any, Any]) -> None:

@@ -1,8 +1,6 @@
 """The commands design and study.
 
-The command design: numbers of a scene for which its equilibrium is what is asked.
-
-The command study: many runs of one scene with other values.
+design: numbers of a scene for which its equilibrium is what is asked; study: many runs of one scene with other values.
 """
 
 from __future__ import annotations
@@ -353,13 +351,7 @@ def study(
             console.done(f"case {case}", target, status=result.status)
             return
         if sensitivity is not None:
-            rows = hybrid.sensitivity(source, sensitivity)
-            for row in rows:
-                console.json("influence", **row._asdict())
-            console.show(lambda: _influences(rows))
-            if derivatives:
-                _show_shares(console, hybrid.shares(source, sensitivity))
-            console.json("done", file=str(source))
+            _show_sensitivity(console, source, sensitivity, derivatives)
             return
         console.source = ""
         folder = output or source.with_suffix(".zarr")
@@ -371,6 +363,17 @@ def study(
                 progress=listener,
             )  # fmt: skip
         _show(console, found, folder, clock.perf_counter() - begin, netcdf)
+
+
+def _show_sensitivity(console: Console, source: Path, result: str, derivatives: bool) -> None:
+    """What each variable of a study does to a result; derivatives: shares of its spread as well."""
+    rows = hybrid.sensitivity(source, result)
+    for row in rows:
+        console.json("influence", **row._asdict())
+    console.show(lambda: _influences(rows))
+    if derivatives:
+        _show_shares(console, hybrid.shares(source, result))
+    console.json("done", file=str(source))
 
 
 def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path | None) -> None:

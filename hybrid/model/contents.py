@@ -349,39 +349,11 @@ def _torque_at_winch(scene: LineScene, line: Line) -> Iterator[Entry]:
 
 def contents_of(scene: LineScene, line: Line, zones: Sequence[Zone], flat: Entry) -> tuple[Entry, ...]:
     """What is on and by which key, what is off and what would switch it on; flat: whether it is in a plane."""
-    kinds = {z.kind for z in zones}
+    has_rods = any(z.kind == "rod" for z in zones)
     entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))
-    entries += _parts(scene, line, "rod" in kinds, flat)
-    extensible = [x.stiffness is not None for x in scene.cable.sections]
-    entries.append(Entry("axial compliance", any(extensible), "sections[].axial_stiffness"))
-    if any(x.tension_strain is not None for x in scene.cable.sections):
-        entries.append(Entry("tension over strain by a table", True, "sections[].tension_strain"))
-    if any(x.syrope is not None for x in scene.cable.sections):
-        entries.append(Entry("tension over strain by the highest mean tension", True, "sections[].syrope"))
-    if line.bits & BENDING_LAW:
-        why = "sections[].moment_curvature, cable.attachments of kind bend_restrictor"
-        entries.append(Entry("moment over curvature by a table", True, why))
-    if line.bits & BENDING_SLIP:
-        if any(x.bending_slip or x.first_loading for x in scene.cable.sections):
-            why = "sections[].bending_slip, first_loading; in equilibria as on first loading from straight"
-            entries.append(Entry("layers that slip as the line bends", True, why))
-        if any(x.stiffness_per_tension for x in scene.cable.sections):
-            entries.append(Entry("bending stiffness that grows with tension", True, "sections[].stiffness_per_tension"))
-    if any(x.creep is not None for x in scene.cable.sections):
-        entries.append(Entry("strain that grows with the logarithm of time", True, "sections[].creep"))
-    if any(x.dynamic_stiffness is not None for x in scene.cable.sections):
-        entries.append(Entry("stiffness that depends on speed and mean tension", True, "sections[].dynamic_stiffness"))
-    if "rod" in kinds:
-        assumed = [i for i, x in enumerate(scene.cable.sections) if x.torsional_stiffness is None and x.initial_bending]
-        if assumed:
-            which = ", ".join(f"sections[{i}]" for i in assumed)
-            entries.append(
-                Entry(
-                    "torsional stiffness = bending stiffness / 1.3",
-                    True,
-                    f"assumed (solid round section): {which} gives none",
-                )
-            )
+    entries += (*_parts(scene, line, has_rods, flat), *_laws(scene, line))
+    if has_rods:
+        entries += _assumed_torsion(scene)
     entries += [Entry(x.what, True, x.why, "implausible", x.s) for x in implausible(scene)]
     entries.append(model_error(scene, zones))
     if isinstance(scene.model, AdaptiveModel):
@@ -399,37 +371,74 @@ def contents_of(scene: LineScene, line: Line, zones: Sequence[Zone], flat: Entry
     if isinstance(scene.model, AdaptiveModel) and not any(x.turns for x in scene.cable.sections):
         why = "rods that come and go have what sections[].rotary_inertia gives; fixed zones and `model: rod` any"
         entries = [replace(x, why=why) if x.what == "rotary inertia" else x for x in entries]
-    if scene.ends.turns:
-        free = swivels(scene)
-        loose = next((z for z in zones if z.kind != "rod" and not line.torsion.size and not free), None)
-        what, why = f"twist by {scene.ends.turns:g} turns of the ends", "ends.*.turns"
-        if free:
-            why = f"no torque: the swivel at s = {free[0]:g} m lets it turn back"
-        elif loose is not None:
-            why = f"no effect: the catenary zone s = {loose.s_a:g} to {loose.s_b:g} m passes no torque on; a rod does"
-        entries.append(Entry(what, loose is None and not free, why, event="torque neglected" if loose else ""))
-    entries += (*_torque_at_winch(scene, line), *obstacle_entries(scene, obstacle_rows(scene)))
+    entries += (*_twisted_ends(scene, line, zones), *_torque_at_winch(scene, line))
+    entries += (*obstacle_entries(scene, obstacle_rows(scene)), *_of_ends(scene, line))
+    return tuple(entries)
+
+
+def _laws(scene: LineScene, line: Line) -> Iterator[Entry]:
+    """Laws of sections: of tension over strain, and of moment over curvature."""
+    sections = scene.cable.sections
+    yield Entry("axial compliance", any(x.stiffness is not None for x in sections), "sections[].axial_stiffness")
+    if any(x.tension_strain is not None for x in sections):
+        yield Entry("tension over strain by a table", True, "sections[].tension_strain")
+    if any(x.syrope is not None for x in sections):
+        yield Entry("tension over strain by the highest mean tension", True, "sections[].syrope")
+    if line.bits & BENDING_LAW:
+        why = "sections[].moment_curvature, cable.attachments of kind bend_restrictor"
+        yield Entry("moment over curvature by a table", True, why)
+    if line.bits & BENDING_SLIP:
+        if any(x.bending_slip or x.first_loading for x in sections):
+            why = "sections[].bending_slip, first_loading; in equilibria as on first loading from straight"
+            yield Entry("layers that slip as the line bends", True, why)
+        if any(x.stiffness_per_tension for x in sections):
+            yield Entry("bending stiffness that grows with tension", True, "sections[].stiffness_per_tension")
+    if any(x.creep is not None for x in sections):
+        yield Entry("strain that grows with the logarithm of time", True, "sections[].creep")
+    if any(x.dynamic_stiffness is not None for x in sections):
+        yield Entry("stiffness that depends on speed and mean tension", True, "sections[].dynamic_stiffness")
+
+
+def _assumed_torsion(scene: LineScene) -> Iterator[Entry]:
+    """Sections that bend and give no torsional stiffness."""
+    sections = scene.cable.sections
+    assumed = [i for i, x in enumerate(sections) if x.torsional_stiffness is None and x.initial_bending]
+    if assumed:
+        which = ", ".join(f"sections[{i}]" for i in assumed)
+        why = f"assumed (solid round section): {which} gives none"
+        yield Entry("torsional stiffness = bending stiffness / 1.3", True, why)
+
+
+def _twisted_ends(scene: LineScene, line: Line, zones: Sequence[Zone]) -> Iterator[Entry]:
+    """Twist by turns of the ends, and what keeps it from acting."""
+    if not scene.ends.turns:
+        return
+    free = swivels(scene)
+    loose = next((z for z in zones if z.kind != "rod" and not line.torsion.size and not free), None)
+    what, why = f"twist by {scene.ends.turns:g} turns of the ends", "ends.*.turns"
+    if free:
+        why = f"no torque: the swivel at s = {free[0]:g} m lets it turn back"
+    elif loose is not None:
+        why = f"no effect: the catenary zone s = {loose.s_a:g} to {loose.s_b:g} m passes no torque on; a rod does"
+    yield Entry(what, loose is None and not free, why, event="torque neglected" if loose else "")
+
+
+def _of_ends(scene: LineScene, line: Line) -> Iterator[Entry]:
+    """How both ends are held, and what has no effect there."""
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = end.prescribed_motion is not None
         spring = f", by a spring of {end.spring:g} N m/rad" if end.spring < inf else ""
         if moving and _by_first_harmonic(scene, end):
             why = "an RAO is of linear waves: the vessel moves by the first harmonic (waves.kind: stream_function)"
-            entries.append(Entry(f"higher harmonics of the waves in the motion of ends.{name}", False, why))
+            yield Entry(f"higher harmonics of the waves in the motion of ends.{name}", False, why)
         if _swivel_holds(scene, end, cell) and (line.spin[cell] or isinstance(scene.model, AdaptiveModel)):
             why = "its twist counts as bend there, by two bending stiffnesses or an intrinsic_curvature"
-            entries.append(Entry(f"free turning at the swivel of ends.{name}", False, why, event="ignored"))
+            yield Entry(f"free turning at the swivel of ends.{name}", False, why, event="ignored")
         text = f"ends.{name}: {end.kind}{spring}{', moving' if moving else ''}{_let_go(scene, name)}"
-        entries.append(Entry(text, True, f"ends.{name}"))
+        yield Entry(text, True, f"ends.{name}")
         if not line.spin[cell] and end.acts_by_moment:
-            entries.append(
-                Entry(
-                    f"{OF_AN_END}{name}",
-                    False,
-                    "the cable ends in a catenary zone, which transmits no bending moment",
-                    event="ignored",
-                )
-            )
-    return tuple(entries)
+            why = "the cable ends in a catenary zone, which transmits no bending moment"
+            yield Entry(f"{OF_AN_END}{name}", False, why, event="ignored")
 
 
 @dataclass(frozen=True)

@@ -158,11 +158,7 @@ def _taken(
     unit, about = history.unit, f"{name}, {history.basis}"
     values = history.values
     if take == "profile":
-        if history.s is None:
-            raise ResultError(f"'{name}' has no profile: it is no quantity along the line")
-        along = "s" if kept.line is None else f"{own}_s"
-        variable = Variable(unit, f"{WORDS[take]}: {about}", (along,), {along: ("m", history.s)})
-        return variable, np.fmax.reduce(values, axis=0)
+        return _profile(history, name, "s" if kept.line is None else f"{own}_s", f"{WORDS[take]}: {about}")
     if take == "history":
         if history.s is not None and at is None:
             raise ResultError(f"a history of '{name}' is at a place\n    try:      at: [0]")
@@ -191,6 +187,13 @@ def _taken(
     memory[own, "summary"] = summary
     variable = Variable(unit if other is None else other, text, dims, places)
     return _placed(variable, getattr(summary, attribute))
+
+
+def _profile(history: History, name: str, along: str, label: str) -> tuple[Variable, Floats]:
+    """The largest values along the line, over the dimension `along`."""
+    if history.s is None:
+        raise ResultError(f"'{name}' has no profile: it is no quantity along the line")
+    return Variable(history.unit, label, (along,), {along: ("m", history.s)}), np.fmax.reduce(history.values, axis=0)
 
 
 def _over_steps(result: Result, name: str, take: str) -> float | None:
