@@ -272,7 +272,7 @@ BROKEN = {
     "name from the list of banned words": 0,
     "more than two constants in a line": 0,
     "constructor above 40 lines": 1,
-    "function above 60 lines": 14,
+    "function above 60 lines": 8,
     "fmt: skip": 429,
 }
 # Words that do not say what a thing is or does; the second ones only where they are the whole name.

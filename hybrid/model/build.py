@@ -17,6 +17,7 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.mesh.cell_lengths import COMPRESSED_SHARE, FLANK, SHARP
@@ -281,8 +282,7 @@ def build(
     mesh: nodes (N+1,) m and zones, or the layout of a line whose zones move, all rod; None: as resolution places them.
     like: begin with the shape of this model of the same cable; spare: whether other shapes to begin with are made.
 
-    Raises SceneError where the scene cannot be meshed (a rod zone of one cell, nodes
-    that miss a zone boundary).
+    SceneError: the scene cannot be meshed (a rod zone of one cell, nodes that miss a zone boundary).
     """
     cable = cable_of(scene)
     resolution = resolution or first_resolution(scene)
@@ -297,14 +297,10 @@ def build(
         assert paid is not None
         layout = paid.first_layout
         s = layout.nodes
-    n = s.size - 1
-    middle = 0.5 * (s[:-1] + s[1:])
-    zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
-    rod = np.array([zones[int(i)].kind == "rod" for i in zone_of])
-    _refuse_single_rod_cells(zones, zone_of)
-    refuse_too_many(n)
+    rod = _rods_in(zones, s)
+    refuse_too_many(rod.size)
 
-    sea = surroundings(scene, n)
+    sea = surroundings(scene, rod.size)
     fastest = float(np.linalg.norm(sea.values.current, axis=1).max())
     sections = merged_sections(scene.cable.sections)
     scale = tension_scale(scene, sections, bool(rod.any()), fastest)
@@ -319,11 +315,9 @@ def build(
 
     shape = hung(scene, line, sea.values) if like is None else Hanging(like.start.r, like.start.T)
     start, shape_name, ends = first_state(scene, line, cable, sea, scale, shape)
-    others = [
-        (name, other_state(scene, r, line, cable, scale))
-        for name, r in (spare_shapes(scene, s) if shape is not None else from_joint(scene, s))
-        if spare and like is None
-    ]
+    shapes = spare_shapes(scene, s) if shape is not None else from_joint(scene, s)
+    wanted = shapes if spare and like is None else ()
+    others = [(name, other_state(scene, r, line, cable, scale)) for name, r in wanted]
     plane, flat = in_plane(scene, start, others, ends.values)
     kept: Floats | None = None
     if plane is not None and (scene.obstacles or scene.contact.self):  # which are computed in space
@@ -548,7 +542,10 @@ def _following_parts(scene: LineScene, cable: Material, base: Floats, resolution
     return np.asarray(np.minimum(2 ** halvings.astype(int), MOST_FOLLOWING))
 
 
-def _refuse_single_rod_cells(zones: Sequence[Zone], zone_of: np.ndarray) -> None:
+def _rods_in(zones: Sequence[Zone], s: Floats) -> NDArray[np.bool_]:
+    """Which cells (N,) between nodes s (N+1,) are rods; SceneError: a rod zone of one cell."""
+    middle = 0.5 * (s[:-1] + s[1:])
+    zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
     for k, zone in enumerate(zones):
         if zone.kind == "rod" and int((zone_of == k).sum()) < 2:
             raise SceneError(
@@ -561,3 +558,4 @@ def _refuse_single_rod_cells(zones: Sequence[Zone], zone_of: np.ndarray) -> None
                     )
                 ]
             )
+    return np.array([z.kind == "rod" for z in zones])[zone_of]

@@ -27,7 +27,7 @@ from hybrid.store.envelope import (
 )
 from hybrid.store.reader import Result
 from hybrid.store.records import UNKNOWN, not_converged_in
-from hybrid.store.verdicts import accuracy_text, asked_accuracy, doubt_of, quantity_limits, section_limits
+from hybrid.store.verdicts import Doubt, accuracy_text, asked_accuracy, doubt_of, quantity_limits, section_limits
 from hybrid.view.curves import Along, Worst, along, held_loop, trapped_loop, worst
 from hybrid.view.figure import NEWS, ZERO, prefix, short
 from hybrid.view.projections import STILL, free_edges
@@ -404,32 +404,51 @@ def _hockling(result: Result) -> Fact:
         f"Nearest to a loop {there}: a torque of {amount(abs(values['torque']), 'N m', 3)} needs a tension of "
         f"{amount(values['needed'], 'N', 3)}, there is {amount(values['tension'], 'N', 3)}"
     )
-    verdict = ": the criterion is broken, a straight cable would throw a loop" if values["ratio"] >= 1.0 else ""
-    if verdict and values["tension"] < 0.0:
-        verdict = ": it is compressed there, and a straight line in compression is beyond the criterion"
-    if doubt is not None:
-        verdict = f"; the margin is {doubt.text}"
-    elif not verdict:
-        verdict = f", {short(1.0 / values['ratio'], 3)} times as much"
-    weight = "alarm" if values["ratio"] >= 1.0 else "note" if doubt is not None else "plain"
-    text = f"{text}{verdict}.{pressing}{loops}"
-    if (loop := trapped_loop(result, found, torque)) is not None:
+    text += f"{_hockling_verdict(values, doubt)}.{pressing}{loops}"
+    for more, loop in (
+        _trapped(result, found, torque, doubt),
+        _while_touching(result, found, torque, np.asarray(tension.values), doubt),
+    ):
+        text += more
         values |= loop
-        text += (
-            f" A loop of the largest torque would lie on itself until {amount(loop['pop_out_tension'], 'N', 3)} pull "
-            f"it open, bent to {amount(loop['pop_out_radius'], 'm', 3)}"
-        )
-        if (kinks := loop.get("kink_margin", np.inf) < 1.0) or ("kink_margin" in loop and doubt is None):
-            text += f", {short(loop['kink_margin'], 3)} of the radius allowed" + (": it kinks first" if kinks else "")
-        text += "."
-    if (held := held_loop(result, found, torque, np.asarray(tension.values))) is not None:
-        values |= held
-        then = moment(result, held["pop_out_time"])
-        by = f"{short(held['pop_out_margin'], 3)} times its tension" if doubt is None else "a margin not verified"
-        text += (
-            f" While the cable touches itself, a loop would be pulled open by {by}{then}, at no other output by less."
-        )
+    weight = "alarm" if values["ratio"] >= 1.0 else "note" if doubt is not None else "plain"
     return Fact("hockling", title, f"{text} {HOCKLING}.", weight, values, t, s)
+
+
+def _hockling_verdict(values: dict[str, float], doubt: Doubt | None) -> str:
+    """Whether a straight line throws a loop, and by which margin it does not."""
+    if values["ratio"] >= 1.0:
+        if values["tension"] < 0.0:
+            return ": it is compressed there, and a straight line in compression is beyond the criterion"
+        return ": the criterion is broken, a straight cable would throw a loop"
+    return f", {short(values['margin'], 3)} times as much" if doubt is None else f"; the margin is {doubt.text}"
+
+
+def _trapped(result: Result, found: Along, torque: np.ndarray, doubt: Doubt | None) -> tuple[str, dict[str, float]]:
+    """What a loop of the largest torque would be like, in words and numbers."""
+    loop = trapped_loop(result, found, torque)
+    if loop is None:
+        return "", {}
+    text = (
+        f" A loop of the largest torque would lie on itself until {amount(loop['pop_out_tension'], 'N', 3)} pull "
+        f"it open, bent to {amount(loop['pop_out_radius'], 'm', 3)}"
+    )
+    if (kinks := loop.get("kink_margin", np.inf) < 1.0) or ("kink_margin" in loop and doubt is None):
+        text += f", {short(loop['kink_margin'], 3)} of the radius allowed" + (": it kinks first" if kinks else "")
+    return f"{text}.", loop
+
+
+def _while_touching(
+    result: Result, found: Along, torque: np.ndarray, tension: np.ndarray, doubt: Doubt | None
+) -> tuple[str, dict[str, float]]:
+    """By how much a loop of a line that touches itself would be pulled open, in words and numbers."""
+    held = held_loop(result, found, torque, tension)
+    if held is None:
+        return "", {}
+    then = moment(result, held["pop_out_time"])
+    by = f"{short(held['pop_out_margin'], 3)} times its tension" if doubt is None else "a margin not verified"
+    text = f" While the cable touches itself, a loop would be pulled open by {by}{then}, at no other output by less."
+    return text, held
 
 
 def _seabed(result: Result) -> Fact:
