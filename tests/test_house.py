@@ -271,9 +271,9 @@ BROKEN = {
     "docstring whose first line is no whole sentence": 0,
     "name from the list of banned words": 0,
     "more than two constants in a line": 0,
-    "constructor above 40 lines": 1,
+    "constructor above 40 lines": 0,
     "function above 60 lines": 8,
-    "fmt: skip": 429,
+    "fmt: skip": 428,
 }
 # Words that do not say what a thing is or does; the second ones only where they are the whole name.
 BANNED = {"calm", "follow", "found", "haste", "its", "look", "looks", "loudest", "pace", "patience", "said",
