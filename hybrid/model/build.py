@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.mesh.cell_lengths import COMPRESSED_SHARE, FLANK, SHARP
-from hybrid.kernels.state.report import PLANAR
+from hybrid.kernels.state.report import OBSTACLES, PLANAR
 from hybrid.kernels.state.state import Ends, Floats, Line, State
 from hybrid.model.catenary_guess import Hanging
 from hybrid.model.contents import Entry, contact_bits, contents_of
@@ -62,6 +62,7 @@ from hybrid.scene.schema import (
     RodModel,
     RodZone,
     ZonesModel,
+    reachable_obstacles,
 )
 
 # Of the length: how far an equilibrium may be out of the plane and count as in it (Newton's tolerance).
@@ -81,7 +82,7 @@ def in_plane(
     if scene.dimension == 3:
         return None, Entry(WHAT, False, "dimension: 3")
     asked = scene.dimension == 2
-    touching = "contact.self" if scene.contact.self else "obstacles" if scene.obstacles else ""
+    touching = "contact.self" if scene.contact.self else "obstacles" if reachable_obstacles(scene) else ""
     if touching and not asked:
         what = "of the line with itself" if scene.contact.self else "with obstacles"
         return None, Entry(WHAT, False, f"{touching}: contact {what} is computed in space")
@@ -318,7 +319,7 @@ def build(
     others = _other_starts(scene, line, cable, scale, shape is not None) if spare and like is None else []
     plane, flat = in_plane(scene, start, others, ends.values)
     kept: Floats | None = None
-    if plane is not None and (scene.obstacles or scene.contact.self):  # which are computed in space
+    if plane is not None and (line.bits & OBSTACLES or scene.contact.self):  # which are computed in space
         kept, plane = plane[2], None
     elif plane is not None and scene.dimension == 2:
         line = planar(line, plane)

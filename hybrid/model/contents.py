@@ -53,7 +53,14 @@ from hybrid.scene.bodies import Carried, FreeBody
 from hybrid.scene.ends import Clamped, End, Payout, Pinned
 from hybrid.scene.network import Network, SomeScene
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, LinesContact
-from hybrid.scene.schema import AdaptiveModel, CatenaryModel, LineScene, RecordedWaves, StreamFunctionWaves
+from hybrid.scene.schema import (
+    AdaptiveModel,
+    CatenaryModel,
+    LineScene,
+    RecordedWaves,
+    StreamFunctionWaves,
+    reachable_obstacles,
+)
 
 # Diameters of slack of the smallest loop: WINDOW of contact.self_contact_pairs less OUTER of contact.self_contact_law,
 # which a plan does not import.
@@ -322,12 +329,14 @@ def _left_out(scene: LineScene) -> Iterator[Entry]:
 
 def obstacle_entries(scene: LineScene, rows: Floats) -> Iterator[Entry]:
     """Each obstacle of a scene, with how stiff it is; rows: (M, OBSTACLE) of them."""
+    touched = reachable_obstacles(scene)
     for (name, x), row in zip(scene.obstacles.items(), rows, strict=True):
         why = "given" if x.stiffness else "so that it lies at most a twentieth of its diameter deep at rest"
         text = f"obstacle {name}: {x.kind}, {row[STIFFNESS]:.3g} N/m per m, friction {x.friction:g}"
         text += ", set from outside" * x.from_outside + ", moves" * (x.moves and not x.from_outside)
         key = f"bodies.{name}.shape" if isinstance(x, Carried) else f"obstacles.{name}"
-        yield Entry(text, True, f"{key}; stiffness: {why}")
+        why = f"{key}; stiffness: {why}" if name in touched else f"{key}; the line is too short to reach it"
+        yield Entry(text, name in touched, why)
 
 
 def _torque_at_winch(scene: LineScene, line: Line) -> Iterator[Entry]:

@@ -26,6 +26,7 @@ from hybrid.model.line import NO_INERTIA, WITH_SECTIONS, line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Layout, LineOnBase, Zone
 from hybrid.model.network import NetworkResolution, build_system, first_lines
+from hybrid.model.obstacles import obstacle_bits
 from hybrid.model.resolution import Resolution
 from hybrid.model.sea import Surroundings, surroundings
 from hybrid.model.sections import stiffeners_of
@@ -50,7 +51,8 @@ def nearby(
     Its start, its other starts and its contents are those of `model`.  Tables of `scene` that are the same objects as
     those of `of` count as unchanged.
     """
-    if model.payout is not None or (_turned_by_shape(model) and not clamped):
+    reaches_more = bool(obstacle_bits(scene) & ~(model.line.bits | without))
+    if model.payout is not None or reaches_more or (_turned_by_shape(model) and not clamped):
         return _built(model, scene, resolution)
     if _moves_ends_alone(of, scene):
         line, chords = model.line._replace(bits=model.line.bits & ~without), model.start.e[[0, -1]]

@@ -13,7 +13,7 @@ from hybrid.kernels.junctions.bodies import FORCE, FRAME, LEVEL, LIFT, MASS, MOM
 from hybrid.kernels.junctions.joined_lines import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.laws.water import PIECE
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.report import MEETS_FROM, MEETS_TO, ONSET_OF, STRAND, TURNED
+from hybrid.kernels.state.report import MEETS_FROM, MEETS_TO, OBSTACLES, ONSET_OF, STRAND, TURNED
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.bodies import (
@@ -52,7 +52,7 @@ from hybrid.scene.bodies import FixedBody, way_out
 from hybrid.scene.network import Network
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import Connections, Fairlead
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import LineScene, reachable_obstacles
 
 MOST_ROUNDS = 100  # of Newton's method for the first places of the points
 SAME_FORCE = 1e-5  # of the largest force at a point: what may be left there of what does not balance
@@ -282,7 +282,7 @@ def _kept_in_plane(system: Network, models: Sequence[Model], joints: Sequence[tu
     flat = Entry(WHAT, True, f"dimension: 2; {plane.text()}")
     found = []
     for x, scene, held in zip(models, scenes, joints, strict=True):
-        if max(held) >= 0 or scene.obstacles or scene.contact.self:
+        if max(held) >= 0 or x.line.bits & OBSTACLES or scene.contact.self:
             found.append(replace(x, kept_in=axes[2]))
         else:
             contents = tuple(flat if e.what == WHAT else e for e in x.contents)
@@ -499,7 +499,7 @@ class FirstLines:
         scene, mesh, line = self.scene(name, (), directions), self.meshes.get(name), self._system.lines[name]
         alone = not any(self._system.is_joined(point) for point in (line.start, line.end))
         with naming_connection(name):
-            return build(scene, self._resolution[name], mesh, spare=alone or bool(scene.obstacles))
+            return build(scene, self._resolution[name], mesh, spare=alone or bool(reachable_obstacles(scene)))
 
     def scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> LineScene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""

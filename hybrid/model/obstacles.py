@@ -90,7 +90,7 @@ from hybrid.scene.obstacles import (
     SphereObstacle,
     TorusObstacle,
 )
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import LineScene, reachable_obstacles
 
 # Parts of the diameter of a line.
 DEPTH = 0.02  # how deep it lies in an obstacle under what the scene asks for, where it follows its radius,
@@ -103,10 +103,11 @@ CELLS_PER_RADIUS, MOST_CELLS = 4.0, 2000
 
 
 def obstacle_bits(scene: LineScene) -> int:
-    """Bits of kernels.state.report that the obstacles of a scene ask for."""
-    if not scene.obstacles:
+    """Bits of kernels.state.report that the obstacles ask for which the line of a scene may touch."""
+    touched = reachable_obstacles(scene)
+    if not touched:
         return 0
-    return OBSTACLES | (FRICTION if any(x.friction for x in scene.obstacles.values()) else 0)
+    return OBSTACLES | (FRICTION if any(x.friction for x in touched.values()) else 0)
 
 
 def kind_of(obstacle: Obstacle) -> int:
@@ -229,7 +230,7 @@ def _put_shape(row: Floats, x: Obstacle, strand: float) -> None:
 
 def least_cells(scene: LineScene) -> float:
     """Cells that a line has at least whose cells follow the radii of obstacles."""
-    round_ = [x for x in scene.obstacles.values() if not isinstance(x, PlaneObstacle)]
+    round_ = [x for x in reachable_obstacles(scene).values() if not isinstance(x, PlaneObstacle)]
     radii = [bend_radius(x) + strand_radius(scene) for x in round_]
     return min(CELLS_PER_RADIUS * scene.length / min(radii), MOST_CELLS) if radii else 0.0
 

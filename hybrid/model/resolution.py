@@ -19,7 +19,15 @@ from hybrid.scene.accuracy import NOT_ASKED, ROUGHEST, USUAL, Accuracy, amount
 from hybrid.scene.cable import Cable
 from hybrid.scene.motion_checks import shortest_period
 from hybrid.scene.motion_tables import SHIFTS, Motion
-from hybrid.scene.schema import AdaptiveModel, CatenaryZone, LineScene, RodModel, Section, ZonesModel
+from hybrid.scene.schema import (
+    AdaptiveModel,
+    CatenaryZone,
+    LineScene,
+    RodModel,
+    Section,
+    ZonesModel,
+    reachable_obstacles,
+)
 from hybrid.scene.waves import PeriodicWaves
 
 # Part of the requested error that neglecting bending in catenary zones may use; mesh and time step share the rest.
@@ -382,7 +390,7 @@ def _waves_are_irregular(scene: LineScene) -> bool:
 
 def rubs_on_obstacles(scene: LineScene) -> bool:
     """Whether a line may rub on obstacles: its tension then jumps where contact begins."""
-    return any(x.friction for x in scene.obstacles.values())
+    return any(x.friction for x in reachable_obstacles(scene).values())
 
 
 def may_be_held(scene: LineScene) -> bool:
@@ -446,7 +454,7 @@ def model_is_free(scene: LineScene, moves: bool = True) -> bool:
     """
     named = scene.model != AdaptiveModel()
     wants = (scene.time is not None or not moves) and requested_accuracy(scene) is not None and mesh_is_free(scene)
-    return wants and not (named or scene.output.criteria or scene.contact.self or scene.obstacles)
+    return wants and not (named or scene.output.criteria or scene.contact.self or reachable_obstacles(scene))
 
 
 def first_resolution(scene: LineScene) -> Resolution:
@@ -463,7 +471,7 @@ def first_resolution(scene: LineScene) -> Resolution:
         part = min(x for x, _, _ in which)
         local = min(step * (x / ONE) ** 1.5 for x, _, step in which) * scene.length
         if mesh_is_free(scene):
-            least = ON_OBSTACLES if scene.obstacles else COARSEST
+            least = ON_OBSTACLES if reachable_obstacles(scene) else COARSEST
             fineness = min(max(max(cells * sqrt(ONE / x) for x, cells, _ in which), least), FINEST)
     part *= OF_ZONES
     time = scene.time
@@ -473,7 +481,7 @@ def first_resolution(scene: LineScene) -> Resolution:
         assert time.step is not None
         return Resolution(fineness, time.step, None, zones or part)
     step = min(time.step or time.duration / LEAST_STEPS, time.duration)
-    step = min(step, shortest_period(scene.ends, scene.environment, scene.obstacles) / PER_PERIOD)
+    step = min(step, shortest_period(scene.ends, scene.environment, reachable_obstacles(scene)) / PER_PERIOD)
     found = Resolution(fineness, step, time.tolerance or local, zones or part)
     shown, still = vibration_step(scene, want)
     return replace(found, step=shown, later=step, still=still) if shown < step else found

@@ -203,6 +203,7 @@ class AtPoint(NamedTuple):
     axes_of_others: bool = False  # it is clamped to a free point, whose axes other lines may give
     twisted: bool = False  # by turns of the other end: nothing there lets it spin
     near: Triple | None = None  # where the search of the equilibrium puts a free end first, m
+    swung: bool = False  # by a body that turns: its own motion is not all that moves it
 
 
 class EndTable(Table):
@@ -229,6 +230,11 @@ class EndTable(Table):
     def is_placed(self) -> bool:
         """Whether a position that is held is known, and no first guess of what lines move."""
         return not self._at.moves
+
+    @property
+    def is_swung(self) -> bool:
+        """Whether a body that turns moves it beside its own motion."""
+        return self._at.swung
 
     @property
     def first_position(self) -> Triple | None:

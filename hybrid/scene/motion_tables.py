@@ -373,7 +373,7 @@ def farthest(
     within: m, a distance of which only what is beyond is of interest: nearer ones are not looked for in time.
     """
     apart = math.dist(*places)
-    if apart + sum(_most(x, duration) for x in motions) <= within:
+    if apart + sum(most_shift(x, duration) for x in motions) <= within:
         return apart, 0.0
     return max(((_apart(places, motions, t), t) for t in times_of(motions, duration)), key=lambda x: x[0])
 
@@ -398,7 +398,7 @@ def _apart(places: tuple[Triple, Triple], motions: tuple[Motion | None, Motion |
     return math.dist((a[0] + u[0], a[1] + u[1], a[2] + u[2]), (b[0] + v[0], b[1] + v[1], b[2] + v[2]))
 
 
-def _most(motion: Motion | None, duration: float) -> float:
+def most_shift(motion: Motion | None, duration: float) -> float:
     """What a motion moves an end by at most, m."""
     if motion is None:
         return 0.0

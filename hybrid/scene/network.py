@@ -510,12 +510,14 @@ class Network(SceneTables):
         clamp, moves = self.clamp(name, key), self.may_leave(name, key)
         given: dict[str, Any] = {"position": place, "motion": motion}
         given["payout"] = getattr(self.lines[name].connections, key).payout
+        body = self.body_of(getattr(self.lines[name], key))
+        swung = isinstance(body, FixedBody) and body.motion != body.shift
         if held is None or clamp is None:
             twisted = moves and clamp is not None and not clamp.swivel
-            return Pinned(**given).at_point(AtPoint(moves, clamp is not None and not moves, twisted))
+            return Pinned(**given).at_point(AtPoint(moves, clamp is not None and not moves, twisted, swung=swung))
         turns = 0.0 if carrying else clamp.turns  # a first shape is that of the line with no point
         given |= {"tangent": held[0], "normal": held[1], "swivel": clamp.swivel, "turns": turns}
-        return Clamped(**given, bend_stiffness=clamp.bend_stiffness).at_point(AtPoint(moves))
+        return Clamped(**given, bend_stiffness=clamp.bend_stiffness).at_point(AtPoint(moves, swung=swung))
 
     def _free_end(self, name: str, key: Literal["start", "end"], near: Triple | None) -> End:
         """The end of a line at a point that is no more than that; near: as of `FreePoint.only_end`."""

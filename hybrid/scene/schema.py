@@ -9,8 +9,8 @@ The tables live in five files (`cable`, `attachments`, `sea`, `ends`, `task`); i
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -41,15 +41,17 @@ from hybrid.scene.analysis import (
 )
 from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
 from hybrid.scene.base import Table, Text, Vector, refuse
+from hybrid.scene.bodies import Carried
 from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section, Vortices
 from hybrid.scene.checks import contradictions
-from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned
+from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned, Triple
 from hybrid.scene.motion_checks import lasting_period, moved_in
-from hybrid.scene.motion_tables import Harmonic, Load, Motion, Travel
+from hybrid.scene.motion_tables import TURNS, Harmonic, Load, Motion, Travel, most_shift
 from hybrid.scene.obstacles import (
     BoxObstacle,
     CylinderObstacle,
     MeshObstacle,
+    Obstacle,
     Obstacles,
     PlaneObstacle,
     SheaveObstacle,
@@ -286,3 +288,121 @@ class LineScene(SceneTables):
     def _no_contradiction(self) -> LineScene:
         refuse(contradictions({name: getattr(self, name) for name in type(self).model_fields}))
         return self
+
+
+# Which obstacles of a scene a line can reach, by its length, its ends and the strain that its sections bear.
+#
+# A point of a line at the arc length s is within s of the start, and within the rest of the length of the end, both
+# measured along the stretched line.  A run stops where a section is stretched beyond what it bears (max_strain): the
+# stretched length has a bound.  An end that moves may be anywhere within the bound of its motion.  The points of a
+# short part of a line lie in two balls, one about each end, and what these have in common lies in one ball.  An
+# obstacle that is farther than the radius from the middle of every such ball is never touched.
+#
+# Where no bound is known, the line counts as one that reaches every obstacle:
+#
+#     both ends are free, or are moved by other lines, or may be let go;
+#     an end may be set from outside, or its motion goes on for ever, or a vessel or a file has it;
+#     line is paid out;
+#     the obstacle is on a body or set from outside, moves so that it turns, or turns freely (bearing).
+
+# Parts of the length of which each has a ball: how much larger than necessary these are is a part of the length.
+PARTS = 64
+# Diameters between the middle of the line and a surface that it does not touch: half of one, and the onset of contact.
+APART = 1.0
+# Of the length: how far from where a scene has them Newton's method and round-off may leave the line.
+ROUND_OFF = 1e-6
+
+
+class Ball(NamedTuple):
+    """Where points of a line may be."""
+
+    middle: Triple  # m, inertial
+    radius: float  # m
+
+
+class Anchor(NamedTuple):
+    """An end that is held."""
+
+    place: Triple  # m, inertial
+    shift: float  # m, how far it moves at most
+
+
+def reachable_obstacles(scene: LineScene) -> Obstacles:
+    """The obstacles of a scene that its line may touch, by name, in order."""
+    return {name: x for name, x in scene.obstacles.items() if may_reach(scene, x)}
+
+
+def may_reach(scene: LineScene, obstacle: Obstacle) -> bool:
+    """Whether a line may touch an obstacle; where no bound is known it may."""
+    shift = _shift_of_obstacle(obstacle)
+    if math.isinf(shift):
+        return True
+    apart = shift + APART * max(x.diameter or 0.0 for x in scene.cable.sections) + ROUND_OFF * scene.length
+    return all(any(obstacle.distance(x.middle) <= x.radius + apart for x in balls) for balls in _covers(scene))
+
+
+def longest_stretched(scene: LineScene) -> float:
+    """Length, m, beyond which a line is not stretched; what does not stretch keeps the length that it has."""
+    return sum(x.length * (1.0 + (x.strain_limit if x.stiffness else 0.0)) for x in scene.cable.sections)
+
+
+def _covers(scene: LineScene) -> Iterator[Iterator[Ball]]:
+    """Sets of balls, the coarsest first, each of which holds all of the line; none: no bound is known."""
+    ends = scene.ends.both
+    if scene.contact.ends_are_set or any(getattr(end, "payout", None) is not None for end in ends):
+        return
+    first, last = (_anchor(end) for end in ends)
+    far = longest_stretched(scene)
+    if first is not None and last is not None:
+        yield iter([_around(first, last, far)])
+        parts = sorted(range(PARTS), key=lambda k: abs(2 * k + 1 - PARTS))  # those in the middle reach farthest
+        yield (_between(first, last, far * (k + 1) / PARTS, far * (1.0 - k / PARTS)) for k in parts)
+    elif (held := first or last) is not None:
+        yield iter([Ball(held.place, far + held.shift)])
+
+
+def _around(first: Anchor, last: Anchor, far: float) -> Ball:
+    """The ball whose diameter is the longest axis of the ellipsoid in which a line of a length (m) lies."""
+    (x, y, z), (u, v, w) = first.place, last.place
+    return Ball((0.5 * (x + u), 0.5 * (y + v), 0.5 * (z + w)), 0.5 * (far + first.shift + last.shift))
+
+
+def _between(first: Anchor, last: Anchor, begun: float, left: float) -> Ball:
+    """A ball that holds what is within `begun` (m) of the one anchor and within `left` of the other."""
+    a, b = begun + first.shift, left + last.shift
+    apart = math.dist(first.place, last.place)
+    along = 0.5 * (apart + (a * a - b * b) / apart) if apart > 0.0 else math.copysign(math.inf, a - b)
+    if along <= 0.0:  # the ball about the first is smaller, and its middle is on this side of the plane of both rims
+        return Ball(first.place, a)
+    if along >= apart:
+        return Ball(last.place, b)
+    (x, y, z), (u, v, w), part = first.place, last.place, along / apart
+    middle = (x + part * (u - x), y + part * (v - y), z + part * (w - z))
+    return Ball(middle, math.sqrt(max(a * a - along * along, 0.0)))
+
+
+def _anchor(end: End) -> Anchor | None:
+    """Where an end is held; None: no bound of its place is known."""
+    place = end.held_position
+    if place is None or end.release is not None or end.is_swung or not end.is_placed:
+        return None
+    shift = _largest_shift(end.prescribed_motion)
+    return Anchor(place, shift) if math.isfinite(shift) else None
+
+
+def _largest_shift(motion: Motion | None) -> float:
+    """How far (m) a motion moves at most, whenever; infinite: no bound is known."""
+    if motion is None:
+        return 0.0
+    if any(getattr(motion, x) is not None for x in ("velocity", "follow", "vessel", "file")):
+        return math.inf
+    return most_shift(motion, 0.0)
+
+
+def _shift_of_obstacle(obstacle: Obstacle) -> float:
+    """How far (m) points of an obstacle move out of its shape at rest; infinite: no bound is known."""
+    motion = obstacle.motion
+    turns = motion is not None and any(getattr(motion, x) is not None for x in TURNS)
+    if isinstance(obstacle, Carried) or obstacle.from_outside or turns or getattr(obstacle, "bearing", None):
+        return math.inf
+    return _largest_shift(motion)

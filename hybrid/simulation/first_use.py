@@ -21,7 +21,7 @@ from hybrid.model.resolution import first_resolution, wants_errors
 from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import Equilibrium, LineScene
+from hybrid.scene.schema import Equilibrium, LineScene, reachable_obstacles
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.entry.in_plane", "run.entry.in_space")
@@ -81,7 +81,7 @@ def _is_in_space(scene: LineScene, dimension: int | None) -> bool:
     """Whether a line is not computed in a plane, whatever it does."""
     tables = scene.environment, scene.cable, scene.ends, scene.initial
     leaves = plane_of(*tables, TYPED if dimension == 2 else EXACT)[1]
-    return dimension == 3 or bool(scene.contact.self or scene.obstacles or leaves)
+    return dimension == 3 or bool(scene.contact.self or reachable_obstacles(scene) or leaves)
 
 
 def _is_judged(scene: LineScene, static: bool) -> bool:

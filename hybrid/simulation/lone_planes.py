@@ -299,7 +299,8 @@ class LonePlanes(Part):
             stays = model.layout is None and model.payout is None
             x.monitor.comes_back = may and stays
             if x.plane is not None and not may:
-                self._note(k, 0, "out of plane", f"the line comes near itself or another one: {IN_SPACE}, {TOUCHES}")
+                near = "may reach an obstacle" if model.line.bits & OBSTACLES else "comes near itself or another one"
+                self._note(k, 0, "out of plane", f"the line {near}: {IN_SPACE}, {TOUCHES}")
             if x.plane is not None and not (may and same_plane(x.plane, model.plane)):
                 self._leave(k)
             if not same_plane(x.monitor.home, model.plane):  # loads are others

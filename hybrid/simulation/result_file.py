@@ -19,7 +19,6 @@ from hybrid.kernels.state.report import (
     LEAF,
     MESH,
     NORMAL,
-    OBSTACLES,
     PLACE,
     RADIUS,
     RIM,
@@ -296,8 +295,7 @@ def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:
             text, plane = f"{text}; the mean of its depths", _mean_plane(sea)
             out += _depths(model)
         out.append((Field("seabed", "", text, (4,), ("plane",), "inertial"), plane))
-    if line.bits & OBSTACLES:
-        out += _obstacle_shapes(model)
+    out += _obstacle_shapes(model)
     if line.bits & SURFACE:
         out.append((Field("surface", "m", "height of still water"), np.array(sea.surface)))
     if model.attached:

@@ -102,6 +102,51 @@ def test_only_what_is_joined_to_nothing_is_computed_in_a_plane(flat: list[list[i
     assert flat[-1] == []
 
 
+def ball(*at: float) -> Tables:
+    """A small ball in the way of nothing."""
+    return {"obstacles": {"ball": {"kind": "sphere", "at": [*at], "radius": 0.2, "stiffness": 1e5}}}
+
+
+def test_an_obstacle_out_of_reach_leaves_a_line_in_its_plane(flat: list[list[int]]) -> None:
+    """As without it, to the bit; one that the line could reach does not, and is written beside both."""
+    alone, far, near = (
+        hybrid.run(as_network(swinging(0.8, 0.0) | x)).lines["cable"] for x in ({}, ball(7, 10, -40), ball(7, 10, 5))
+    )
+    assert flat == [[0], [0], []]
+    for key in ("position", "velocity", "tension", "curvature", "energy/kinetic", "steps/iterations"):
+        np.testing.assert_array_equal(far[key], alone[key], err_msg=key)
+    np.testing.assert_allclose(near.position, alone.position, rtol=0, atol=1e-9 * 30)
+    assert not any(far["obstacles/ball/normal_force"].ravel())
+    contents = {at: hybrid.plan(swinging(0.8, 0.0) | ball(7, 10, at)).contents for at in (-40, 5)}
+    why = [{e.what: e.why for e in x}["computed in a plane (3 unknowns a node)"] for x in contents.values()]
+    assert why[0].startswith("all of the scene lies in") and why[1].startswith("obstacles: contact with obstacles")
+    assert [e.on for x in contents.values() for e in x if e.what.startswith("obstacle ball")] == [False, True]
+
+
+def test_an_obstacle_takes_only_lines_out_of_their_planes_that_may_reach_it(flat: list[list[int]]) -> None:
+    spans = {
+        "points": {f"{x}{k}": {"position": [8 * k - 4, y, 0]} for x, y in zip("abc", (0, 20, 40), strict=True) for k in (0, 1)},
+        "lines": {x: SPANS["lines"]["a"] | {"start": f"{x}0", "end": f"{x}1", "initial": "equilibrium"} for x in "abc"},
+    }  # fmt: skip
+    beside = hybrid.run(scene(spans, ball(0, 20, 1), duration=0.2))
+    assert flat[-1] == [0, 2]
+    alone = hybrid.run(scene(spans, duration=0.2))
+    assert flat[-1] == [0, 1, 2]
+    for name, x in alone.lines.items():
+        np.testing.assert_allclose(beside.lines[name].position, x.position, rtol=0, atol=1e-8)
+
+
+@pytest.mark.long
+def test_other_loads_may_reach_an_obstacle(flat: list[list[int]], tmp_path: Path) -> None:
+    """An end comes nearer from 1 s on, which lets the line come to the ball: it goes on in space."""
+    tables = swinging(0.8, 0.0) | ball(7.5, 10, -10.6) | {"time": {"duration": 1.0, "step": 0.05}}
+    hybrid.run(tables, tmp_path / "part.h5", progress=False).close()
+    assert flat == [[0]]
+    nearer = ["ends.end.motion.travel={by: [-3, -4, 0], over: 2, begin: 1}"]
+    found = hybrid.resume(tmp_path / "part.h5", until=4.0, settings=nearer, progress=False)
+    assert flat[-1] == [] and [e.kind for e in found.events].count("out of plane") == 1
+
+
 @pytest.mark.long
 def test_other_loads_may_take_a_line_out_of_its_plane(flat: list[list[int]], tmp_path: Path) -> None:
     """A current across it from 2 s on: the same motion, but for the push by which it leaves, as computed in space."""
