@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Batch, Floats, Line, Sea
-from hybrid.kernels.watch.observed_outputs import observed_joined
+from hybrid.kernels.watch.observed_outputs import Found, observed_joined
 from hybrid.model.mesh import Zone
 from hybrid.outputs.observation import Observation, Touchdown, links, touchdown
 from hybrid.outputs.observed_states import Grid, Rows, linear
@@ -175,9 +175,10 @@ class JoinedObservation(Observation):
         return int(self.begin[k] + np.argmin(np.abs(0.5 * (s[:-1] + s[1:]) - self.grid.s[at])))
 
     @cached_property
-    def _observed(self) -> tuple[Floats, Floats, Floats, Floats]:
-        M, strain, energy, bend = observed_joined(self.line, self.batch, self.begin)
-        return M[..., None], strain[..., None], np.ascontiguousarray(energy.T), bend[:, None]
+    def _observed(self) -> Found:
+        x = observed_joined(self.line, self.batch, self.grid.hinges, self.marks, self.begin)
+        energy = np.ascontiguousarray(x.energy.T)
+        return Found(x.moment[..., None], x.strain[..., None], energy, x.bend[:, None], x.rods[..., None])
 
     @cached_property
     def touchdown(self) -> Touchdown:

@@ -263,7 +263,7 @@ class Observation(ObservedStates):
 
         potential: of weight and buoyancy; of contact: stored by the seabed, and by contact of the line with itself.
         """
-        kinetic, bending, torsion, stretch, potential = self._observed[2]
+        kinetic, bending, torsion, stretch, potential = self._observed.energy
         if self.batch.turn.size:
             # One by one: the last digit of a product over a batch depends on its size, and so would a resumed run's.
             each = zip(self.batch.turn[:, :, TURN], self.batch.T, strict=True)

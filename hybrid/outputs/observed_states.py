@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.sparse_rows import add_rows, cubic_rows, linear_rows
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
-from hybrid.kernels.watch.observed_outputs import observed
+from hybrid.kernels.watch.observed_outputs import Found, observed
+from hybrid.kernels.watch.soft_rods import BENT, C
 from hybrid.model.mesh import Zone
 
 Integers = NDArray[np.int64]
@@ -454,29 +455,45 @@ class ObservedStates:
         return np.asarray(self.e / self.length[:, None])
 
     @cached_property
-    def _observed(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Moments (N+1, 3, nb) N m, strains (N+1, 3, nb) rad, energies (5, nb) J and bends (N+1, nb) 1/m."""
-        M, strain, energy, bend = observed(self.line, self.batch, self._varied)
+    def _observed(self) -> Found:
+        """What the outputs mean, the outputs last."""
+        M, strain, energy, bend, rods = observed(self.line, self.batch, self.grid.hinges, self.marks, self._varied)
         if len(M) < self.batch.t.size:  # a catenary has neither
             M = strain = np.broadcast_to(np.zeros(1), (self.batch.t.size, *M.shape[1:]))
-        return last(M), last(strain), last(energy), bend.T
+        return Found(last(M), last(strain), last(energy), bend.T, last(rods))
+
+    @property
+    def marks(self) -> NDArray[np.int8]:
+        """(N+1,) 1 at nodes with two sides."""
+        return (np.bincount(self.grid.side_nodes, minlength=self.line.s.size) > 1).astype(np.int8)
+
+    @property
+    def restored(self) -> Floats:
+        """(N+1, nb) 1/m, curvature of rods that lack stiffness, if they had it, else NaN; (0, nb): none is known."""
+        return self._observed.rods[:, BENT]
+
+    @property
+    def parts_of_stiffness(self) -> Floats:
+        """(N+1, nb) of elements; 1 where nothing lacks or is known."""
+        rods = self._observed.rods
+        return rods[:, C] if len(rods) else np.ones((self.line.s.size, self.columns))
 
     @property
     def element_strains(self) -> Floats:
         """(N+1, 3, nb) rad, of the elements at nodes, as of kernels.watch.observed_outputs."""
-        return self._observed[1]
+        return self._observed.strain
 
     @property
     def bends(self) -> Floats:
         """(N+1, nb) 1/m, from cell to cell, as of kernels.watch.observed_outputs."""
-        return self._observed[3]
+        return self._observed.bend
 
     # ---- moments, and which way the line bends ------------------------------------------------
 
     @property
     def node_moment(self) -> Floats:
         """(N+1, 3, nb) N m, inertial."""
-        return self._observed[0]
+        return self._observed.moment
 
     @cached_property
     def node_tangent(self) -> Floats:

@@ -179,8 +179,9 @@ def payout_kernels() -> tuple[Any, ...]:
 
 
 def _compile_outputs(model: Model) -> None:
-    from hybrid.kernels.watch.observed_outputs import observe_outputs
+    from hybrid.kernels.watch.observed_outputs import observe_outputs, observe_soft_rods
 
+    observe_soft_rods(np.zeros((0, 0), np.int64))
     observe_outputs(np.zeros((0, 0), np.int64))
     stored_energy(model.line, model.sea.values, model.start.r)
 

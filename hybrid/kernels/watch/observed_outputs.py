@@ -39,6 +39,7 @@ from hybrid.kernels.machine.binding import Series
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
+from hybrid.kernels.state.books import STRAINS
 from hybrid.kernels.state.state import (
     ALONG_LINE,
     NO_TURN,
@@ -50,6 +51,7 @@ from hybrid.kernels.state.state import (
     blank_line,
     no_ends,
 )
+from hybrid.kernels.watch.soft_rods import BENT, EI, LINE, RAW, C, Rods, part_of_stiffness, restore_stiffness
 
 # Points of a cell at which the bed presses, where its load on nodes is found.
 POINTS = 12
@@ -340,6 +342,9 @@ class Output(NamedTuple):
     strain: Floats  # (N+1, 3) rad
     energy: Floats  # (5,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy)
     bend: Floats  # (N+1,) 1/m, from cell to cell, inside the line; empty: not asked for
+    hinges: Floats  # as of `Books`
+    marks: NDArray[np.int8]  # (N+1,) nodes with two sides
+    rods: Floats  # (N+1, STRAINS) as `Books.strains`, of kernels.watch.soft_rods; empty: not asked for
 
 
 def _blank() -> Output:
@@ -358,6 +363,9 @@ def _blank() -> Output:
         nodes,
         np.zeros(5),
         np.zeros(2),
+        np.zeros((3, 3)),
+        np.zeros(2, np.int8),
+        np.zeros((2, STRAINS)),
     )
 
 
@@ -386,6 +394,18 @@ def observe_outputs(tables):
                 before = d
 
 
+@kernel
+def observe_soft_rods(tables):
+    """Find, of outputs that are observed, curvature of rods that lack stiffness (else NaN), and parts of it (column C)."""
+    for k in range(tables.shape[0]):
+        x = _read(tables[k])
+        for i in range(x.rods.shape[0]):
+            x.rods[i, RAW], x.rods[i, BENT] = math.hypot(x.strain[i, 0], x.strain[i, 1]) / x.line.hn[i], math.nan
+        restore_stiffness(x.line, x.ends, x, Rods(x.rods, x.hinges, x.marks))
+        for i in range(x.rods.shape[0]):
+            x.rods[i, C] = part_of_stiffness(x.line, i, x.hinges)
+
+
 def slipped(line: Line, batch: Batch) -> Floats:
     """`slip_now` (nb, N+1, 4 L) of outputs: their layers bear what they have, as stiff as their tension makes them."""
     n = batch.T.shape[1]
@@ -399,19 +419,31 @@ def slipped(line: Line, batch: Batch) -> Floats:
     return out
 
 
-def observed(
-    line: Line, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Moments and strains (nb, N+1, 3) as of kernels.march.energies, energies (nb, 5) J and bends (nb, N+1) 1/m of outputs.
+class Found(NamedTuple):
+    """What is found of nb outputs, one behind the other where their lines are others."""
 
-    A line of catenary alone has no moment and no strain, (1, N+1, 3) of zeros; one of rod alone no bends, (nb, 0).
-    varied: arrays (nb, ...) of the line by name, where it is another one in every output.
+    moment: Floats  # (nb, N+1, 3) N m, as of kernels.march.energies; of catenary alone (1, N+1, 3) of zeros, as strain
+    strain: Floats  # (nb, N+1, 3) rad
+    energy: Floats  # (nb, 5) J
+    bend: Floats  # (nb, N+1) 1/m; of rod alone (nb, 0)
+    rods: Floats  # (nb, N+1, STRAINS) as of `observe_soft_rods`; (nb, 0, STRAINS): no rods, or nothing known of them
+
+
+def observed(
+    line: Line, batch: Batch, hinges: Floats, marks: NDArray[np.int8],
+    varied: Mapping[str, Floats] = MappingProxyType({}),
+) -> Found:  # fmt: skip
+    """What outputs of one line mean.
+
+    hinges: as of `Books`; marks: (N+1,) nodes with two sides; varied: arrays (nb, ...) of the line by name, where it is another one in every output.
     A bend is 2 tan(x/2) over the length of line around the node, x the angle from cell to cell; zero at the ends.
     """
     nb, n = batch.T.shape
     rods, catenary = bool(line.element.any() or line.spin.any()), not line.spin.all()
     moment, strain = (np.zeros((nb if rods else 1, n + 1, 3)) for _ in range(2))
     energy, bend = np.zeros((nb, 5)), np.zeros((nb, n + 1 if catenary else 0))
+    soft = rods and hinges[LINE, EI] > 0.0
+    whole = np.zeros((nb, n + 1 if soft else 0, STRAINS))
     own = {"moment": moment, "strain": strain} if rods else {}
     state = {"r": batch.r, "e": batch.e, "v": batch.v, "a1": batch.a1, "w": batch.w, "T": batch.T}
     if batch.turn.size:
@@ -425,21 +457,26 @@ def observed(
     first = Output(
         there, Ends(*(x[0] for x in held)),
         **{"turn": NO_TURN} | {name: x[0] for name, x in state.items()}, moment=moment[0], strain=strain[0],
-        energy=energy[0], bend=bend[0],
+        energy=energy[0], bend=bend[0], hinges=hinges, marks=marks, rods=whole[0],
     )  # fmt: skip
     along = (
         state
         | own
         | of_line
-        | {"energy": energy, "bend": bend}
+        | {"energy": energy, "bend": bend, "rods": whole}
         | {f"ends.{name}": x for name, x in held._asdict().items()}
     )
-    observe_outputs(_series(first, nb, along))
-    return moment, strain, energy, bend
+    tables = _series(first, nb, along)
+    observe_outputs(tables)
+    if soft:
+        observe_soft_rods(tables)
+    return Found(moment, strain, energy, bend, whole)
 
 
-def observed_joined(line: Line, batch: Batch, begin: NDArray[np.int64]) -> tuple[Floats, Floats, Floats, Floats]:
-    """The same of nb outputs of other lines, one behind the other: moments, strains (M, 3), energies (nb, 5), bends (M,).
+def observed_joined(
+    line: Line, batch: Batch, hinges: Floats, marks: NDArray[np.int8], begin: NDArray[np.int64]
+) -> Found:
+    """The same of nb outputs of other lines, one behind the other: of nodes (M, ...) in place of (nb, N+1, ...).
 
     begin: (nb+1,) nodes before each line; line, batch: arrays along all of them, in `batch` with one row; between two
     lines is a cell that belongs to none.  Without catenary there are no bends, (0,).
@@ -447,9 +484,10 @@ def observed_joined(line: Line, batch: Batch, begin: NDArray[np.int64]) -> tuple
     nodes, catenary = int(begin[1]), not line.spin.all()
     moment, strain = np.zeros((begin[-1], 3)), np.zeros((begin[-1], 3))
     energy, bend = np.zeros((begin.size - 1, 5)), np.zeros(begin[-1] if catenary else 0)
-    on_nodes = {"r": batch.r[0], "v": batch.v[0], "moment": moment, "strain": strain} | (
-        {"bend": bend} if catenary else {}
-    )
+    soft = line.spin.any() and hinges[LINE, EI] > 0.0
+    whole = np.zeros((begin[-1] if soft else 0, STRAINS))
+    on_nodes = {"r": batch.r[0], "v": batch.v[0], "moment": moment, "strain": strain, "marks": marks}
+    on_nodes |= ({"bend": bend} if catenary else {}) | ({"rods": whole} if soft else {})
     on_nodes |= {f"line.{name}": getattr(line, name) for name in NODES_OF_LINE}
     on_cells = {name: getattr(batch, name)[0] for name in ("e", "a1", "w", "T")}
     on_cells |= {f"line.{name}": getattr(line, name) for name in ALONG_LINE if name not in NODES_OF_LINE}
@@ -459,12 +497,15 @@ def observed_joined(line: Line, batch: Batch, begin: NDArray[np.int64]) -> tuple
     first = Output(
         line._replace(**{name: cut[f"line.{name}"] for name in ALONG_LINE}),
         Ends(*(x[0] for x in held)),
-        **{"turn": NO_TURN, "bend": bend} | own,
+        **{"turn": NO_TURN, "bend": bend, "rods": whole} | own,
         energy=energy[0],
+        hinges=hinges,
     )
     along = {"energy": energy} | {f"ends.{name}": x for name, x in held._asdict().items()}
     tables = _series(first, energy.shape[0], along)
     _series.shift(tables, on_nodes, begin[:-1], np.diff(begin))
     _series.shift(tables, on_cells, begin[:-1], np.diff(begin) - 1)
     observe_outputs(tables)
-    return moment, strain, energy, bend
+    if soft:
+        observe_soft_rods(tables)
+    return Found(moment, strain, energy, bend, whole)

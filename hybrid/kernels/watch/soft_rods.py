@@ -25,10 +25,15 @@ Columns of books.strains while it is solved, from the first node on: M_i = d_i -
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.state.state import Floats
 
 # Columns of books.strains.
 RAW = 0  # curvature of elements
@@ -39,6 +44,14 @@ WHOLE = 1.0 - 1e-9  # p from which on a rod has all of its stiffness
 LINE = 2  # first row of books.hinges of pieces of the line
 EI, END, GJ = range(3)  # columns of these
 SLACK = 2.5e-5  # least h T/K, for lines with hardly any tension: M fades within some 200 cells
+
+
+class Rods(NamedTuple):
+    """Of `Books` what is needed here."""
+
+    strains: Floats
+    hinges: Floats
+    marks: NDArray[np.int8]
 
 
 @inner
