@@ -430,9 +430,12 @@ class Found(NamedTuple):
 
 
 def observed(
-    line: Line, batch: Batch, hinges: Floats, marks: NDArray[np.int8],
+    line: Line,
+    batch: Batch,
+    hinges: Floats,
+    marks: NDArray[np.int8],
     varied: Mapping[str, Floats] = MappingProxyType({}),
-) -> Found:  # fmt: skip
+) -> Found:
     """What outputs of one line mean.
 
     hinges: as of `Books`; marks: (N+1,) nodes with two sides; varied: arrays (nb, ...) of the line by name, where it is another one in every output.
