@@ -8,7 +8,6 @@ the other, with a cell of no length between two.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from hybrid.kernels.contact.self_contact_law import FIRST, INNER, LAST, OUTER, W
 from hybrid.kernels.contact.self_contact_pairs import WINDOW, Contact
 from hybrid.kernels.contact.self_distance import NEIGHBOURS
 from hybrid.kernels.laws.obstacles import cells_met, distances, put_obstacles, thinner_cells
-from hybrid.kernels.laws.seabed import G1, G2
+from hybrid.kernels.laws.seabed import half_cells
 from hybrid.kernels.state.report import (
     DAMPING,
     FIXED,
@@ -163,38 +162,6 @@ def _normals(sea: Sea, k: int, nodes: Nodes, seen: Floats, which: Integers) -> F
     x = found.reshape(6, -1)
     n = np.stack([x[j] - x[3 + j] for j in range(3)], axis=1) / (2.0 * step)
     return np.asarray(n / np.linalg.norm(n, axis=1, keepdims=True))
-
-
-def half_cells(
-    p0: Floats, p1: Floats, v0: Floats, v1: Floats, h: Floats, law: tuple[float, float, float]
-) -> tuple[Floats, Floats, Floats]:
-    """Forces (n,) N on both nodes of cells, and the energy (n,) J that these store: kernels.laws.seabed, of many.
-
-    p0, p1: m, penetration at the nodes; v0, v1: m/s, its rates; h: m; law: stiffness N/m per m, damping, onset m.
-    """
-    k, c, o = law
-    dp = np.where(p1 == p0, 1.0, p1 - p0)
-    edges = np.sort(np.clip([np.where(p1 == p0, 1.0, (x - p0) / dp) for x in (0.0, o)], 0.0, 1.0), axis=0)
-    ends = [np.zeros_like(p0), edges[0], edges[1], np.ones_like(p0)]
-    first, second, energy = (np.zeros_like(p0) for _ in range(3))
-    for a, b in pairwise(ends):
-        middle = p0 + 0.5 * (a + b) * (p1 - p0)
-        slope, shift = np.where(middle < o, 0.5, 1.0), np.where(middle < o, 0.0, 0.5 * o)
-        fa, fb = (k * (slope * (p0 + x * (p1 - p0)) - shift) + c * (v0 + x * (v1 - v0)) for x in (a, b))
-        cut = np.where(fa * fb < 0.0, a - fa / np.where(fa == fb, 1.0, fb - fa) * (b - a), b)  # damping lets go
-        for x0, x1 in ((a, cut), (cut, b)):
-            for g in (G1, G2):
-                x, w = x0 + g * (x1 - x0), 0.5 * h * (x1 - x0)
-                p, v = p0 + x * (p1 - p0), v0 + x * (v1 - v0)
-                q = np.where(p < o, (0.5 * k * p + c * v) * p / o, k * (p - 0.5 * o) + c * v)
-                q = np.where(p > 0.0, np.maximum(q, 0.0), 0.0)
-                first += w * (1.0 - x) * q
-                second += w * x * q
-        for g in (G1, G2):
-            p, w = p0 + (a + g * (b - a)) * (p1 - p0), 0.5 * h * (b - a)
-            stored = np.where(p < o, p * p * p / (6.0 * o), 0.5 * p * (p - o) + o * o / 6.0)
-            energy += w * k * np.where(p > 0.0, stored, 0.0)
-    return first, second, energy
 
 
 def obstacle_fields(names: Sequence[str]) -> list[Field]:

@@ -9,8 +9,6 @@ import pytest
 
 import hybrid
 from hybrid.cli.tables import extremes_facts
-from hybrid.kernels.laws.seabed import contact
-from hybrid.outputs.obstacle_forces import half_cells
 from hybrid.view.summary import facts_of
 from tests.validation.test_validation_lines_contact import FORCES, ROPE, WEIGHT, crossing, force_between
 
@@ -23,21 +21,6 @@ PIPES = {
 
 
 # --- obstacles --------------------------------------------------------------------------------------------
-
-
-def test_the_law_of_many_cells_is_that_of_one() -> None:
-    """Of the seabed's kernel, with damping that lets go within a cell."""
-    random = np.random.default_rng(3)
-    p = 0.01 * random.normal(size=(2, 200))
-    p[0, :20], p[1, 20:30] = p[1, :20], 0.004  # level; at the onset
-    v, h = random.normal(size=(2, 200)), random.uniform(0.1, 0.3, 200)
-    keep = p.max(axis=0) > 0.0
-    p, v, h = p[:, keep], v[:, keep], h[keep]
-    first, second, _ = half_cells(*p, *v, h, (1e4, 30.0, 0.004))
-    for k in range(h.size):
-        a = contact(p[0, k], p[1, k], v[0, k], v[1, k], h[k], 1e4, 30.0, 0.004)[0]
-        b = contact(p[1, k], p[0, k], v[1, k], v[0, k], h[k], 1e4, 30.0, 0.004)[0]
-        np.testing.assert_allclose((first[k], second[k]), (a, b), rtol=1e-11, atol=1e-12)
 
 
 def laid(**more: Any) -> dict[str, Any]:
