@@ -1,9 +1,6 @@
-"""How errors follow from what runs differ by.
+"""How errors follow from what runs differ by: their order, their sizes, and values between outputs.
 
-How errors follow from what runs differ by: the order with which they fall, their sizes, outputs between outputs.
-
-How far forces at the ends differ from run to run between outputs: by snaps, and where a line rings.
-
+Forces at the ends differ from run to run between outputs as well: by snaps, and where a line rings.
 A snap is a force at the ends that rises after a line that was taut went slack.  Its size follows from how the line lay
 while it was slack, which is another in every run, however fine: the largest force of a run can be a smooth one that
 converges, and in the next run a snap exceeds it.  A line that rings faster than its outputs is late by another part of

@@ -1,9 +1,8 @@
 """Errors of extremes and of the statistics of an irregular motion.
 
-Errors of what limits are held against: extremes over all steps and nodes, which outputs do not show.
-
-Runs to compare with keep their extremes as the result does.  Of three, each r times as fine as the one before, the two
-changes give the order p, the last one the error:
+Extremes are those over all steps and nodes that limits are held against, which outputs do not show.  Runs to compare
+with keep their extremes as the result does.  Of three, each r times as fine as the one before, the two changes give the
+order p, the last one the error:
 
     symbol   meaning                                                   unit
     x        extremes of a run (hybrid.store.limits.extremes_about)    that of the limit
@@ -15,8 +14,6 @@ changes give the order p, the last one the error:
 An extreme may agree in two runs by chance, or because it stands at another place: so each place has its own change, and
 what the change before foretells of the next counts as well.  p may be far below 1: where cells do not show a bend,
 finer ones find a sharper one every time.
-
-What converges of an irregular motion: its extremes and standard deviations, of runs that are to be compared.
 
 Where a line snaps or the sea is irregular, runs differ at an instant however fine they are: a snap comes a little
 earlier or later.  Extremes over windows and standard deviations converge, and mostly the largest value of a run.

@@ -1,15 +1,13 @@
 """Which model a scene is computed with, and what bending that is left out changes.
 
-What leaving bending out changes in a run: the same with rods in place of catenaries is computed, and compared.
-
+What leaving bending out changes: the run with rods in place of catenaries is computed as well, and compared.
 Lines that are joined move each other: all get the error that one of them has.  The rods have the cells and the very
 steps of the run, and where zones have moved those of its rods, so that both have the same error by the mesh and by the
 step.  Beside point loads and clamps that catenaries bend at they have shorter cells, within which bending fades.  A run
 to compare with, whose cells and steps are longer, shows it of catenaries that move and touch nothing; else the result
 does.
 
-The model of a scene that leaves the choice: rods, catenaries or zones that move, whichever costs least.
-
+A scene that leaves the choice of its model gets rods, catenaries or zones that move, whichever costs least.
 A pre-run of rods shows where the cable bends and how tension goes; what each kind would cost follows from the cells
 that it needs.  docs/zone_rules.md
 """

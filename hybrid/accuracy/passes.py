@@ -1,8 +1,7 @@
 """All passes of one scene in motion, and what their result says of its errors.
 
-Writes into a result how wrong it may be, how finely it was computed, and what that took.
-
-All passes of one scene in motion: the pre-run, the result, the runs that its errors are estimated by, finer results.
+Passes are the pre-run, the result, the runs that its errors are estimated by, and finer results.  A result gets written
+into it how wrong it may be, how finely it was computed, and what that took.
 
 The result is computed first and is in its place before anything else is tried: what stops later, by Ctrl-C, a kill or a
 failure, leaves it there, and the file says what is still to come (`Result.pending`).  `hybrid resume` makes up for it.

@@ -1,8 +1,7 @@
 """Whether a result is as accurate as asked, and how the next one is refined.
 
-Whether a result is as accurate as asked, and the mesh, step and zones with which the next one should be.
-
-A finer result beside the one before it: which of the two a refinement returns, and when it takes its place.
+A refinement chooses mesh, step and zones of the finer result, which of the two it returns, and when the finer one
+replaces the other.
 """
 
 from __future__ import annotations

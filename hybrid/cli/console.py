@@ -1,11 +1,8 @@
-"""What commands print, for people or as JSON, and the line of progress.
+"""What commands print: results, notes, errors and progress, for people or as JSON.
 
-The line that a run draws over itself on a terminal: which pass, how far, how fast, how long still.
-
-Where the error stream is no terminal it is a line of its own every few seconds.  It is written to the error stream, so
+The line of progress tells which pass, how far, how fast, how long still, and is drawn over itself on a terminal.  Where
+the error stream is no terminal it is a line of its own every few seconds.  It is written to the error stream, so
 that the output stays free for results.
-
-What commands print: results, notes, errors and progress, for people or as JSON, one object per line.
 """
 
 from __future__ import annotations

@@ -1,14 +1,10 @@
-"""Results of the cases of a design, and what they answer to unknowns.
+"""Results of the cases of a design, equilibria and motions, and what they answer to unknowns.
 
-Results of motions of the cases of a design, and what they answer to unknowns.
-
-Where a search asks for slopes they are tangents along the steps of a run or, where these are not known, forward
-differences of runs in its steps, cells and zones; else those of the run before, corrected by what results changed by on
-the way (secants, after Broyden), so that a step takes a run of each case.  Of an extreme its other peaks are known as
-well, so that a search sees which of them would be the largest.  Results of a case that a search does not need are what
-the last run of it foretells.
-
-Results of equilibria and motions by unknowns, of one scene or of the cases of a design.
+Where a search asks for slopes of a motion they are tangents along the steps of a run or, where these are not known,
+forward differences of runs in its steps, cells and zones; else those of the run before, corrected by what results
+changed by on the way (secants, after Broyden), so that a step takes a run of each case.  Of an extreme its other peaks
+are known as well, so that a search sees which of them would be the largest.  Results of a case that a search does not
+need are what the last run of it foretells.
 """
 
 from __future__ import annotations

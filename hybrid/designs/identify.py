@@ -1,8 +1,7 @@
-"""Numbers of a scene from what was measured of it.
+"""Numbers of a scene from what was measured of its equilibrium or motion.
 
-What was measured of an equilibrium or a motion: a table of places, times and quantities, as results and numbers.
-
-Numbers of a scene from what was measured of its equilibrium or motion, how well they are known, and what is not.
+What was measured is a table of places, times and quantities.  Of each number it is said how well it is known, or that
+it is not.
 """
 
 from __future__ import annotations

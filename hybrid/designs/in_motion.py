@@ -1,16 +1,14 @@
 """What results of a motion answer to numbers of the scene.
 
-Where contact begins and ends, and what numbers of the scene do to it.
+Where contact begins and ends along a line of cells it goes from node to node: between two of them it answers by half as
+much as the line does, and in between by much more.  Its derivative is therefore that of equilibria between which it
+goes over several cells.
 
-In a line of cells it goes from node to node: between two of them it answers by half as much as the line does, and in
-between by much more.  Its derivative is therefore that of equilibria between which it goes over several cells.
-
-What results of a motion answer to numbers of the scene: differences of runs with the steps and cells of a base run.
-
-Where steps follow the motion, a number that changes them changes results by more than by itself: a small difference of
-two runs is then wrong by factors.  Steps and cells of the base run are therefore those of every run, whether a scene
-gives them or its accuracy has chosen them; runs in which a step was divided, or zones are others, are no neighbours of
-the base run, and no derivative is made of them.
+Derivatives are differences of runs with the steps and cells of a base run.  Where steps follow the motion, a number
+that changes them changes results by more than by itself: a small difference of two runs is then wrong by factors.
+Steps and cells of the base run are therefore those of every run, whether a scene gives them or its accuracy has chosen
+them; runs in which a step was divided, or zones are others, are no neighbours of the base run, and no derivative is
+made of them.
 """
 
 from __future__ import annotations

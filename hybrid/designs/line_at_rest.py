@@ -1,12 +1,8 @@
-"""One line at rest: its residuals, its results, and their gradients.
+"""One line at rest: its residuals when its scene changes, its results, and their gradients.
 
-One line at rest: what its equations leave over when its scene changes, and its results beside the equilibrium.
-
-Gradients of results of a line at rest by its unknowns q.
-
-From them one transposed solve has the derivative of a result g by all numbers:  dg/dp = λ·∂R/∂p  with  Aᵀλ = ∂g/∂q
-(theory.md, 22).  A result depends on the unknowns near its place, or near the ends of the line.  Only these are moved,
-each by itself; that no other one counts is tried with all of the others at once.
+Gradients are those by the unknowns q.  From them one transposed solve has the derivative of a result g by all numbers:
+dg/dp = λ·∂R/∂p  with  Aᵀλ = ∂g/∂q (theory.md, 22).  A result depends on the unknowns near its place, or near the ends
+of the line.  Only these are moved, each by itself; that no other one counts is tried with all of the others at once.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """An equilibrium of lines, and what its results answer to numbers of the scene.
 
-Free bodies, and points that lines are clamped to, at rest: what their equations leave over when their scene changes.
+At an equilibrium R(q; p) = 0, so that  A dq/dp = dR/dp  with the matrix A of the modes (theory.md, 20): one solve for
+each number, in place of two equilibria, or for each result where numbers are many (designs.line_at_rest).  dR/dp is the
+change of the block rows of the same state between two networks.  Lines that meet at free points move with them, and
+those at bodies turn with these.  A cable is the network of one line.
 
 Of a body that lines pull at with forces f at arms a, and with moments m where they are clamped,
 
@@ -9,17 +12,9 @@ Of a body that lines pull at with forces f at arms a, and with moments m where t
 a change of the scene changes its own F and M (weight, water, loads), the arms, and the forces and moments of the same
 shapes of the lines.  What lines leave over at their ends comes through the place of the ends (linear.matrices).
 
-Contact of lines with each other in an equilibrium: its stiffness, and what its forces answer to numbers of a scene.
-
-Contact has an energy, whose second derivative by the places of the nodes belongs to the matrix.  Diameters, bending
-stiffness and lengths change the forces of the same shapes; sample points stay as many as they are.
-
-An equilibrium, and what its results answer to numbers of the scene.
-
-At an equilibrium R(q; p) = 0, so that  A dq/dp = dR/dp  with the matrix A of the modes (theory.md, 20): one solve for
-each number, in place of two equilibria, or for each result where numbers are many (designs.line_at_rest).  dR/dp is the
-change of the block rows of the same state between two networks.  Lines that meet at free points move with them, and
-those at bodies turn with these (designs.network_at_rest).  A cable is the network of one line.
+Contact of lines with each other has an energy, whose second derivative by the places of the nodes belongs to the
+matrix.  Diameters, bending stiffness and lengths change the forces of the same shapes; sample points stay as many as
+they are.
 """
 
 from __future__ import annotations

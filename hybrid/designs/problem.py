@@ -1,8 +1,7 @@
 """A design file as a problem, and as a component.
 
-A design file as a problem: unknowns, equilibria of cases, what results have to keep, what is minimised.
-
-Inputs and outputs of a design as a component: names, units, rows of results, bounds.
+A problem has unknowns, equilibria of cases, what results have to keep, and what is minimised; a component has inputs
+and outputs with names, units, rows of results and bounds.
 """
 
 from __future__ import annotations

@@ -1,15 +1,11 @@
-"""Tangents along the steps of a run.
-
-Lines beside those of a run: what tangents along its steps are made of (hybrid.designs.tangents).
+"""Tangents along the steps of a run: what its results answer to all numbers, in one run.
 
 Beside each step the line of a scene with a little more of a number is kept at the tangent of the step's end, with the
 factors of the step itself (kernels.watch.tangents).  What a kernel does not follow is refused here (`Unfollowed`), and
 is left to differences of runs.
 
-Tangents along the steps of a run: what its results answer to numbers of the scene, in one run for all numbers.
-
-Of all lines together (hybrid.designs.tangents), with the points and bodies that they are joined to
-(kernels.run.network_tangents).  A cable is the network of one line.
+They are of all lines together, with the points and bodies that these are joined to (kernels.run.network_tangents).  A
+cable is the network of one line.
 """
 
 from __future__ import annotations

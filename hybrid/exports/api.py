@@ -1,22 +1,18 @@
-"""Write a result in a format of other programs.
-
-Cycles of tension and curvature at the places that matter, for fatigue: histories, and rainflow counts of them.
-
-Places: both ends, the touchdown (where in its range the curvature ranges most), the place where the curvature
-ranges most of all, and those asked for.  At the ends the tension is the end force of the step log, known at every step;
-all else is known at the outputs.  Curvature is counted about one axis fixed in space, the one the cable bends most
-about at that place: a magnitude would fold a bend to both sides into half its range.
-
-Not done: stress (it needs the section), S-N curves, damage and life.
-
-Write a result in a format of other programs: `export(result, "run.nc")`.
+"""Write a result in a format of other programs: `export(result, "run.nc")`.
 
 nc      everything, for xarray, MATLAB, Panoply and other programs that read netCDF (`labelled`)
 csv     histories at some places, for spreadsheets
 vtkhdf  the cable over time, for ParaView (`vtk`)
-fatigue cycles of tension and curvature at the places that matter, and the histories they are counted in (`fatigue`)
+fatigue cycles of tension and curvature at the places that matter, and the histories they are counted in
 
 Exports read files and nothing else.  A file appears when it is complete, and not at all if it cannot be made so.
+
+Places of fatigue: both ends, the touchdown (where in its range the curvature ranges most), the place where the
+curvature ranges most of all, and those asked for.  At the ends the tension is the end force of the step log, known at
+every step; all else is known at the outputs.  Curvature is counted about one axis fixed in space, the one the cable
+bends most about at that place: a magnitude would fold a bend to both sides into half its range.
+
+Not done: stress (it needs the section), S-N curves, damage and life.
 """
 
 from __future__ import annotations

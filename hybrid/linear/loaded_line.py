@@ -1,10 +1,7 @@
-"""One line of a linear network in the sea.
+"""One line of a linear network in the sea: excitation, linear drag, and motion by frequency.
 
-What excites a line about its equilibrium, by frequency: waves that pass, and motions of its ends.
-
-Everything is  Re(X exp(-i w t)),  so that velocities are -i w X and accelerations -w^2 X.
-
-One line of a linear network in the sea: what excites it, its linear drag, and its motion at every frequency.
+What excites it about its equilibrium are waves that pass, and motions of its ends.  Everything is  Re(X exp(-i w t)),
+so that velocities are -i w X and accelerations -w^2 X.
 """
 
 from __future__ import annotations

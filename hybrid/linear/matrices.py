@@ -1,13 +1,10 @@
-"""Stiffness and mass of a network about its equilibrium.
+"""Stiffness and mass of a network about its equilibrium, as sparse matrices.
 
-What remembers, about an equilibrium: layers that slip as a line bends, and soil.
-
-Both have two stiffnesses there, of what loads them first and of small motions to and fro.  By the first, derivatives of
-equilibria are known: each equilibrium is one of first loading.  The second is the limit of periodic motions that become
-small: a layer that is at its slip moment slips in the first of them, and never again where they bend by less than that
-moment over its stiffness; soil unloads and loads again along branches of the same first slope, K Pu/D.
-
-Stiffness and mass of a network about its equilibrium, as sparse matrices, from the block rows of the march.
+Layers that slip as a line bends, and soil, remember.  Both have two stiffnesses there, of what loads them first and of
+small motions to and fro.  By the first, derivatives of equilibria are known: each equilibrium is one of first loading.
+The second is the limit of periodic motions that become small: a layer that is at its slip moment slips in the first of
+them, and never again where they bend by less than that moment over its stiffness; soil unloads and loads again along
+branches of the same first slope, K Pu/D.
 
 The block rows of a state are linear in c_v and c_a (docs/theory.md, 2): with c_v = 0 they are K + c_a M.  Unknowns of
 a line are those of its blocks, (dT of the cell before a node, dr of the node, dpsi of the cell after it); tension stays

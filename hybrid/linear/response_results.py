@@ -6,7 +6,7 @@ For f = c |u| u of a velocity u = U + x with x normal and of covariance S,  E[df
 it is the linear law that leaves least in the mean square.  A sum of few harmonics is not normal: its law, the best in
 the same sense, is  E[f x^T] E[x x^T]^-1  over their phases; of a single one it has the same first harmonic.
 
-What a response by frequency has found: amplitudes of each line, with deviations, spectra, extremes and fatigue.
+Of each line there are amplitudes, deviations, spectra, extremes and fatigue.
 """
 
 from __future__ import annotations

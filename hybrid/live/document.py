@@ -1,8 +1,7 @@
 """The text of a scene that several edit, and new scenes in five questions.
 
-The text of a scene that several browsers and other editors change: its revisions, its file, and merging.
-
-A new scene in five questions: what it is, and four numbers; the text explains itself and is meant to be changed.
+Browsers and other editors change it: there are revisions, a file, and merging.  The five questions are what a new scene
+is, and four numbers; its text explains itself and is meant to be changed.
 """
 
 from __future__ import annotations

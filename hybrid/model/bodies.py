@@ -1,8 +1,7 @@
 """Rigid bodies as numbers, and ends that are clamped to them.
 
-Rigid bodies as numbers: what a free one is, where it is first, what loads it, and how a known one moves.
-
-Ends of lines that are clamped to points and bodies: frames in axes of these, axes of free points.
+What a free body is, where it is first, what loads it, and how a known one moves; frames of ends in axes of the points
+and bodies that they are clamped to.
 """
 
 from __future__ import annotations

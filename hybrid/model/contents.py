@@ -1,10 +1,7 @@
-"""What a scene switches on, and which lines may touch.
+"""What a scene switches on and by which key, and which lines may touch.
 
-Whether contact of a line with itself is computed: as the scene asks, else wherever the line can reach itself.
-
-The contents of a model: what a scene switches on and by which key, what is off and what would switch it on.
-
-Which lines of a system may touch each other, as numbers.
+What is off is named with what would switch it on.  Contact of a line with itself is computed as the scene asks, else
+wherever the line can reach itself.
 """
 
 from __future__ import annotations

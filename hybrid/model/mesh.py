@@ -1,8 +1,7 @@
 """Where the nodes go, and meshes whose rods come and go.
 
-Where the nodes go: zones and sections cut the line, cells fill the pieces, graded if asked.
-
-A mesh whose rods come and go: its cells; where cells follow the curvature, base cells of one or several cells.
+Zones and sections cut the line, cells fill the pieces, graded if asked.  A mesh whose rods come and go has its cells
+or, where cells follow the curvature, base cells of one or several cells.
 """
 
 from __future__ import annotations

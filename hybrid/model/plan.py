@@ -1,8 +1,6 @@
-"""What would be computed for a scene, and what it would cost.
+"""What would be computed for a scene, and what it would cost, without computing it.
 
-What the kinds of model would cost for a scene that leaves the choice, and where catenaries are no choice.
-
-What would be computed for a scene, without computing it.
+For a scene that leaves the choice of the model: what each kind would cost, and where a catenary cannot hold the line.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Rigid bodies of a network: what they are, and their shapes.
 
-Shapes of free bodies that lines touch: as obstacles of every line, carried by the body.
-
-Rigid bodies of a system of lines: what they are, how they float, and how they move where that is known.
+How they float, and how they move where that is known.  Shapes that lines touch are obstacles of every line, carried by
+the body.
 """
 
 from __future__ import annotations

@@ -2,8 +2,6 @@
 
 A line that is paid out from a reel or taken in, at one of its ends: how its length changes with time.
 
-How the two ends are held, moved and loaded.
-
 Tangents point along increasing s at *both* ends: at the start into the cable, at the
 end out of it.  Directions need not have length one; whoever uses them normalises.
 """

@@ -1,8 +1,7 @@
 """How a scene says that ends, points and bodies move and are loaded.
 
-Forces and moments that a scene gives at an end: constant, or a history that is linear between its rows.
-
-How a scene says that an end, a point or a body moves: harmonics, travel, a vessel, a file.
+Forces and moments are constant, or a history that is linear between its rows.  Motions are harmonics, travel, of a
+vessel, or of a file.
 """
 
 from __future__ import annotations

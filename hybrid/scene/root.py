@@ -1,6 +1,6 @@
 """The one root of a scene, and the short form of one line.
 
-The scene of a cable as a network of one line, and where the keys of the one are in the other.
+A scene is points, bodies, lines and their environment, also where it was written as a cable: a network of one line.
 
 Words of the short form, left, and of the network:
 
@@ -12,8 +12,6 @@ Words of the short form, left, and of the network:
     everything else                          as it is
 
 The line is called `cable`, and the points are called as the ends are.
-
-The one root of a scene: points, bodies, lines and their environment, also where it was written as a cable.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""The sea around the cable: currents, the seabed and its depths.
+"""The sea around the cable: currents, the seabed and its depths; waves are in `waves.py`.
 
-A bed of depths on a grid: depths at the crossings of rising x and y, inline or from a CSV file.
-
-The sea around the cable: currents and the seabed; its waves are in `waves.py`.
+A bed of depths has them at the crossings of rising x and y, inline or from a CSV file.
 
 Heights count along z; directions in degrees from x, counter-clockwise seen from above.
 """

@@ -1,8 +1,7 @@
 """How a section stretches, and checks of it by formulas of codes.
 
-Checks of a section by the formulas of codes; they change nothing that is computed.
-
-How a section stretches where tension is no multiple of strain: a table, and the dynamic stiffness of fibre ropes.
+Where tension is no multiple of strain, it is a table or the dynamic stiffness of fibre ropes.  Checks change nothing
+that is computed.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """Contradictions about where the cable is, and what hangs on it.
 
-Contradictions about where the cable is: how far the ends may be apart, and where it starts.
-
-Contradictions about what hangs on the cable: attachments and the bodies at its ends.
+How far the ends may be apart, where it starts, attachments, and the bodies at its ends.
 """
 
 from __future__ import annotations

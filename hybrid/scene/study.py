@@ -1,8 +1,7 @@
 """Study and design files: a scene, what varies, and what is kept or sought.
 
-The study file: a scene, what is varied in it, and what is kept of each run.
-
-The design file: a scene, the numbers of it that are sought, and what its equilibrium has to be.
+A study varies numbers of a scene and keeps results of each run; a design seeks numbers for what the equilibrium has to
+be.
 """
 
 from __future__ import annotations

@@ -470,7 +470,7 @@ def ways_to_settle(model: NetworkModel) -> dict[int, str]:
 
 
 def settling(scene: LineScene, model: Model, touches: bool = False) -> str:
-    """How friction is to at_rest_with_contact, as of `settled_with_friction`.
+    """How friction is to settle, as of `settled_with_friction`.
 
     A shape that the scene gives is where the line was laid.  "usual": as "pull" on a bed alone, where that leads
     anywhere, else not, which a scene has that says nothing of it.  What is paid out was laid under tension; and

@@ -1,6 +1,6 @@
 """What a run that fails leaves, and bends where a rod is slack.
 
-Bends that weight makes where a rod carries almost no tension, within less than a cell.
+Weight makes bends within less than a cell where a rod carries almost no tension:
 
     symbol   meaning                                                             unit
     EI       bending stiffness about the weaker axis                             N m2
@@ -11,7 +11,7 @@ Where the tension is below EI/l^2, bending and weight alone form the line, over 
 turns against the next shows no more than the mean of the bend: its curvature is too small, and the length of line that
 bends too great.
 
-What a run that fails leaves: why no step leads on, and its last good state in a file of its own.
+A run that fails leaves why no step leads on, and its last good state in a file of its own.
 """
 
 from __future__ import annotations

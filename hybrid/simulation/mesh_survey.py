@@ -1,8 +1,8 @@
 """The mesh pre-run, and shorter cells at layers.
 
-The mesh pre-run: a coarse run that shows where the cable bends, and hence where cells should be short.
+The mesh pre-run is a coarse run that shows where the cable bends, and hence where cells should be short.
 
-Shorter cells where a rod bends within less than a cell, of a scene that leaves the mesh open and asks for nothing.
+Of a scene that leaves the mesh open and asks for nothing, cells become shorter where a rod bends within less than one:
 
     symbol   meaning                                                             unit
     EI       bending stiffness, about the weaker axis                            N m2
@@ -10,7 +10,7 @@ Shorter cells where a rod bends within less than a cell, of a scene that leaves 
 
 What the equilibrium on the usual mesh shows decides: where cells are longer than a part of lambda beside a clamp, a
 point load or a change of section that bends the line, or turn too far.  Elsewhere, and where nothing is hidden, the
-mesh stays as it is.  Where an accuracy is asked for, a pre-run places the cells (`mesh_survey`).
+mesh stays as it is.  Where an accuracy is asked for, the pre-run places the cells.
 """
 
 from __future__ import annotations

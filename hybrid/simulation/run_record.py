@@ -1,8 +1,7 @@
 """What is recorded of a run of lines, and the file that it goes to.
 
-What a run of lines is recorded in: a result of each line within that of the points, or that of a line alone.
-
-What is recorded of a run of lines: outputs, steps, events and checkpoints, as it goes on.
+Outputs, steps, events and checkpoints go, as the run goes on, to a result of each line within that of the points, or to
+that of a line alone.
 """
 
 from __future__ import annotations

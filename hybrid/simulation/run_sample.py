@@ -1,8 +1,7 @@
 """What is compared and checked of a run.
 
-What is compared of a run: how finely it was computed, its outputs, and where these are.
-
-What is checked of a result when it is complete: outputs too far apart for its end forces, vibrations damped out.
+Compared is how finely it was computed, its outputs, and where these are.  Checked is, when it is complete, whether
+outputs are too far apart for its end forces, and vibrations damped out.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
-"""What a run that begins as its scene says starts with.
+"""What a run that begins as its scene says starts with, and errors that name their line.
 
-Equilibria of lines that touch themselves or each other.
-
-Whether they do, and the damped motion with contact that leads to them.
-
-What a run that begins as its scene says starts with, and errors that name their line.
+Lines that touch themselves or each other come to their equilibrium by a damped motion with contact.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """What `hybrid.Simulation` gives out and takes in, and states to come back to.
 
-What `hybrid.Simulation` gives out and takes in: states, forces, vectors that are checked, obstacles that are set.
-
-Several lines in motion kept in memory, to come back to: for steps that are computed several times over.
+It gives out and takes in states, forces, vectors that are checked and obstacles that are set.  States are kept in
+memory for steps that are computed several times over.
 """
 
 from __future__ import annotations

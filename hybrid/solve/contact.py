@@ -1,8 +1,6 @@
 """Contact of lines: their arrays, and the tables of its kernels.
 
-Contact of a line with itself: its arrays for a line, and the table of its kernel.
-
-Contact of several lines of a system with each other: their arrays as one line, and the tables of its kernel.
+Several lines that touch each other have their arrays as one line.
 """
 
 from __future__ import annotations

@@ -1,15 +1,13 @@
 """Equilibrium of lines that touch, and whether it would stay.
 
-Whether an equilibrium with contact would stay: one stiffness of all lines, points and contact is positive definite.
+It would stay where one stiffness of all lines, points and contact is positive definite.  Line by line that cannot be
+judged: what one line rests on is another one, which gives way.  Points move; bodies and what is clamped to them are
+held where they are, so that a motion of these alone is not found.
 
-Line by line that cannot be judged: what one line rests on is another one, which gives way.  Points move; bodies and
-what is clamped to them are held where they are, so that a motion of these alone is not found.
-
-Equilibrium of lines that touch: a damped motion with contact until it rests, then Newton with contact.
-
-Statics find an equilibrium from any shape, and Newton's path there may pass a line through itself or another one.  A
-motion from a start that is apart does not, so its rest has the loops and crossings that the start and the ends imply.
-Friction, between strands and on the bed, is left out.
+It is found by a damped motion with contact until it rests, then by Newton with contact.  Statics find an equilibrium
+from any shape, and Newton's path there may pass a line through itself or another one.  A motion from a start that is
+apart does not, so its rest has the loops and crossings that the start and the ends imply.  Friction, between strands
+and on the bed, is left out.
 """
 
 from __future__ import annotations

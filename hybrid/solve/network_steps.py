@@ -1,8 +1,6 @@
-"""Steps of several lines, many in a call.
+"""Steps of several lines, many in a call: what kernels.run.network_run works with.
 
-What is said of compiled steps outside: how long calls are, how a try ended, samples of a line as views.
-
-Steps of several lines, many in a call: what kernels.run.network_run works with, and its clock for Python.
+Outside is known how long calls are, how a try ended, and samples of a line as views.
 """
 
 from __future__ import annotations
@@ -154,7 +152,7 @@ class NetworkSteps:
         self._waves = 0
         self._is_new = True  # whether nobody knows which lines are near what is free in the state of now
         self._followed = np.zeros((0, 0), np.int64)  # jobs of zones
-        # lines whose cells, or nodes at a winch, are to change after the outputs within the step, which may fill buffers
+        # lines whose cells, or nodes at a winch, change after the outputs within the step, which may fill buffers
         self._due, self._nodes_due = np.zeros(0, np.int64), np.zeros(0, np.int64)
         self._changes = self._winds = False  # whether cells of some line, or nodes at a winch, change in compiled steps
         clock = self.clock

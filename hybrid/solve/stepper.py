@@ -4,7 +4,7 @@ Generalized-alpha in time: sets up a step, takes it, and gives the accelerations
 
 Chung & Hulbert 1993; Arnold & Bruels 2007; docs/theory.md section 2.
 
-Lines that meet at points, as their solver takes them and gives them back (solve.network_solver).
+Lines that meet at points go to solve.network_solver and come back.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """How much of its capacity a line uses, by sections and by codes.
 
-How much of its capacity a line uses of tension and curvature at once, and of its strength as a mooring line.
+Of tension and curvature at once:
 
     symbol   meaning                                                      unit
     T, k     tension, curvature, at one time and place                    N, 1/m
@@ -11,7 +11,7 @@ How much of its capacity a line uses of tension and curvature at once, and of it
 Between the directions of two corners u = (p x e)/(c_i x e), with p = (T, k), e = c_{i+1} - c_i and x the cross product
 in the plane.  Tension below zero counts as none where the polygon has no compression.
 
-Use of sections by the formulas of codes: a mooring line by DNV-OS-E301, a riser by DNV-OS-F201.
+By codes, of a mooring line DNV-OS-E301, of a riser DNV-OS-F201:
 
     symbol        meaning                                                                unit
     T, M          effective tension, size of the bending moment                          N, N m

@@ -1,10 +1,7 @@
 """What a result file is made of, on disk or in memory.
 
-What a result file is made of: fields, the tables they form, and how HDF5 gets them.
-
-The layout is described in store/reader.py; store/writer.py fills it.
-
-The contents of a result as arrays in memory: what a `Result` reads from, and what is written to a file in one go.
+Fields form tables, which HDF5 gets.  The layout is described in store/reader.py; store/writer.py fills it.  Contents as
+arrays in memory are what a `Result` reads from as well, and are written to a file in one go.
 """
 
 from __future__ import annotations

@@ -1,15 +1,11 @@
 """The HDF5 file of a result, and copies of it.
 
-The HDF5 file of a result: where it may be written, how it is created, opened, given up and closed.
-
 Files have the v110 format: the oldest with SWMR (single writer, multiple readers), so the most other programs can read
 it.  A file is made under another name and moved into place when readers can open it.
 
-Copies of result files: all rows or some, without what is left out.
-
-A run is resumed in a copy, because HDF5 refuses to open a file for writing that a killed process was writing ("file is
-already open for write"; the mark can be taken away by h5clear alone), and because the file stays as it is until the
-copy is whole.
+Copies have all rows or some.  A run is resumed in a copy, because HDF5 refuses to open a file for writing that a killed
+process was writing ("file is already open for write"; the mark can be taken away by h5clear alone), and because the
+file stays as it is until the copy is whole.
 """
 
 from __future__ import annotations

@@ -1,24 +1,21 @@
 """Whether a result file is as it was written, and bytes of named arrays.
 
-Whether a result file is as it was written; asked before HDF5 touches it.
+A file is checked before HDF5 touches it.  HDF5 checks its own tables, but not the numbers: a byte that has changed on a
+disk or on the way would be another result.  And over tables that are spoilt it may crash or never come back
+(tests/harden/test_harden_files.py counts).  So a closed file has a few bytes behind its end (HDF5 ignores them) with
+the CRC-32 of all the others, which is compared before it is opened; a very long file is asked for its length only.
 
-HDF5 checks its own tables, but not the numbers: a byte that has changed on a disk or on the way would be another
-result.  And over tables that are spoilt it may crash or never come back (tests/harden/test_harden_files.py counts).
-So a closed file has a few bytes behind its end (HDF5 ignores them) with the CRC-32 of all the others, which is compared
-before it is opened; a very long file is asked for its length only.
-
-A file that is marked as being written can be opened by readers alone who read it with patience (SWMR): HDF5 then reads
+A file that is marked as being written can be opened by readers alone who read it as such (SWMR): HDF5 then reads
 a table again and again until its checksum is right, waiting twice as long each time, so a file that a killed process
 left and that is cut off or spoilt never opens (61 of 200 variants).  So only a file whose writer is alive is read like
 that; of one that was left the mark is taken away, in a copy in memory, and HDF5 reads every table once.
 The mark stands in the first 48 bytes (superblock, version 3 of the HDF5 file format specification).
 
-Named arrays and plain values as bytes, and back, without any trust in the bytes.
-
-A tree is a dict of names to arrays, numbers, texts, None, lists and dicts of these.  As bytes it is a magic word with
-the number of the format, a digest of what follows, the length of what follows, the length of the head (8 bytes each,
-little endian), the head (the tree as JSON, in which an array is {"@array": [dtype, shape, offset]}) and the arrays, one
-after the other.  Nothing in them names a class or a function, and no array is longer than the bytes that are there.
+Bytes of named arrays and plain values are read without any trust in them.  A tree is a dict of names to arrays,
+numbers, texts, None, lists and dicts of these.  As bytes it is a magic word with the number of the format, a digest of
+what follows, the length of what follows, the length of the head (8 bytes each, little endian), the head (the tree as
+JSON, in which an array is {"@array": [dtype, shape, offset]}) and the arrays, one after the other.  Nothing in them
+names a class or a function, and no array is longer than the bytes that are there.
 """
 
 from __future__ import annotations

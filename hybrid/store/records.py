@@ -1,8 +1,7 @@
 """What a result consists of and is read from.
 
-What a result consists of: zones and their history, events, attributes; other names that are understood.
-
-What a `Result` reads from: an HDF5 file, or a group of one; of a result in memory see store.format.
+Zones and their history, events, attributes; other names that are understood.  It is read from an HDF5 file or a group
+of one; of a result in memory see store.format.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Write what a run computes, and what is known only when it is complete.
 
-What is known of a result only when it is complete: estimated errors, what was spent on them.
-
-Write what a run computes: `Recorder`, an HDF5 writer that knows nothing of the physics.
+`Recorder` is an HDF5 writer that knows nothing of the physics.  Known only when a result is complete are estimated
+errors, and what was spent on them.
 
 Every dataset is created before the first output, because the file is then switched to
 SWMR (single writer, multiple readers): from that moment other processes can read it, and

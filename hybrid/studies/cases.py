@@ -1,11 +1,8 @@
 """The cases of a study, and which variables matter.
 
-Which variables matter for a result of a study: indices of Sobol, elementary effects of Morris, rank correlations.
-
-SALib makes the designs and evaluates them; what was sampled otherwise has rank correlations (Spearman), which any table
-has.
-
-The cases of a study: a table of variables, and the scene of each row.
+Cases are a table of variables, and a scene of each row.  Which variables matter: indices of Sobol, elementary effects
+of Morris, rank correlations.  SALib makes the designs and evaluates them; what was sampled otherwise has rank
+correlations (Spearman), which any table has.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """What runs on a worker of a study, and what it keeps.
 
-What a study keeps of each run: numbers, histories and profiles, with units.
-
-What runs on a worker of a study: a batch of cases, and what is kept of each.
+A worker runs a batch of cases, and keeps numbers, histories and profiles of each, with units.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Curves along the cable and over time, as a page keeps them.
 
-Quantities along the cable with both values where they jump, and curves with a gap there.
-
-What a page keeps of a long run: frames, points and curves, chosen so that no peak is lost from a curve.
+Quantities have both values where they jump, and curves a gap there.  Of a long run frames, points and curves are chosen
+so that no peak is lost from a curve.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
 """A figure as plain data, and pictures on their way to a file.
 
-Writing pictures, films and reports: files of others are not replaced, and none is left half written.
+Of pictures, films and reports, files of others are not replaced, and none is left half written.
 
-A figure as plain data: panels with curves, bands, marks, maps and texts. A back end turns it into a picture.
-
-Coordinates are in the units that the axes name, sizes in points. Items are drawn in the order of their list, but
-`Area`, `Box` and `Map` lie behind the grid. An item without a label is not in the legend, and items of a
-panel with one label are one entry.
+A figure has panels with curves, bands, marks, maps and texts. A back end turns it into a picture. Coordinates are in
+the units that the axes name, sizes in points. Items are drawn in the order of their list, but `Area`, `Box` and `Map`
+lie behind the grid. An item without a label is not in the legend, and items of a panel with one label are one entry.
 """
 
 from __future__ import annotations

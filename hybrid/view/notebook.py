@@ -1,11 +1,8 @@
 """What a cell of a notebook shows of a result.
 
-The cable in space as a figure of plotly, with a slider over time: what a notebook shows of a result.
-
-The figure holds all moments that it shows, so that its slider works without a kernel: in a notebook that is opened
-again, and in one exported to HTML.
-
-What a cell of a notebook shows of a result: its card, and below it the cable in space with a slider over time.
+It is the card of the result, and below it the cable in space as a figure of plotly, with a slider over time.  The
+figure holds all moments that it shows, so that its slider works without a kernel: in a notebook that is opened again,
+and in one exported to HTML.
 
 JupyterLab and VS Code draw the figure with plotly's own script.  For pages made of a notebook (nbconvert) the first
 result that a kernel shows brings plotly.js, packed, and asks no other host for it.

@@ -1,8 +1,7 @@
 """What to look at: planes of view, and obstacles in them.
 
-What to look at: planes that suit a cable's shape, how much of its surroundings, which times and points to show.
-
-Obstacles for pictures: outlines in a plane of view, surfaces in space; where they are at an output, if they move.
+Planes suit a cable's shape; so do its surroundings, and the times and points that are shown.  Obstacles are outlines in
+a plane of view and surfaces in space, and may move.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""A report of a result: one HTML file that explains itself.
+"""A report of a result: one HTML file that explains itself, works without a network, and moves.
 
-Facts, statistics and tables of a report: of lines, of many the worst first, and of points and bodies.
-
-A report of a result: one HTML file that explains itself, works without a network, and moves.
+Facts, statistics and tables are of lines, of many the worst first, and of points and bodies.
 
 `write_report(result, path)` puts together facts (what to know first), pictures (plotly, drawn in the browser as they
 come into view), events, the energy balance and the scene.  Numbers and plotly.js are packed with gzip inside the file:

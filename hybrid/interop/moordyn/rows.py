@@ -1,11 +1,10 @@
 """The text of a MoorDyn deck as tables and options.
 
-The text of a MoorDyn deck as tables: rows that know their line, cells that know what they should be.
+Rows know their line, cells know what they should be.  A deck is a row of sections, each begun by a line of dashes with
+a title.  A table has a row of column names and one of units, which MoorDyn skips without reading them; then a row for
+each thing.  What follows !, # or % is a comment.
 
-A deck is a row of sections, each begun by a line of dashes with a title.  A table has a row of column names and one of
-units, which MoorDyn skips without reading them; then a row for each thing.  What follows !, # or % is a comment.
-
-OPTIONS of a deck: what acts on the lines is read, the rest is sorted by what it concerns.
+Of the OPTIONS of a deck, what acts on the lines is read, the rest is sorted by what it concerns.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
 """The cable in a plane: its vectors and its block elimination.
 
-The cable in a plane: cell, element, water and seabed with two components instead of three.
-
-The laws are those of kernels.laws.element, kernels.laws.element, kernels.laws.water and kernels.laws.seabed for a configuration that lies in
-the plane of p and q; what is left of a rotation there is one angle.  Tests hold the two against each other.
-One source for both is slower: with the drag and added mass of space, called with a third component of zero, an iteration
-of 1000 catenary cells in a current takes 15 % more, one of rods 9 %.
+The laws are those of kernels.laws (element, water, seabed) with two components, for a configuration that lies in the
+plane of p and q; what is left of a rotation there is one angle.  Tests hold the two against each other.  One source for
+both is slower: with the drag and added mass of space, called with a third component of zero, an iteration of 1000
+catenary cells in a current takes 15 % more, one of rods 9 %.
 
     symbol   meaning                                              shape  unit     frame
     p, q, n  axes of the plane and its normal, p x q = n          3      -        inertial
@@ -17,10 +15,9 @@ of 1000 catenary cells in a current takes 15 % more, one of rods 9 %.
     k        stiffness of the element against kappa               -      N m      about n
     u, b     velocity and acceleration relative to the water      2      m/s..    plane
 
-Block rows of a cable in a plane: their elimination and the solve back, with three unknowns per node instead of five.
-
-Block i has the tension of the cell before node i (dT_{i-1}) and the node's two components in the plane; its rows are
-the length of that cell and the balance of the node.  After elimination
+Block rows have three unknowns per node instead of five.  Block i has the tension of the cell before node i (dT_{i-1})
+and the node's two components in the plane; its rows are the length of that cell and the balance of the node.  After
+elimination
 
     x_i = X_i[5] - X_i[0..2] x_{i+1} - X_i[3..4] dr_{i+2}
 

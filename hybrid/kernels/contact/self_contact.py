@@ -1,12 +1,9 @@
-"""Contact of a line with itself in a step.
+"""Contact of a line with itself in a step: near pairs, limits of corrections, forces and friction.
 
-Energy that a step of a line that touches itself puts in though no work accounts for it: such a step is repeated.
-
-Contact of a line with itself in a step: pairs of pieces that are near, limits of corrections, forces and friction.
-
-A run calls `contact_task` by its address, so that lines without self-contact compile none of it: before a try of a step
-(PREPARE), to shorten what Newton's method predicts and corrects so that no two strands pass through each other (LIMIT),
-to put the forces of contact into a correction (TOUCH; kernels.contact.self_contact_solve), and for the energy at the end (FINISH).
+A step that puts energy in for which no work accounts is repeated.  A run calls `contact_task` by its address, so that
+lines without self-contact compile none of it: before a try of a step (PREPARE), to shorten what Newton's method
+predicts and corrects so that no two strands pass through each other (LIMIT), to put the forces of contact into a
+correction (TOUCH; kernels.contact.self_contact_solve), and for the energy at the end (FINISH).
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """The law of contact of a line with itself, and its friction.
 
-Contact of a line with itself: the curve, the foot of a point on a piece of it, the law, and its derivatives.
-
 The curve is the quadratic B-spline whose control points are the nodes: one piece for every inner node p, from the
 middle of the cell before it to the middle of the cell after it, with a tangent that has no jumps,
 
@@ -18,10 +16,8 @@ gradient phi' J^T n, and with the foot eliminated the second derivative
     H = J^T (phi'' n n^T + (phi'/d)(1 - n n^T)) J - b b^T/c,
     b = phi' (-J^T y'/d + J_v^T n),    c = phi' (|y'|^2 - (x - y).y'')/d
 
-Friction where a line touches itself: an elastic travel at every point of contact, forces and moments on both strands.
-
-The strands touch where the line from x to y is parted as their diameters D_p and D_q are, halfway for equal ones.  In a
-step their surfaces shift against each other there by
+Friction is an elastic travel at every point of contact.  The strands touch where the line from x to y is parted as
+their diameters D_p and D_q are, halfway for equal ones.  In a step their surfaces shift against each other there by
 
     g = P (W_x u_p - W_y u_q - (d/2) (b_p phi_p + b_q phi_q) x n),    P = 1 - n n^T,    b_p = 2 D_p/(D_p + D_q)
 

@@ -11,15 +11,14 @@ e and psi of the cell, theta (inertial) of the point or body; A and a are those 
     at the start   G = -C - [M]x - C_d (W - [w_cell - w_frame]x),       at the end   G = C + C_d W,
 
 with W the change of the frame's angular velocity,  W = cv R' J_l(n)^-1 R^T - [w_frame]x.  Where tension makes a torque
-(kernels.laws.tension_torque), the moment changes by  g q dT  with the tension of the cell as well, and the law of length
-of the cell by  g q . (1 + tau W) dtheta,  at the start with a minus sign.
+(kernels.laws.tension_torque), the moment changes by  g q dT  with the tension of the cell as well, and the law of
+length of the cell by  g q . (1 + tau W) dtheta,  at the start with a minus sign.
 
-One line of a system, as its ends feel it: the eliminated line as a linear relation between its two ends.
-
-The march leaves of a line (kernels.algebra.block_elimination) a relation  x_i = b_i - A_i x_{i+1} - C_i dr_{i+2}  and, of an end
-that is joined to a point, the last block not yet solved: four rows, the length of the last cell and the balance of the
-last node, for the tension of that cell and the point.  Where the start is joined as well, its shift is an unknown, and
-where a rod is clamped to what turns, so is that turn:  with q = (shift of the start, turn there, turn at the end),
+The eliminated line is a linear relation between its two ends.  The march leaves of a line
+(kernels.algebra.block_elimination) a relation  x_i = b_i - A_i x_{i+1} - C_i dr_{i+2}  and, of an end that is joined to
+a point, the last block not yet solved: four rows, the length of the last cell and the balance of the last node, for the
+tension of that cell and the point.  Where the start is joined as well, its shift is an unknown, and where a rod is
+clamped to what turns, so is that turn:  with q = (shift of the start, turn there, turn at the end),
 
     x_i = b_i - A_i x_{i+1} - C_i dr_{i+2} + D_i q,
 

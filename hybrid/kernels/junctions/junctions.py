@@ -6,9 +6,9 @@ line hands over,
 
     S (dT, q_0, q_N) = right-hand side,   rows: length of the last cell, force and moment on the start, on the end,
 
-goes by G^T into the balances of points and bodies: forces, and rho x force and moments.  A force F turns with the arm of
-its fairlead, which adds  [F]x [rho]x  to the moment.
-A point that lines are clamped to is a body without mass.  Torques through catenary zones stand at the end of this file.
+goes by G^T into the balances of points and bodies: forces, and rho x force and moments.  A force F turns with the arm
+of its fairlead, which adds  [F]x [rho]x  to the moment.  A point that lines are clamped to is a body without mass.
+Torques through catenary zones stand at the end of this file.
 """
 
 from __future__ import annotations
@@ -233,7 +233,7 @@ def end_matrix(joint, points, arm, clamped, G):
 
 
 class Followers(NamedTuple):
-    """How both ends of a line end_matrix the points and bodies that they are joined to.
+    """How both ends of a line follow the points and bodies that they are joined to.
 
     at: where the unknowns of those begin; rows, size: how many rows and columns of their G, (2, 6, 6), count.
     """

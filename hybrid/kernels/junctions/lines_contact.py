@@ -1,19 +1,16 @@
-"""Contact of lines with themselves and each other.
-
-Contact of several lines with each other and themselves: one search, one law and one solve for all of them.
+"""Contact of lines with themselves and each other: one search, one law and one solve.
 
 The lines stand one after the other as one line of kernels.contact, whose arrays are filled from theirs before every
 question and whose answers go back to them.  It is asked by the address of `shared_task`, at the last of these lines:
 all others have taken their step by then.
 
-Half of the energy of a point of contact between two lines is of each.  The work that other lines do on a line, W, is that
-of the mean of their forces before and after a step on its way, with the change of its half: over all lines it is that of
-friction.
+Half of the energy of a point of contact between two lines is of each.  The work that other lines do on a line, W, is
+that of the mean of their forces before and after a step on its way, with the change of its half: over all lines it is
+that of friction.
 
-Contact of the lines of a system with themselves and each other in a correction of Newton's method, beside the lines' junctions.
-
-As kernels.contact.self_contact_solve, with the matrix A of all lines, points and bodies in place of that of one line: a product
-with A^-1 carries a right-hand side on the nodes in contact through the kept factors of the lines, the junctions and back.
+In a correction of Newton's method it is solved as in kernels.contact.self_contact_solve, with the matrix A of all
+lines, points and bodies in place of that of one line: a product with A^-1 carries a right-hand side on the nodes in
+contact through the kept factors of the lines, the junctions and back.
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
-"""What the kernels of several lines get, and which lines are solved by themselves.
+"""What kernels of several lines get, and which lines are solved by themselves.
 
-What the kernels of several lines get: the lines, points and bodies of a system, and the task that is asked.
-
-Lines that are solved by themselves among bodies and sheaves that other lines move.
-
-What moves freely has come to its place before such a line is solved, and the line is in its way at most: one that comes to
-touch it is solved with the others, and so is one that is near it at the beginning of a step.  A line that touches nothing
-of it is solved by itself as without it.
+They get the lines, points and bodies of a network, and the task that is asked.  Among bodies and sheaves that other
+lines move some lines are solved by themselves.  What moves freely has come to its place before such a line is solved,
+and the line is in its way at most: one that comes to touch it is solved with the others, and so is one that is near it
+at the beginning of a step.  A line that touches nothing of it is solved by itself as without it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The cell between two nodes, and the element at a node.
 
-The cell: what happens between two nodes, tension and the direction of the chord.
+The cell has tension and the direction of the chord.
 
     symbol   meaning                                      shape  unit   frame
     e        chord r_{c+1} - r_c                          3      m      inertial
@@ -17,7 +17,7 @@ The cell: what happens between two nodes, tension and the direction of the chord
 
 Every function returns the quantity and its exact derivative with respect to e.
 
-The element at a node: bending and twist between the two cells that meet there (a rod), or nothing (a joint).
+The element has bending and twist between the two cells that meet at a node (a rod), or nothing (a joint).
 
     symbol     meaning                                          shape  unit   frame
     Ra, Rb     frames of the cells before and after the node    9      -      columns inertial

@@ -1,13 +1,8 @@
-"""What acts on a node besides the cells themselves.
+"""What acts on a node besides the cells themselves: inertia, weight, water, bodies, seabed.
 
-What acts on a node besides the cells themselves: inertia, weight, water, bodies, seabed.
-
-Each paragraph stands behind the bit of its force; symbols as in kernels.laws.water, kernels.laws.water
-and kernels.laws.seabed.
-
-What acts on a node of a cable in a plane besides the cells themselves: kernels.laws.node_forces with two components.
-
-tests/kernels/test_planar.py holds both against each other for every force.
+Each paragraph stands behind the bit of its force; symbols as in kernels.laws.water and kernels.laws.seabed.  Of a cable
+in a plane it is the same with two components: tests/kernels/test_planar.py holds both against each other for every
+force.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Obstacles that a line touches, fixed or moving.
 
-Obstacles that move: where they are at the ends of a step, and how their surfaces go.
+Of those that move, at the ends of a step:
 
     symbol   meaning                                                            shape  unit  frame
     c, R     place of an obstacle and its rotation since t = 0                  3, 9   m, -  inertial
@@ -8,10 +8,8 @@ Obstacles that move: where they are at the ends of a step, and how their surface
     x0, x    a point that goes with the obstacle, at the begin and the end of
              a step: x = c + R R0^T (x0 - c0)                                   3      m     inertial
 
-An obstacle moves by a motion about its place, turns about its own axis by a spin, or is set from outside.  A spin leaves
-the surface where it is, and carries along what rubs on it.
-
-Obstacles that a line touches, fixed or moving (kernels.laws.obstacles).
+An obstacle moves by a motion about its place, turns about its own axis by a spin, or is set from outside.  A spin
+leaves the surface where it is, and carries along what rubs on it.
 
 What d, n and K of each kind are is in kernels.laws.surfaces.  A cell presses on the obstacle as on the bed
 (kernels.laws.seabed): the penetration is linear between its nodes, and the force per length has a potential.
@@ -26,8 +24,8 @@ What d, n and K of each kind are is in kernels.laws.surfaces.  A cell presses on
     q        elastic travel of friction: the way of the node along the surface    3      m      inertial
 
 Friction acts on the centreline: mu N at most, against the travel, whatever its direction.  A node that touches several
-fixed surfaces has one travel, of which each takes the part along itself; what is kept of it lies along all of them.  Where
-an obstacle moves every one has a travel of its own, which lies in it and turns with it.
+fixed surfaces has one travel, of which each takes the part along itself; what is kept of it lies along all of them.
+Where an obstacle moves every one has a travel of its own, which lies in it and turns with it.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """The seabed: where it is under a point, and its contact and friction.
 
-The seabed under a point: a plane, or a surface through depths on a grid.
-
-A bed of depths is the bicubic Hermite surface through the heights at the grid's points.  The slopes there are limited
-(scene.depths): height and slope are continuous, a plane comes out as a plane, and between four points no height is
-above or below all of theirs.  Beyond the grid the bed goes on straight.
+It is a plane, or a surface through depths on a grid.  A bed of depths is the bicubic Hermite surface through the
+heights at the grid's points.  The slopes there are limited (scene.depths): height and slope are continuous, a plane
+comes out as a plane, and between four points no height is above or below all of theirs.  Beyond the grid the bed goes
+on straight.
 
     symbol   meaning                                                     shape   unit
     z        height of the bed at x, y; zx, zy its slopes, zxy the rate  -       m, -, -, 1/m
@@ -12,9 +11,7 @@ above or below all of theirs.  Beyond the grid the bed goes on straight.
     n        unit normal, upwards: (-zx, -zy, 1)/size                    3       -
     p        how deep a point lies below where contact begins, along n   -       m
 
-The seabed: contact and friction of one half of a cell.
-
-A cell that touches presses on the bed with the force per length
+Contact and friction are of one half of a cell.  A cell that touches presses on the bed with the force per length
 
     q = k P(p) + c P'(p) dp/dt, never below 0,   P = p^2/(2 o) for 0 < p < o,  p - o/2 beyond
 

@@ -9,10 +9,10 @@ The nearest place of a surface of triangles, by a tree of boxes over them, and w
     n        (y - c)/d; on a face its normal                                      3      -      of the obstacle
     h, a     curvature 1/d across a, the direction of an edge; 0 of a face        -, 3   1/m
 
-Within is what the normal of the nearest feature says, on edges and corners weighted by the angles of the facets that meet
-there (Baerentzen and Aanaes 2005): closed surfaces, turned outwards (scene.mesh_file).
+Within is what the normal of the nearest feature says, on edges and corners weighted by the angles of the facets that
+meet there (Baerentzen and Aanaes 2005): closed surfaces, turned outwards (scene.mesh_file).
 
-Surfaces of obstacles, all kinds by one function: distance, outward normal and curvature at a point.
+All kinds by one function: distance, outward normal and curvature at a point.
 
     symbol   meaning                                                              shape  unit   frame
     d        distance of a point to the surface moved out by the radius of the
@@ -30,7 +30,7 @@ Surfaces of obstacles, all kinds by one function: distance, outward normal and c
     torus     what is within the radius of a ring                          1/rho         n_s/s
     sheave    a disc with a groove of circular section, whose rims are     -1/rho in the n_s/s
               tori                                                         groove
-    mesh      what is within the radius of a closed surface of triangles   as of a box (kernels.laws.surfaces)
+    mesh      what is within the radius of a closed surface of triangles   as of a box
 
 rho is the distance to the axis, edge or ring; s that to the axis of a torus or sheave, n_s the part of n away from it.
 """

@@ -1,6 +1,6 @@
 """Torque that tension makes, with constant stiffness and with a law of length.
 
-Torque that tension makes in a helically armoured cable, and how the cable lengthens as it turns (docs/theory.md, 15).
+In a helically armoured cable tension makes a torque, and the cable lengthens as it turns (docs/theory.md, 15).
 
     symbol   meaning                                                              shape  unit
     c        torque by tension, `tension_torque` of a section                     -      N m per N
@@ -10,16 +10,17 @@ Torque that tension makes in a helically armoured cable, and how the cable lengt
     s        twist of an element by tension, g_a T_a + g_b T_b                    -      rad
 
 With W = F(eps + c tau) + GJ tau^2/2 per length, Q = GJ tau + c T and T = F'(eps + c tau); F is EA/2 times a square, or
-what a law of tension over strain stores (kernels.laws.tension_torque).  The torque of an element is kb (k - k0 + s), so that tension takes part of the strain without stress, and the law of length of a cell is
+what a law of tension over strain stores.  The torque of an element is kb (k - k0 + s), so that tension takes part of the strain without stress, and the law of length of a cell is
     l - h - h ck T - 2 g c T + g (Q_i + Q_{i+1}) = 0,
 of a law of tension over strain with that strain in place of ck T.
 Both follow from one function of k, l and T, so that no energy is lost.
 
-A block row does not reach the tension of the cell after next, which the spin and the force of a cell know: in these rows
-of the matrix the change of s is (g_a + g_b) dT_a, everywhere, so that torques and forces of the matrix still add up to
-nothing.  That slows Newton's method by the difference of both changes, and touches nothing else.  Lines without such sections have empty arrays here and run none of this.
+A block row does not reach the tension of the cell after next, which the spin and the force of a cell know: in these
+rows of the matrix the change of s is (g_a + g_b) dT_a, everywhere, so that torques and forces of the matrix still add
+up to nothing.  That slows Newton's method by the difference of both changes, and touches nothing else.  Lines without
+such sections have empty arrays here and run none of this.
 
-Cells whose tension is no multiple of their strain, in a line in which tension makes a torque (docs/theory.md, 15).
+Of cells whose tension is no multiple of their strain:
 
     symbol   meaning                                                                              unit
     x        strain of the law, eps + c tau: T = F'(x), of kernels.laws.axial_law                 -

@@ -1,6 +1,6 @@
 """The water: its flow, and its forces on cells and members.
 
-The water: its current three_from a height, the waves that pass, and how much of a cell they wet.
+Its current at a height, the waves that pass, and how much of a cell they wet:
 
     symbol   meaning                                              shape  unit      frame
     U, U1    velocity of the current and its derivative dU/dz     3      m/s, 1/s  inertial
@@ -10,8 +10,8 @@ The water: its current three_from a height, the waves that pass, and how much of
     A, w, k  amplitude, frequency, wave number of a component     -      m, 1/s, 1/m
 
 Waves are linear (Airy), each component of an irregular sea by itself.  Above and below still
-water the kinematics are stretched after Wheeler: the depth three_from which a component is taken is
-scaled so that the moving surface has what linear theory has three_from the still one.  Components of one
+water the kinematics are stretched after Wheeler: the depth at which a component is taken is
+scaled so that the moving surface has what linear theory has at the still one.  Components of one
 wave of finite height hold up to the surface as they are.
 
 Forces of the water on a half cell or on a body, with their exact derivatives.
@@ -25,7 +25,7 @@ too, which is how its derivatives are proved.
     vd       acceleration of the node relative to the water     3      m/s2     inertial
     d, il    direction and 1/length of the half cell's chord    3, -   -, 1/m   inertial
     cn, ct   rho D Cn h/4, pi rho D Ct h/4                      -      kg/m
-    an, three_from   added mass of the half cell, normal, tangential    -      kg
+    an, at   added mass of the half cell, normal, tangential    -      kg
     f        force on the node                                  3      N        inertial
     B, D, L  df/du, df/dr (through vd), df/de                   9      N s/m, N/m  inertial
 
@@ -36,7 +36,7 @@ Morison members of a body: drag and wave force on pieces of cylinders that are f
 
 Pieces stand in the row of numbers of their body (kernels.junctions.bodies), behind all else.  A piece has the force
 
-    f = w (-cn |un| un - ct |ut| ut + cm (a - d (d.a)))        three_from its middle, u = v - water
+    f = w (-cn |un| un - ct |ut| ut + cm (a - d (d.a)))        at its middle, u = v - water
 
 of its velocity u relative to the water and of the water's acceleration a there; un, ut: parts across and along d.
 
@@ -59,7 +59,7 @@ from hybrid.kernels.laws import drag_law
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.state import LANES
 
-# A component whose motion has faded to this part of its surface value is left out three_from that depth.
+# A component whose motion has faded to this part of its surface value is left out at that depth.
 FADED = 1e-4
 LAST = math.log(FADED)
 # x + TO_WHOLE - TO_WHOLE is x rounded to a whole number; a quarter turn in two parts, the first of 33 bits.
@@ -96,7 +96,7 @@ SAME_WETNESS = 1e-4
 
 @inner
 def current_at(z, current, part, height):
-    """U and U1 three_from a height, from the table (z, current), times `part`."""
+    """U and U1 at a height, from the table (z, current), times `part`."""
     n = z.shape[0]
     if n == 1 or height <= z[0]:
         return (part * current[0, 0], part * current[0, 1], part * current[0, 2]), (0.0, 0.0, 0.0)
@@ -137,7 +137,7 @@ def cos_sin(a):
 
 @inner
 def exp_of_small(y):
-    """exp(y) for -10 <= y <= 10 without branches: the 32nd power of Taylor's series three_from y/32; within 1e-14 of the value."""
+    """exp(y) for -10 <= y <= 10 without branches: the 32nd power of Taylor's series at y/32; within 1e-14 of the value."""
     x = y / 32.0
     q = 1.0 + x * (
         1.0 + x * (E2 + x * (E3 + x * (E4 + x * (E5 + x * (E6 + x * (E7 + x * (E8 + x * (E9 + x * E10))))))))
@@ -153,7 +153,7 @@ def exp_of_small(y):
 def elevate(sea, r, u, first):
     """Heights of the surface over LANES nodes from `first` on, after Wheeler, and what is needed of the components.
 
-    Rows of sea.lanes: 0 x, 1 y, 2 the depth three_from which components are taken, 3 elevation, from 10 on cosine and sine.
+    Rows of sea.lanes: 0 x, 1 y, 2 the depth at which components are taken, 3 elevation, from 10 on cosine and sine.
     """
     lanes, waves, part = sea.lanes, sea.waves, sea.now[2]
     for l in range(LANES):
@@ -171,7 +171,7 @@ def elevate(sea, r, u, first):
             lanes[3, l] += A * c
     for l in range(LANES):
         eta = part * lanes[3, l]
-        # Wheeler: the surface keeps what linear theory has three_from z = 0, the bed what it has there
+        # Wheeler: the surface keeps what linear theory has at z = 0, the bed what it has there
         up = sea.stretched * eta
         s = min(lanes[2, l] - sea.surface, eta) - up
         if sea.depth < math.inf:
@@ -221,11 +221,11 @@ def still_below(sea):
 
 @kernel
 def wave_kinematics(sea, r, u):
-    """Fill sea.flow: velocity and acceleration of the waves three_from the positions r + u, and the elevation above them.
+    """Fill sea.flow: velocity and acceleration of the waves at the positions r + u, and the elevation above them.
 
     Where all components have faded it is still water; the elevation, by which only what is near it knows, is left out.
 
-    A component is A cos(kx x + ky y - w t + phase) three_from the surface; everything is multiplied by the grown part of the
+    A component is A cos(kx x + ky y - w t + phase) at the surface; everything is multiplied by the grown part of the
     sea, sea.now[2], and its rate of growth sea.now[3] counts in the acceleration.
     """
     part, rate = sea.now[2], sea.now[3]
@@ -307,16 +307,16 @@ def half_cell_drag(u, d, il, cn, ct):
 
 
 @inner
-def half_cell_added_mass(vd, d, il, an, three_from, ca):
-    """Inertia of the water carried along: f = -an P vd - three_from d (d.vd), D = ca df/dvd, L = df/de."""
+def half_cell_added_mass(vd, d, il, an, at, ca):
+    """Inertia of the water carried along: f = -an P vd - at d (d.vd), D = ca df/dvd, L = df/de."""
     t = vd[0] * d[0] + vd[1] * d[1] + vd[2] * d[2]
     n = (vd[0] - t * d[0], vd[1] - t * d[1], vd[2] - t * d[2])
-    f = (-an * n[0] - three_from * t * d[0], -an * n[1] - three_from * t * d[1], -an * n[2] - three_from * t * d[2])
-    c1, c2 = -ca * an, ca * (an - three_from)
+    f = (-an * n[0] - at * t * d[0], -an * n[1] - at * t * d[1], -an * n[2] - at * t * d[2])
+    c1, c2 = -ca * an, ca * (an - at)
     x, y, z = c2 * d[0], c2 * d[1], c2 * d[2]
     xy, xz, yz = x * d[1], x * d[2], y * d[2]
     D = (c1 + x * d[0], xy, xz, xy, c1 + y * d[1], yz, xz, yz, c1 + z * d[2])
-    b = il * (an - three_from)
+    b = il * (an - at)
     bt = b * t
     x, y, z = b * n[0] - bt * d[0], b * n[1] - bt * d[1], b * n[2] - bt * d[2]
     L = (
@@ -369,7 +369,7 @@ class PieceForce(NamedTuple):
 
 @inner
 def piece_force(row, o, d, u):
-    """`PieceForce` on the piece three_from o of a row, direction d, relative velocity u (inertial)."""
+    """`PieceForce` on the piece at o of a row, direction d, relative velocity u (inertial)."""
     w, cn, ct = row[o + WET], row[o + CN], row[o + CT]
     ut = dot(d, u)
     un = sub(u, scale(ut, d))

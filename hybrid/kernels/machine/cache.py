@@ -1,11 +1,8 @@
 """Where the machine code of the kernels is kept, and its files.
 
-Machine code of one kernel in a file: a magic word, the number of the format, a header in JSON, the object.
-
-What is read is executed, so nothing else in it is: no pickle, and no byte before the digest of header and object is
-right.  The digest finds damage; who may write such a file is a matter of its folder and owner (kernels.machine.cache).
-
-Where the machine code of the kernels is kept.
+A file has the machine code of one kernel: a magic word, the number of the format, a header in JSON, the object.  What
+is read is executed, so nothing else in it is: no pickle, and no byte before the digest of header and object is right.
+The digest finds damage; who may write such a file is a matter of its folder and owner.
 
 numba's own cache looks only at the file a kernel stands in, so it keeps a stale
 kernel when a function *imported from another file* is edited.  Here a folder

@@ -1,14 +1,11 @@
 """Machine code of an entry: its digest, and where it comes from.
 
-What the machine code of a kernel is made of, as a digest: an edit recompiles the kernels that it reaches, and no others.
-
+An edit recompiles the kernels that it reaches, and no others.
 From the entry on, every function that kernels call is followed by its global names: bytecode, constants, options of the
 compiler, layouts of NamedTuples.  Comments, docstrings, annotations and line numbers are not in it.
 
-Machine code of an entry: of this process, on disk, or compiled and kept.
-
-numba is imported only to compile.  A file holds machine code and three names (kernels.machine.cache); nothing in it is
-unpickled, which would execute whatever it says.
+Code is of this process, on disk, or compiled and kept.  numba is imported only to compile.  A file holds machine code
+and three names (kernels.machine.cache); nothing in it is unpickled, which would execute whatever it says.
 """
 
 from __future__ import annotations

@@ -1,17 +1,14 @@
 """NamedTuples of arrays by reference, numbers with names, and their types.
 
-NamedTuples of arrays in kernels: by reference, as the address of a table of the addresses of their arrays.
+A reference is the address of a table of the addresses of the arrays.  numba hands such a tuple from function to
+function as hundreds of numbers, which is most of what it would compile.  A reference is one number; `line.h` reads
+address and shape of that array where they are needed.  numba hears of all this (kernels.machine.reference_types) when
+the first kernel is compiled.
 
-numba hands such a tuple from function to function as hundreds of numbers, which is most of what it would compile.  A
-reference is one number; `line.h` reads address and shape of that array where they are needed.  numba hears of all this
-(kernels.machine.reference_types) when the first kernel is compiled.
+Numbers in one array have names: `clock.now` in kernels and in Python.
 
-Numbers with names in one array: `clock.now` in kernels and in Python, where `clock[0]` would tell nobody what it is.
-
-Types of the arguments of an entry, as keys of a table and as text.
-
-numba has its own, which the compiler makes of these (kernels.machine.reference_types); a kernel that is on disk is found and
-called without it.
+Types of the arguments of an entry are keys of a table, and text.  numba has its own, which the compiler makes of these
+(kernels.machine.reference_types); a kernel that is on disk is found and called without it.
 """
 
 from __future__ import annotations

@@ -4,8 +4,7 @@ The march along s for a cable in a plane: three unknowns per node instead of fiv
 
 States, ends and sea stay what they are, vectors of space: their components
 across the plane are neither read nor written.  Symbols as in kernels.algebra.plane; docs/theory.md, 5.
-
-What the equations of a configuration in a plane leave over (kernels.march.march).
+What equations leave over is as in kernels.march.march.
 """
 
 from __future__ import annotations

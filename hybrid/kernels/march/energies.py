@@ -1,8 +1,6 @@
-"""Energies of a state, and powers into the cable.
+"""Energies of a state, powers into the cable after a step, their work, and end forces.
 
-What a state means: moments, energies and powers, from the same laws the solver uses.
-
-Powers into the cable after a step, the work they do, and the pull at its ends.
+They follow from the same laws the solver uses.
 """
 
 from __future__ import annotations

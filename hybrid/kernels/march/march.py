@@ -1,18 +1,14 @@
 """The march along s, its corrections, and what equations leave over.
 
-The march along s: each block row is eliminated as it is born (docs/theory.md, 5).
+Each block row is eliminated as soon as it is made (docs/theory.md, 5).  Nodes between two catenary cells, which are
+most of them, take a loop of their own: what the other nodes carry along for bending, some 150 numbers, would be most of
+what they cost.
 
-Nodes between two catenary cells, which are most of them, take a loop of their own: what the other nodes carry along for
-bending, some 150 numbers, would be most of what they cost.
+A correction changes positions, chords, tensions, directors and rates.  `plane` is the plane of a line that is computed
+in one, else None; `space` is None for such a line, else 1.  numba drops what stands behind `is not None` of the one
+that is None, so what the other kind needs is not compiled.
 
-What a correction does to the configuration: positions, chords, tensions, directors and rates.
-
-`plane` is the plane of a line that is computed in one, else None; `space` is None for such a line, else 1.  numba
-drops what stands behind `is not None` of the one that is None, so what the other kind needs is not compiled.
-
-What the equations of a configuration in space leave over, without their derivatives and their elimination.
-
-The same functions as in kernels.march.march: what only derivatives need is not compiled.
+What equations leave over is made by the same functions: what only derivatives need is not compiled.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Torque that passes through catenary zones, also where zones change.
-
-Torque that passes through catenary zones (docs/theory.md, 15).
+"""Torque that passes through catenary zones, also where zones change (docs/theory.md, 15).
 
 A catenary has no frames, so one number stands for the twist of a zone: the turn of the frame after it against the frame
 before it, carried along the chords by the smallest rotations, and counted beyond half a turn.
@@ -16,11 +14,10 @@ It answers to the spins of the cells beside it and to all chords:
 That couples two cells far apart, which the march does not know: its solution is corrected by that of a small dense
 system.  Newton calls `pass_torque` by its address, so that lines without such zones compile none of it.
 
-Torque when zones change: directors of rods that are new, turns of zones that are new (docs/theory.md, 15).
-
-Along the old line the twist is known everywhere: how far its directors turn against one that is carried along the chords
-by the smallest rotations, and in zones the share of their turn.  New rods are twisted by it, and new zones begin with
-what of it lies between the frames beside them, so that no turn is lost either way.
+Where zones change, rods get new directors and zones new turns.  Along the old line the twist is known everywhere: how
+far its directors turn against one that is carried along the chords by the smallest rotations, and in zones the share of
+their turn.  New rods are twisted by it, and new zones begin with what of it lies between the frames beside them, so
+that no turn is lost either way.
 """
 
 from __future__ import annotations

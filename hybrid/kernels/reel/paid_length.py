@@ -1,6 +1,6 @@
 """How long a line that is paid out is, and what its length makes.
 
-How long a line that is paid out is, and what its length makes of the cells that it changes (docs/theory.md, 19).
+Of the cells that its length changes (docs/theory.md, 19):
 
 symbol  meaning                                                    unit
 L       unstretched length that is out                             m
@@ -13,8 +13,8 @@ The forces that balance the nodes around one that has just entered a line at its
 
 The discrete line is in balance on cells of unequal lengths with places that lie on no smooth curve: where the lengths
 of neighbours jump, so do second differences.  A node that is put on the curve through them, or left out, unbalances its
-neighbours, which would send waves of bending along the line.  The forces across the line that are missing are put on the
-nodes and taken off slowly (paid_length.eased), as the new cells get their lengths (docs/theory.md, 19).
+neighbours, which would send waves of bending along the line.  The forces across the line that are missing are put on
+the nodes and taken off slowly (paid_length.eased), as the new cells get their lengths (docs/theory.md, 19).
 
 Layers that slip of a line that is paid out: how far they have slipped goes with the material (docs/theory.md, 19).
 

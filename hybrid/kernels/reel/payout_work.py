@@ -1,13 +1,12 @@
 """Energy and contact of material that is paid out.
 
-Contact with the seabed and with obstacles of a line that is paid out, where material flows past nodes.
+Contact is with the seabed and with obstacles, where material flows past nodes.  The fairlead and the nodes that ride
+with it do not move as the material there does: in a step it goes by the length that comes less along the line than they
+do.  Friction is against the way of the material (docs/theory.md, 19), and what it takes beyond the way of the nodes the
+winch gives.  A cell that grows longer lies on what it touches with more material.  Where obstacles move each has a
+travel and a force of its own on every node, and friction of each is against that.
 
-The fairlead and the nodes that ride with it do not move as the material there does: in a step it goes by the length that
-comes less along the line than they do.  Friction is against the way of the material (docs/theory.md, 19), and what it
-takes beyond the way of the nodes the winch gives.  A cell that grows longer lies on what it touches with more material.
-Where obstacles move each has a travel and a force of its own on every node, and friction of each is against that.
-
-Energy that comes in with material that is paid out, and what a step leaves for the books of the next.
+A step leaves the energy that comes in with material for the books of the next.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
-"""What the numbers of a step's report and of obstacles' rows are.
+"""What the numbers of a step's report and of obstacles' rows are, each with its name.
 
-What rows of Sea.obstacles, Sea.carried, State.grip and of samples hold of obstacles.
+Rows of obstacles are those of Sea.obstacles, Sea.carried, State.grip and of samples.
 
-What a step reports beside its state: one array of numbers, each with its name here.
-
-The assembly of every iteration clears and writes the first `ASSEMBLED` numbers, the step the others.
+What a step reports beside its state is one array of numbers.  The assembly of every iteration clears and writes the
+first `ASSEMBLED` numbers, the step the others.
 
     name                      meaning                                                          unit
     FORCE_A, FORCE_B          force of the line on what holds, carries or loads its start, its

@@ -1,8 +1,7 @@
 """Lengths of steps, and the weights of generalized-alpha for them.
 
-Weights of generalized-alpha for steps that change (docs/theory.md, 2).
-
-Lengths of steps in a compiled run: equal parts up to a stop, or by the error of the steps before (step_law).
+Weights are those of docs/theory.md, 2.  Lengths are equal parts up to a stop, or go by the error of the steps before
+(step_law).
 """
 
 from __future__ import annotations

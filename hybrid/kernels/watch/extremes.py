@@ -1,17 +1,15 @@
-"""Extremes over all accepted steps, also where cells change.
+"""Extremes over all accepted steps at every node, also where cells change.
 
-Extremes over all accepted steps: of tension, curvature, moment, torque, contact force, displacement, at every node.
+They are of tension, curvature, moment, torque, contact force and displacement.  Where a quantity may have two values,
+at point loads and changes of section, the one on the right has a column of its own (books.right).  They follow the
+rules of the outputs (outputs.observation): tension of the middles of cells is interpolated to nodes, and taken on both
+sides of point loads and changes of section; at the ends it is the pull of what holds them.  A catenary has the
+curvature of the circle that two of its chords are tangents of; its ends, joints and marked nodes, where it may have a
+kink, have what its inner nodes lead to.
 
-Where a quantity may have two values, at point loads and changes of section, the one on the right has a column of its own
-(books.right).  They follow the rules of the outputs (outputs.observation): tension of the middles of cells is interpolated to nodes, and
-taken on both sides of point loads and changes of section; at the ends it is the pull of what holds them.  A
-catenary has the curvature of the circle that two of its chords are tangents of; its ends, joints and marked nodes, where
-it may have a kink, have what its inner nodes lead to.
-
-Extremes where cells change: those of nodes whose cells stay go on, all others are taken into those of the finest mesh.
-
-Nodes are those of arc length s, (N+1,) m, before a change and to_s, (M+1,) m, after it; rods, (N,) and to_rods, (M,)
-tell which cells are rod.  Extremes are as in kernels.state.books, (4, rows, N+1+K), of K marked nodes behind all; unknown
+Where cells change, those of nodes whose cells stay go on, all others are taken into those of the finest mesh.  Nodes
+are those of arc length s, (N+1,) m, before a change and to_s, (M+1,) m, after it; rods, (N,) and to_rods, (M,) tell
+which cells are rod.  Extremes are as in kernels.state.books, (4, rows, N+1+K), of K marked nodes behind all; unknown
 ones are infinite, and change nothing.
 """
 

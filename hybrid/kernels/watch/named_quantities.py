@@ -1,8 +1,7 @@
 """Extremes of named quantities and of pipes over all accepted steps.
 
-Wall tension and von Mises stress of pipes over all accepted steps, at every node: docs/theory.md, section on outputs.
-
-Tension, curvature and torque are those of kernels.watch.extremes, pressures those of still water at the height of the node.
+Of pipes, at every node (docs/theory.md, section on outputs): wall tension and von Mises stress.  Tension, curvature and
+torque are those of kernels.watch.extremes, pressures those of still water at the height of the node.
 
     symbol   meaning                                                     shape   unit
     F        tension in the wall                                         -       N
@@ -11,10 +10,8 @@ Tension, curvature and torque are those of kernels.watch.extremes, pressures tho
     m, w     mean and half difference of Lame's stresses: radial stress  -       Pa, N
              m - w/d^2, hoop stress m + w/d^2 at the diameter d
 
-Lowest and highest values over all accepted steps of the quantities that a scene asks for by name.
-
-They follow the rules of the outputs (outputs.quantities), whose values they are where a step ends at an output: forces
-and angles of the pull at an end, the touchdown point, layback, and clearances of the chords of the line.
+Named quantities follow the rules of the outputs (outputs.quantities), whose values they are where a step ends at an
+output: forces and angles of the pull at an end, the touchdown point, layback, and clearances of the chords of the line.
 
     symbol   meaning                                                     shape   unit
     f        pull: force of the line on what holds its end               3       N

@@ -7,16 +7,13 @@ How the kinematics of waves differ a little beside a place: their slopes, for li
     S        depth at which components are taken, stretched after Wheeler (laws.water)    m
     theta    phase of a component                                                         rad
 
-Velocity is (kx/k L cos, ky/k L cos, U sin) of theta, acceleration (w kx/k L sin, w ky/k L sin, -w U cos).  By x, y and S
-both are symmetric and without trace: five sums each; S and the elevation follow from those of the surface.
+Velocity is (kx/k L cos, ky/k L cos, U sin) of theta, acceleration (w kx/k L sin, w ky/k L sin, -w U cos).  By x, y and
+S both are symmetric and without trace: five sums each; S and the elevation follow from those of the surface.
 
-What tangents along the steps of a run work with (kernels.watch.tangents).
-
-What the motion of a line answers to numbers of its scene: tangents along the steps of a run (docs/theory.md, 22).
-
-A step solves R(new, old; p) = 0.  With x' the tangent of what is known of its end (`old`, predicted), another line, of
-a scene with a little more of p, stands at new + h x'; what its equations leave over, less what those of the line leave
-over, by h, is the right-hand side of the correction of x', whose matrix is the one that Newton factored last.
+Tangents go along the steps of a run (docs/theory.md, 22).  A step solves R(new, old; p) = 0.  With x' the tangent of
+what is known of its end (`old`, predicted), another line, of a scene with a little more of p, stands at new + h x';
+what its equations leave over, less what those of the line leave over, by h, is the right-hand side of the correction of
+x', whose matrix is the one that Newton factored last.
 
     symbol   meaning
     h        part of a number by which the scene of the other line differs
