@@ -40,7 +40,7 @@ from hybrid.cli.app import (
     report_error,
     session,
     words,
-)  # fmt: skip
+)
 from hybrid.cli.console import Console, guard_output, raise_lost_output, span, speed
 
 if TYPE_CHECKING:

@@ -113,7 +113,7 @@ def _rows(found: Response, hours: float) -> list[dict[str, Any]]:
 
 def _row(
     found: Response, line: LineResponse, label: str, name: str, s: Any, mean: Any, unit: str, hours: float
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     deviation = line.deviation(name)
     at = int(deviation.argmax())
     known = name not in ADDED or bool(line.resolved(name)[at])

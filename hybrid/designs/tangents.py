@@ -622,4 +622,4 @@ def refuse_system(run: Run) -> None:
             "bodies turn at first": bool(run.state.bodies[:, W : W + 3].any()),
             "steps follow errors": run.loop.controlled,
         }
-    )  # fmt: skip
+    )

@@ -226,8 +226,7 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
         way, over = math.hypot(*motion.travel.by), motion.travel.over
         speed, acceleration = TOP_SPEED * way / over, TOP_ACCELERATION * way / over / over
         if stretch(speed, acceleration) > most:
-            enough = min(TOP_SPEED * way / (most * c),
-                         math.sqrt(TOP_ACCELERATION * way * cable.length / most) / c)  # fmt: skip
+            enough = min(TOP_SPEED * way / (most * c), math.sqrt(TOP_ACCELERATION * way * cable.length / most) / c)
             given = f"{way:.6g} m in {over:g} s: up to {speed:.3g} m/s and {acceleration:.3g} m/s^2"
             fix = f"over: {_rounded_up(enough)} (s) or more, if way and time are meant so"
             yield Finding(("travel", "over"), limit_text(speed, acceleration), fix, given)

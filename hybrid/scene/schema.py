@@ -152,7 +152,7 @@ __all__ = [
     "Waves",
     "ZonesModel",
     "missing_time",
-]  # fmt: skip
+]
 
 
 # pydantic leaves a bound under its own name where a validator of ours stands before the number

@@ -203,9 +203,9 @@ class Study(Table):
         "names of variables in `vary` without values",
     )  # fmt: skip
     carry: tuple[Text, ...] = Field(
-        default=(), description="columns of the table of cases that are no keys, such as probabilities: kept beside "
-        "the results"
-    )  # fmt: skip
+        default=(),
+        description="columns of the table of cases that are no keys, such as probabilities: kept beside the results",
+    )
     only_if: Text | None = Field(
         default=None, description="condition on variables; other cases are left out, such as Hs < 0.1 * Tp**2"
     )
@@ -403,7 +403,7 @@ class Measured(Table):
         description="CSV file, relative to the design file: a column s (m), columns of quantities such as tension, or "
         "x, y, z of the position; of a motion a column t (s); where lines have names a column line, with several "
         "cases a column case"
-    )  # fmt: skip
+    )
     at: Where | None = Field(
         default=None, description="in place of a column s: arc length, start or end, where all of it was measured [m]"
     )

@@ -354,9 +354,7 @@ class LineJobs:
         self.books = list(books)
         for k, each in enumerate(books):
             asks = each.asked.size or each.walls.size
-            self.bind_line(
-                k, books=each, quantities=note_quantities.address(self._numbers[0, 0]) if asks else 0
-            )  # fmt: skip
+            self.bind_line(k, books=each, quantities=note_quantities.address(self._numbers[0, 0]) if asks else 0)
         if self._contacts or self.shared is not None:
             self._touch()
 

@@ -159,9 +159,7 @@ def _controls(scene: dict[str, Any]) -> dict[str, Any]:
         frame = {"duration": duration, "redraw": True}
         return {"mode": "immediate", "fromcurrent": True, "frame": frame, "transition": {"duration": 0}}
 
-    steps = [
-        {"method": "animate", "label": short(t, 4), "args": [[str(k)], shown(0.0)]} for k, t in enumerate(times)
-    ]  # fmt: skip
+    steps = [{"method": "animate", "label": short(t, 4), "args": [[str(k)], shown(0.0)]} for k, t in enumerate(times)]
     slider = {
         "active": 0, "steps": steps, "x": 0.12, "len": 0.86, "y": 0.0, "pad": {"t": 8, "b": 8},
         "currentvalue": {"prefix": "t = ", "suffix": " s", "xanchor": "left"}, "transition": {"duration": 0},

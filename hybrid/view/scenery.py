@@ -218,9 +218,7 @@ def _uneven(result: Result, box: np.ndarray, size: float) -> dict[str, Any]:
     if not far:
         box[:, 2] = min(box[0, 2], low), max(box[1, 2], high)
     text = f"seabed, z from {short(low, 4)} to {short(high, 4)} m"
-    return {
-        "name": "seabed", "far": far, "text": text, "surface": (X, Y, z), "fill": SAND, "line": BED, "solid": 0.85
-    }  # fmt: skip
+    return {"name": "seabed", "far": far, "text": text, "surface": (X, Y, z), "fill": SAND, "line": BED, "solid": 0.85}
 
 
 def _triangles() -> dict[str, list[int]]:

@@ -218,7 +218,7 @@ HEAD = SAMPLE_WORK + WORKS
 
 def sample_size(
     cells: int, varies: bool = False, zones: int = 0, touches: bool = False, obstacles: int = 0, layers: int = 0
-) -> int:  # fmt: skip
+) -> int:
     """Numbers of a sample of a line of so many cells.
 
     varies: with lengths and stiffness; zones: with turns; touches: with the force of contact with itself; obstacles: of
