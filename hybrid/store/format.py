@@ -102,15 +102,6 @@ def attributes_of_format() -> dict[str, str | int]:
     return {"format": FORMAT, "format_version": FORMAT_VERSION, **numbers}
 
 
-def create_attributes(file: h5py.File) -> None:
-    """Root attributes that are the same in all files of this version; `write_attributes` adds the others."""
-    for name, value in attributes_of_format().items():
-        file.attrs[name] = value
-    for name, width in STATUS_WIDTHS.items():
-        dtype = h5py.string_dtype("utf-8", width)  # fixed, to be overwritten by `close`
-        file.attrs.create(name, fixed_text(status_attributes("running", "")[name], dtype), dtype=dtype)
-
-
 def status_attributes(status: str, message: str) -> dict[str, str]:
     """The attributes that say how a run ended, cut to what a file has room for."""
     given = {"status": status, "message": message}
@@ -138,7 +129,7 @@ def write_texts(file: h5py.File, texts: Mapping[str, str]) -> None:
 def scales_of(points: int, fields: Sequence[Field], fixed: Sequence[Field]) -> dict[str, Field]:
     """Dimension scales of what does not grow, by name; ResultError where two sizes of a dimension differ.
 
-    Those with INDEX as description count from 0; `s`, and what is in `fixed`, get their values by `write_fixed`.
+    Those with INDEX as description count from 0; `s`, and what is in `fixed`, get their values from `values_of_fixed`.
     """
     grid = Field("s", "m", "unstretched arc length from the start, of the output grid", (points,), ("s",))
     scales = {"s": grid} | {f.name: f for f in fixed if f.dims == (f.name,)}
@@ -160,21 +151,6 @@ def scale_values(field: Field) -> np.ndarray:
     return np.arange(field.shape[0]) if field.description == INDEX else np.zeros(field.shape, field.dtype)
 
 
-def create_scales(file: h5py.File, points: int, fields: Sequence[Field], fixed: Sequence[Field]) -> None:
-    """The datasets that do not grow: dimension scales first, then the fixed quantities; `write_fixed` gives values."""
-    scales = scales_of(points, fields, fixed)
-    for name, field in scales.items():
-        data = file.create_dataset(name, data=scale_values(field))
-        annotate(data, field.unit, field.description, field.frame)
-        data.make_scale(name)
-        data.dims[0].label = name
-    for field in fixed:
-        if field.name not in scales:
-            data = file.create_dataset(field.name, data=np.zeros(field.shape, field.dtype))
-            annotate(data, field.unit, field.description, field.frame)
-            attach(data, field.dims, [file[d] for d in field.dims])
-
-
 def add_fixed(file: h5py.File, fixed: Sequence[tuple[Field, np.ndarray]]) -> None:
     """Quantities that do not grow and that the file does not have yet; of the dimensions, scales come first."""
     for field, values in fixed:
@@ -189,12 +165,6 @@ def add_fixed(file: h5py.File, fixed: Sequence[tuple[Field, np.ndarray]]) -> Non
             attach(data, field.dims, [file[d] for d in field.dims])
 
 
-def write_fixed(file: h5py.File, grid_s: np.ndarray, fixed: Sequence[tuple[Field, np.ndarray]]) -> None:
-    """The values of what does not grow: the output grid, and quantities that do not depend on time."""
-    for name, values in values_of_fixed(grid_s, fixed).items():
-        write_all(h5d.open(file.id, name.encode()), values)
-
-
 def values_of_fixed(grid_s: np.ndarray, fixed: Sequence[tuple[Field, np.ndarray]]) -> dict[str, np.ndarray]:
     """Checked values by name of what does not grow; ResultError."""
     if grid_s.ndim != 1 or len(grid_s) == 0 or not np.isfinite(grid_s).all() or (np.diff(grid_s) <= 0).any():
@@ -207,26 +177,6 @@ def write_all(data: h5d.DatasetID, values: np.ndarray) -> None:
     if data.shape != values.shape:
         raise ResultError(f"{h5i.get_name(data).decode()} has shape {values.shape}, expected {data.shape}")
     data.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values))
-
-
-def create_table(file: h5py.File, group: str, fields: Sequence[Field], rows: int | None) -> None:
-    """Datasets that grow along their first dimension, whose scale is the first of them."""
-    parent = file.require_group(group)
-    for k, field in enumerate(fields):
-        is_text = field.dtype.startswith("S")
-        dtype = h5py.string_dtype("utf-8", int(field.dtype[1:])) if is_text else np.dtype(field.dtype)
-        size = int(dtype.itemsize * np.prod(field.shape, dtype=int))
-        chunk = max(1, min(chunk_rows(size), BLOCK, rows or BLOCK))
-        data = parent.create_dataset(
-            field.name, (0, *field.shape), dtype, maxshape=(None, *field.shape), chunks=(chunk, *field.shape)
-        )
-        annotate(data, field.unit, field.description, field.frame)
-        if k == 0:
-            scale = data
-            scale.make_scale(field.name)
-            data.dims[0].label = data.name.lstrip("/")
-        else:
-            attach(data, (scale.name.lstrip("/"), *field.dims), [scale, *(file[d] for d in field.dims)])
 
 
 def chunk_rows(size: int) -> int:
@@ -258,7 +208,7 @@ def annotate(data: h5py.Dataset | h5d.DatasetID, unit: str, description: str, fr
 
 
 def check_column(file: h5py.Group, group: str, field: Field) -> None:
-    """ResultError unless a dataset is one that `create_table` makes for the field, to which rows can be appended.
+    """ResultError unless a dataset is one of the field to which rows can be appended.
 
     HDF5 never comes back from closing a file in which it could not append.
     """
