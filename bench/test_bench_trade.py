@@ -15,7 +15,6 @@ from peers import adapters, trade
 from peers.adapters.interface import PeerFailed, PeerResult, PeerRun
 
 import hybrid
-from hybrid.scene.read import one_line
 from hybrid.store.tradeoff_table import FAILED, Row
 from hybrid.studies import runs
 from hybrid.studies.tradeoff import END_FORCES, force_difference, with_errors
@@ -80,7 +79,7 @@ def test_another_program_agrees(code: str) -> None:
     pytest.importorskip(adapters.PEERS[code].package)
     peer_run = next(each for each in adapters.peer_runs(scene()) if each.code == code and each.elements == 50)
     answer = adapters.compute(peer_run, scene())
-    result = hybrid.run(hybrid.validate_scene(runs.scene_data(one_line(scene()), "rod", "0.3%")))
+    result = hybrid.run(hybrid.validate_scene(runs.scene_data(scene(), "rod", "0.3%")))
     truth = {name: np.array(result[name]) for name in runs.COMPARED}
     found = with_errors(Row(code, "", "", "done"), answer.values, truth, 12.0)
     assert found.position_part is not None and found.position_part < 0.01

@@ -73,7 +73,7 @@ def _found(store: RunStore, run: PeerRun, repeat: int, scene: Scene) -> Found:
     row = Row(run.code, run.model, run.settings, FAILED, run.unsupported)
     if run.unsupported:
         return replace(row, status=adapters.UNSUPPORTED), {}
-    row = replace(row, key=key_of(one_line(scene), repeat, adapters.fingerprint(run)) + run.tag)
+    row = replace(row, key=key_of(scene, repeat, adapters.fingerprint(run)) + run.tag)
     found = store.load(row.key)
     if found is None:
         store.report(run.name, 0.0)

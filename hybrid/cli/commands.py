@@ -184,10 +184,8 @@ def trade(
         raise UsageError(f"--peers: {PEERS_ARE}")
     with session(as_json, quiet) as console:
         from hybrid.cli.tables import judged, trade_table
-        from hybrid.scene.read import one_line
 
         asked = load(console, scene, settings)
-        one_line(asked, str(scene))
         folder = output or Path(scene.with_suffix(".trade").name)
         console.left = f"{folder} keeps the runs that are done; the same command makes the others"
         console.note(f"runs and tables go to the folder {folder}")

@@ -49,8 +49,8 @@ class _Renamed:
 class Row(_Renamed):
     """One run.
 
-    Errors are the largest over all outputs and points (position) or both ends (end force); parts are of the length
-    of the cable and of the largest end force; estimates are the run's own.  None: there is no such figure.
+    Errors are the largest over all outputs, lines and points (position) or both ends (end force); parts are of the
+    length of each line and of its largest end force; estimates are the run's own.  None: there is no such figure.
     """
 
     code: str
@@ -112,12 +112,13 @@ def pareto(points: Sequence[tuple[float, float]]) -> list[bool]:
 class TradeTable(_Renamed):
     """What was asked, what it is compared with, and the rows.
 
-    bound_position (m), bound_end_force (N): what `target` comes to, None: it does not ask for that.
+    bound_position (m), bound_end_force (N): what `target` comes to, None: it does not ask for that; of a part, for the
+    longest line and the largest end force.
     """
 
     title: str
     target: str
-    length: float  # m
+    length: float  # m, of the longest line
     largest_end_force: float | None  # N, at the ends, of the reference
     bound_position: float | None
     bound_end_force: float | None
@@ -146,9 +147,16 @@ class TradeTable(_Renamed):
         check = getattr(self.check, name) if self.check else None
         return max(getattr(self.reference, f"estimate_{name}") or 0.0, OF_DIFFERENCE * (check or 0.0))
 
+    def held_error(self, row: Row, name: str, asked: str) -> float | None:
+        """Error (m or N) to hold against a bound; where a part is asked, the largest part of all lines."""
+        error, part = getattr(row, name), getattr(row, f"{name}_part")
+        whole = self.length if name == "position" else self.largest_end_force
+        return part * whole if asked.strip().endswith("%") and part is not None and whole else error
+
     def score(self, row: Row) -> float:
         """Error over what is asked for, of the quantity where that is largest: at 1 or less it is met."""
-        pairs = ((row.position, self.bound_position), (row.end_force, self.bound_end_force))
+        bounds = {"position": self.bound_position, "end_force": self.bound_end_force}
+        pairs = ((self.held_error(row, name, self.target), bound) for name, bound in bounds.items())
         return max((error / bound for error, bound in pairs if error is not None and bound), default=0.0)
 
     def front(self) -> list[Row]:
@@ -257,9 +265,12 @@ def judged(table: TradeTable, bounds: Sequence[tuple[float | None, float | None]
     What the reference itself may be wrong by counts for them: a run is blamed only for what is its own.
     """
     rows = []
-    for row, (position, end_force) in zip(table.rows, bounds, strict=True):
-        named = (("position", row.position, position), ("end_force", row.end_force, end_force))
-        over = [(x / most, name) for name, x, most in named if x is not None and most and x - table.doubt(name) > most]
+    for row, bounds_of_row in zip(table.rows, bounds, strict=True):
+        over = []
+        for name, most in zip(_NAMED, bounds_of_row, strict=True):
+            x, error = table.held_error(row, name, row.asked), getattr(row, name)
+            if x and error and most and x - table.doubt(name) * (x / error) > most:
+                over.append((x / most, name))
         worst, name = max(over, default=(0.0, ""))
         if row.status == DONE and over:
             estimate = getattr(row, f"estimate_{name}")

@@ -8,12 +8,13 @@ import os
 import platform
 import subprocess
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
+from posixpath import join, split
 from statistics import median
 from typing import Any, get_args
 
@@ -23,10 +24,10 @@ from hybrid.accuracy.api import run
 from hybrid.errors import Complaint, ComputationError, ResultError, SceneError
 from hybrid.scene.accuracy import of_length
 from hybrid.scene.analysis import LEAST_DAMPED
-from hybrid.scene.base import Kinds
-from hybrid.scene.read import as_scene, one_line, scene_text
+from hybrid.scene.base import Kinds, dotted
+from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import LineScene, Model
+from hybrid.scene.schema import Model
 from hybrid.simulation.progress import Progress
 from hybrid.store.reader import Result
 from hybrid.store.tradeoff_table import DONE, FAILED, MISSED, OURS, Row
@@ -37,8 +38,6 @@ WARM_PART = 0.02
 # Keys of a model that set the resolution: the study chooses these.
 FINENESS = ("kind", "tolerance", "rod_cell", "hold_time")
 COMPARED = ("position", "reaction_start", "reaction_end")
-# The same of runs for a level (studies.tradeoff).
-ALONG = ("bending_moment", "curvature")
 # Files of the package that change no answer, only how it is shown or ranked.
 SHOWS = ("cli", "view", "exports", "interop")
 
@@ -55,14 +54,15 @@ class StudyProgress:
 
 @dataclass(frozen=True)
 class RunSpec:
-    """A run to be made."""
+    """A run to be made; unchanged: lines that do not admit the model and keep theirs, and why."""
 
     model: str
     accuracy: str
-    scene: LineScene | None  # None: refused
+    scene: Scene | None  # None: refused
     refused: str = ""
     times: int = 1  # repetitions; the median of their CPU times counts
     kept: tuple[str, ...] = COMPARED  # outputs that are compared
+    unchanged: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -74,13 +74,19 @@ def model_kinds() -> tuple[str, ...]:
     return next(part.names for part in get_args(Model) if isinstance(part, Kinds))
 
 
-def scene_data(scene: LineScene, kind: str, accuracy: str | Mapping[str, str]) -> dict[str, Any]:
-    """The scene with this model at this accuracy, and without keys that set the resolution; as data.
+def scene_data(
+    scene: Scene,
+    kind: str,
+    accuracy: str | Mapping[str, str],
+    lines: Collection[str] | None = None,
+    more: Mapping[str, float] | None = None,
+) -> dict[str, Any]:
+    """The scene with a model at an accuracy, without keys that set the resolution; as data.
 
-    A part is one of the length and of the end forces, by which runs are compared.
+    A part is one of the length and of the end forces, by which runs are compared.  lines: of the network, those that
+    get the model, None: all; the others keep theirs.  more: keys of the model.
     """
     data = scene.model_dump(mode="json", exclude_none=True)
-    data.pop("mesh", None)
     time, output = data["time"], data.get("output", {})
     for name in ("step", "tolerance"):
         time.pop(name, None)
@@ -88,34 +94,53 @@ def scene_data(scene: LineScene, kind: str, accuracy: str | Mapping[str, str]) -
         time.pop("rho_inf")
     for name in ("errors", "criteria"):
         output.pop(name, None)
-    given = data["model"] if data["model"]["kind"] == kind else {}
+    for line in scene.lines:
+        model = scene.asked_scene(line).model.model_dump(mode="json", exclude_none=True)
+        table: Any = data
+        for key in scene.form.place(("lines", line, "model"))[:-1]:
+            table = table[key]
+        table.pop("mesh", None)
+        table.pop("accuracy", None)
+        if lines is None or line in lines:
+            table["model"] = _without_fineness(model, kind) | dict(more or {})
+            continue
+        if "model" in table:
+            table["model"] = _without_fineness(model, model["kind"])
+        if model["kind"] == "catenary" and not isinstance(accuracy, str):  # which has no moment that could be asked
+            table["accuracy"] = {name: x for name, x in accuracy.items() if name in ("position", "tension")}
+    return data | {"accuracy": of_length(accuracy) if isinstance(accuracy, str) else dict(accuracy)}
+
+
+def _without_fineness(given: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    """A model of a kind with what the scene says of that kind, but for the resolution."""
+    kept = {name: x for name, x in given.items() if name not in FINENESS} if given["kind"] == kind else {}
     if kind == "adaptive":  # zones that move are one of the models that are compared
-        given |= {"always_move": True}
-    kept = {name: value for name, value in given.items() if name not in FINENESS}
+        kept |= {"always_move": True}
     if "zones" in kept:
         kept["zones"] = [{k: x for k, x in zone.items() if k not in ("cells", "ratio")} for zone in kept["zones"]]
-    asked = of_length(accuracy) if isinstance(accuracy, str) else dict(accuracy)
-    return data | {"model": {"kind": kind} | kept, "accuracy": asked}
+    return {"kind": kind} | kept
 
 
-def run_spec(scene: LineScene, kind: str, accuracy: str) -> RunSpec:
-    try:
-        return RunSpec(kind, accuracy, one_line(as_scene(scene_data(scene, kind, accuracy))))
-    except SceneError as error:
-        return RunSpec(kind, accuracy, None, _in_short(error))
-
-
-def level_spec(
-    scene: LineScene, kind: str, name: str, accuracy: Mapping[str, str], model: Mapping[str, float] | None = None
+def run_spec(
+    scene: Scene,
+    kind: str,
+    accuracy: str | Mapping[str, str],
+    name: str = "",
+    more: Mapping[str, float] | None = None,
+    kept: tuple[str, ...] = COMPARED,
 ) -> RunSpec:
-    """A run for an accuracy with several parts, which has a name; model: more keys of the model."""
-    data = scene_data(scene, kind, accuracy)
-    data["model"] |= model or {}
-    kept = (*COMPARED, *ALONG)
-    try:
-        return RunSpec(kind, name, one_line(as_scene(data)), kept=kept)
-    except SceneError as error:
-        return RunSpec(kind, name, None, _in_short(error), kept=kept)
+    """A run with a model on all lines that admit it; name: of an accuracy with several parts; more: of the model."""
+    found, lines, why = None, list[str](), dict[str, str]()
+    for line in scene.lines:
+        try:
+            found = as_scene(scene_data(scene, kind, accuracy, [*lines, line], more))
+            lines.append(line)
+        except SceneError as error:
+            why[dotted(scene.form.place(("lines", line)))] = _in_short(error)
+    asked = name or str(accuracy)
+    if found is None:
+        return RunSpec(kind, asked, None, next(iter(why.values())), kept=kept)
+    return RunSpec(kind, asked, found, kept=kept, unchanged=why)
 
 
 def _in_short(error: SceneError) -> str:
@@ -189,7 +214,7 @@ class RunStore:
         draft.replace(runs / f"{row.key}.json")
         return row, half
 
-    def _compute(self, row: Row, spec: RunSpec, scene: LineScene, required: bool) -> tuple[Row, dict[str, np.ndarray]]:
+    def _compute(self, row: Row, spec: RunSpec, scene: Scene, required: bool) -> tuple[Row, dict[str, np.ndarray]]:
         spent, result = [], None
         try:
             self._warm_up(spec, scene)
@@ -197,7 +222,7 @@ class RunStore:
                 what = spec.name + (f", {k + 1} of {spec.times}" if spec.times > 1 else "")
                 self.report(what, 0.0)
                 begin = clock.process_time()
-                result = run(Scene.model_validate(scene), progress=self._reporter(what))
+                result = run(scene, progress=self._reporter(what))
                 spent.append(clock.process_time() - begin)
         except ComputationError as error:
             if required:
@@ -209,7 +234,12 @@ class RunStore:
                 raise
             return replace(row, cause=f"a bug: {type(error).__name__}: {error}"), {}
         assert result is not None
-        values = {name: np.array(result[name]) for name in spec.kept if name in result}
+        values = {
+            join(line, name): np.array(each[name])
+            for line, each in result.each_line()
+            for name in spec.kept
+            if name in each
+        }
         row = replace(_figures_of(result, row), cpu=median(spent))
         self.computed += 1
         return self.save(row, values)
@@ -220,7 +250,7 @@ class RunStore:
 
         return report_fraction
 
-    def _warm_up(self, spec: RunSpec, scene: LineScene) -> None:
+    def _warm_up(self, spec: RunSpec, scene: Scene) -> None:
         """Compile and load the kernels of a model; the result of this run is not used."""
         if spec.model in self._warm:
             return
@@ -233,7 +263,12 @@ class RunStore:
             run(as_scene(data))
 
 
-def key_of(scene: LineScene, repeat: int, also: str = "") -> str:
+def of_line(values: Mapping[str, np.ndarray], line: str) -> dict[str, np.ndarray]:
+    """Of the outputs of a run those of a line, "" of one without a name."""
+    return {split(key)[1]: x for key, x in values.items() if split(key)[0] == line}
+
+
+def key_of(scene: Scene, repeat: int, also: str = "") -> str:
     """Hash of all that decides the result of a run: scene, files it reads, package, repetitions."""
     digest = hashlib.sha256(f"{version('hybrid-cable')} {repeat}{also}\n{scene_text(scene)}".encode())
     for path in scene.named_files():
@@ -248,11 +283,11 @@ def key_of(scene: LineScene, repeat: int, also: str = "") -> str:
 
 def _figures_of(result: Result, row: Row) -> Row:
     """Status, cost and estimates of a result."""
-    attributes = result.attributes
+    attributes, steps = result.attributes, max(len(line["steps/t"]) for _, line in result.each_line())
     missed = next((event.text for event in result.events if event.kind == "accuracy missed"), "")
     return replace(
         row, status=MISSED if missed else DONE, cause=missed, cells=attributes.get("cells"),
-        steps=len(result["steps/t"]), runs=attributes.get("effort_runs"), effort_cpu=attributes.get("effort_cpu"),
+        steps=steps, runs=attributes.get("effort_runs"), effort_cpu=attributes.get("effort_cpu"),
         estimate_position=attributes.get("error_total_position"),
         estimate_end_force=attributes.get("error_total_end_force"),
     )  # fmt: skip

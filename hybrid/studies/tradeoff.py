@@ -18,8 +18,9 @@ import io
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,8 +28,9 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.model.resolution import RequestedAccuracy, requested_accuracy
 from hybrid.scene.accuracy import amount
 from hybrid.scene.analysis import LEAST_DAMPED
-from hybrid.scene.read import SceneLike, as_scene, one_line
-from hybrid.scene.schema import LineScene
+from hybrid.scene.base import dotted
+from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.root import Scene
 from hybrid.simulation.progress import interrupts
 from hybrid.store.tradeoff_table import CHECK, FAILED, REFERENCE, Row, TradeTable, judged
 from hybrid.studies.runs import (
@@ -37,8 +39,8 @@ from hybrid.studies.runs import (
     RunSpec,
     RunStore,
     StudyProgress,
-    level_spec,
     model_kinds,
+    of_line,
     run_spec,
     scene_data,
 )
@@ -51,6 +53,8 @@ REFERENCE_ACCURACY, LEAST_FINER = "0.03%", 0.5
 CHECK_COARSER = 3.0  # the run that shows how converged the reference is: asked for so many times its error
 ROUGHEST_PART = 0.1  # of what `accuracy` takes
 END_FORCES = COMPARED[1:]
+OF_LEVELS = (*COMPARED, "bending_moment", "curvature")
+Values = Mapping[str, np.ndarray]  # outputs of a run
 # Said to those who ask for other programs.
 PEERS_ARE = "other programs are compared by a bench now: in bench of the sources, python -m peers.trade SCENE.yaml"
 
@@ -80,7 +84,7 @@ def trade(
     KeyboardInterrupt leaves a table of the finished runs.
     """
     target, progress = _renamed(former, target, progress)
-    tables = one_line(as_scene(scene))
+    tables = as_scene(scene)
     tables.require_time()
     names = _models(tables, models)
     goal = reference or _finer(tables, accuracies)
@@ -93,23 +97,24 @@ def trade(
     kinds = [kind for kind, reason in names.items() if not reason or models is not None]
     rod = "rod" if _refusal(tables, "rod", goal) == "" else kinds[0]
     specs = [replace(run_spec(tables, kind, x), times=repeat) for x in accuracies for kind in kinds]
+    notes += [f"Not admitted by {x}, which keeps its model: {y}." for x, y in _unchanged(specs).items()]
     with interrupts() as stopped:
         store = RunStore(Path(folder), progress, 2 + len(specs), stopped)
         best, reference_values = store.get(run_spec(tables, rod, goal), required=True)
         rows = [replace(best, status=REFERENCE)]
         limits: list[tuple[float | None, float | None]] = [(None, None)]
-        largest = _largest_end_force(reference_values)
+        largest, lengths = _largest_end_force(reference_values), _lengths(tables)
         try:
-            check, _ = _compared(store, run_spec(tables, rod, _coarser(goal)), reference_values, tables.length)
+            check = _compared(store, run_spec(tables, rod, _coarser(goal)), reference_values, lengths)
             rows.append(replace(check, status=CHECK) if check.status != FAILED else check)
             limits.append((None, None))
             for spec, want in zip(specs, [x for x in checks for _ in kinds], strict=True):
-                rows.append(_compared(store, spec, reference_values, tables.length)[0])
+                rows.append(_compared(store, spec, reference_values, lengths))
                 limits.append(_bounds(want, largest))
         finally:
             position, end_force = _bounds(wanted, largest)
             table = TradeTable(
-                tables.title, target, tables.length, largest, position, end_force, tuple(rows), tuple(notes),
+                _title(tables), target, tables.length, largest, position, end_force, tuple(rows), tuple(notes),
                 (*store.facts, *_measured(store, repeat, command)), store.total - len(rows),
             )  # fmt: skip
             table = _written(judged(table, limits), kinds, store.folder)
@@ -151,11 +156,30 @@ def _order(row: Row, kinds: Sequence[str]) -> int:
 # --- what is asked ------------------------------------------------------------------------------
 
 
-def _refusal(scene: LineScene, kind: str, accuracy: str) -> str:
+def _title(scene: Scene) -> str:
+    """The title, else the names that its lines have."""
+    return scene.title or ", ".join(scene.asked_lines)
+
+
+def _lengths(scene: Scene) -> dict[str, float]:
+    """Of every line by its name, "" of one that has none, m."""
+    return {name: x.length for name, x in scene.asked_scenes.items()}
+
+
+def _unchanged(specs: Sequence[RunSpec]) -> dict[str, str]:
+    """Lines that keep their model while others change, and which they do not admit."""
+    found: dict[str, dict[str, None]] = {}
+    for spec in specs:
+        for line, why in spec.unchanged.items():
+            found.setdefault(line, {})[f"{spec.model} ({why})"] = None
+    return {line: ", ".join(each) for line, each in found.items()}
+
+
+def _refusal(scene: Scene, kind: str, accuracy: str) -> str:
     return run_spec(scene, kind, accuracy).refused
 
 
-def _models(scene: LineScene, wanted: Sequence[str] | None) -> dict[str, str]:
+def _models(scene: Scene, wanted: Sequence[str] | None) -> dict[str, str]:
     """Kinds of models, and why the scene does not admit them, "" if it does."""
     known = model_kinds()
     for name in wanted or ():
@@ -164,36 +188,47 @@ def _models(scene: LineScene, wanted: Sequence[str] | None) -> dict[str, str]:
     return {kind: _refusal(scene, kind, ACCURACIES[0]) for kind in wanted or known}
 
 
-def _notes(scene: LineScene, models: Mapping[str, str], chosen: bool) -> list[str]:
+def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
     """Keys of the scene that the study ignores, and models that the scene does not admit."""
-    time = scene.require_time()
+    time, output, lines = scene.require_time(), scene.written.output, scene.lines
+    called = {name: partial(_called, scene, name) for name in lines}
+    given = {name: scene.asked_scene(name).model for name in lines}
     dropped = [f"time.{x}" for x in ("step", "tolerance") if getattr(time, x) is not None]
     dropped += ["time.rho_inf"] if time.rho_inf > LEAST_DAMPED else []
-    dropped += [name for name in ("mesh", "accuracy") if getattr(scene, name) is not None]
-    dropped += [f"output.{x}" for x in ("errors", "criteria") if x in scene.output.model_fields_set]
-    given = scene.model.model_dump(exclude_none=True)
-    dropped += [f"model.{x}" for x in FINENESS[1:] if x in given]
+    dropped += [called[name]("mesh") for name, x in lines.items() if x.mesh is not None]
+    dropped += ["accuracy"] if scene.accuracy is not None else []
+    dropped += [called[name]("accuracy") for name, x in lines.items() if x.accuracy is not None]
+    dropped += [f"output.{x}" for x in ("errors", "criteria") if x in output.model_fields_set]
+    for name, model in given.items():
+        dropped += [f"{called[name]('model')}.{x}" for x in FINENESS[1:] if getattr(model, x, None) is not None]
     notes = [f"The study chooses mesh, steps and tolerance: it ignores these keys of the scene: {', '.join(dropped)}."]
-    kept = [x for x in sorted(scene.model.model_fields_set) if x not in FINENESS]
-    if kept:
-        notes.append(f"Of the scene's model it uses {', '.join(kept)}, for runs of that kind ({scene.model.kind}).")
+    for name, model in given.items():
+        kept, what = [x for x in sorted(model.model_fields_set) if x not in FINENESS], called[name]("model")
+        if kept:
+            notes.append(f"Of the scene's {what} it uses {', '.join(kept)}, for runs of that kind ({model.kind}).")
     if chosen:
         notes += [f"Not admitted by the scene: {kind} ({why})." for kind, why in models.items() if why]
     return notes if dropped else notes[1:]
 
 
-def _asked(scene: LineScene, accuracy: str, where: str) -> RequestedAccuracy:
-    """An accuracy in numbers; SceneError if it is none."""
+def _called(scene: Scene, line: str, key: str) -> str:
+    """What a key of a line is called in the scene."""
+    return dotted(scene.form.place(("lines", line, key)))
+
+
+def _asked(scene: Scene, accuracy: str, where: str) -> RequestedAccuracy:
+    """An accuracy in numbers, parts of the longest line's length; SceneError if it is none."""
     try:
-        found = requested_accuracy(one_line(as_scene(scene_data(scene, scene.model.kind, accuracy))))
+        lines = as_scene(scene_data(scene, "", accuracy, lines=())).asked_scenes.values()
     except SceneError as error:
         bad = [c for c in error.complaints if c.where.startswith("accuracy")] or error.complaints
         raise SceneError([replace(c, where=where, line=None, column=None) for c in bad[:1]]) from None
+    found = requested_accuracy(max(lines, key=lambda line: line.length))
     assert found is not None
     return found
 
 
-def _finer(scene: LineScene, accuracies: Sequence[str]) -> str:
+def _finer(scene: Scene, accuracies: Sequence[str]) -> str:
     """An accuracy for the reference: the usual one, or a third of the finest accuracy."""
     parts = [amount(x)[1] for x in accuracies if _asked(scene, x, "accuracies") and amount(x)[0] == "part"]
     return f"{100 * min([amount(REFERENCE_ACCURACY)[1], *(x / CHECK_COARSER for x in parts)]):.3g}%"
@@ -229,15 +264,28 @@ def _bounds(want: RequestedAccuracy, largest: float | None) -> tuple[float | Non
 # --- errors -------------------------------------------------------------------------------------
 
 
-def _compared(
-    store: RunStore, spec: RunSpec, reference: Mapping[str, np.ndarray], length: float
-) -> tuple[Row, dict[str, np.ndarray]]:
+AnyRow = TypeVar("AnyRow", Row, "LevelRow")
+
+
+def _worst(each: Sequence[AnyRow], *names: str) -> AnyRow:
+    """Of the rows of a run for each line one with their largest figures of these names."""
+    said = next((x for x in each if x.status == FAILED), each[0])
+    known = {name: [x for x in (getattr(row, name) for row in each) if x is not None] for name in names}
+    worst: dict[str, Any] = {name: max(found, default=None) for name, found in known.items()}
+    return replace(said, **worst)
+
+
+def _compared(store: RunStore, spec: RunSpec, reference: Values, lengths: Mapping[str, float]) -> Row:
+    """The row of a run with its errors, the largest of all lines."""
     row, values = store.get(spec)
-    return (with_errors(row, values, reference, length) if values else row), values
+    if not values:
+        return row
+    each = [with_errors(row, of_line(values, x), of_line(reference, x), length) for x, length in lengths.items()]
+    return _worst(each, "position", "position_part", "end_force", "end_force_part")
 
 
-def with_errors(row: Row, values: Mapping[str, np.ndarray], reference: Mapping[str, np.ndarray], length: float) -> Row:
-    """The row with its errors: outputs (nt, ...) of the run and of the reference, at the same times and places."""
+def with_errors(row: Row, values: Values, reference: Values, length: float) -> Row:
+    """The row with the errors of a line; outputs (nt, ...) are of the same times and places."""
     position = float(np.linalg.norm(values["position"] - reference["position"], axis=-1).max())
     forces = [
         float(force_difference(values[x], reference[x]).max()) for x in END_FORCES if x in values and x in reference
@@ -258,15 +306,10 @@ def force_difference(force: np.ndarray, reference: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(force - reference, axis=-1))
 
 
-def _largest_end_force(reference: Mapping[str, np.ndarray]) -> float | None:
-    """N; None: no end is held."""
-    return (
-        max(
-            (float(np.linalg.norm(reference[x], axis=-1).max()) for x in END_FORCES if x in reference),
-            default=None,
-        )
-        or None
-    )
+def _largest_end_force(reference: Values) -> float | None:
+    """N, of all lines; None: no end is held."""
+    forces = [x for key, x in reference.items() if key.endswith(END_FORCES)]
+    return max((float(np.linalg.norm(x, axis=-1).max()) for x in forces), default=None) or None
 
 
 def _measured(store: RunStore, repeat: int, command: str) -> list[tuple[str, str]]:
@@ -411,7 +454,7 @@ def trade_levels(
     refuse_peers(former)
     for name in former:
         raise TypeError(f"trade_levels() got an unexpected keyword argument {name!r}")
-    tables = one_line(as_scene(scene))
+    tables = as_scene(scene)
     tables.require_time()
     specs = []
     for level, asked in LEVELS.items():
@@ -420,24 +463,28 @@ def trade_levels(
                 continue  # what it follows is not asked
             more = {"curvature_error": ALONG} if model == FOLLOWING else {}
             kind = "adaptive" if model == FOLLOWING else model
-            specs.append((level, model, level_spec(tables, kind, f"level {level}", asked, more)))
+            specs.append((level, model, run_spec(tables, kind, asked, f"level {level}", more, OF_LEVELS)))
     with interrupts() as stopped:
         store = RunStore(Path(folder), progress, 1 + len(specs), stopped)
-        best, exact = store.get(level_spec(tables, "rod", "reference", REFERENCE_OF_LEVELS), required=True)
-        rows = []
+        goal = run_spec(tables, "rod", REFERENCE_OF_LEVELS, "reference", kept=OF_LEVELS)
+        (best, exact), lengths, rows = store.get(goal, required=True), _lengths(tables), []
         for level, model, spec in specs:
             row, values = store.get(replace(spec, times=repeat))
-            rows.append(level_row(level, model, row, values, exact, tables.length))
+            each = [
+                level_row(level, model, row, of_line(values, x), of_line(exact, x), length)
+                for x, length in lengths.items()
+            ]
+            rows.append(_worst(each, "position", "end_force", "moment", "curvature", "worst"))
+    unchanged = _unchanged([goal, *(spec for *_, spec in specs)])
     facts = (*store.facts, *([("command", f"`{command}`")] if command else []))
-    table = LevelTable(tables.title, best, tuple(rows), facts)
+    facts += tuple((f"not admitted by {x}, which keeps its model", y) for x, y in unchanged.items())
+    table = LevelTable(_title(tables), best, tuple(rows), facts)
     table.write(store.folder)
     return table
 
 
-def level_row(
-    level: str, model: str, row: Row, values: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], length: float
-) -> LevelRow:
-    """The row of a run with its errors."""
+def level_row(level: str, model: str, row: Row, values: Values, exact: Values, length: float) -> LevelRow:
+    """The row of a run with the errors of a line."""
     out = LevelRow(level, model, row.status, row.cause, cells=row.cells, steps=row.steps, runs=row.runs, cpu=row.cpu)
     if not values:
         return out
@@ -456,9 +503,7 @@ def level_row(
     return replace(out, worst=max((x / bound for x, bound in asked if x is not None), default=None))
 
 
-def _relative(
-    values: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], name: str, peaks: bool
-) -> float | None:
+def _relative(values: Values, exact: Values, name: str, peaks: bool) -> float | None:
     """Largest error of a quantity (nt, ns) over its largest value; peaks: of the largest of every output."""
     if name not in values or name not in exact:
         return None

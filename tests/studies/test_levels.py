@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import hybrid
+from hybrid.scene.read import scene_text
+from hybrid.scene.root import in_full
 from hybrid.store.tradeoff_table import FAILED, Row
 from hybrid.studies import runs
 from hybrid.studies.tradeoff import ALONG, LEVELS, LevelRow, LevelTable, level_row, status_of
@@ -91,3 +95,24 @@ def test_levels_are_computed_once_and_kept(tmp_path: Path, monkeypatch: pytest.M
     read = list(csv.DictReader(io.StringIO((tmp_path / "levels.csv").read_text())))
     assert [x["level"] for x in read] == [row.level for row in first.rows]
     assert "# a line that sags: what each level costs" in (tmp_path / "levels.md").read_text()
+
+
+@pytest.mark.long
+def test_of_several_lines_the_worst_error_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A network of one line has the rows of its cable; a line beside it adds its errors, and keeps what it must."""
+    loose = {"position": "3%", "tension": "3%", "bending_moment": "5%", "curvature": "5%"}
+    monkeypatch.setattr("hybrid.studies.tradeoff.MODELS", ("rod",))
+    monkeypatch.setattr("hybrid.studies.tradeoff.LEVELS", {"C": loose})
+    monkeypatch.setattr("hybrid.studies.tradeoff.REFERENCE_OF_LEVELS", loose | {"position": "1%", "tension": "1%"})
+    network = in_full(hybrid.validate_scene(SAG))
+    data: dict[str, Any] = yaml.safe_load(scene_text(network))
+    (section,) = data["lines"]["cable"]["sections"]
+    chain = {name: x for name, x in section.items() if name != "bending_stiffness"} | {"length": 13.0}
+    data["lines"]["beside"] = {"start": "start", "end": "end", "sections": [chain], "model": "catenary"}
+    cable, one, two = (hybrid.trade_levels(x, tmp_path / str(k)) for k, x in enumerate((SAG, network, data)))
+    clocks = {"cpu": None}
+    assert replace(one.rows[0], **clocks) == replace(cable.rows[0], **clocks)
+    (row,) = two.rows
+    assert row.moment and row.curvature and row.worst and row.cells and row.cells > (one.rows[0].cells or 0)
+    assert [what for what, _ in two.facts if "keeps" in what] == ["not admitted by lines.beside, which keeps its model"]
+    assert "# a line that sags" in (tmp_path / "2" / "levels.md").read_text()

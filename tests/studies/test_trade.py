@@ -18,7 +18,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
-from hybrid.scene.read import one_line
+from hybrid.scene.root import in_full
 from hybrid.store.tradeoff_table import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
 from hybrid.studies import runs, tradeoff
 from hybrid.view.study_report import plot_trade
@@ -55,8 +55,9 @@ def scene(**changes: Any) -> hybrid.Scene:
 
 def row(model: str = "rod", asked: str = "1%", cpu: float = 1.0, error: float = 0.5, **more: Any) -> Row:
     """A run with `error` metres and ten times as many newtons."""
-    figures = {"position": error, "end_force": 10.0 * error, "position_part": error / 10, "end_force_part": error / 20}
-    return Row("hybrid", model, asked, "done", cpu=cpu, **figures | more)
+    figures = {"position": error, "end_force": 10.0 * error} | more
+    parts = {"position_part": figures["position"] / 10, "end_force_part": (figures["end_force"] or 0.0) / 200}
+    return Row("hybrid", model, asked, "done", cpu=cpu, **parts | figures)
 
 
 def table(*rows: Row, position: float | None = 1.0, end_force: float | None = 10.0, **more: Any) -> TradeTable:
@@ -126,6 +127,16 @@ def test_a_run_that_misses_what_it_was_asked_says_by_how_much() -> None:
     assert second.status == MISSED and second.cause == "position error 3 times the accuracy"
 
 
+def test_a_part_is_of_each_line_and_a_size_is_not() -> None:
+    """0.5 m are a fifth of a line of 2.5 m beside one of 10 m: twice the 10 % that are asked, half of 1 m."""
+    short = row(error=0.5, end_force=0.0, position_part=0.2)
+    assert table(short).score(short) == pytest.approx(2.0)
+    assert replace(table(short), target="1 m").score(short) == pytest.approx(0.5)
+    limits = [(None, None), (1.0, 10.0)]
+    assert judged(table(short), limits).rows[1].cause == "position error 2 times the accuracy"
+    assert judged(table(replace(short, asked="1 m")), limits).rows[1].status == "done"
+
+
 def test_a_run_is_not_blamed_for_the_error_of_the_reference() -> None:
     """The reference is known to 0.2 m, half of what the check differs by: 1.1 m may be 0.9 m, 1.3 m may not be 1 m."""
     check = replace(row(error=0.4), status=CHECK)
@@ -184,12 +195,12 @@ def test_who_asks_for_other_programs_is_told_where_they_are(compute: Any, tmp_pa
 
 
 def test_a_run_keeps_the_scene_and_drops_its_resolution() -> None:
-    asked = hybrid.validate_scene(runs.scene_data(one_line(scene()), "adaptive", "0.3%"))
+    asked = hybrid.validate_scene(runs.scene_data(scene(), "adaptive", "0.3%"))
     assert asked.mesh is None and asked.time is not None and asked.time.step is None
     assert asked.accuracy is not None and asked.accuracy.position == "0.3%"
     assert asked.model.kind == "adaptive" and asked.model.tolerance is None and asked.model.force_rod == ((0.0, 1.0),)
     assert asked.cable == scene().cable and asked.ends == scene().ends and asked.output.points == 25
-    assert runs.scene_data(one_line(scene()), "rod", "1%")["model"] == {"kind": "rod"}
+    assert runs.scene_data(scene(), "rod", "1%")["model"] == {"kind": "rod"}
 
 
 def test_models_are_those_of_the_schema_that_the_scene_admits() -> None:
@@ -198,7 +209,7 @@ def test_models_are_those_of_the_schema_that_the_scene_admits() -> None:
     data = soft.model_dump(mode="json", exclude_none=True)
     del data["cable"]["sections"][0]["bending_stiffness"]
     soft = hybrid.validate_scene(data | {"model": "catenary"})
-    admitted = [kind for kind, why in tradeoff._models(one_line(soft), None).items() if not why]
+    admitted = [kind for kind, why in tradeoff._models(soft, None).items() if not why]
     assert "catenary" in admitted and "rod" not in admitted
 
 
@@ -231,7 +242,7 @@ def test_a_scene_without_time_is_refused(tmp_path: Path) -> None:
     ("accuracies", "reference"), [(["10%", "3%"], "0.03%"), (["0.06%"], "0.02%"), (["3 cm"], "0.03%")]
 )
 def test_the_reference_is_finer_than_the_ladder(accuracies: list[str], reference: str) -> None:
-    assert tradeoff._finer(one_line(scene()), accuracies) == reference
+    assert tradeoff._finer(scene(), accuracies) == reference
     assert (
         tradeoff._coarser("0.03%") == "0.09%"
         and tradeoff._coarser("8%") == "10%"
@@ -314,6 +325,67 @@ def test_table_page_and_picture(ladder: tuple[TradeTable, Path]) -> None:
         assert said in page, said
     assert page.count("**recommended**") == 1
     assert_drawn(folder / "trade.png")
+
+
+def figures_of(found: TradeTable) -> list[Row]:
+    """The rows without clocks, and without the key that is that of the text of the scene."""
+    return [replace(row, cpu=None, effort_cpu=None, key="") for row in found.rows]
+
+
+@pytest.mark.long
+def test_the_network_of_one_line_has_the_rows_of_its_cable(ladder: tuple[TradeTable, Path], tmp_path: Path) -> None:
+    found = hybrid.trade(in_full(scene()), tmp_path, **LADDER)
+    assert figures_of(found) == figures_of(ladder[0])
+    assert (found.bound_position, found.bound_end_force) == (ladder[0].bound_position, ladder[0].bound_end_force)
+    assert [found.score(x) for x in found.rows] == [ladder[0].score(x) for x in ladder[0].rows]
+
+
+def joined(**of_chain: Any) -> dict[str, Any]:
+    """A rope and a shorter chain that hang in water and meet at a free point; `of_chain`: more of the chain's table."""
+    section = SAG["cable"]["sections"][0]
+    chain = {k: x for k, x in section.items() if k != "bending_stiffness"} | {"length": 3.0, "mass": 4.0}
+    return {
+        "environment": SAG["environment"],
+        "points": {
+            "left": {"kind": "fixed", "position": [0, 0, -5]},
+            "knot": {"kind": "free", "initial_guess": [7, 0, -9], "mass": 5.0},
+            "right": {"kind": "fixed", "position": [10, 0, -5], "motion": SAG["ends"]["end"]["motion"]},
+        },
+        "lines": {
+            "rope": {"start": "left", "end": "knot", "sections": [section | {"length": 9.0}], "model": "catenary"},
+            "chain": {"start": "knot", "end": "right", "sections": [chain]} | of_chain,
+        },
+        "time": {"duration": 0.5},
+        "output": {"every": 0.1, "points": 11},
+    }  # fmt: skip
+
+
+@pytest.mark.long
+def test_lines_that_are_joined_have_the_worst_error_of_all(tmp_path: Path) -> None:
+    found = hybrid.trade(joined(), tmp_path, models=["rod", "catenary"], accuracies=["10%"], reference="3%")
+    assert [(x.name, x.status) for x in found.rows[:2]] == [("rod 3%", REFERENCE), ("rod 9%", CHECK)]
+    assert found.length == 9.0 and "# rope, chain" in (tmp_path / "trade.md").read_text()
+    assert "- Not admitted by lines.chain, which keeps its model: rod (" in (tmp_path / "trade.md").read_text()
+    store = runs.RunStore(tmp_path, None, 0, lambda: False)
+    (_, exact), lengths = store.load(found.reference.key) or pytest.fail(), {"rope": 9.0, "chain": 3.0}
+    for row in found.choices:
+        _, values = store.load(row.key) or pytest.fail()
+        errors = {x: np.linalg.norm(values[f"{x}/position"] - exact[f"{x}/position"], axis=-1).max() for x in lengths}
+        assert row.position == pytest.approx(max(errors.values()))
+        assert row.position_part == pytest.approx(max(errors[x] / lengths[x] for x in lengths))
+        assert row.position_part * found.length / found.bound_position <= found.score(row), "of a part the largest part"
+        assert row.cells and row.steps and row.runs and row.end_force and row.estimate_position
+
+
+def test_a_line_that_does_not_admit_a_model_keeps_its_own() -> None:
+    asked = hybrid.validate_scene(joined(model="catenary", accuracy="5%", mesh={"cells": 9}))
+    spec = runs.run_spec(asked, "rod", "1%")
+    assert spec.scene is not None and not spec.refused and list(spec.unchanged) == ["lines.chain"]
+    assert {name: x.chosen_model.kind for name, x in spec.scene.lines.items()} == {"rope": "rod", "chain": "catenary"}
+    assert all(x.mesh is None and x.accuracy is None for x in spec.scene.lines.values())
+    assert runs.run_spec(asked, "zones", "1%").refused, "no line has zones"
+    (dropped, *_) = tradeoff._notes(asked, {}, True)
+    assert "lines.chain.mesh, lines.chain.accuracy" in dropped
 
 
 @pytest.mark.slow  # a ladder of runs
