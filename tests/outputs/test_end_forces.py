@@ -174,6 +174,28 @@ def test_a_taut_leg_leaves_an_anchor_at_the_level_of_the_bed_as_one_a_micron_abo
         np.testing.assert_allclose(forces, forces[0], rtol=1e-5)
 
 
+def test_a_stiff_rod_that_rises_from_its_anchor_without_tension_does_not_lie_beside_it() -> None:
+    """Its tension counted as the weight of a cell, under which a line without bending would hang down to the bed.
+
+    It was 299 N upwards for 515 N with a buoyant middle, in cells of 1.5 m."""
+    rope = {"diameter": 0.085, "mass": 12.6, "axial_stiffness": 1.32e7, "bending_stiffness": 1.78e4}
+    sections = [
+        rope | {"length": 22.3},
+        rope | {"length": 24.3, "diameter": 0.202, "mass": 25.8},
+        rope | {"length": 31.6},
+    ]
+    places = {"start": [102.4, 41, -68.30569792314034], "end": [116.09, 15.24, -34.99]}
+    tables = {
+        "environment": {"fluid": {"density": RHO}, "seabed": {"z": places["start"][2], "stiffness": 3726}},
+        "cable": {"sections": sections},
+        "ends": {name: {"kind": "pinned", "position": place} for name, place in places.items()},
+        "initial": "equilibrium",
+        "model": "rod",
+    }
+    coarse, fine = (hybrid.static(tables | {"mesh": {"cells": n}}).reaction_start[0, 2] for n in (53, 212))
+    assert coarse == pytest.approx(fine, rel=0.01)
+
+
 @pytest.mark.long
 def test_what_a_support_at_the_level_of_the_bed_answers_to_is_known_in_motion() -> None:
     """Derivatives by mass along the steps of a run against runs with 0.1 % more and less.

@@ -38,6 +38,7 @@ SHORTEST = 1e-18  # of the cell, that lies: less is nothing, and more than nothi
 ROUND_OFF = 2.3e-16  # of the cell, to which the length that lies is known
 FAR = 40.0  # layers to a cell from which on the two ends of the cell do not know of each other
 LEAST_TENSION = 0.125  # of the weight of a cell: with less it would hang deeper than it is long
+STIFF = 9.6  # T h2/EI with which a string sags under its weight as a beam of a length h that turns freely at its ends
 SMALL_TENSION = 1e-3  # of sqrt(k EI), below which it does not change how a rod lies
 
 
@@ -247,6 +248,9 @@ def force_at_support(line, sea, ends, state, k, x, found):
     weigh = 1.0
     if h < FAR * layer.L:
         weigh = 1.0 - (h / layer.L / math.sinh(h / layer.L)) ** 2
+    if layer.EI > 0.0 and d1 < 0.0:  # a rod so stiff that it cannot come down to the bed from there lies nowhere
+        hangs = max(state.T[c], 0.0) + STIFF * layer.EI / (h * h)
+        weigh *= max(1.0 - (2.0 * hangs * d1 / (w * h * h)) ** 2, 0.0)
     return found + weigh * (force - coarse)
 
 
