@@ -1,10 +1,7 @@
 """Natural modes and responses of a scene about its equilibrium.
 
-`hybrid.modes`: natural periods and shapes of a scene about its equilibrium under full loads.
-
-`hybrid.response`: standard deviations, spectra and extremes in a stationary sea, linear about the equilibrium.
-
-At every frequency of the scene's waves and motions
+`hybrid.modes` has natural periods and shapes under full loads; `hybrid.response` standard deviations, spectra and
+extremes in a stationary sea.  At every frequency of the scene's waves and motions
 
     (A - w^2 M - i w C) q = f,      C = C_0 + C_d,
 

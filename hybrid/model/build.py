@@ -1,11 +1,7 @@
 """From the scene to the plan of a line, in space or in a plane.
 
-From a scene that lies in a plane to a line that is computed in it.
-
-From the scene to the plan: the only place where a Scene becomes arrays.
-
-`build(scene)` decides what the scene requires, fills the line's arrays with it and
-lists its contents: what is on and by which key, what is off.
+This is the only place where a Scene becomes arrays: `build(scene)` decides what the scene requires, fills the line's
+arrays with it and lists its contents: what is on and by which key, what is off.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Models that differ from another in numbers or in fewer nodes.
 
-The model of a scene that differs from another in numbers alone, on the same cells, without what begins a search.
-
-The same line on fewer nodes, and back: an equilibrium on a coarse mesh is a start for a fine one.
+Numbers differ on the same cells, without what begins a search.  An equilibrium on fewer nodes is a start for one on
+many.
 """
 
 from __future__ import annotations

@@ -1,13 +1,9 @@
 """A batch of states, and the output grid that it is brought to.
 
-From a mesh to the fixed output grid: interpolation as sparse matrices, of second order and more.
-
-Zone by zone: a joint, or a point load, may be a kink, and nothing is drawn across it.
-
-A batch of states on nodes, cells and ends of a line: what of it was computed, each array made once if needed.
-
-Arrays have the node or cell first, then the component, and the nb outputs of the batch last: one numpy operation serves
-the batch.
+The grid is reached by interpolation as sparse matrices, of second order and more, zone by zone: a joint, or a point
+load, may be a kink, and nothing is drawn across it.  What was computed of a batch is made once, if it is needed.
+Arrays have the node or cell first, then the component, and the nb outputs of the batch last: one numpy operation
+serves the batch.
 """
 
 from __future__ import annotations

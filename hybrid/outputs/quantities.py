@@ -1,8 +1,7 @@
 """Quantities that a scene asks for by name, and the use of sections.
 
-What sections bear, of a batch of states: stress of pipes (docs/theory.md), parts used of capacities and codes.
-
-Quantities that a scene asks for by name, of a batch of states: angles and forces at ends, layback, clearance.
+Of a batch of states: angles and forces at ends, layback, clearance; stress of pipes (docs/theory.md), and the parts
+that are used of capacities and codes.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Curvature and twist on the sides of an observation's stretches.
 
-Curvature and twist on the sides of an observation's stretches: of rods by their elements, of catenaries by bends.
+Rods have them by their elements, catenaries by bends.
 
 At ends of a stretch without an element they follow from the moment that is given there, or from the nodes inside.
 Between nodes the vector of curvature is interpolated, across the plane of the bend: its size alone would stay large

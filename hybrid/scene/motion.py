@@ -1,8 +1,6 @@
 """Prescribed motion of an end or a vessel.
 
-Motion of a vessel in waves by its RAOs, and the harmonics of a point of the vessel.
-
-RAOs are a CSV table or a dataset of Capytaine.
+RAOs of a vessel in waves are a CSV table or a dataset of Capytaine.
 
     symbol   meaning                                                           unit
     A, w, k  amplitude, angular frequency, wave vector of a wave               m, 1/s, 1/m
@@ -11,10 +9,8 @@ RAOs are a CSV table or a dataset of Capytaine.
     p        the point in axes of the vessel                                   m
 
 A degree of freedom with amplitude a and phase lag b moves as a A cos(w t - phi - b): a positive phase comes after the
-crest.  To first order in the angles, as RAOs are, a point moves by X + Q x p in axes of the vessel (x to the bow, y to
-port, z up, right-handed), which stand at `heading` from the inertial x axis.
-
-Prescribed motion of an end: position, velocity, frame and angular velocity at any time.
+crest.  To first order in the angles, as RAOs are, a point moves by X + Q x p in axes of the vessel (x to the bow, y
+to port, z up, right-handed), which stand at `heading` from the inertial x axis.
 
 Motion has to start from rest and stay smooth: `motion_checks` refuses what does not.
 

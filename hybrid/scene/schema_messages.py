@@ -1,11 +1,9 @@
 """The schema as a tree and in plain words.
 
-The schema as a tree: what a location or a path leads to, and which keys, kinds and descriptions stand there.
+The tree says what a location leads to, the words what a key expects, and what to try when it got something else.
 
 Everything is read off the models: types, bounds, units (in the descriptions) and the tags of unions, which show as
 ``<tag>`` in pydantic's locations and are dropped from the paths of keys.
-
-The schema in plain words: what a key expects, and what to try when it got something else.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
 """Spectra of irregular seas, and steady waves of finite height.
 
-Irregular seas of a scene by their spectra, and several together.
-
 Directions in degrees from x, counter-clockwise seen from above.
 
-Steady waves of finite height by the stream function (Rienecker and Fenton 1981).
-
-Its Fourier series meets the conditions at the surface.
+The Fourier series of the stream function (Rienecker and Fenton 1981) meets the conditions at the surface.
 
     symbol   meaning                                                                        unit
     H, d, T  height from trough to crest, depth, period                                     m, m, s

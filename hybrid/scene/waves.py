@@ -1,15 +1,13 @@
 """Waves on the sea of a scene, by numbers or from files.
 
-Waves from files: given one by one, or a measured elevation of the surface and its harmonics.
+They are regular, irregular by a spectrum, given wave by wave, or measured, as an elevation of the surface:
 
     symbol    meaning                                        unit
     A, w, phi amplitude, angular frequency, phase of a wave  m, 1/s, rad
     X_j       discrete Fourier transform of the elevation    m
 
-The harmonic j of N samples at steps dt from t0 on is (2/N) |X_j| cos(w_j (t - t0) + arg X_j), w_j = 2 pi j/(N dt); the
-wave that has it at a place is A cos(k.(x - place) - w t + phi) with phi = w t0 - arg X.
-
-Waves on the sea of a scene: regular, irregular by a spectrum, given wave by wave, or measured.
+The harmonic j of N samples at steps dt from t0 on is (2/N) |X_j| cos(w_j (t - t0) + arg X_j), w_j = 2 pi j/(N dt);
+the wave that has it at a place is A cos(k.(x - place) - w t + phi) with phi = w t0 - arg X.
 
 Directions in degrees from x, counter-clockwise seen from above.
 """

@@ -1,8 +1,7 @@
 """How near lines come to themselves and each other.
 
-How near a line comes to itself in a run: an event where its surfaces meet, and the least clearance for the file.
-
-Lines beside each other: their contact, whether they cross between two shapes, a watch over those without contact.
+There is an event where surfaces meet between which no contact is computed, and the least clearance for the file.
+Lines that cross between two shapes are found.
 """
 
 from __future__ import annotations

@@ -1,13 +1,11 @@
 """Other cells for a line of a run.
 
-A line of a run, as changes of its cells and nodes see it.
+Changes need no help of Python's: they go to arrays with room for the most cells that there can be.
 
-Other cells for a line of a run without Python's help: on arrays with room for the most that there can be.
-
-Two sets of arrays, the sides, take turns: a change goes from one to the other (kernels.mesh.remesh), and the tables of
-the run get the numbers of the other one.  What Python has of the line is made anew when the run comes back (`sync`).
-A planner derives from `Remesh`: cells that follow with kinds of cells (simulation.cell_changes), and nodes at a winch
-(simulation.payout_nodes).
+Two sets of arrays, the sides, take turns: a change goes from one to the other (kernels.mesh.remesh), and the tables
+of the run get the numbers of the other one.  What Python has of the line is made anew when the run comes back
+(`sync`). A planner derives from `Remesh`: cells that follow with kinds of cells (simulation.cell_changes), and nodes
+at a winch (simulation.payout_nodes).
 """
 
 from __future__ import annotations

@@ -1,15 +1,12 @@
 """A run made again from its checkpoint, and what a result leaves to be done.
 
-Checkpoints of a cable as hybrid-cable 1.0 and before kept them, as those of a run of one line.
-
-Such a tree has no names of lines: the state of the line, its books and the clock of the steps stand beside each other.
-
-A run made again from its checkpoint: the model from scene and mesh, what moves its zones, how finely it is computed.
+Trees of hybrid-cable 1.0 and before have no names of lines: the state of the line, its books and the clock of the
+steps stand beside each other.
 
 A checkpoint holds named arrays and plain values alone.  What follows from the scene is made from the scene, and every
 number that is read is checked for its type, its shape and, where a wrong one would do harm, its size.
 
-What a result leaves to be done: the rest of a run that was cut off, more of it, or other loads from some time on.
+Left to be done are the rest of a run that was cut off, more of it, or other loads from some time on.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """Events where a line may hockle, where the scheme fails a motion, and at knots.
 
-Events where the torque of a line is enough, for its tension, to throw a loop, and where it has thrown one.
-
-What the time scheme does to a motion: energy it creates or loses, periods that are off, unstable rest.
-
-Events of outputs where a knot of a line tightens, and where a line leaves a sheave.
+A line may hockle where its torque is enough, for its tension, to throw a loop.  The time scheme fails where it
+creates or loses energy, where periods are off, and where rest is unstable.  Lines that leave a sheave have an event,
+too.
 """
 
 from __future__ import annotations

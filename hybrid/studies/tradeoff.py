@@ -1,14 +1,10 @@
 """Error against cost: models at several accuracies and levels of demand.
 
-Error against cost: models at several accuracies on one scene, each run compared with a converged rod.
+Each run is compared with a converged rod, and kept in the folder, so that a second call computes only what is
+missing.
 
-Every finished run is kept in the folder, so that a second call computes only what is missing.
-docs/trade.md
-
-What three levels of demand cost with every model: position and tension; bending moments as well; curvature as well.
-
-Every run asks for the accuracy of its level, and is compared with a rod everywhere of a third of that error.
-docs/trade.md
+Levels of demand are position and tension; bending moments as well; curvature as well.  A run asks for the accuracy of
+its level, and is compared with a rod everywhere of a third of that error (docs/trade.md).
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Pages of a study, and pictures of a design.
 
-Pictures of a design: the lines of every case before and after, and histories that were measured.
-
-The page of a study: ranges, response curves, exceedance, parallel coordinates, and a table to sort and filter.
+The page of a study has ranges, response curves, exceedance, parallel coordinates, and a table to sort and filter.  A
+design has the lines of every case before and after, and histories that were measured.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
 """Changes of cells in a run: their lengths and their kinds.
 
-Other cells for a line in the middle of a run, on arrays that have room for the most that there can be.
-
 What a change of cells (kernels.mesh.remesh) calls: `plan_cells` places the nodes, kernels.mesh.remesh makes the line,
 kernels.mesh.cell_changes carries the state and its lengths, `renew` what the run knows beside, `before_forces` and
 `after_forces` the report of the state.
 
-A change of cells in a run: the state goes to the new ones, lengths go on smoothly, and the energy is known.
+Lengths go on smoothly through a change, and its energy is known.
 """
 
 from __future__ import annotations

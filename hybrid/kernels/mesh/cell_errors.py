@@ -1,6 +1,6 @@
 """What a cell makes wrong, and how long it may be where waves run.
 
-What a cell makes wrong, against the shares that the scene allows: one rule for its kind and its length.
+Errors count against the shares that the scene allows: one rule for the kind of a cell and its length.
 
     symbol   meaning                                                        unit
     e_k      error of leaving bending out of a cell: of its kind            m, N, 1/m, N m
@@ -10,10 +10,10 @@ What a cell makes wrong, against the shares that the scene allows: one rule for 
     kappa    curvature at a node                                            1/m
     angle    of a kink or between a clamp and the line                      rad
 
-Each has four parts: position, tension, curvature and bending moment.  A cell whose largest e_k/share is below 1 may be a
-catenary, any other is rod; either is as long as e_h allows (docs/theory.md, 13).
+Each has four parts: position, tension, curvature and bending moment.  A cell whose largest e_k/share is below 1 may
+be a catenary, any other is rod; either is as long as e_h allows (docs/theory.md, 13).
 
-How long cells may be where waves run: from the velocities of nodes, over time.
+Waves are seen from the velocities of nodes, over time.
 
     symbol   meaning                                                        unit
     v        velocity of a node                                             m/s
@@ -22,9 +22,10 @@ How long cells may be where waves run: from the velocities of nodes, over time.
     tau      time in which W changes by a factor of e at most               s
     finer    fineness: all lengths asked for are so many times as short     1
 
-A wave shorter than the cells bends no node of theirs, but moves them: a cell of length h interpolates the velocity with the
-error h^2 |v''| / 8.  What a change of cells leaves in the velocities lasts a few steps, and v'' of a wave passes zero
-twice a period: so log W follows that length no faster than t/tau, whatever the steps are, and is near its median.
+A wave shorter than the cells bends no node of theirs, but moves them: a cell of length h interpolates the velocity
+with the error h^2 |v''| / 8.  What a change of cells leaves in the velocities lasts a few steps, and v'' of a wave
+passes zero twice a period: so log W follows that length no faster than t/tau, whatever the steps are, and is near its
+median.
 """
 
 from __future__ import annotations

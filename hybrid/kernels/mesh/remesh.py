@@ -1,16 +1,14 @@
 """Other cells for a line in the middle of a run.
 
-Other cells for a line in the middle of a run: one road for cells that follow, kinds of cells and nodes at a winch.
+There is one road for cells that follow and nodes at a winch.
 
 Two sets of arrays with room for the most cells, the sides, take turns: a change goes from one to the other, and the
-tables of the run get the numbers of the other one.  A planner says whether a change is due and how many cells there will
-be; the parts of a change fill the new line, carry the state to it, and book what the run knows beside.
+tables of the run get the numbers of the other one.  A planner says whether a change is due and how many cells there
+will be; the parts of a change fill the new line, carry the state to it, and book what the run knows beside.
 
-Steps, planners and parts are kernels of their own and called by address: a kernel takes a table of addresses as constant
-(kernels.machine.references), so what writes to tables must not be one that reads them.  Tables differ with the side, the
-parity of the state and the number of cells: each is fixed numbers plus numbers per old and new cell.
-
-The fields of a line, of what its cells are made of per length; how they are copied and moved.
+Steps, planners and parts are kernels of their own and called by address: a kernel takes a table of addresses as
+constant (kernels.machine.references), so what writes to tables must not be one that reads them.  Tables differ with
+the side, the parity of the state and the number of cells: each is fixed numbers plus numbers per old and new cell.
 
 What a cell is made of is a row: weight, stiffness and curvature of rods, then by FIELDS whatever cells and nodes have
 in proportion to length.  A cell that grows at a winch has the means of all that it consists of.

@@ -1,11 +1,10 @@
 """When a stretch must be a rod, and how its bending comes in.
 
-When a stretch must be a rod: every criterion of the table, as a ratio, at every step.
-
-Every criterion is a ratio, what is there over what a catenary can stand: at 1 a stretch becomes a
-rod, and below the criterion's `off` it may become a catenary again.  Errors of position that leaving
-bending out would make (e_k of kernels.mesh.cell_errors) count against the shares that the scene allows: of position, tension,
-curvature and moment.  Slack, a torque near to a loop and contact have no bound in a catenary (docs/theory.md, 13).
+Every criterion of the table is evaluated at every step, as a ratio, what is there over what a catenary can stand: at
+1 a stretch becomes a rod, and below the criterion's `off` it may become a catenary again.  Errors of position that
+leaving bending out would make (e_k of kernels.mesh.cell_errors) count against the shares that the scene allows: of
+position, tension, curvature and moment.  Slack, a torque near to a loop and contact have no bound in a catenary
+(docs/theory.md, 13).
 
     symbol   meaning                                          shape  unit
     EI       bending stiffness at a node                      -      N m2
@@ -13,7 +12,7 @@ curvature and moment.  Slack, a torque near to a loop and contact have no bound 
     turn     |d_b - d_a| of the chords at a node              -      rad
     Mt       torque                                           -      N m
 
-Bending on its way in and out: how much of its stiffness every node has, and the energy that a change of it frees.
+Bending comes in and goes out by a share of its stiffness, whose change frees energy.
 
 grown: (n,) of base cells, 0 to 1; leaving: (n,) those on their way out; ramp_factor: (n,) times as fast as the others
 that some come in.  Times in ramp times of the manager.

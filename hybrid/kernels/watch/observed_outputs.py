@@ -4,10 +4,11 @@ The balance across the bed beside edges of contact is solved anew on parts of ce
 
     (T w')' - (EI w'')'' + q + P(-w, -dw/dt) = 0
 
-over some cells about the edge, each cut into parts, by Newton's method (outputs.edge_errors says what for).  Loads q are
-those that balance the nodes.  Heights of the first and last node stay, with the curvature there; at a clamp the first
-part turns against its direction.  Without the bed and for T > 0 minus the derivative of the balance is symmetric and
-positive definite, and the bed adds to its diagonal: A = L D L^T with two diagonals below the main one, without pivoting.
+over some cells about the edge, each cut into parts, by Newton's method (outputs.edge_errors says what for).  Loads q
+are those that balance the nodes.  Heights of the first and last node stay, with the curvature there; at a clamp the
+first part turns against its direction.  Without the bed and for T > 0 minus the derivative of the balance is
+symmetric and positive definite, and the bed adds to its diagonal: A = L D L^T with two diagonals below the main one,
+without pivoting.
 
     symbol  meaning                                                      unit
     w       height above where contact begins, at nodes                  m
@@ -18,7 +19,7 @@ positive definite, and the bed adds to its diagonal: A = L D L^T with two diagon
     q       load per length that is not of the bed                       N/m
     a, b, c main diagonal of A, without the bed, first and second below  N/m
 
-What the states of a batch of outputs mean, in one call: moments, strains, energies, bends of catenaries.
+Besides there are moments, strains, energies and bends of catenaries.
 """
 
 from __future__ import annotations
