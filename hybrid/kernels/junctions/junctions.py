@@ -532,7 +532,7 @@ def correct_torques(system):
     """Corrections of lines with the torque through their catenary zones."""
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
-        pass_torque(1, job.line, job.ends, job.new, job.work, CORRECT, system.asked.scheme_cv)
+        pass_torque(1, job, job.new, CORRECT, system.asked.scheme_cv)
 
 
 @inner

@@ -65,7 +65,6 @@ from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, SELF_FRICTION_WORK
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.newton import (
-    ADDRESS,
     ASKED,
     FIND,
     FINISH,
@@ -76,6 +75,7 @@ from hybrid.kernels.step.newton import (
     REST,
     ask_contact,
     read,
+    touches,
     with_radius,
 )
 
@@ -424,7 +424,7 @@ def prepare_sweeps(system, job):
 def touching(system, job, l):
     """Points of the contact that a line has."""
     line_job = read(system.tables[l])
-    if not line_job.contact[ADDRESS] > 0:
+    if not touches(line_job):
         return 0
     return read_contact(job.contacts[l]).contact.counts.points
 
@@ -550,8 +550,8 @@ def put_contact(system, job):
     points = 0
     for l in range(system.tables.shape[0]):
         line_job = read(system.tables[l])
-        if line_job.contact[ADDRESS] > 0:
-            ask_contact(line_job.contact, line_job.contact_table, REST if job.rests[0] else FIND)
+        if touches(line_job):
+            ask_contact(line_job, REST if job.rests[0] else FIND)
             contact = read_contact(job.contacts[l]).contact
             if contact.counts.overflow:
                 return NO_SOLUTION
@@ -571,11 +571,11 @@ def prepare_contact(system):
     safe, task, t = 1.0, task_of(system.asked), system.asked.time
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
-        if job.contact[ADDRESS] > 0:
+        if touches(job):
             clock = job.books.clock
             clock.now, clock.try_end, clock.step_before, clock.rho = t - task.dt, t, task.before, task.rho
             clock.rho_before = task.rho_before
-            safe = min(safe, ask_contact(job.contact, job.contact_table, PREPARE))
+            safe = min(safe, ask_contact(job, PREPARE))
     return safe
 
 
@@ -586,13 +586,13 @@ def largest_radius(system):
     rho = task.rho
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
-        if job.contact[ADDRESS] > 0:
-            rho = min(rho, ask_contact(job.contact, job.contact_table, RADIUS))
+        if touches(job):
+            rho = min(rho, ask_contact(job, RADIUS))
     common = with_radius(task, rho)
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
-        if job.contact[ADDRESS] > 0:
-            own = ask_contact(job.contact, job.contact_table, RADIUS)
+        if touches(job):
+            own = ask_contact(job, RADIUS)
             clock = job.books.clock
             if own > rho:
                 clock.rho *= rho / own
@@ -606,8 +606,8 @@ def safe_part(system):
     part = 1.0
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
-        if job.contact[ADDRESS] > 0:
-            part = min(part, ask_contact(job.contact, job.contact_table, LIMIT))
+        if touches(job):
+            part = min(part, ask_contact(job, LIMIT))
     return part
 
 

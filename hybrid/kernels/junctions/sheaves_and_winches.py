@@ -44,7 +44,7 @@ from hybrid.kernels.reel.reel import MOVES, WAITS
 from hybrid.kernels.reel.reel import read as read_reel
 from hybrid.kernels.state.report import ALONE, BEARING, FREE, INERTIA, LEFT_OVER, SPIN, TRUE, YIELDING
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.newton import STEP, call_reel, read
+from hybrid.kernels.step.newton import STEP, read, wind
 
 
 class SpinningJob(NamedTuple):
@@ -297,7 +297,7 @@ def give_lengths(system):
             stage = read_reel(line_job.reel_table).reel.stage
             left = stage.out_of_balance - line_job.work.x[int(stage.pulls_at), 0]
             stage.change, stage.lengthens = -system.asked.part * left / stage.alone, MOVES
-            call_reel(line_job.iterated, line_job.reel_table)
+            wind(line_job)
 
 
 @kernel

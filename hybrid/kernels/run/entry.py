@@ -39,7 +39,6 @@ from hybrid.kernels.step.newton import (
     OK,
     RUN,
     STEP,
-    Calls,
     Limits,
     Task,
     blank_job,
@@ -60,9 +59,7 @@ def solve_job(plane, space, job):
     Returns as kernels.step.newton.solve.
     """
     task, clock, old, new, was, now = job.task, job.books.clock, job.old, job.new, job.was, job.now
-    iterated = 0
     if task.what == RUN:
-        iterated = job.iterated
         if job.books.counts.parity:
             old, new, was, now = job.new, job.old, job.now, job.was
         dt = clock.try_end - clock.now
@@ -72,8 +69,7 @@ def solve_job(plane, space, job):
             limits = Limits(limits.reach, limits.scale, min(left, limits.most), limits.tolerance)
         fixed = job.books.counts.controlled == 0
         task = Task(STEP, dt, clock.step_before, clock.rho, 0.0, 0.0, False, limits, cut, clock.rho_before, fixed)
-    states, calls = States(old, new, was, now), Calls(job.contact, job.contact_table, iterated, job.reel_table)
-    return solve(plane, space, task, job.line, job.sea, job.ends, states, job.work, job.books.strains, calls)
+    return solve(plane, space, task, job, States(old, new, was, now))
 
 
 @kernel

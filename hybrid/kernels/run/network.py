@@ -61,7 +61,6 @@ from hybrid.kernels.junctions.borders import (
 )
 from hybrid.kernels.junctions.junctions import move_joints
 from hybrid.kernels.junctions.network_job import read_system, task_of
-from hybrid.kernels.laws.bending_law import BEHIND_REST, BEHIND_STEP
 from hybrid.kernels.laws.end_motion import sea_at
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import put_matrix as put_matrix_of
@@ -77,7 +76,6 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.report import (
     ENDED,
-    FRICTION,
     LOCAL_ERROR,
     RESIDUAL,
     RESIDUAL_NODE,
@@ -90,19 +88,17 @@ from hybrid.kernels.state.report import (
 from hybrid.kernels.state.report import TURNED as TURNED_AXES
 from hybrid.kernels.step.accept import book_torques, impose_now, keep_past, watch
 from hybrid.kernels.step.newton import (
-    ADDRESS,
     ASSEMBLY,
     CORRECTION,
     CUT_SHORT,
     EQUILIBRIUM,
-    FINISH,
     GAIN,
     LARGEST_TURN,
     LOW_TENSION,
-    NEAR,
     NOT_CONVERGED,
     NOT_FINITE,
     OK,
+    OPEN,
     REST,
     SINGULAR,
     SLACK,
@@ -111,24 +107,26 @@ from hybrid.kernels.step.newton import (
     WHOLE,
     Task,
     ask_contact,
+    begin_line_step,
     call_quantities,
     call_reel,
-    end_slip,
+    carry,
+    end_line_step,
     has_converged,
-    linearise_law,
-    most_turn,
+    may_gain,
     read,
     round_off_tension,
+    rubs,
+    touches,
+    wind,
     with_radius,
 )
 from hybrid.kernels.step.sampling import SAME_TIME, frame_between, hermite, parabola, sample_head, sample_state
-from hybrid.kernels.step.step import LARGEST_STEP_TURN, States, begin_step, end_step, find_rates
+from hybrid.kernels.step.step import LARGEST_STEP_TURN, States, find_rates
 from hybrid.kernels.step.step_control import Scheme, scheme
 from hybrid.kernels.watch.extremes import first_strains, note_extremes
 
 JUNCTIONS = 5
-# Of an iteration: its corrections are found, and are to be made.
-OPEN = -2
 call_solver = caller((0, 0, 0.0, 0))
 # Places among the numbers of a job, whose first field is its task.
 TASK_CV = Task._fields.index("cv")
@@ -148,8 +146,8 @@ def march_lines(system, steps):
     for l in range(tables.shape[0]):
         job = read(tables[l])
         n = job.line.h.shape[0]
-        if steps and job.iterated != 0:
-            call_reel(job.iterated, job.reel_table)
+        if steps:
+            wind(job)
         outcome, _, _, where = call_solver(system.solver, tables[l])
         # the last block is not solved yet; forces of a line alone are known whatever its equations are
         known = joints[l, END] >= 0 and where == n
@@ -157,8 +155,8 @@ def march_lines(system, steps):
             known = job.work.report[RESIDUAL] < math.inf
         if outcome != OK and not (outcome == SINGULAR and known):
             return l, where
-        if steps and job.iterated != 0:
-            call_reel(job.iterated, job.reel_table)
+        if steps:
+            wind(job)
     ask(system, FORCE)
     return -1, -1
 
@@ -186,19 +184,17 @@ def size_up(tables, ca):
 
 
 @inner
-def linearise_laws(tables, s):
-    """Mean tensions of lines whose tensions are no multiples of strains, with the last correction."""
-    for l in range(tables.shape[0]):
-        job = read(tables[l])
-        linearise_law(job.line, job.sea, job.old, job.new, job.work, s.dt, s.cv, s.ca)
+def states_of(job):
+    """The states between which a line is solved with others."""
+    return States(job.old, job.new, job.was, job.now)
 
 
 @inner
-def end_slips(tables, part):
-    """How far layers of all lines have slipped."""
+def carry_lines(tables, s, what):
+    """What all lines remember goes to where the last correction has led."""
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        end_slip(job.line, job.ends, job.old, job.new, job.work, part)
+        carry(job, states_of(job), s, what)
 
 
 @inner
@@ -209,8 +205,8 @@ def begin_lines(tables, s, safe):
     """
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        turn, cell = begin_step(None, 1, job.line, job.sea, job.old, job.new, job.work.u, s, safe)
-        if not turn < most_turn(job.contact):
+        far, turn, cell = begin_line_step(None, 1, job, states_of(job), s, safe)
+        if far:
             return l, turn, cell
     return -1, 0.0, -1
 
@@ -226,17 +222,13 @@ def end_lines(tables, joints, floors, s, task, good):
         job = read(tables[l])
         find_rates(1, job.line, job.sea, job.old, job.new, job.work.u, s)
         if good:
-            touches = job.contact[ADDRESS] > 0
-            if touches:
-                job.work.report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, FINISH)
-            states = States(job.old, job.new, job.was, job.now)
-            turn, cell = end_step(None, 1, job.line, job.sea, job.ends, states, s, task, job.work, job.books.strains)
-            if not turn < most_turn(job.contact):
+            far, turn, cell = end_line_step(None, 1, task, job, states_of(job), s)
+            if far:
                 return l, turn, cell
             report = job.work.report
-            if touches and job.reel == 0 and 0.5 * task.dt >= job.books.clock.shortest:
+            if may_gain(job, task.dt):
                 move_joints(job, joints[l, START], joints[l, END])
-                if ask_contact(job.contact, job.contact_table, GAIN) > 0.0:
+                if ask_contact(job, GAIN) > 0.0:
                     return l, turn, cell  # it creates energy: in halves
             if not report[SLACKEST] > floors[l]:
                 return l, 0.0, int(report[SLACKEST_CELL])
@@ -296,9 +288,9 @@ def begin_books(tables, joints, t):
                 grip_obstacles(line, sea, job.work.u, new, new.grip, new.grip)
             for i in range(new.r.shape[0]):
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
-        if job.contact[ADDRESS] > 0:
+        if touches(job):
             books.clock.now = t
-            report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, REST)
+            report[SELF_CONTACT_ENERGY] = ask_contact(job, REST)
         move_joints(job, joints[l, START], joints[l, END])
         if job.reel != 0:
             call_reel(job.reel, job.reel_table)
@@ -376,16 +368,13 @@ def predict_step(system, task, t):
 
 @inner
 def give_scheme(system, task, s):
-    """Tell all lines and borders of the scheme with which they are marched; whether anything rubs, as a number."""
-    rubs, tables, numbers = 0, system.tables, system.numbers
+    """Tell all lines and borders of the scheme with which they are marched; whether anything rubs."""
+    rub, tables, numbers = False, system.tables, system.numbers
     system.asked.scheme_cv, system.asked.scheme_ca = s.cv, s.ca
     for l in range(tables.shape[0]):
         numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
-        job = read(tables[l])
-        rubs |= job.line.bits & FRICTION
-        if job.contact[ADDRESS] > 0:
-            rubs |= job.contact[NEAR]
-    return rubs
+        rub = rubs(read(tables[l])) or rub
+    return rub
 
 
 @inner
@@ -417,7 +406,7 @@ def find_corrections(system, task, s, it):
         return SINGULAR, line, where
     ask(system, BALANCE)
     if task.what == ASSEMBLY:
-        linearise_laws(tables, s)  # rates of twist are known now
+        carry_lines(tables, s, task.what)  # rates of twist are known now
         return OK, -1, -1
     ask(system, BLOCK)
     if task.what == JUNCTIONS:
@@ -434,7 +423,7 @@ def find_corrections(system, task, s, it):
 
 
 @inner
-def find_part(system, task, s, it, rubs):
+def find_part(system, task, s, it, rub):
     """The part of the corrections that is made, and their size as Newton compares it, its line and cell."""
     shift, turn, size, line, where = size_up(system.tables, s.ca)
     moves = system.moves
@@ -445,7 +434,7 @@ def find_part(system, task, s, it, rubs):
     part = min(1.0, 1.0 / shift) if shift > 0.0 else 1.0
     if turn * part > LARGEST_TURN:
         part = LARGEST_TURN / turn
-    if rubs != 0 and s.cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
+    if rub and s.cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
         part *= 0.5
     return min(part, ask(system, SAFE_PART)), size, line, where
 
@@ -463,7 +452,7 @@ def make_corrections(system, s, part):
 @inner
 def iterate(system, task, s):
     """Newton's iterations: outcome, their number, predicted next correction, line and cell, whether it was cut short."""
-    most, rubs = task.limits.most, give_scheme(system, task, s)
+    most, rub = task.limits.most, give_scheme(system, task, s)
     before, left, size = math.inf, math.inf, math.inf
     outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
     ask(system, FORGET)
@@ -473,7 +462,7 @@ def iterate(system, task, s):
         if found != OPEN:
             outcome, before = found, math.inf
             break
-        part, size, line, where = find_part(system, task, s, it, rubs)
+        part, size, line, where = find_part(system, task, s, it, rub)
         make_corrections(system, s, part)
         outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
         before = size if part == 1.0 else math.inf
@@ -507,8 +496,7 @@ def solve_system(table):
     outcome, it, left, line, where, cut_short = iterate(system, task, s)
     if task.what == STEP or task.what == EQUILIBRIUM:
         ask(system, CARRY)
-        linearise_laws(tables, s)
-        end_slips(tables, BEHIND_STEP if task.what == STEP else BEHIND_REST)
+        carry_lines(tables, s, task.what)
     if task.what == STEP:
         bad, line_of_bad, cell = end_system_step(system, task, s, outcome == OK)
         if bad != OK:

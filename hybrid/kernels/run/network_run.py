@@ -53,7 +53,6 @@ from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKES
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import note_cuts, renew_accelerations, watch_push
 from hybrid.kernels.step.newton import (
-    ADDRESS,
     CUT_SHORT,
     GAIN,
     OK,
@@ -64,6 +63,7 @@ from hybrid.kernels.step.newton import (
     call_follower,
     call_itself,
     call_solver,
+    may_gain,
     read,
 )
 from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, note_past, passes
@@ -211,14 +211,6 @@ def renew_water(steps, system):
 
 
 @inner
-def gains(job, clock):
-    """Whether contact of a line with itself has put energy in, in a try that may be halved."""
-    if not job.contact[ADDRESS] > 0 or job.reel != 0 or 0.5 * (clock.try_end - clock.now) < clock.shortest:
-        return False
-    return ask_contact(job.contact, job.contact_table, GAIN) > 0.0
-
-
-@inner
 def try_lone(steps, system):
     """Solve the step that is tried of every line that is joined to nothing that moves with it.
 
@@ -234,7 +226,7 @@ def try_lone(steps, system):
         outcome, it, left, where = call_solver(steps.marchers[j], steps.lone[j])
         if outcome == CUT_SHORT:
             outcome, steps.counts.is_cut = OK, 1
-        if outcome == OK and gains(job, clock):
+        if outcome == OK and may_gain(job, clock.try_end - clock.now) and ask_contact(job, GAIN) > 0.0:
             outcome = TURNED_TOO_FAR  # in halves
         if outcome == OK and not job.work.report[SLACKEST] > system.floors[l]:
             outcome, where = SLACK, int(job.work.report[SLACKEST_CELL])

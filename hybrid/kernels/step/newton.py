@@ -5,9 +5,23 @@ Newton's method for one step (in time, or one static solve): the only nonlinear 
 Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
 tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.march.march).
 
-`solve` is inlined in the one entry to all that needs the march (kernels.run.network_run): a second one would compile it once more.
+`solve` is inlined in the one entry to all that needs the march (kernels.run.entry): a second one would compile it once more.
 
 All that steps of a line need, by reference: what an entry of kernels.run.entry gets as its table.
+
+What is beside the band of the line is a border.  Newton asks all of them a question in one place, by the function that is
+named here, and in this order; of a line that does not have it each costs a comparison.  The Newton of joined lines
+(kernels.run.network) asks the same functions of each line where no border of joined lines takes their place.
+
+    border                     prepare       before_march     after_march  couple      safe_part  move_borders  carry
+    torque through catenaries                torques                       correction                           powers
+    law of length                            linearised                                                         means
+    layers that slip                         what they bear                                                     slip
+    winch                                    nodes that ride  length
+    sheaves                                                                angles                 angles
+    contact with itself        part, radius                                forces      part                     energy
+
+The powers of torques and the energy of contact are of a step that is found alone (`solve`, `end_line_step`).
 """
 
 from __future__ import annotations
@@ -61,6 +75,7 @@ call_reel = caller(0)
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = range(6)  # errors.Outcome, as kernels see it
 CUT_SHORT = -1  # a step that is taken though Newton has not converged in the iterations it may take (Task.cut)
 STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = range(5)
+OPEN = -2  # of an iteration: its corrections are found, and are to be made
 
 
 # Newton stops when the next correction, predicted from the last two by quadratic
@@ -95,19 +110,6 @@ class Task(NamedTuple):
     fixed: bool = False  # whether steps have a fixed length, but for parts of one
 
 
-class Calls(NamedTuple):
-    """What is called by its address while a step is solved, and its tables.
-
-    contact: of a step of a line in space that may meet itself (kernels.contact.self_contact); its address is 0 for
-    others.  reel: address of kernels.reel.payout.iterate, for a line that is paid out; 0: iterations need nothing of it.
-    """
-
-    contact: NDArray[np.int64]
-    contact_table: NDArray[np.int64]
-    reel: int
-    reel_table: NDArray[np.int64]
-
-
 # Below this the correction is accepted when it no longer shrinks: round-off of ill-scaled lines.
 ROUND_OFF = 1e-6
 # Round-off of the length of the line, as a part of it (equal cells are all rounded the same way), and the most, as a
@@ -121,44 +123,6 @@ LOW_TENSION = 1e-3
 # A chord that would turn by more than this in one iteration shortens the whole correction
 # (damped Newton): the linearised constraint of length is useless beyond about half a radian.
 LARGEST_TURN = 0.7
-
-call_torque = caller_of_six(0)
-call_law = caller_of_six(0)
-call_slip = caller_of_six(0)
-# ca, 1/s2, of a solve for accelerations is larger (solve.stepper.HEAVY): mean tensions stay as they are.
-AT_REST = 1e30
-
-
-@inner
-def pass_torque(space, line, ends, state, work, part, cv):
-    """A part of what a torque through catenary zones takes (kernels.march.zone_torque), where there is one."""
-    if space is not None:
-        if work.torsion.address != 0:
-            call_torque(work.torsion.address, line, ends, state, work, part, cv)
-
-
-@inner
-def linearise_law(line, sea, old, new, work, dt, cv, ca):
-    """Linearise the law of length where tension is no multiple of strain (kernels.laws.axial_law); dt: s, of a step, else 0."""
-    if line.law_at.shape[0] != 0:
-        if not dt > 0.0 and not (cv == 0.0 and ca < AT_REST):
-            dt = -1.0
-        call_law(line.law_at[0], line, old, new, work, dt, sea.now[0])
-
-
-@inner
-def begin_slip(line, ends, old, new, work, dt, cv, ca):
-    """Before a march: how far layers have slipped that slip on each other (kernels.laws.bending_law), if there are any."""
-    if line.slip_at.shape[0] != 0:
-        part = IN_MOTION if dt > 0.0 or cv != 0.0 or ca >= AT_REST else LOADED_FIRST
-        call_slip(line.slip_at[0], line, ends, old, new, work, part)
-
-
-@inner
-def end_slip(line, ends, old, new, work, part):
-    """How far they have slipped after a step (BEHIND_STEP), in an equilibrium (BEHIND_REST)."""
-    if line.slip_at.shape[0] != 0:
-        call_slip(line.slip_at[0], line, ends, old, new, work, part)
 
 
 @inner
@@ -192,19 +156,6 @@ def has_converged(size, before, it, part, tolerance):
 
 
 @inner
-def ask_contact(contact, table, what):
-    """What kernels.contact.self_contact answers."""
-    contact[ASKED] = what
-    return call_contact(contact[ADDRESS], table)
-
-
-@inner
-def most_turn(contact):
-    """The largest turn, rad, of a chord in a step."""
-    return LARGEST_STEP_TURN if contact[ADDRESS] == 0 else LARGEST_CONTACT_TURN
-
-
-@inner
 def with_radius(task, rho):
     """The task of a step with its spectral radius where that of equal steps is rho."""
     before, rho_before = task.before, task.rho_before
@@ -214,128 +165,6 @@ def with_radius(task, rho):
     return Task(
         task.what, task.dt, before, rho, task.cv, task.ca, task.turning, task.limits, task.cut, rho_before, task.fixed
     )  # fmt: skip
-
-
-@inner
-def start_step(plane, space, task, line, sea, old, new, work, contact, contact_table):
-    """Predict the end of a step; the task with its spectral radius, its scheme, and the largest turn and its cell.
-
-    Where the line touches itself the radius is 0: what contact excites within a step must not stay.
-    """
-    rho, safe = task.rho, 1.0
-    if contact[ADDRESS] != 0:
-        safe = ask_contact(contact, contact_table, PREPARE)
-        rho = ask_contact(contact, contact_table, RADIUS)
-    task = with_radius(task, rho)
-    s = scheme(task.rho, task.before, task.rho_before, task.dt)
-    turn, where = begin_step(plane, space, line, sea, old, new, work.u, s, safe)
-    return task, s, turn, where
-
-
-@inner
-def solve(plane, space, task, line, sea, ends, states, work, strains, calls):
-    """Do a task at the configuration `new` of `States`, of a step that starts at old.r.
-
-    STEP            predict `new` from `old`, solve, find the rates; strains: of the elements, empty: not wanted
-    EQUILIBRIUM     solve from the prediction in work.u and `new`
-    ASSEMBLY        one march, for its report and its block rows
-    CORRECTION      one march and the solution of its equations, into work.x
-
-    Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
-    prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
-    may end on a branch that has nothing to do with it.  With task.cut a step whose last iteration made a full correction
-    is taken though it has not converged (CUT_SHORT); its report is of the iterate before that correction.
-    """
-    old, new, _, _ = states
-    contact, contact_table, reel, reel_table = calls
-    reach, scale, most, tolerance = task.limits
-    s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
-    if task.what == STEP:
-        task, s, turn, where = start_step(plane, space, task, line, sea, old, new, work, contact, contact_table)
-        if not turn < most_turn(contact):
-            return TURNED_TOO_FAR, 0, turn, where
-    cv, ca = s.cv, s.ca
-    before, left = math.inf, math.inf
-    noise = round_off_tension(line, ca, scale)
-    outcome, it, where, size = NOT_CONVERGED, 0, -1, math.inf
-    while it < most and outcome == NOT_CONVERGED:
-        it += 1
-        bad, good = -1, True
-        pass_torque(space, line, ends, new, work, BEFORE_MARCH, cv)
-        linearise_law(line, sea, old, new, work, task.dt, cv, ca)
-        begin_slip(line, ends, old, new, work, task.dt, cv, ca)
-        if reel != 0:
-            call_reel(reel, reel_table)
-        if space is not None:
-            bad = march(line, sea, ends, old.r, new, cv, ca, work)
-        if plane is not None:
-            bad = march_planar(line, sea, ends, old.r, new, cv, ca, work)
-        if bad >= 0:
-            outcome, where = SINGULAR, bad
-            if not work.report[RESIDUAL] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
-                outcome, where = NOT_FINITE, int(work.report[RESIDUAL_NODE])
-            break
-        if task.what == ASSEMBLY:
-            outcome = OK
-            break
-        if reel != 0:
-            call_reel(reel, reel_table)
-        if space is not None:
-            good = substitute(work.X, work.x)
-            pass_torque(space, line, ends, new, work, CORRECT, cv)
-            if new.sheave.shape[0] > 0 and task.what == STEP:
-                turn_with(line, sea, ends, old.r, new, work, cv, ca)
-        if plane is not None:
-            good = substitute_planar(plane, work.X, work.x)
-        if not good:
-            outcome, where = NOT_FINITE, first_bad(work.x, new.e)
-            break
-        if task.what == CORRECTION:
-            outcome = OK
-            break
-        if contact[ADDRESS] != 0 and not ask_contact(contact, contact_table, TOUCH) > 0.0:
-            before = math.inf
-            break
-        shift, turn, where, pull, big = measure(new.e, new.T, work.x)
-        part = 1.0
-        if shift > reach and not task.turning:
-            part = reach / shift
-        if turn * part > LARGEST_TURN:
-            part = LARGEST_TURN / turn
-        if (line.bits & FRICTION or contact[NEAR] != 0) and cv > 0.0 and it in (7, 10, 13):
-            part *= 0.5  # it goes round between sticking and sliding, or feet of contact between two pieces
-        if contact[ADDRESS] != 0:
-            part = min(part, ask_contact(contact, contact_table, LIMIT))
-        update(plane, space, line, new, cv, ca, part, task.turning, work)
-        if space is not None:
-            if new.sheave.shape[0] > 0 and task.what == STEP:
-                roll_on(line, sea, new, s, part, work.x)
-        turn = max(turn, WHOLE * shift / reach)
-        size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
-        outcome, left = has_converged(size, before, it, part, tolerance)
-        before = size if part == 1.0 else math.inf
-    cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
-    if cut_short:
-        outcome = OK
-        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
-            left = size
-    if task.what == STEP:
-        find_rates(space, line, sea, old, new, work.u, s)
-    if task.what != ASSEMBLY or work.couple.shape[0] > 0:  # rates of twist are known now
-        linearise_law(line, sea, old, new, work, task.dt, cv, ca)
-    if task.what == STEP or task.what == EQUILIBRIUM:
-        end_slip(line, ends, old, new, work, BEHIND_STEP if task.what == STEP else BEHIND_REST)
-    pass_torque(space, line, ends, new, work, AFTER_STEP, cv)
-    if task.what == STEP:
-        if outcome == OK:
-            if contact[ADDRESS] != 0:
-                work.report[SELF_CONTACT_ENERGY] = ask_contact(contact, contact_table, FINISH)
-            turn, cell = end_step(plane, space, line, sea, ends, states, s, task, work, strains)
-            if not turn < most_turn(contact):
-                outcome, where = TURNED_TOO_FAR, cell
-            elif cut_short:
-                outcome = CUT_SHORT
-    return outcome, it, left, where
 
 
 class Job(NamedTuple):
@@ -381,3 +210,267 @@ def blank_job() -> Job:
 read = reader(blank_job())
 call_solver, call_follower, call_itself = caller((0, 0, 0.0, 0)), caller(0), caller(0)
 call_quantities = caller(0)
+
+call_torque = caller_of_six(0)
+call_law = caller_of_six(0)
+call_slip = caller_of_six(0)
+# ca, 1/s2, of a solve for accelerations is larger (solve.stepper.HEAVY): mean tensions stay as they are.
+AT_REST = 1e30
+
+
+# --- borders of a line: one of them at a time ---------------------------------------------------------------
+
+
+@inner
+def pass_torque(space, job, state, part, cv):
+    """A part of what a torque through catenary zones takes (kernels.march.zone_torque), where there is one."""
+    if space is not None:
+        if job.work.torsion.address != 0:
+            call_torque(job.work.torsion.address, job.line, job.ends, state, job.work, part, cv)
+
+
+@inner
+def linearise_law(job, states, s):
+    """Linearise the law of length where tension is no multiple of strain (kernels.laws.axial_law)."""
+    if job.line.law_at.shape[0] != 0:
+        dt = s.dt
+        if not dt > 0.0 and not (s.cv == 0.0 and s.ca < AT_REST):
+            dt = -1.0
+        call_law(job.line.law_at[0], job.line, states.old, states.new, job.work, dt, job.sea.now[0])
+
+
+@inner
+def pass_slip(job, states, part):
+    """A part of what layers that slip on each other take (kernels.laws.bending_law), if there are any."""
+    if job.line.slip_at.shape[0] != 0:
+        call_slip(job.line.slip_at[0], job.line, job.ends, states.old, states.new, job.work, part)
+
+
+@inner
+def wind(job):
+    """What a line that is paid out does in an iteration of a step (kernels.reel.payout.iterate)."""
+    if job.iterated != 0:
+        call_reel(job.iterated, job.reel_table)
+
+
+@inner
+def touches(job):
+    """Whether contact of the line is computed with the line."""
+    return job.contact[ADDRESS] > 0
+
+
+@inner
+def ask_contact(job, what):
+    """What kernels.contact.self_contact answers."""
+    job.contact[ASKED] = what
+    return call_contact(job.contact[ADDRESS], job.contact_table)
+
+
+@inner
+def rubs(job):
+    """Whether forces on the line jump between sticking and sliding, or where feet of contact change the piece."""
+    return (job.line.bits & FRICTION) != 0 or (touches(job) and job.contact[NEAR] != 0)
+
+
+@inner
+def may_gain(job, dt):
+    """Whether a step of dt (s) is repeated in halves where contact of the line with itself has put energy in."""
+    return touches(job) and job.reel == 0 and 0.5 * dt >= job.books.clock.shortest
+
+
+# --- borders of a line: one question of all of them ----------------------------------------------------------
+
+
+@inner
+def prepare(job, rho):
+    """Before a step is tried: the part of its prediction that is safe, and its spectral radius, where equal steps have rho.
+
+    Where the line touches itself the radius is 0: what contact excites within a step must not stay.
+    """
+    safe = 1.0
+    if touches(job):
+        safe = ask_contact(job, PREPARE)
+        rho = ask_contact(job, RADIUS)
+    return safe, rho
+
+
+@inner
+def before_march(space, job, states, s, what):
+    """What borders do to the equations of the configuration, before they are assembled."""
+    pass_torque(space, job, states.new, BEFORE_MARCH, s.cv)
+    linearise_law(job, states, s)
+    pass_slip(job, states, IN_MOTION if s.dt > 0.0 or s.cv != 0.0 or s.ca >= AT_REST else LOADED_FIRST)
+    if what == STEP:
+        wind(job)
+
+
+@inner
+def after_march(job, what):
+    """What they do to equations that are eliminated, before these are solved."""
+    if what == STEP:
+        wind(job)
+
+
+@inner
+def couple(space, job, states, s, what, good):
+    """Put borders into a correction that was found without them, and is `good` if it is finite; False: that fails."""
+    pass_torque(space, job, states.new, CORRECT, s.cv)
+    if space is not None:
+        if states.new.sheave.shape[0] > 0 and what == STEP:
+            turn_with(job.line, job.sea, job.ends, states.old.r, states.new, job.work, s.cv, s.ca)
+    if good and what != CORRECTION and touches(job):
+        return ask_contact(job, TOUCH) > 0.0
+    return True
+
+
+@inner
+def safe_part(job):
+    """The part of a correction that is safe."""
+    return ask_contact(job, LIMIT) if touches(job) else 1.0
+
+
+@inner
+def move_borders(space, job, new, s, part, what):
+    """Their unknowns move by the part of the correction that is made."""
+    if space is not None:
+        if new.sheave.shape[0] > 0 and what == STEP:
+            roll_on(job.line, job.sea, new, s, part, job.work.x)
+
+
+@inner
+def carry(job, states, s, what):
+    """What they remember goes to where a solution has led."""
+    linearise_law(job, states, s)
+    if what in (STEP, EQUILIBRIUM):
+        pass_slip(job, states, BEHIND_STEP if what == STEP else BEHIND_REST)
+
+
+# --- a step of a line, whichever Newton solves it ------------------------------------------------------------
+
+
+@inner
+def most_turn(job):
+    """The largest turn, rad, of a chord in a step."""
+    return LARGEST_STEP_TURN if job.contact[ADDRESS] == 0 else LARGEST_CONTACT_TURN
+
+
+@inner
+def begin_line_step(plane, space, job, states, s, safe):
+    """Predict a step of which a part is safe; whether it turns a chord too far, by how much (rad), and its cell."""
+    turn, cell = begin_step(plane, space, job.line, job.sea, states.old, states.new, job.work.u, s, safe)
+    return not turn < most_turn(job), turn, cell
+
+
+@inner
+def end_line_step(plane, space, task, job, states, s):
+    """The report of a step that is solved; whether it turns a chord too far, by how much (rad), and its cell."""
+    if touches(job):
+        job.work.report[SELF_CONTACT_ENERGY] = ask_contact(job, FINISH)
+    turn, cell = end_step(plane, space, job.line, job.sea, job.ends, states, s, task, job.work, job.books.strains)
+    return not turn < most_turn(job), turn, cell
+
+
+# --- Newton of a line by itself ------------------------------------------------------------------------------
+
+
+@inner
+def find_correction(plane, space, task, job, states, s, where):
+    """One march and the solution of its equations with all borders, into work.x.
+
+    Returns OPEN, or the outcome with which the solution ends here, and the cell or node where it fails; else `where`.
+    """
+    line, work, new, bad, good = job.line, job.work, states.new, -1, True
+    before_march(space, job, states, s, task.what)
+    if space is not None:
+        bad = march(line, job.sea, job.ends, states.old.r, new, s.cv, s.ca, work)
+    if plane is not None:
+        bad = march_planar(line, job.sea, job.ends, states.old.r, new, s.cv, s.ca, work)
+    if bad >= 0:
+        if not work.report[RESIDUAL] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
+            return NOT_FINITE, int(work.report[RESIDUAL_NODE])
+        return SINGULAR, bad
+    if task.what == ASSEMBLY:
+        return OK, where
+    after_march(job, task.what)
+    if space is not None:
+        good = substitute(work.X, work.x)
+    if plane is not None:
+        good = substitute_planar(plane, work.X, work.x)
+    coupled = couple(space, job, states, s, task.what, good)
+    if not good:
+        return NOT_FINITE, first_bad(work.x, new.e)
+    if task.what == CORRECTION:
+        return OK, where
+    return (OPEN if coupled else NOT_CONVERGED), where
+
+
+@inner
+def find_part(task, job, new, s, it, noise):
+    """The part of the correction that is made, its size as Newton compares it, and its cell; noise: N, of round-off."""
+    reach, scale, _, _ = task.limits
+    shift, turn, where, pull, big = measure(new.e, new.T, job.work.x)
+    part = 1.0
+    if shift > reach and not task.turning:
+        part = reach / shift
+    if turn * part > LARGEST_TURN:
+        part = LARGEST_TURN / turn
+    if rubs(job) and s.cv > 0.0 and it in (7, 10, 13):
+        part *= 0.5  # it goes round between sticking and sliding, or feet of contact between two pieces
+    part = min(part, safe_part(job))
+    turn = max(turn, WHOLE * shift / reach)
+    return part, (turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))), where
+
+
+@inner
+def solve(plane, space, task, job, states):
+    """Do a task at the configuration `new` of `States`, of a step that starts at old.r.
+
+    STEP            predict `new` from `old`, solve, find the rates; books.strains: of elements, empty: not wanted
+    EQUILIBRIUM     solve from the prediction in work.u and `new`
+    ASSEMBLY        one march, for its report and its block rows
+    CORRECTION      one march and the solution of its equations, into work.x
+
+    Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
+    prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
+    may end on a branch that has nothing to do with it.  With task.cut a step whose last iteration made a full correction
+    is taken though it has not converged (CUT_SHORT); its report is of the iterate before that correction.
+    """
+    line, work, new, s = job.line, job.work, states.new, Scheme(task.dt, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
+    if task.what == STEP:
+        safe, rho = prepare(job, task.rho)
+        task = with_radius(task, rho)
+        s = scheme(task.rho, task.before, task.rho_before, task.dt)
+        far, turn, where = begin_line_step(plane, space, job, states, s, safe)
+        if far:
+            return TURNED_TOO_FAR, 0, turn, where
+    before, left, size = math.inf, math.inf, math.inf
+    noise = round_off_tension(line, s.ca, task.limits.scale)
+    outcome, it, where = NOT_CONVERGED, 0, -1
+    while it < task.limits.most and outcome == NOT_CONVERGED:
+        it += 1
+        found, where = find_correction(plane, space, task, job, states, s, where)
+        if found != OPEN:
+            outcome, before = found, math.inf
+            break
+        part, size, where = find_part(task, job, new, s, it, noise)
+        update(plane, space, line, new, s.cv, s.ca, part, task.turning, work)
+        move_borders(space, job, new, s, part, task.what)
+        outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
+        before = size if part == 1.0 else math.inf
+    cut_short = task.cut and outcome == NOT_CONVERGED and it == task.limits.most and before < math.inf
+    if cut_short:
+        outcome = OK
+        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
+            left = size
+    if task.what == STEP:
+        find_rates(space, line, job.sea, states.old, new, work.u, s)
+    if task.what != ASSEMBLY or work.couple.shape[0] > 0:  # rates of twist are known now
+        carry(job, states, s, task.what)
+    pass_torque(space, job, new, AFTER_STEP, s.cv)
+    if task.what == STEP and outcome == OK:
+        far, turn, cell = end_line_step(plane, space, task, job, states, s)
+        if far:
+            outcome, where = TURNED_TOO_FAR, cell
+        elif cut_short:
+            outcome = CUT_SHORT
+    return outcome, it, left, where
