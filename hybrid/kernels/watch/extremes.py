@@ -55,7 +55,7 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.report import FORCE_A, OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.watch.soft_rods import BENT, bend_direction, of_chords, part_of_stiffness, restore_stiffness
+from hybrid.kernels.watch.soft_rods import BENT, Rods, bend_direction, of_chords, part_of_stiffness, restore_stiffness
 
 SAME_PLACE = 1e-9  # part of a length
 
@@ -196,9 +196,9 @@ def towards(line, state, marks, i, side):
     """Curvature at what may be a kink, node i, as the nodes on its side (-1, 1) lead to."""
     x = 0.0
     if is_smooth(line, marks, i + side):
-        x = of_chords(line, state, i + side)
+        x = of_chords(line, state.e, i + side)
         if is_smooth(line, marks, i + 2 * side) and is_smooth(line, marks, i + 3 * side):
-            there = of_chords(line, state, i + 2 * side)
+            there = of_chords(line, state.e, i + 2 * side)
             far = abs(line.s[i + side] - line.s[i]) / abs(line.s[i + 2 * side] - line.s[i + side])
             x = max(0.0, x + far * (x - there))
     return x
@@ -276,7 +276,7 @@ def cut_layer_at_end(line, state, books, k):
     """
     n, EI, T, h = line.h.shape[0], books.hinges[k, 0], state.T, line.h
     way, j = 1 - 2 * k, 1 + k * (n - 2)
-    end, direction = towards(line, state, books.marks, k * n, way), bend_direction(state, j)
+    end, direction = towards(line, state, books.marks, k * n, way), bend_direction(state.e, j)
     first, depth = T[k * (n - 1)], 0.0
     while 0 < j < n and T[min(j, j - way)] > 0.0 and not line.spin[min(j, j - way)] and first > 0.0:
         depth += depth_of(T[min(j, j - way)], EI, h[min(j, j - way)])
@@ -284,7 +284,7 @@ def cut_layer_at_end(line, state, books, k):
         if part <= FADED or line.spin[j - 1] != line.spin[j]:
             break
         if is_smooth(line, books.marks, j):
-            along = dot(bend_direction(state, j), direction)
+            along = dot(bend_direction(state.e, j), direction)
             books.strains[j, BENT] = with_layer(books.strains[j, BENT], -end * part, along)
         else:
             books.strains[j, BENT] = -end * part
@@ -304,7 +304,7 @@ def put_layers_back(line, ends, state, books):
     for i in range(n + 1):
         bent[i, BENT] = bent[i, 0] if line.element[i] else 0.0
         if is_smooth(line, books.marks, i):
-            bent[i, BENT] = of_chords(line, state, i)
+            bent[i, BENT] = of_chords(line, state.e, i)
     for k in range(2):
         if is_hinge(line, books, k):
             cut_layer_at_end(line, state, books, k)
@@ -318,17 +318,17 @@ def put_layers_back(line, ends, state, books):
         if not (0 < j < n and is_smooth(line, books.marks, outer) and goes_on(line, books.marks, j, way)):
             continue
         T, EI = state.T[min(j, i)], stiffness_at(line, j)
-        direction, part = bend_direction(state, outer), layer_part(line, state, j, way, EI)
+        direction, part = bend_direction(state.e, outer), layer_part(line, state, j, way, EI)
         before = stiffness_share(EI, T, line.hn[i], line.h[min(outer, i)])
         after = stiffness_share(EI, T, line.hn[i], line.h[min(j, i)])
-        along = dot(bend_direction(state, j), direction)
-        turned = dot(bend_direction(state, i), direction)
-        there = at_hinge(of_chords(line, state, i), turned, of_chords(line, state, outer), before, after, part)
+        along = dot(bend_direction(state.e, j), direction)
+        turned = dot(bend_direction(state.e, i), direction)
+        there = at_hinge(of_chords(line, state.e, i), turned, of_chords(line, state.e, outer), before, after, part)
         bent[i, 0], bent[i, BENT] = abs(there), with_layer(own, there, along)
         for _ in range(FARTHEST):
             if part <= FADED:
                 break
-            along = dot(bend_direction(state, j), direction)
+            along = dot(bend_direction(state.e, j), direction)
             bent[j, BENT] = with_layer(bent[j, BENT], there * part, along)
             j += way
             if not (0 < j < n and goes_on(line, books.marks, j, way)):
@@ -474,7 +474,7 @@ def note_extremes(line, sea, ends, state, books, t):
     n = line.h.shape[0]
     note_tension(line, ends, state, books, t)
     put_layers_back(line, ends, state, books)
-    restore_stiffness(line, ends, state, books)
+    restore_stiffness(line, ends, Rods(state.e, state.T, books.strains, books.hinges, books.marks))
     if line.bits & SEABED:
         note_contact(line, sea, state, books, t)
     zone, zones = 0, line.torsion.shape[0]

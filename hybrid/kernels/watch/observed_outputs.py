@@ -402,7 +402,7 @@ def observe_soft_rods(tables):
         x = _read(tables[k])
         for i in range(x.rods.shape[0]):
             x.rods[i, RAW], x.rods[i, BENT] = math.hypot(x.strain[i, 0], x.strain[i, 1]) / x.line.hn[i], math.nan
-        restore_stiffness(x.line, x.ends, x, Rods(x.rods, x.hinges, x.marks))
+        restore_stiffness(x.line, x.ends, Rods(x.e, x.T, x.rods, x.hinges, x.marks))
         for i in range(x.rods.shape[0]):
             x.rods[i, C] = part_of_stiffness(x.line, i, x.hinges)
 

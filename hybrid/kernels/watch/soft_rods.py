@@ -47,18 +47,20 @@ SLACK = 2.5e-5  # least h T/K, for lines with hardly any tension: M fades within
 
 
 class Rods(NamedTuple):
-    """Of `Books` what is needed here."""
+    """Of a state and of `Books` what is needed here: the same of a step and of an output."""
 
+    e: Floats
+    T: Floats
     strains: Floats
     hinges: Floats
     marks: NDArray[np.int8]
 
 
 @inner
-def of_chords(line, state, i):
+def of_chords(line, e, i):
     """Curvature, 1/m, at node i of the circle that its two chords are tangents of."""
-    d, _, _ = chord(get3(state.e, i - 1))
-    dn, _, _ = chord(get3(state.e, i))
+    d, _, _ = chord(get3(e, i - 1))
+    dn, _, _ = chord(get3(e, i))
     s = cross(d, dn)
     return 2.0 * math.sqrt(dot(s, s)) / (max(1.0 + dot(d, dn), 1e-12) * line.hn[i])
 
@@ -72,23 +74,23 @@ def across(a, b):
 
 
 @inner
-def bend_direction(state, i):
+def bend_direction(e, i):
     """Direction across both chords at inner node i."""
-    return across(chord(get3(state.e, i - 1))[0], chord(get3(state.e, i))[0])
+    return across(chord(get3(e, i - 1))[0], chord(get3(e, i))[0])
 
 
 @inner
-def bend_at(line, ends, state, books, i):
+def bend_at(line, ends, rods, i):
     """Curvature of the chords at a node of a rod, a vector, 1/m; 0 at an end without an element."""
     n = line.h.shape[0]
     if 0 < i < n:
-        size = books.strains[i, RAW] if line.element[i] else of_chords(line, state, i)
-        return scale(size, bend_direction(state, i))
+        size = rods.strains[i, RAW] if line.element[i] else of_chords(line, rods.e, i)
+        return scale(size, bend_direction(rods.e, i))
     if not line.element[i]:
         return (0.0, 0.0, 0.0)
-    R, d = get9(ends.frame, 0 if i == 0 else 1), chord(get3(state.e, min(i, n - 1)))[0]
+    R, d = get9(ends.frame, 0 if i == 0 else 1), chord(get3(rods.e, min(i, n - 1)))[0]
     t = (R[2], R[5], R[8])
-    return scale(books.strains[i, RAW], across(t, d) if i == 0 else across(d, t))
+    return scale(rods.strains[i, RAW], across(t, d) if i == 0 else across(d, t))
 
 
 @inner
@@ -138,21 +140,21 @@ def goes_on_outside(line, marks, i):
 
 
 @inner
-def balance(line, ends, state, books, i, a, b):
+def balance(line, ends, rods, i, a, b):
     """Diagonal and right side of the balance of node i of the rod from node a to b, if a is not an end that turns."""
-    n, h, pieces, inside = line.h.shape[0], line.h, books.hinges, a < i < b
+    n, h, pieces, inside = line.h.shape[0], line.h, rods.hinges, a < i < b
     way = 1 if i == a else -1
     K, rod = all_stiffness(line, i, pieces, way), min(max(i, a), b - 1)
-    T = 0.5 * (state.T[i - 1] + state.T[i]) if inside else state.T[rod]
+    T = 0.5 * (rods.T[i - 1] + rods.T[i]) if inside else rods.T[rod]
     T = max(T, SLACK * K / h[rod])
     lack = 1.0 - part_of_stiffness(line, i, pieces) if line.element[i] else 1.0
-    rhs = scale(T * lack * line.hn[i], bend_at(line, ends, state, books, i))
+    rhs = scale(T * lack * line.hn[i], bend_at(line, ends, rods, i))
     diagonal = T / K + (1.0 / h[i - 1] if i > a else 0.0) + (1.0 / h[i] if i < b else 0.0)
     outer = i - way
-    if not inside and 0 < outer < n and goes_on_outside(line, books.marks, outer):
+    if not inside and 0 < outer < n and goes_on_outside(line, rods.marks, outer):
         cell = 1.0 / h[min(i, outer)]
         diagonal += cell
-        rhs = add(rhs, scale(K * line.hn[i] * cell * of_chords(line, state, outer), bend_direction(state, outer)))
+        rhs = add(rhs, scale(K * line.hn[i] * cell * of_chords(line, rods.e, outer), bend_direction(rods.e, outer)))
     return diagonal, rhs
 
 
@@ -168,18 +170,18 @@ def get_solved(bent, i):
 
 
 @kernel
-def restore_rod(line, ends, state, books, a, b):
+def restore_rod(line, ends, rods, a, b):
     """Enter into column BENT the curvature of the rod from node a to b with all of its stiffness.
 
     Of joints into RAW as well: on the side of the catenary it is the same.
     """
-    bent, pieces, h, n = books.strains, books.hinges, line.h, line.h.shape[0]
+    bent, pieces, h, n = rods.strains, rods.hinges, line.h, line.h.shape[0]
     for i in range(a, b + 1):
         if turns_freely(line, i):
             for k in range(4):
                 bent[i, C + k] = 0.0
             continue
-        diagonal, rhs = balance(line, ends, state, books, i, a, b)
+        diagonal, rhs = balance(line, ends, rods, i, a, b)
         if i > a:
             diagonal -= bent[i - 1, C] / h[i - 1]
             rhs = add(rhs, scale(1.0 / h[i - 1], get_solved(bent, i - 1)))
@@ -190,7 +192,7 @@ def restore_rod(line, ends, state, books, a, b):
     for j in range(b - a + 1):
         i = b - j
         M = add(get_solved(bent, i), scale(bent[i, C], M))
-        bend, part = bend_at(line, ends, state, books, i), 0.0
+        bend, part = bend_at(line, ends, rods, i), 0.0
         if line.element[i]:
             part = part_of_stiffness(line, i, pieces)
         K = all_stiffness(line, i, pieces, 1 if i == a else -1)
@@ -201,9 +203,9 @@ def restore_rod(line, ends, state, books, a, b):
 
 
 @kernel
-def restore_stiffness(line, ends, state, books):
+def restore_stiffness(line, ends, rods):
     """`restore_rod` of all rods with an element that has not all of its stiffness, if that is known."""
-    n, pieces, a = line.h.shape[0], books.hinges, 0
+    n, pieces, a = line.h.shape[0], rods.hinges, 0
     while pieces[LINE, EI] > 0.0 and a < n:
         if not line.spin[a]:
             a += 1
@@ -213,5 +215,5 @@ def restore_stiffness(line, ends, state, books):
             soft |= line.kb[b, 2] > 0.0 and part_of_stiffness(line, b, pieces) < WHOLE
             b += 1
         if soft:
-            restore_rod(line, ends, state, books, a, b)
+            restore_rod(line, ends, rods, a, b)
         a = b
