@@ -83,7 +83,7 @@ def agree(tables: dict[str, Any], of: list[str], keys: list[str], monkeypatch: p
     ours, off = by_tangents(*asked), np.full((len(keys), len(of)), np.inf)
     floor = 1e-3 * np.abs(ours.values) / np.array(list(asked[-1].values()))[:, None]
     for part in (1e-3, 1e-5, 1e-6, 1e-4, 3e-4, 1e-7, 3e-5, 3e-6, 3e-7):
-        monkeypatch.setattr(way, "PARTS", (part, 2.0 * part))
+        monkeypatch.setattr(way, "STEP_PARTS", (part, 2.0 * part))
         theirs = by_differences(*asked)
         np.testing.assert_allclose(ours.values, theirs.values, rtol=1e-12)
         whole = np.maximum(np.abs(theirs.derivatives), floor)
