@@ -26,7 +26,7 @@ from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.step.step import States
 from hybrid.kernels.watch import observed_outputs
 from hybrid.model.build import build, planar, untwist
-from hybrid.outputs import observed_states as output_grid
+from hybrid.outputs import observed_states
 from hybrid.scene.read import one_line
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stability import seed
@@ -70,7 +70,7 @@ def kernel_time(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[float]]:
 
     monkeypatch.setattr(NetworkSteps, "go", timed(NetworkSteps.go, "run"))
     for room, name in (
-        (entry, "in_plane"), (entry, "in_space"), (observed_outputs, "observe_outputs"), (output_grid, "add_rows"),
+        (entry, "in_plane"), (entry, "in_space"), (observed_outputs, "observe_outputs"), (observed_states, "add_rows"),
     ):  # fmt: skip
         monkeypatch.setattr(room, name, timed(getattr(room, name), "other"))
     return times

@@ -12,7 +12,6 @@ from functools import cache
 from typing import Any, Protocol
 
 from hybrid.scene import combinations, motion_checks, sea_checks, start_checks
-from hybrid.scene import start_checks as attachment_checks
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -417,12 +416,12 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     start_checks.start_is_known,
     start_checks.equilibrium_exists,
     sea_checks.fluid_density,
-    attachment_checks.attachments_on_cable,
-    attachment_checks.restrictors_hold_what_bends,
-    attachment_checks.swivels_turn,
-    attachment_checks.attachments_in_fluid,
-    attachment_checks.bodies_in_fluid,
-    attachment_checks.densities,
+    start_checks.attachments_on_cable,
+    start_checks.restrictors_hold_what_bends,
+    start_checks.swivels_turn,
+    start_checks.attachments_in_fluid,
+    start_checks.bodies_in_fluid,
+    start_checks.densities,
     sea_checks.waves,
     sea_checks.wave_is_steady,
     sea_checks.record_lasts,

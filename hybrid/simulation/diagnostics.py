@@ -45,7 +45,7 @@ from hybrid.model.obstacles import CELLS_PER_RADIUS
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.scene.plane import OUT
-from hybrid.simulation import watches as scheme_watch
+from hybrid.simulation import watches
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.failure import (
     TURNS,
@@ -113,7 +113,7 @@ UNWATCHED: dict[str, Any] = {
     "_writhe": np.nan,
     "_writhes": LOOP,
     "_bent": 0.0,
-    "_created": [*scheme_watch.NONE_CREATED],
+    "_created": [*watches.NONE_CREATED],
     "_section": False,
     "_kink": KINK,
     "_negative": NEGATIVE,
@@ -177,7 +177,7 @@ class Diagnostics:
         """What has been noted so far, and what `finish` will judge by."""
         clock, count = books.clock, books.counts
         known = {name: getattr(self, name) for name in REMEMBERED}
-        return known | {name: getattr(self.of_scheme, name) for name in scheme_watch.REMEMBERED} | {
+        return known | {name: getattr(self.of_scheme, name) for name in watches.REMEMBERED} | {
             "pulls": [float(clock.least_peak), float(clock.largest_peak)], "_rho": float(clock.rho),
             "_moved": float(clock.moved), "_steps": int(count.measured),
             "worst": books.worst[: min(int(count.measured), b.WORST)].copy(), "placed": books.placed,
@@ -189,7 +189,7 @@ class Diagnostics:
         r: (N+1, 3) m, where nodes are now.  Returns where base nodes were at the start, (n, 3) m.
         """
         vars(self).update({name: saved[name] for name in REMEMBERED})
-        vars(self.of_scheme).update({name: saved[name] for name in scheme_watch.REMEMBERED})
+        vars(self.of_scheme).update({name: saved[name] for name in watches.REMEMBERED})
         placed, worst, steps = saved["placed"], saved["worst"], saved["_steps"]
         if placed.shape not in (NOWHERE.shape, (books.base.size, 3)) or worst.shape != (min(steps, b.WORST), 4):
             raise ValueError("places of another line")

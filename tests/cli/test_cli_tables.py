@@ -5,7 +5,7 @@ import pytest
 from rich.table import Table
 
 import hybrid
-from hybrid.cli import statistics_commands as response_command
+from hybrid.cli import statistics_commands
 from hybrid.cli.console import Console, Grid
 from hybrid.cli.tables import _largest_moment
 from hybrid.linear.response_results import ADDED, LineResponse, Response
@@ -65,7 +65,7 @@ def test_rows_of_a_response_that_is_not_valid_are_marked() -> None:
         np.zeros((5, 3)), np.ones(4), np.ones(5), {"curvature": np.full(5, 2.0 * ADDED["curvature"])}, np.ones(5),
     )  # fmt: skip
     for notes, valid in (((), {"tension", "x", "y", "z"}), (("tension at s = 5 m: not valid",), {"x", "y", "z"})):
-        rows = response_command._rows(Response("", {"cable": line}, {}, {}, 1, {}, notes), 3.0)
+        rows = statistics_commands._rows(Response("", {"cable": line}, {}, {}, 1, {}, notes), 3.0)
         assert {row["quantity"] for row in rows if row["valid"]} == valid
-        shown = response_command._response_table(Response("", {"cable": line}, {}, {}, 1, {}, notes), rows, 3.0)
+        shown = statistics_commands._response_table(Response("", {"cable": line}, {}, {}, 1, {}, notes), rows, 3.0)
         assert "curvature, not valid" in [*shown.columns[0].cells] and ("x" in [*shown.columns[0].cells])

@@ -16,8 +16,7 @@ import hybrid.simulation.run_record
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.root import in_full
-from hybrid.simulation import case, zones_at_rest
-from hybrid.simulation import restart as restore
+from hybrid.simulation import case, restart, zones_at_rest
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, hdf5_file
 from hybrid.store import writer as record
@@ -157,7 +156,7 @@ def test_another_program_goes_on_and_says_so(tmp_path, monkeypatch, whole):
     path = stopped(tmp_path / "run.h5", monkeypatch)
     with h5py.File(path) as file:
         t = checkpoint.read_checkpoint(file).t
-    monkeypatch.setattr(restore, "program", lambda: "9.9.9 0123456789abcdef")
+    monkeypatch.setattr(restart, "program", lambda: "9.9.9 0123456789abcdef")
     with hybrid.resume(path) as result, hybrid.open(whole) as same:
         (event,) = (e for e in result.events if e.kind == OTHER_PROGRAM)
         assert event.t == t and hybrid.__version__ in event.text and "9.9.9" in event.text

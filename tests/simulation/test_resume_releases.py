@@ -17,7 +17,7 @@ import pytest
 import hybrid
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.read import one_line
-from hybrid.simulation import restart as restore
+from hybrid.simulation import restart
 from hybrid.simulation.restart import as_of_line
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
@@ -82,7 +82,7 @@ def test_a_file_of_0_6_is_resumed(other: bool, tmp_path: Path, monkeypatch: pyte
     """
     path = kept("result_0.6.h5.gz", tmp_path)
     if other:  # as a release will that is not the one that wrote it
-        monkeypatch.setattr(restore, "program", lambda: "9.9.9 0123456789abcdef")
+        monkeypatch.setattr(restart, "program", lambda: "9.9.9 0123456789abcdef")
     with opened(path) as file:
         point = read_checkpoint(file)
     assert point.t == pytest.approx(0.5) and point.program.startswith("0.6.0 ")

@@ -1,7 +1,7 @@
 """Changes of cells in a run: their lengths and their kinds.
 
-What a change of cells (kernels.mesh.remesh) calls: `plan_cells` places the nodes, kernels.mesh.remesh makes the line,
-kernels.mesh.cell_changes carries the state and its lengths, `renew` what the run knows beside, `before_forces` and
+A change of cells (kernels.mesh.remesh) makes the line there, and calls what is here: `plan_cells` places the nodes,
+`begin_switch` and `end_switch` carry the state and its lengths, `renew` what the run knows beside, `before_forces` and
 `after_forces` the report of the state.
 
 Lengths go on smoothly through a change, and its energy is known.

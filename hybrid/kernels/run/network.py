@@ -1,14 +1,12 @@
 """Newton's method for lines that meet at points, and samples within its steps.
 
-Newton's method for lines that meet at points: one nonlinear loop for all of them, in space.
+One nonlinear loop is for all of them, in space.
 
 Every line is marched along s by the kernel of a single line, which is called by its address.  Whatever couples lines is a
 border, points and bodies as well; the loop knows them by their list alone (kernels.junctions.borders).
 Symbols and stopping rule as in kernels.step.newton.
 
-The lines and bodies of a system at times within its steps, as rows of samples (kernels.step.sampling).
-
-Ends of lines are where their nodes are, as points are, which have no samples of their own.  Bodies move by the cubic of
+Samples are rows of the lines and bodies at times within a step (kernels.step.sampling).  Ends of lines are where their nodes are, as points are, which have no samples of their own.  Bodies move by the cubic of
 their velocities at both ends of the step, and turn by that of their spins; what lines do to them lies on the parabola
 through the step before as well, as reactions do.
 """

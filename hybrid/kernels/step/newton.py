@@ -1,13 +1,11 @@
-"""Newton's method for one step, and what it works on.
-
-Newton's method for one step (in time, or one static solve): the only nonlinear loop of the package.
+"""Newton's method for one step of a line, in time or at rest, and what it works on.
 
 Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
 tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.march.march).
 
 `solve` is inlined in the one entry to all that needs the march (kernels.run.entry): a second one would compile it once more.
 
-All that steps of a line need, by reference: what an entry of kernels.run.entry gets as its table.
+`Job` has all that steps of a line need, by reference: it is the table of an entry of kernels.run.entry.
 
 What is beside the band of the line is a border.  Newton asks all of them a question in one place, by the function that is
 named here, and in this order; of a line that does not have it each costs a comparison.  The Newton of joined lines
@@ -67,7 +65,7 @@ LARGEST_CONTACT_TURN = 0.3
 # Contact of the line with itself: places of `contact` (address, what is asked, whether it is near), and what is asked
 # (kernels.contact.self_contact).
 ADDRESS, ASKED, NEAR = range(3)
-SHARED = -1  # in place of an address: contact of the line is computed with that of another line of its system
+SHARED = -1  # in place of an address: contact of the line is computed with that of another line
 PREPARE, LIMIT, TOUCH, FINISH, REST, RADIUS, GAIN, FIND = range(8)
 call_contact = caller(0.0)
 call_reel = caller(0)
@@ -103,7 +101,7 @@ class Task(NamedTuple):
     rho: float = 0.0  # spectral radius at infinity
     cv: float = 0.0  # 1/s, dv'/dr' of what is no step
     ca: float = 0.0  # 1/s2, dvd'/dr'
-    turning: bool = False  # whether chords are turned instead of shifted (kernels.step.newton.update)
+    turning: bool = False  # whether chords are turned instead of shifted (kernels.march.march.update)
     limits: Limits = Limits(1.0, 1.0, 1)
     cut: bool = False  # whether a step is taken as the last iteration has left it, converged or not
     rho_before: float = 0.0  # spectral radius of the step that led to its start
