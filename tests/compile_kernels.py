@@ -20,33 +20,22 @@ import numpy as np
 
 import hybrid
 from hybrid.simulation.first_use import payout_kernels
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 CABLE = {"length": 20, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 20}
 CABLE |= {"drag": {"normal": 1.2}, "added_mass": {"normal": 1}}
-SCENE = {
-    "environment": {"fluid": {"density": 1025}, "seabed": {"z": -9, "stiffness": 1e3}},
-    "cable": {"sections": [CABLE]},
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, -9]},
-        "end": {
-            "kind": "pinned", "position": [14, 0, 0], "motion": {"heave": {"amplitude": 0.1, "period": 4}, "ramp": 4},
-        },
-    },
-    "initial": "equilibrium", "mesh": {"cells": 12}, "time": {"duration": 0.2, "step": 0.1},
-}  # fmt: skip
+SCENE = cable_scene(
+    CABLE, pinned_at(0, 0, -9), pinned_at(14, 0, 0, motion={"heave": {"amplitude": 0.1, "period": 4}, "ramp": 4}),
+    fluid={"density": 1025}, seabed={"z": -9, "stiffness": 1e3}, mesh=12, time=(0.2, 0.1)
+)  # fmt: skip
 LINE = {"start": "low", "end": "free", "model": "rod", "mesh": {"cells": 12}, "sections": [CABLE]}
-LINES = {
-    "environment": {"fluid": {"density": 1025}},
-    "points": {
-        "low": {"position": [0, 0, 0]}, "high": {"position": [12, 0, 0]},
-        "free": {"kind": "free", "initial_guess": [11, 0, 0]},
-    },
-    "lines": {
-        "a": LINE | {"contact": {"self": True, "friction": 0.3}},
-        "b": LINE | {"start": "free", "end": "high", "model": "catenary", "sections": [CABLE | {"length": 5}]},
-    },
-    "time": {"duration": 0.2, "step": 0.1},
-}  # fmt: skip
+LINES = network_scene(
+    {"low": {"position": [0, 0, 0]}, "high": {"position": [12, 0, 0]},
+     "free": {"kind": "free", "initial_guess": [11, 0, 0]}},
+    {"a": LINE | {"contact": {"self": True, "friction": 0.3}},
+     "b": LINE | line_between("free", "high", CABLE | {"length": 5}, model="catenary")},
+    fluid={"density": 1025}, time=(0.2, 0.1)
+)  # fmt: skip
 
 # The longest first: who comes second to a kernel loads it, or waits.
 BY_TABLE = {

@@ -42,6 +42,7 @@ from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
 from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest
 from hybrid.solve.stepper import JoinedLine, NetworkState, Stepper
+from tests.scenes import cable_scene
 
 Floats = NDArray[np.float64]
 Kick = Callable[[State, Model], None]
@@ -69,9 +70,8 @@ def scene(
         tables["mesh"] = {"cells": cells}
     tables.setdefault("initial", {"kind": "equilibrium"})
     return Scene.model_validate(
-        {"environment": environment, "cable": {"sections": [section]}, "ends": {"start": start, "end": end},
-         "model": kind} | tables
-    )  # fmt: skip
+        cable_scene(section, start, end, environment=environment, model=kind, initial=None) | tables
+    )
 
 
 def tables_with(tables: Any, changes: Mapping[str, Any]) -> Any:

@@ -34,6 +34,7 @@ from hybrid.kernels.state.state import state_for
 from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
 from hybrid.solve.borders import JointJobs
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 BARE = {"length": 2.0, "mass": 0.1}
 BENDS = BARE | {"bending_stiffness": 1.0e-2}
@@ -81,15 +82,7 @@ def on_it(**attachment: Any) -> dict[str, Any]:
 def scene(section: dict[str, Any], model: Any = "catenary", **tables: Any) -> hybrid.Scene:
     """A cable that hangs from a pin."""
     return hybrid.validate_scene(
-        {
-            "cable": {"sections": [section]},
-            "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-            "initial": "equilibrium",
-            "model": model,
-            "mesh": {"cells": 8},
-            "time": {"duration": 0.05, "step": 0.01},
-        }
-        | tables
+        cable_scene(section, pinned_at(0, 0, 0), "free", model=model, mesh=8, time=(0.05, 0.01)) | tables
     )
 
 
@@ -324,14 +317,11 @@ def test_the_contents_name_every_optional_part() -> None:
     assert asked["criteria as fields"].on
 
 
-HANGING = {
-    "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [3, 0, 0]}, "middle": {"initial_guess": [1.5, 0, -1]}},
-    "lines": {
-        name: {"start": name, "end": "middle", "model": "catenary", "mesh": {"cells": 4},
-               "sections": [BARE | {"diameter": 0.01}], "contact": {"self": False}}
-        for name in "ab"
-    },
-}  # fmt: skip
+HANGING = network_scene(
+    {"a": {"position": [0, 0, 0]}, "b": {"position": [3, 0, 0]}, "middle": {"initial_guess": [1.5, 0, -1]}},
+    {name: line_between(name, "middle", BARE | {"diameter": 0.01}, model="catenary", mesh=4,
+                        contact={"self": False}) for name in "ab"}
+)  # fmt: skip
 BALL = {"mass": 1.0, "inertia": [1, 1, 1], "initial_guess": [1.5, 0, -3], "shape": {"kind": "sphere", "radius": 0.1}}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, clamped_at
 
 SAME = np.eye(3)
 STATIC, MOVING = 2e-9, 2e-7  # of the length, and of the largest tension
@@ -37,18 +38,13 @@ def scene(case, rotate=SAME, sections=SECTIONS, **changes):
     def turned(x):
         return tuple(float(c) for c in rotate @ np.array(x, float))
 
-    data = {
-        "environment": {"gravity": 0.0, "fluid": {"density": 1000.0, "current": turned([0.3, 0.2, -1.0])}},
-        "cable": {"sections": sections},
-        "ends": {
-            "start": {"kind": "clamped", "position": turned([0.1, -0.2, 0.3]), "tangent": turned([0.2, 0.1, -1]), "normal": turned([1, 0.5, 0])},
-            "end": {"kind": "free", "force": turned([6.0, 3.0, -4.0])},
-        },
-        "initial": {"kind": "equilibrium", "direction": turned([0.3, 0.2, -0.9])},
-        "model": MODELS[case],
-        "time": {"duration": 0.5, "step": 0.01},
-        "output": {"every": 0.1, "points": 41},
-    }  # fmt: skip
+    data = cable_scene(
+        sections, clamped_at(turned([0.1, -0.2, 0.3]), turned([0.2, 0.1, -1]), normal=turned([1, 0.5, 0])),
+        {"kind": "free", "force": turned([6.0, 3.0, -4.0])}, gravity=0.0,
+        fluid={"density": 1000.0, "current": turned([0.3, 0.2, -1.0])},
+        initial={"kind": "equilibrium", "direction": turned([0.3, 0.2, -0.9])}, model=MODELS[case], time=(0.5, 0.01),
+        output=(0.1, 41)
+    )  # fmt: skip
     if case != "hybrid":
         data["mesh"] = {"cells": 40}
     return hybrid.validate_scene(data | changes)

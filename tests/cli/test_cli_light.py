@@ -14,16 +14,12 @@ import pytest
 import hybrid
 from hybrid.cli.app import session
 from hybrid.kernels.machine.cache import CacheWarning
+from tests.scenes import cable_scene, pinned_at
 
 HEAVY = {"numba", "h5py", "matplotlib", "scipy"}
-HANGING = {
-    "cable": {"sections": [{"length": 1.0, "mass": 1.0}]},
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-    "initial": "equilibrium",
-    "model": "catenary",
-    "mesh": {"cells": 4},
-    "time": {"duration": 0.1, "step": 0.001},
-}
+HANGING = cable_scene(
+    {"length": 1.0, "mass": 1.0}, pinned_at(0, 0, 0), "free", model="catenary", mesh=4, time=(0.1, 0.001)
+)
 CODE = """
 import sys, json
 from hybrid.cli.commands import main

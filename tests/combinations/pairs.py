@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.root import in_full
 from tests.problems import tables_with
+from tests.scenes import cable_scene, pinned_at
 
 LENGTH, OUTPUTS = 12.0, 5
 Tables = dict[str, Any]
@@ -23,17 +24,10 @@ SECTION = {
     "length": LENGTH, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 20.0,
     "torsional_stiffness": 15.0, "damping": {"mass": 0.5},
 }  # fmt: skip
-BASE: Tables = {
-    "environment": {"gravity": 9.81},
-    "cable": {"sections": [SECTION]},
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [10, 0, 3], "motion": {"travel": {"by": [0.05, 0, 0.1], "over": 0.5}}},
-    },
-    "initial": "equilibrium",
-    "contact": {"self": False}, "model": "rod", "mesh": {"cells": 12},
-    "time": {"duration": 0.1 * OUTPUTS, "step": 0.02}, "output": {"every": 0.1, "points": 13},
-}  # fmt: skip
+BASE: Tables = cable_scene(
+    SECTION, pinned_at(0, 0, 0), pinned_at(10, 0, 3, motion={"travel": {"by": [0.05, 0, 0.1], "over": 0.5}}),
+    gravity=9.81, contact={"self": False}, model="rod", mesh=12, time=(0.1 * OUTPUTS, 0.02), output=(0.1, 13)
+)  # fmt: skip
 
 S, START, END = "cable.sections.0.", "ends.start", "ends.end"
 WATER = {"density": 1025, "current": [0.3, 0.2, 0]}

@@ -15,6 +15,7 @@ from hybrid.model.build import build
 from hybrid.scene.read import as_scene, one_line
 from tests.combinations.pairs import ADAPTIVE, BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_network
 from tests.problems import tables_with
+from tests.scenes import cable_scene
 
 SPRING = 30.0  # N m/rad, 1.9 of half a cell
 LAYERS = [{"stiffness": 12.0, "moment": 0.4}, {"stiffness": 5.0, "moment": 0.9}]
@@ -37,14 +38,13 @@ def cantilever(section: Tables, moments: list[list[float]], spring: float | None
     start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 1, 0]}
     plain = {"length": 2.0, "mass": 1e-3, "axial_stiffness": 1e6, "torsional_stiffness": 10.0, "damping": 20.0}
     locks = [{"kind": "bend_restrictor", "range": [0, 2], "radius": 15}] if "slip" not in str(section) else []
-    return hybrid.run({
-        "environment": {"gravity": 0}, "cable": {"sections": [plain | section], "attachments": locks},
-        "ends": {"start": start | ({"bend_stiffness": spring} if spring else {}),
-                 "end": {"kind": "free", "moment": {"history": moments}}},
-        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]},
-        "model": "rod", "contact": {"self": False}, "mesh": {"cells": 8},
-        "time": {"duration": moments[-1][0], "step": 0.1}, "output": {"every": 0.5, "points": 9, "exact": True},
-    } | more)  # fmt: skip
+    return hybrid.run(
+        cable_scene(plain | section, start | ({"bend_stiffness": spring} if spring else {}),
+                    {"kind": "free", "moment": {"history": moments}}, attachments=locks, gravity=0,
+                    initial={"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}, model="rod",
+                    contact={"self": False}, mesh=8, time=(moments[-1][0], 0.1),
+                    output={"every": 0.5, "points": 9, "exact": True}) | more
+    )  # fmt: skip
 
 
 def turned(r: NDArray[np.float64], about: NDArray[np.float64]) -> NDArray[np.float64]:

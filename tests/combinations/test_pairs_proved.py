@@ -13,6 +13,7 @@ from hybrid.errors import ComputationError
 from hybrid.scene.wave_theory import steady_wave, wavenumber
 from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_network
 from tests.problems import tables_with
+from tests.scenes import cable_scene, pinned_at
 
 EXACT: Tables = {"output.exact": True}
 
@@ -53,12 +54,9 @@ def test_a_taut_line_whose_rods_come_and_go_is_as_slow_as_that_of_rayleigh() -> 
                "torsional_stiffness": 100.0, "rotary_inertia": J}  # fmt: skip
     far = {"kind": "pinned", "position": [length * (1.0 + pull / EA), 0, 0]}
     found = hybrid.modes(
-        {
-            "environment": {"gravity": 0.0}, "cable": {"sections": [section]}, "initial": "equilibrium",
-            "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": far},
-            "model": {"kind": "adaptive", "force_rod": [[0, length]]}, "mesh": {"cells": 100},
-        },
-        20,
+        cable_scene(section, pinned_at(0, 0, 0), far, gravity=0.0,
+                    model={"kind": "adaptive", "force_rod": [[0, length]]}, mesh=100),
+        20
     )  # fmt: skip
     omega = np.array([2.0 * np.pi / x.period for x in found.modes])
     for n in (1, 2, 3):
@@ -253,11 +251,10 @@ def test_a_line_that_breaks_off_another_one_leaves_that_as_an_end_that_is_let_go
     section = {"length": 8, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0, "torsional_stiffness": 15.0,
                "damping": {"mass": 0.5}}  # fmt: skip
     released = {"kind": "clamped", "position": place.tolist(), "tangent": tangent, "release_at": {"time": 0.3}}
-    alone = hybrid.run({
-        "cable": {"sections": [section]}, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 32},
-        "ends": {"start": released, "end": {"kind": "pinned", "position": [9, 0, 1]}},
-        "time": {"duration": 1.0, "step": 0.01}, "output": {"every": 0.05, "points": 13, "exact": True},
-    })  # fmt: skip
+    alone = hybrid.run(cable_scene(
+        section, released, pinned_at(9, 0, 1), model="rod", mesh=32, time=(1.0, 0.01),
+        output={"every": 0.05, "points": 13, "exact": True}
+    ))  # fmt: skip
     moved = found.lines["right"].position
     assert np.ptp(moved[:, 0], axis=0).max() > 1.0
     assert np.abs(alone.position - moved).max() < 1e-7

@@ -12,6 +12,7 @@ import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
 from tests.combinations.pairs import Tables, as_network, seen_by
 from tests.problems import tables_with
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 LENGTH = 12.0
 SECTION: Tables = {
@@ -25,12 +26,10 @@ def hung(model: str = "rod", **more: Any) -> Tables:
     """A line in the plane of x and z whose upper end is moved in it."""
     motion = {"surge": {"amplitude": 0.4, "period": 1.5}, "heave": {"amplitude": 0.5, "period": 1.2}, "ramp": 0.5}
     fluid = {"density": 1025, "surface": 6.0, "current": [0.3, 0, 0]}
-    return {
-        "environment": {"fluid": fluid}, "cable": {"sections": [SECTION]},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1]},
-                 "end": {"kind": "pinned", "position": [8, 0, 3], "motion": motion}},
-        "initial": "equilibrium", "model": model, "contact": {"self": False}, "mesh": {"cells": 36}, "dimension": 2,
-    } | deepcopy(STEPS) | more  # fmt: skip
+    return cable_scene(
+        SECTION, clamped_at([0, 0, 0], [1, 0, -1]), pinned_at(8, 0, 3, motion=motion), fluid=fluid, model=model,
+        contact={"self": False}, mesh=36, dimension=2
+    ) | deepcopy(STEPS) | more  # fmt: skip
 
 
 def system(tables: Tables) -> Tables:

@@ -16,6 +16,7 @@ import pytest
 
 import hybrid
 from hybrid.couple import moordyn
+from tests.scenes import line_between, network_scene
 
 DECK = Path(__file__).parents[1] / "data" / "moordyn" / "three_lines.txt"
 PLACES = [40.0, 0.0, -14.0, -20.0, 34.64, -14.0, -20.0, -34.64, -14.0]
@@ -100,14 +101,12 @@ def several(broken: bool) -> hybrid.Simulation:
     """Two ropes of their own, one of which comes off a point at 0.2 s if the scene says so."""
     rope = {"length": 3.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e4, "damping": {"mass": 0.5}}
     points = {"a": [0, 0, 0], "b": [2, 0, 0], "c": [0, 1, 0], "d": [2, 1, 0]}
-    tables: dict[str, Any] = {
-        "points": {name: {"position": x} for name, x in points.items()},
-        "lines": {
-            name: {"start": a, "end": b, "sections": [rope], "mesh": {"cells": 12}, "model": {"kind": "catenary", "slack": "warn"}}
-            for name, a, b in (("one", "a", "b"), ("other", "c", "d"))
-        },
-        "time": {"duration": 0.5, "step": 0.02},
-    }  # fmt: skip
+    tables: dict[str, Any] = network_scene(
+        {name: {"position": x} for name, x in points.items()},
+        {name: line_between(a, b, rope, mesh=12, model={"kind": "catenary", "slack": "warn"}) for name, a,
+         b in (("one", "a", "b"), ("other", "c", "d"))},
+        time=(0.5, 0.02)
+    )  # fmt: skip
     if broken:
         tables["points"]["b"]["break_at"] = {"time": 0.2}
     return hybrid.Simulation(tables)

@@ -14,16 +14,15 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 
 pytestmark = pytest.mark.needs("simpleeval")
 
 G = 9.81
-HANGING = {
-    "environment": {"gravity": G},
-    "cable": {"sections": [{"length": 40.0, "mass": 5.0, "axial_stiffness": 1e12}]},
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-    "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10},
-}  # fmt: skip
+HANGING = cable_scene(
+    {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e12}, pinned_at(0, 0, 0), "free", gravity=G, model="catenary",
+    mesh=10
+)  # fmt: skip
 LENGTH, MASS = "cable.sections[0].length", "cable.sections[0].mass"
 TOP = {"quantity": "tension", "at": "start"}
 
@@ -54,8 +53,7 @@ def test_stiffness_of_a_cantilever_for_a_deflection():
         "torsional_stiffness": 1e3,
     }
     clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
-    scene = HANGING | {"cable": {"sections": [section]}, "ends": {"start": clamp, "end": "free"}, "model": "rod",
-                       "mesh": {"cells": 80}}  # fmt: skip
+    scene = HANGING | cable_scene(section, clamp, "free", model="rod", mesh=80, initial=None)
     found = hybrid.design(
         scene, unknowns={"cable.sections[0].bending_stiffness": {"low": 50, "high": 5000}},
         targets={"tip": {"quantity": "position.z", "at": "end", "value": -0.02}},

@@ -11,6 +11,7 @@ from hybrid.designs.case_results import PART, TANGENT, Motions, Peaks
 from hybrid.designs.numbers import scene_with
 from hybrid.designs.wanted import over_time, peaks, smoothed
 from tests.designs.test_in_motion import G, W, heaved, on_the_bed
+from tests.scenes import cable_scene
 
 MASS, AMPLITUDE = "cable.sections[0].mass", "ends.start.motion.heave.amplitude"
 TOP = {"quantity": "tension", "at": "start", "over": "max"}
@@ -130,11 +131,10 @@ def test_what_has_no_equilibrium_is_designed_in_motion():
         "bending_stiffness": 10.0,
         "torsional_stiffness": 10.0,
     }
-    scene = {
-        "environment": {"gravity": 9.0}, "cable": {"sections": [section]}, "ends": {"start": "free", "end": "free"},
-        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}, "model": "rod",
-        "mesh": {"cells": 8}, "time": {"duration": 1.0, "step": 0.05},
-    }  # fmt: skip
+    scene = cable_scene(
+        section, "free", "free", gravity=9.0, initial={"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]},
+        model="rod", mesh=8, time=(1.0, 0.05)
+    )  # fmt: skip
     low = {"quantity": "position.z", "at": "start", "over": "last", "value": -5.0}
     found = hybrid.design(scene, unknowns={"environment.gravity": {"low": 1, "high": 20}}, targets={"low": low})
     assert found.numbers["environment.gravity"] == pytest.approx(10.0, rel=1e-6) and found.equilibria == 0

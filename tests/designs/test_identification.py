@@ -12,6 +12,7 @@ import hybrid
 from hybrid.cli.commands import app
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import in_full
+from tests.scenes import cable_scene, pinned_at
 
 EI, MASS = "cable.sections[0].bending_stiffness", "cable.sections[0].mass"
 G, W = 9.81, 0.05
@@ -226,18 +227,11 @@ def test_friction_of_the_bed_from_the_pull_of_a_dragged_line(tmp_path):
     friction, z = "environment.seabed.friction.axial", -5 * 9.81 / 1e5
     section = {"length": 20, "mass": 5, "diameter": 0.03, "axial_stiffness": 1e5, "damping": {"stiffness": 0.05}}
     bed = {"z": 0, "stiffness": 1e5, "damping": 1e3, "friction": {"axial": 0.5, "lateral": 0.5}}
-    scene = hybrid.validate_scene(
-        {
-            "environment": {"seabed": bed},
-            "cable": {"sections": [section]},
-            "ends": {
-                "start": "free",
-                "end": {"kind": "pinned", "position": [20, 0, z], "motion": {"velocity": [0.5, 0, 0], "ramp": 1}},
-            },
-            "initial": {"kind": "straight", "origin": [0, 0, z], "direction": [1, 0, 0]},
-            "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 6, "step": 0.02},
-        }
-    )  # fmt: skip
+    scene = hybrid.validate_scene(cable_scene(
+        section, "free", pinned_at(20, 0, z, motion={"velocity": [0.5, 0, 0], "ramp": 1}), seabed=bed,
+        initial={"kind": "straight", "origin": [0, 0, z], "direction": [1, 0, 0]}, model="catenary", mesh=20,
+        time=(6, 0.02)
+    ))  # fmt: skip
     weight = 5 * 20 * 9.81
     rows = "".join(f"{t},{0.4 * weight + d}\n" for t, d in ((4, 3), (5, -3)))
     (tmp_path / "pull.csv").write_text("t,tension\n" + rows)

@@ -20,6 +20,7 @@ from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.scene.read import as_scene
 from hybrid.scene.root import in_full
+from tests.scenes import cable_scene, pinned_at
 
 G, A, PERIOD = 9.81, 1.0, 8.0
 W = 2.0 * np.pi / PERIOD
@@ -29,15 +30,10 @@ def heaved(**more):
     """A stiff line with a weight below an end that heaves: its pull is that of the mass, whatever stretches."""
     section = {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e8}
     heave = {"heave": {"amplitude": A, "period": PERIOD}, "ramp": 3.0 * PERIOD}
-    return {
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0], "motion": heave},
-            "end": {"kind": "body", "mass": 60.0},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 8},
-        "time": {"duration": 36.0, "step": 0.1, "rho_inf": 0.5}, "output": {"every": 0.1, "points": 9},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0, motion=heave), {"kind": "body", "mass": 60.0}, model="catenary", mesh=8,
+        time=(36.0, 0.1, 0.5), output=(0.1, 9)
+    ) | more  # fmt: skip
 
 
 def test_the_pull_of_a_mass_that_is_heaved():
@@ -92,14 +88,11 @@ def on_the_bed(model="catenary"):
         "torsional_stiffness": 2e3, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
     }  # fmt: skip
     heave = {"heave": {"amplitude": 1.0, "period": 8.0}, "ramp": 4.0}
-    return {
-        "environment": {"fluid": {"density": 1025}, "seabed": {"z": -100.0, "stiffness": 5e3, "damping": 500.0}},
-        "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -100.0]},
-                 "end": {"kind": "pinned", "position": [205.0, 0, 0], "motion": heave}},
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 40},
-        "time": {"duration": 8.0, "step": 0.05}, "output": {"every": 0.2, "points": 51},
-    }  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, -100.0), pinned_at(205.0, 0, 0, motion=heave), fluid={"density": 1025},
+        seabed={"z": -100.0, "stiffness": 5e3, "damping": 500.0}, model=model, mesh=40, time=(8.0, 0.05),
+        output=(0.2, 51)
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,8 @@ import extras
 import numpy as np
 import pytest
 
+from tests.scenes import cable_scene, clamped_at, pinned_at
+
 pytestmark = extras.of_file("openmdao")
 
 import openmdao.api as om
@@ -18,29 +20,17 @@ from hybrid.scene.study import DESIGN
 
 LENGTH, MASS = "cable.sections[0].length", "cable.sections[0].mass"
 EXAMPLES = Path(__file__).parents[2] / "examples"
-HANGING = {
-    "environment": {"gravity": 9.81},
-    "cable": {"sections": [{"length": 40.0, "mass": 5.0, "axial_stiffness": 1e12}]},
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-    "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10},
-}  # fmt: skip
+HANGING = cable_scene(
+    {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e12}, pinned_at(0, 0, 0), "free", gravity=9.81, model="catenary",
+    mesh=10
+)  # fmt: skip
 TOP = {"quantity": "tension", "at": "start"}
-ROD = {
-    "environment": {"fluid": {"density": 1025.0, "current": [0.2, 0.1, 0.0]}},
-    "cable": {
-        "sections": [
-            {
-                "length": 110.0, "mass": 9.0, "diameter": 0.06, "axial_stiffness": 1e7, "bending_stiffness": 800.0,
-                "torsional_stiffness": 800.0, "drag": {"normal": 1.2},
-            }
-        ]
-    },
-    "ends": {
-        "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0.2]},
-        "end": {"kind": "pinned", "position": [90.0, 0, 20.0]},
-    },
-    "initial": "equilibrium", "model": "rod", "mesh": {"cells": 60},
-}  # fmt: skip
+ROD = cable_scene(
+    {"length": 110.0, "mass": 9.0, "diameter": 0.06, "axial_stiffness": 1e7, "bending_stiffness": 800.0,
+     "torsional_stiffness": 800.0, "drag": {"normal": 1.2}},
+    clamped_at([0, 0, 0], [1, 0, 0.2]), pinned_at(90.0, 0, 20.0), fluid={"density": 1025.0, "current": [0.2, 0.1, 0.0]},
+    model="rod", mesh=60
+)  # fmt: skip
 
 
 @pytest.fixture(autouse=True)

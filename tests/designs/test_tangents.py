@@ -24,6 +24,7 @@ from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.state.report import PLANAR
 from tests.designs.test_in_motion import heaved, on_the_bed
 from tests.designs.test_system_tangents import asked_of
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 OF = ["max tension@240", "last tension@100", "std position.z@150", "max velocity.z@200", "t=3.31 tension@120"]
 SECTION = "cable.sections[0]"
@@ -62,11 +63,9 @@ def twisted() -> dict[str, Any]:
         "torsional_stiffness": 40.0, "damping": {"stiffness": 0.01},
     }  # fmt: skip
     ends = {
-        "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1], "normal": [0, 1, 0], "turns": 0.3},
-        "end": {
-            "kind": "clamped", "position": [8, 1, 1], "tangent": [1, 0, 1], "normal": [0, 1, 0],
-            "motion": {"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0},
-        },
+        "start": clamped_at([0, 0, 0], [1, 0, -1], normal=[0, 1, 0], turns=0.3),
+        "end": clamped_at([8, 1, 1], [1, 0, 1], normal=[0, 1, 0],
+                          motion={"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0})
     }  # fmt: skip
     return {
         "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 24},
@@ -113,12 +112,10 @@ def test_zones_that_stay() -> None:
 def test_a_line_that_starts_as_it_is_placed() -> None:
     """Free at its end: the tangents of the first shape are those of the places that it is given."""
     section = {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e6, "bending_stiffness": 50.0, "diameter": 0.03}
-    tables = {
-        "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
-        "initial": {"kind": "straight", "direction": [1, 0, 0.2]}, "model": "rod", "mesh": {"cells": 20},
-        "time": {"duration": 0.8, "step": 0.02, "rho_inf": 0.5},
-    }  # fmt: skip
+    tables = cable_scene(
+        section, pinned_at(0, 0, 0), {"kind": "free"}, initial={"kind": "straight", "direction": [1, 0, 0.2]},
+        model="rod", mesh=20, time=(0.8, 0.02, 0.5)
+    )  # fmt: skip
     of = ["last tension@20", "last position.z@20"]
     agree(tables, of, [f"{SECTION}.mass", "environment.gravity"])
 

@@ -14,23 +14,16 @@ import pytest
 import hybrid
 from hybrid.cli.commands import main
 from hybrid.errors import ResultError
+from tests.scenes import line_between, network_scene
 
 ROPE = {"length": 60, "mass": 4, "diameter": 0.04, "axial_stiffness": 1e7}
-SCENE: dict[str, Any] = {
-    "title": "A float between an anchor and a hull",
-    "environment": {"fluid": {"density": 1025}},
-    "points": {
-        "anchor": {"position": [-40, 0, -50]}, "fairlead": {"body": "hull", "place": [0, 0, -1]},
-        "float": {"initial_guess": [0, 0, -10], "mass": 200, "volume": 1.0},
-    },
-    "bodies": {"hull": {"position": [40, 0, -49]}},
-    "lines": {
-        "west": {"start": "anchor", "end": "float", "sections": [ROPE], "mesh": {"cells": 8}},
-        "east": {"start": "fairlead", "end": "float", "sections": [ROPE], "mesh": {"cells": 8}},
-    },
-    "time": {"duration": 0.2, "step": 0.05},
-    "output": {"points": 9},
-}  # fmt: skip
+SCENE: dict[str, Any] = network_scene(
+    {"anchor": {"position": [-40, 0, -50]}, "fairlead": {"body": "hull", "place": [0, 0, -1]},
+     "float": {"initial_guess": [0, 0, -10], "mass": 200, "volume": 1.0}},
+    {"west": line_between("anchor", "float", ROPE, mesh=8), "east": line_between("fairlead", "float", ROPE, mesh=8)},
+    title="A float between an anchor and a hull", fluid={"density": 1025}, bodies={"hull": {"position": [40, 0, -49]}},
+    time=(0.2, 0.05), output={"points": 9}
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -22,6 +22,7 @@ from hybrid.exports.api import SUFFIXES, export
 from hybrid.store.format import Field, Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
+from tests.scenes import cable_scene, pinned_at
 
 NS, LENGTH, PERIOD, PULL = 21, 10.0, 2.0, 20.0
 S = np.linspace(0.0, LENGTH, NS)
@@ -315,11 +316,10 @@ def test_vtk_has_obstacles_where_they_are(tmp_path: Path) -> None:
         "floor": {"kind": "plane", "at": [0, 0, -3], "normal": [0, 0, 1]},
         "angle": {"kind": "mesh", "file": str(ANGLE), "scale": 0.1, "at": [1, -3, 0]},
     }
-    result = hybrid.run({
-        "cable": {"sections": [section]}, "obstacles": obstacles, "model": "catenary", "mesh": {"cells": 10},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [2, 0, 0]}},
-        "initial": "equilibrium", "time": {"duration": 0.2, "step": 0.02}, "output": {"every": 0.1, "points": 11},
-    })  # fmt: skip
+    result = hybrid.run(cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(2, 0, 0), obstacles=obstacles, model="catenary", mesh=10,
+        time=(0.2, 0.02), output=(0.1, 11)
+    ))  # fmt: skip
     reader = vtkHDFReader()
     reader.SetFileName(str(export(result, tmp_path / "run.vtkhdf", times=(0.1, None)).files[0]))
     reader.UpdateInformation()

@@ -26,6 +26,7 @@ import numpy as np
 import hybrid
 from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.store.reader import Result
+from tests.scenes import cable_scene
 
 MODELS = ("rod", "catenary", "zones", "adaptive")
 LONGEST = 20.0  # s of processor time: a case that takes longer has failed
@@ -168,12 +169,7 @@ def scene(
         section = {"max_strain": ANY_STRAIN} | section
     if model == "catenary":
         section = {k: v for k, v in section.items() if k not in ("bending_stiffness", "torsional_stiffness")}
-    return {
-        "environment": environment,
-        "cable": {"sections": [section]},
-        "ends": {"start": start, "end": end},
-        "model": kind,
-    } | tables
+    return cable_scene(section, start, end, environment=environment, model=kind, initial=None) | tables
 
 
 def pinned(at: Sequence[float] = (0.0, 0.0, 0.0), **more: Any) -> dict[str, Any]:

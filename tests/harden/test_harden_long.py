@@ -19,6 +19,7 @@ import hybrid
 from hybrid.cli.tables import zones_over_time
 from hybrid.errors import OMITTED, ZONE_EVENTS
 from hybrid.store import recorder as record
+from tests.scenes import pinned_at
 
 STEP, PERIOD = 0.05, 40.0  # s: of a step, and of the coming and going of a rod
 PER_STEP = 80  # bytes of the step log a step: ten numbers
@@ -29,10 +30,7 @@ def _scene(steps: int) -> hybrid.Scene:
     """A few cells between two pins, one of which heaves."""
     heave = {"heave": {"amplitude": 0.2, "period": 4.0}, "ramp": 8.0}
     section = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 0.5, "damping": 0.2}
-    ends = {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [9, 0, 0], "motion": heave},
-    }
+    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(9, 0, 0, motion=heave)}
     return hybrid.validate_scene(
         {"cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "mesh": {"cells": 8},
          "model": {"kind": "adaptive", "tolerance": 0.01, "hold_time": 2.0},

@@ -19,6 +19,7 @@ from hybrid.interop.moordyn import ImportedScene
 from hybrid.interop.moordyn.cables import _rotated
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import Body, Clamped, Free, Pinned
+from tests.scenes import cable_scene, pinned_at
 
 
 def only(name: str, line: int | None = None) -> ImportedScene:
@@ -252,28 +253,12 @@ def test_line_ends_and_comments_of_other_systems(tmp_path: Path) -> None:
 
 # --- from a scene and back ---------------------------------------------------------------------
 
-MOORING: dict[str, Any] = {
-    "environment": {
-        "gravity": 9.81,
-        "fluid": {"density": 1025.0, "surface": 0.0},
-        "seabed": {"z": -100.0, "stiffness": 5.0e3, "damping": 5.0e2},
-    },
-    "cable": {
-        "sections": [
-            {
-                "length": 250.0, "mass": 20.0, "diameter": 0.05, "axial_stiffness": 2.0e8, "bending_stiffness": 2.0e3,
-                "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 0.8},
-            }
-        ]
-    },
-    "ends": {
-        "start": {"kind": "pinned", "position": [0.0, 0.0, -100.0]},
-        "end": {"kind": "pinned", "position": [205.0, 10.0, -3.0]},
-    },
-    "initial": "equilibrium",
-    "mesh": {"cells": 40},
-    "time": {"duration": 10.0},
-}  # fmt: skip
+MOORING: dict[str, Any] = cable_scene(
+    {"length": 250.0, "mass": 20.0, "diameter": 0.05, "axial_stiffness": 2.0e8, "bending_stiffness": 2.0e3,
+     "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 0.8}},
+    pinned_at(0.0, 0.0, -100.0), pinned_at(205.0, 10.0, -3.0), gravity=9.81, fluid={"density": 1025.0, "surface": 0.0},
+    seabed={"z": -100.0, "stiffness": 5.0e3, "damping": 5.0e2}, mesh=40, time={"duration": 10.0}
+)  # fmt: skip
 
 
 def leaves(scene: Scene) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from hybrid.interop.moordyn import export_moordyn, import_moordyn
 from hybrid.interop.moordyn.writer import deck_of
 from hybrid.scene.read import as_scene, read_text, scene_text
 from hybrid.scene.root import in_full
+from tests.scenes import line_between, network_scene
 
 
 class Straight:
@@ -193,15 +194,14 @@ def test_clamps_of_several_lines_are_rods_and_come_back(tmp_path: Path) -> None:
     """At a fixed point and at a body that is turned, in axes of the body; a spring has no counterpart."""
     pipe = {"length": 30.0, "mass": 9.0, "diameter": 0.08, "axial_stiffness": 1e7, "bending_stiffness": 5e3}
     held = {"start": {"tangent": [0.0, 0.6, 0.8], "swivel": True}, "end": {"tangent": [1.0, 0.0, 0.0], "swivel": True}}
-    tables: dict[str, Any] = {
-        "environment": {"fluid": {"density": 1025.0, "surface": 5.0}},
-        "points": {"low": {"position": [0.0, 0.0, -20.0]}, "far": {"position": [-20.0, 0.0, -15.0]}, "lug": {"body": "ship", "place": [1.0, 0.0, -2.0]}},
-        "bodies": {"ship": {"position": [8.0, 3.0, 2.0], "rotation": [0.0, 0.0, 90.0]}},
-        "lines": {
-            "pipe": {"start": "low", "end": "lug", "connections": held, "sections": [pipe], "mesh": {"cells": 20}},
-            "leg": {"start": "low", "end": "far", "sections": [pipe], "model": "catenary", "mesh": {"cells": 10}},
-        },
-    }  # fmt: skip
+    tables: dict[str, Any] = network_scene(
+        {"low": {"position": [0.0, 0.0, -20.0]}, "far": {"position": [-20.0, 0.0, -15.0]},
+         "lug": {"body": "ship", "place": [1.0, 0.0, -2.0]}},
+        {"pipe": line_between("low", "lug", pipe, connections=held, mesh=20),
+         "leg": line_between("low", "far", pipe, model="catenary", mesh=10)},
+        fluid={"density": 1025.0, "surface": 5.0},
+        bodies={"ship": {"position": [8.0, 3.0, 2.0], "rotation": [0.0, 0.0, 90.0]}}
+    )  # fmt: skip
     scene = hybrid.Scene.model_validate(tables)
     made = back(scene, tmp_path)
     ours, theirs = scene.lines["pipe"], made.lines["line1"]

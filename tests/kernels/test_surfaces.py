@@ -15,6 +15,7 @@ from hybrid.kernels.laws import surfaces
 from hybrid.kernels.laws.obstacles import half_thickness
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 
 STRAND = 0.01
 DATA = Path(__file__).parents[1] / "data"
@@ -50,11 +51,8 @@ def is_far(sea: Any, k: int, x: Any, way: float) -> Any:
 
 def scene(**tables: Any) -> hybrid.Scene:
     return hybrid.validate_scene(
-        {
-            "cable": {"sections": [{"length": 2.0, "mass": 0.1, "diameter": 2.0 * STRAND}]},
-            "ends": {"start": {"kind": "pinned", "position": [5, 5, 5]}, "end": "free"},
-            "initial": {"kind": "straight", "direction": [0, 0, -1]}, "obstacles": OBSTACLES,
-        } | tables
+        cable_scene({"length": 2.0, "mass": 0.1, "diameter": 2.0 * STRAND}, pinned_at(5, 5, 5), "free",
+                    initial={"kind": "straight", "direction": [0, 0, -1]}, obstacles=OBSTACLES) | tables
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ import pytest
 import hybrid
 from hybrid.linear.response_results import shape_of_drag
 from hybrid.modal import validity
+from tests.scenes import cable_scene, pinned_at
 
 EA, LENGTH, T0 = 1e6, 50.0, 2e4
 COUNT = 13
@@ -33,17 +34,14 @@ def test_the_stretch_by_swinging() -> None:
     """A light bar that is turned and stretched: EA (a/L + b^2/2L^2) for ends that move by a along and b across."""
     along, across = harmonics(0.002, 1), harmonics(0.3, 2)
     motion = {"surge": along, "sway": across, "ramp": 60.0}
-    scene = {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [{"length": LENGTH / (1.0 + T0 / EA), "mass": 1e-3, "axial_stiffness": EA}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [LENGTH, 0, 0], "motion": motion},
-        },
-        "initial": "equilibrium",
-        "model": "catenary",
-        "mesh": {"cells": 8},
-    }
+    scene = cable_scene(
+        {"length": LENGTH / (1.0 + T0 / EA), "mass": 1e-3, "axial_stiffness": EA},
+        pinned_at(0, 0, 0),
+        pinned_at(LENGTH, 0, 0, motion=motion),
+        gravity=0,
+        model="catenary",
+        mesh=8,
+    )
     found = hybrid.response(scene).lines["cable"]
     t = np.linspace(0.0, 320.0, 20_001)[:-1]
     a, b = moved(t, along), moved(t, across)
@@ -70,17 +68,9 @@ def test_the_rest_of_drag(waves: dict[str, object], part: float, bound: float) -
     """
     section = {"length": 10.0, "mass": 0.2, "diameter": 0.01, "axial_stiffness": 1e8, "drag": {"normal": 1.2}}
     water = {"density": 1025, "surface": 0.0, "waves": waves | {"depth": 10.0, "direction": 90.0, "ramp": 10.0}}
-    scene = {
-        "environment": {"fluid": water},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -9.9]},
-            "end": {"kind": "pinned", "position": [10.005, 0, -9.9]},
-        },
-        "initial": "equilibrium",
-        "model": "catenary",
-        "mesh": {"cells": 10},
-    }
+    scene = cable_scene(
+        section, pinned_at(0, 0, -9.9), pinned_at(10.005, 0, -9.9), fluid=water, model="catenary", mesh=10
+    )
     line = hybrid.response(scene).lines["cable"]
     assert line.left_out["curvature"][2:-2] == pytest.approx(part, rel=bound)
 
@@ -119,17 +109,14 @@ def test_a_string_whose_bend_turns_over_in_waves_as_in_an_hour() -> None:
     """
     rope = {"length": 133.7, "mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
     waves = {"kind": "jonswap", "significant_height": 2.0, "peak_period": 8.0, "direction": 30.0, "ramp": 10.0}
-    scene = {
-        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": waves | {"depth": 100.0}}},
-        "cable": {"sections": [rope | {"added_mass": {"normal": 1.0}}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -95]},
-            "end": {"kind": "pinned", "position": [100, 0, -5]},
-        },
-        "initial": "equilibrium",
-        "model": "catenary",
-        "mesh": {"cells": 60},
-    }
+    scene = cable_scene(
+        rope | {"added_mass": {"normal": 1.0}},
+        pinned_at(0, 0, -95),
+        pinned_at(100, 0, -5),
+        fluid={"density": 1025, "surface": 0, "waves": waves | {"depth": 100.0}},
+        model="catenary",
+        mesh=60,
+    )
     line = hybrid.response(scene).lines["cable"]
     output = {"every": 0.25, "points": [120.33, 127.015]}
     with hybrid.run(scene | {"time": {"duration": 3600.0, "step": 0.15}, "output": output}) as result:
@@ -148,17 +135,14 @@ def test_fast_bends_across_hide_nothing_of_a_quiet_bend() -> None:
     """
     section = {"length": 60.0, "mass": 30.0, "diameter": 0.1, "axial_stiffness": 5e6, "drag": {"normal": 1.2}}
     waves = {"kind": "jonswap", "significant_height": 1.0, "peak_period": 5.0, "direction": 30.0, "ramp": 10.0}
-    scene = {
-        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": waves | {"depth": 100.0}}},
-        "cable": {"sections": [section | {"added_mass": {"normal": 1.0}}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -65]},
-            "end": {"kind": "pinned", "position": [6, 0, -5.15]},
-        },
-        "initial": "equilibrium",
-        "model": "catenary",
-        "mesh": {"cells": 60},
-    }
+    scene = cable_scene(
+        section | {"added_mass": {"normal": 1.0}},
+        pinned_at(0, 0, -65),
+        pinned_at(6, 0, -5.15),
+        fluid={"density": 1025, "surface": 0, "waves": waves | {"depth": 100.0}},
+        model="catenary",
+        mesh=60,
+    )
     found = hybrid.response(scene)
     line, nodes = found.lines["cable"], [3, 4, 6]
     output = {"every": 0.25, "points": [3.0, 4.0, 6.0]}
@@ -175,20 +159,15 @@ def test_curvature_that_is_known_hardly_anywhere_is_not_valid() -> None:
     chain = {"length": 200.0, "mass": 30.0, "diameter": 0.07, "axial_stiffness": 5e6, "drag": {"normal": 1.4}}
     waves = {"kind": "jonswap", "significant_height": 0.2, "peak_period": 8.0, "direction": 30.0}
     motion = {"heave": {"amplitude": 0.02, "period": 9.0}, "ramp": 10.0}
-    scene = {
-        "environment": {
-            "fluid": {"density": 1025, "surface": 0, "waves": waves},
-            "seabed": {"z": -60.0, "stiffness": 5e4},
-        },
-        "cable": {"sections": [chain | {"added_mass": {"normal": 1.0}}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -60]},
-            "end": {"kind": "pinned", "position": [170, 0, -5], "motion": motion},
-        },
-        "initial": "equilibrium",
-        "model": "catenary",
-        "mesh": {"cells": 80},
-    }
+    scene = cable_scene(
+        chain | {"added_mass": {"normal": 1.0}},
+        pinned_at(0, 0, -60),
+        pinned_at(170, 0, -5, motion=motion),
+        fluid={"density": 1025, "surface": 0, "waves": waves},
+        seabed={"z": -60.0, "stiffness": 5e4},
+        model="catenary",
+        mesh=80,
+    )
     found = hybrid.response(scene)
     assert found.lines["cable"].resolved("curvature").sum() == 1
     (note,) = found.notes

@@ -15,6 +15,7 @@ from hybrid.linear.eigen import _every, _nearest
 from hybrid.linear.matrices import linear_network
 from hybrid.modal.api import _modes_on_mesh, equilibrium_of
 from hybrid.scene.read import as_scene
+from tests.scenes import line_between, network_scene
 
 G = 9.81
 
@@ -269,21 +270,12 @@ BUOY = {
 def moored(cells=20, **body):
     """A buoy, all of it in water, over its anchor on a light line, its fairlead 0.5 m below its origin."""
     line = {"length": 30.0, "mass": 1e-3, "diameter": 1e-3, "axial_stiffness": 1e9}
-    return (
-        {
-            "environment": {"fluid": {"density": 1000.0}},
-            "points": {
-                "anchor": {"kind": "fixed", "position": [0, 0, -50]},
-                "eye": {"kind": "fairlead", "body": "buoy", "place": [0, 0, -0.5]},
-            },
-            "bodies": {"buoy": BUOY | body},
-            "lines": {
-                "tether": {
-                    "start": "anchor", "end": "eye", "sections": [line], "model": "catenary", "mesh": {"cells": cells}
-                }
-            },
-        }
-    )  # fmt: skip
+    return (network_scene(
+        {"anchor": {"kind": "fixed", "position": [0, 0, -50]},
+         "eye": {"kind": "fairlead", "body": "buoy", "place": [0, 0, -0.5]}},
+        {"tether": line_between("anchor", "eye", line, model="catenary", mesh=cells)}, fluid={"density": 1000.0},
+        bodies={"buoy": BUOY | body}
+    ))  # fmt: skip
 
 
 def test_moored_body():
@@ -319,40 +311,24 @@ def test_joints_give_way_as_the_solver_says():
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-6 * np.abs(theirs).max())
 
 
-PIPE = {
-    "environment": {"fluid": {"density": 1025.0, "current": [0.3, 0, 0]}},
-    "points": {
-        "bed": {"kind": "fixed", "position": [0, 0, -60]},
-        "east": {"kind": "fixed", "position": [60, 0, -60]},
-        "ring": {"kind": "free", "mass": 20.0, "volume": 0.05, "initial_guess": [30, 0, -30]},
-        "hang": {"kind": "fairlead", "body": "buoy", "place": [0.5, 0, -1.0]},
-        "side": {"kind": "fairlead", "body": "buoy", "place": [0.8, 0.2, 0.0]},
-    },
-    "bodies": {
-        "buoy": {
-            "mass": 900.0, "inertia": [300.0, 300.0, 200.0], "initial_guess": [0.0, 0.0, 0.0],
-            "hydrostatics": {"level": 0.0, "heave": 2e4, "roll": 4e4, "pitch": 4e4},
-        }
-    },
-    "lines": {
-        "pipe": {
-            "start": "bed", "end": "hang", "model": "rod", "mesh": {"cells": 30},
-            "connections": {"end": {"kind": "clamped", "tangent": [0, 0, 1], "normal": [1, 0, 0]}},
-            "sections": [{
-                "length": 59.5, "mass": 12.0, "diameter": 0.1, "axial_stiffness": 1e6, "bending_stiffness": 2e3,
-                "torsional_stiffness": 1e3,
-            }],
-        },
-        "leg": {
-            "start": "east", "end": "ring", "model": "catenary", "mesh": {"cells": 15},
-            "sections": [{"length": 45.0, "mass": 3.0, "diameter": 0.02, "axial_stiffness": 1e6}],
-        },
-        "guy": {
-            "start": "ring", "end": "side", "model": "catenary", "mesh": {"cells": 15},
-            "sections": [{"length": 45.0, "mass": 3.0, "diameter": 0.02, "axial_stiffness": 1e6}],
-        },
-    },
-}  # fmt: skip
+PIPE = network_scene(
+    {"bed": {"kind": "fixed", "position": [0, 0, -60]}, "east": {"kind": "fixed", "position": [60, 0, -60]},
+     "ring": {"kind": "free", "mass": 20.0, "volume": 0.05, "initial_guess": [30, 0, -30]},
+     "hang": {"kind": "fairlead", "body": "buoy", "place": [0.5, 0, -1.0]},
+     "side": {"kind": "fairlead", "body": "buoy", "place": [0.8, 0.2, 0.0]}},
+    {"pipe": line_between("bed", "hang",
+                          {"length": 59.5, "mass": 12.0, "diameter": 0.1, "axial_stiffness": 1e6,
+                           "bending_stiffness": 2e3, "torsional_stiffness": 1e3},
+                          model="rod", mesh=30,
+                          connections={"end": {"kind": "clamped", "tangent": [0, 0, 1], "normal": [1, 0, 0]}}),
+     "leg": line_between("east", "ring", {"length": 45.0, "mass": 3.0, "diameter": 0.02, "axial_stiffness": 1e6},
+                         model="catenary", mesh=15),
+     "guy": line_between("ring", "side", {"length": 45.0, "mass": 3.0, "diameter": 0.02, "axial_stiffness": 1e6},
+                         model="catenary", mesh=15)},
+    fluid={"density": 1025.0, "current": [0.3, 0, 0]},
+    bodies={"buoy": {"mass": 900.0, "inertia": [300.0, 300.0, 200.0], "initial_guess": [0.0, 0.0, 0.0],
+                     "hydrostatics": {"level": 0.0, "heave": 2e4, "roll": 4e4, "pitch": 4e4}}}
+)  # fmt: skip
 
 
 @pytest.mark.long  # 2.7 s

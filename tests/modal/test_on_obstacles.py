@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 from tests.validation.obstacle_scenes import over_pipe
 from tests.validation.test_validation_obstacles_accuracy import PIPE, as_system
 
@@ -19,12 +20,11 @@ def string(friction: float) -> Tables:
     """A taut string without weight, pressed up by a thin pipe across it."""
     section = {"length": 9.99, "mass": 0.5, "diameter": 0.01, "axial_stiffness": 1e6}
     pipe = {"kind": "cylinder", "at": [AT, 0, PUSH - 0.055], "axis": [0, 1, 0], "radius": 0.05, "friction": friction}
-    return {
-        "environment": {"gravity": 0}, "cable": {"sections": [section]}, "obstacles": {"pipe": pipe},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [SPAN, 0, 0]}},
-        "initial": {"kind": "equilibrium", "points": [[0, 0, 0], [AT, 0, PUSH], [SPAN, 0, 0]]},
-        "model": "catenary", "mesh": {"cells": 300}, "contact": {"self": False},
-    }  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(SPAN, 0, 0), gravity=0, obstacles={"pipe": pipe},
+        initial={"kind": "equilibrium", "points": [[0, 0, 0], [AT, 0, PUSH], [SPAN, 0, 0]]}, model="catenary", mesh=300,
+        contact={"self": False}
+    )  # fmt: skip
 
 
 def resting(**pipe: Any) -> Tables:

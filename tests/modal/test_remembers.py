@@ -10,16 +10,15 @@ import pytest
 
 import hybrid
 from tests.problems import tables_with
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 SECTION = {
     "length": 10.0, "mass": 4.0, "diameter": 0.05, "axial_stiffness": 1e6, "bending_stiffness": 200.0,
     "torsional_stiffness": 100.0, "damping": {"mass": 2.0},
 }  # fmt: skip
-CLAMPED: dict[str, Any] = {
-    "cable": {"sections": [SECTION]}, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40},
-    "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
-             "end": {"kind": "pinned", "position": [9, 0, 1]}},
-}  # fmt: skip
+CLAMPED: dict[str, Any] = cable_scene(
+    SECTION, clamped_at([0, 0, 0], [1, 0, 0]), pinned_at(9, 0, 1), model="rod", mesh=40
+)
 S = "cable.sections.0."
 LAYERS = {S + "bending_slip": [{"stiffness": 300.0, "moment": 5.0, "per_tension": 0.02}]}
 PERIOD = 8.0
@@ -82,13 +81,9 @@ PIPE = SECTION | {"mass": 40.0, "diameter": 0.2, "bending_stiffness": 2e5, "axia
 def test_a_pipe_that_heaves_in_soil_has_the_stiffness_of_unloading():
     """omega^2 = K Pu/(D m) at the depth in which first penetration, Pu zeta/(1 + zeta), bears its weight."""
     found = hybrid.modes(
-        {
-            "environment": {"seabed": {"z": 0, "soil": SOIL}}, "cable": {"sections": [PIPE]}, "model": "rod",
-            "ends": {"start": "free", "end": "free"}, "mesh": {"cells": 20},
-            "initial": {"kind": "equilibrium", "points": [[0, 0, 0], [10, 0, 0]]},
-        },
-        6,
-        near=0.0625,
+        cable_scene(PIPE, "free", "free", seabed={"z": 0, "soil": SOIL}, model="rod", mesh=20,
+                    initial={"kind": "equilibrium", "points": [[0, 0, 0], [10, 0, 0]]}),
+        6, near=0.0625
     )  # fmt: skip
     z, D, a, b, K = -found.position["cable"][0, 2], 0.2, 6.0, 0.25, 200.0
     most = a * (z / D) ** b * (500.0 + 900.0 * z) * D
@@ -100,12 +95,10 @@ def test_a_pipe_that_heaves_in_soil_has_the_stiffness_of_unloading():
 @pytest.mark.long
 def test_a_slow_small_motion_of_a_line_in_soil_is_that_in_time_and_a_large_one_is_told():
     """Once it has sunk as far as the motion lets it: in the seventh period tension is off by 1.1 % as yet."""
-    pipe = {
-        "environment": {"seabed": {"z": 0, "soil": SOIL}}, "cable": {"sections": [PIPE | {"length": 30.0}]},
-        "model": "rod", "mesh": {"cells": 60}, "initial": "equilibrium",
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -0.03]},
-                 "end": {"kind": "pinned", "position": [29.7, 0, 3]}},
-    }  # fmt: skip
+    pipe = cable_scene(
+        PIPE | {"length": 30.0}, pinned_at(0, 0, -0.03), pinned_at(29.7, 0, 3), seabed={"z": 0, "soil": SOIL},
+        model="rod", mesh=60
+    )  # fmt: skip
     response, (curvature, tension) = moved(pipe, 4e-6, [12.0, 15.0, 18.0, 24.0], 20)
     assert response.valid
     np.testing.assert_allclose(curvature, 1.0, atol=4e-3)

@@ -14,6 +14,7 @@ from hybrid.cli.commands import app
 from hybrid.linear.response_results import LineResponse, Response, across, along, of_few, phases_of, size_deviation
 from hybrid.scene.combinations import RESPONSE_TO_MOTION
 from hybrid.statistics.fatigue import damage
+from tests.scenes import cable_scene, clamped_at, line_between, pinned_at
 
 T_N = {"kind": "T-N", "log_a": 3.0, "m": 3.0}
 
@@ -71,18 +72,11 @@ def test_bar_that_is_moved_at_its_end():
     """EA k cot(k L) of a bar of 100 m, EA 1e7 N, 10 kg/m at 10 rad/s: 64209.3 N/m; order two."""
     off = []
     for cells in (25, 50):
-        tables = {
-            "environment": {"gravity": 0.0},
-            "cable": {"sections": [{"length": 100.0, "mass": 10.0, "axial_stiffness": 1e7}]},
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, 0]},
-                "end": {
-                    "kind": "pinned", "position": [100.1, 0, 0],
-                    "motion": {"surge": {"amplitude": 0.01, "period": 2.0 * math.pi / 10.0}, "ramp": 1.0},
-                },
-            },
-            "initial": "equilibrium", "model": "catenary", "mesh": {"cells": cells},
-        }  # fmt: skip
+        tables = cable_scene(
+            {"length": 100.0, "mass": 10.0, "axial_stiffness": 1e7}, pinned_at(0, 0, 0),
+            pinned_at(100.1, 0, 0, motion={"surge": {"amplitude": 0.01, "period": 2.0 * math.pi / 10.0}, "ramp": 1.0}),
+            gravity=0.0, model="catenary", mesh=cells
+        )  # fmt: skip
         line = hybrid.response(tables).lines["cable"]
         assert line.f == pytest.approx([10.0 / (2.0 * math.pi)])
         # the tension of the last cell is that of its middle
@@ -182,10 +176,9 @@ def test_a_float_on_a_catenary_makes_a_kink_and_no_curvature():
 def test_a_rod_that_a_clamp_turns_as_in_time():
     """The frame of an end that pitches bends the rod beside it."""
     tables = hung(model="rod", cells=80, damping=0.3, bending_stiffness=2e5)
-    tables["ends"]["end"] = {
-        "kind": "clamped", "position": [6, 0, -5.15], "tangent": [0.1, 0, 1],
-        "motion": {"pitch": {"amplitude": 0.5, "period": 5.0}, "ramp": 10.0},
-    }  # fmt: skip
+    tables["ends"]["end"] = clamped_at(
+        [6, 0, -5.15], [0.1, 0, 1], motion={"pitch": {"amplitude": 0.5, "period": 5.0}, "ramp": 10.0}
+    )
     line = hybrid.response(tables).lines["cable"]
     tables |= {"time": {"duration": 60.0, "step": 0.02}, "output": {"every": 0.1, "points": [50.0, 58.0, 60.0]}}
     result = hybrid.run(tables)
@@ -241,13 +234,7 @@ def test_one_line_of_a_system_is_the_cable():
     """In a sea; and turned about the vertical with its waves."""
     one = hybrid.response(hung(STORM))
     tables = hung(STORM)
-    line = {
-        "start": "a",
-        "end": "b",
-        "sections": tables["cable"]["sections"],
-        "model": "catenary",
-        "mesh": {"cells": 60},
-    }
+    line = line_between("a", "b", tables["cable"]["sections"], model="catenary", mesh=60)
     points = {"a": {"kind": "fixed", "position": [0, 0, -65]}, "b": {"kind": "fixed", "position": [6, 0, -5.15]}}
     several = hybrid.response({"environment": tables["environment"], "points": points, "lines": {"l": line}})
     turned = hung(STORM | {"direction": 120}, end=(0, 6, -5.15))
@@ -296,11 +283,10 @@ def test_a_slow_motion_bends_a_sprung_clamp_as_equilibria_do(law, spring):
 
     def scene(z, **more):
         end = {"kind": "pinned", "position": [7, 0, 3 + z]} | more
-        return {
-            "environment": {"fluid": {"density": 1000}}, "cable": {"sections": [section]},
-            "ends": {"start": clamp, "end": end}, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40},
-            "contact": {"self": False}, "time": {"duration": 10, "step": 0.05}, "output": {"points": 3},
-        }  # fmt: skip
+        return cable_scene(
+            section, clamp, end, fluid={"density": 1000}, model="rod", mesh=40, contact={"self": False},
+            time=(10, 0.05), output={"points": 3}
+        )  # fmt: skip
 
     low, rest, high = (hybrid.static(scene(z)).curvature[0, 0] for z in (-1e-3, 0.0, 1e-3))
     heave = {"heave": {"amplitude": 1e-3, "period": 400.0}, "ramp": 800}
@@ -325,14 +311,10 @@ def test_a_law_of_pieces_is_told_where_its_stiffness_changes(law, quantity):
     section = {"length": 100.0, "mass": 10.0, "diameter": 0.05, "bending_stiffness": 1e4, "torsional_stiffness": 1e3}
     if "moment_curvature" in law:
         section.pop("bending_stiffness")
-    scene = {
-        "environment": {"gravity": 0.0}, "cable": {"sections": [section | {"damping": 0.05} | law]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [101.0, 0, 0], "motion": motion | {"ramp": 10.0}},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20},
-    }  # fmt: skip
+    scene = cable_scene(
+        section | {"damping": 0.05} | law, pinned_at(0, 0, 0), pinned_at(101.0, 0, 0, motion=motion | {"ramp": 10.0}),
+        gravity=0.0, model="rod", mesh=20
+    )  # fmt: skip
     response = hybrid.response(scene)
     assert T / 2.0 < response.lines["cable"].mean_tension[0] < 2.0 * T
     told = [x for x in response.notes if "passes over a point of its table" in x]

@@ -10,6 +10,7 @@ import pytest
 import hybrid
 from hybrid.linear.loaded_line import turning_doubts
 from hybrid.linear.response_results import of_few, phases_of
+from tests.scenes import line_between, network_scene
 from tests.simulation.test_members import RHO, G, body, floating, scene
 
 ANCHORS = {"east": (150.0, 0.0), "north": (-75.0, 130.0), "south": (-75.0, -130.0)}
@@ -176,11 +177,10 @@ def sunken(height, damping):
     }  # fmt: skip
     rope = {"length": 89.5, "mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "added_mass": {"normal": 1.0}}
     waves = {"kind": "pierson_moskowitz", "significant_height": height, "peak_period": 10.0, "depth": 100.0}
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": waves | {"ramp": 10.0}}},
-        "points": points, "bodies": {"buoy": buoy},
-        "lines": {x: {"start": x, "end": f"at_{x}", "sections": [rope], "mesh": {"cells": 8}} for x in ways},
-    }  # fmt: skip
+    return network_scene(
+        points, {x: line_between(x, f"at_{x}", rope, mesh=8) for x in ways},
+        fluid={"density": 1025, "surface": 0, "waves": waves | {"ramp": 10.0}}, bodies={"buoy": buoy}
+    )  # fmt: skip
 
 
 def at_a_point(made):

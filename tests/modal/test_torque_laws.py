@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene
 
 TABLE = [[0, 0], [0.002, 100], [0.004, 240], [0.02, 2500]]
 SLOPE = (2500.0 - 240.0) / 0.016
@@ -30,12 +31,10 @@ def line(law: dict[str, Any], gravity: float, x: float, longer: float = 1.0, **m
     } | law  # fmt: skip
     clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 1, 0]}
     motion = {"surge": {"amplitude": 0.01, "period": 3.0}, "heave": {"amplitude": 0.02, "period": 3.0}, "ramp": 6.0}
-    return {
-        "environment": {"gravity": gravity}, "cable": {"sections": [section]},
-        "ends": {"start": {**clamp, "position": [0, 0, 0]},
-                 "end": {**clamp, "position": [x, 0, 0], "turns": 1.0, "motion": motion}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 24}, "time": {"duration": 1.0, "step": 0.05},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, {**clamp, "position": [0, 0, 0]}, {**clamp, "position": [x, 0, 0], "turns": 1.0, "motion": motion},
+        gravity=gravity, model="rod", mesh=24, time=(1.0, 0.05)
+    ) | more  # fmt: skip
 
 
 def same(law: str) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -13,6 +13,7 @@ from hybrid.linear.matrices import linear_network
 from hybrid.modal.api import equilibrium_of
 from hybrid.scene.read import as_scene
 from tests.designs.test_touching_lines import beside
+from tests.scenes import line_between, network_scene
 
 Tables = dict[str, Any]
 NO_CONTACT = {"contact": {"self": False}}
@@ -33,20 +34,18 @@ def drum(friction: float, damping: float = 0.0) -> Tables:
     over = [[-2.8, 0.1, -1.5], [-0.65, 0.03, 0.1], [0, 0, 0.62], [0.65, 0, 0.1], [2.6, 0, -1.8]]
     held = {"a": over[0], "b": over[-1], "u": [-0.3, -1.2, 2.3], "w": [0.3, 1.2, 2.3]}
     stays = {"sections": [stay], "model": "catenary", "mesh": {"cells": 6}} | NO_CONTACT
-    return {
-        "environment": {"fluid": {"density": 1.0}},
-        "points": {name: {"position": x} for name, x in held.items()} | {
-            name: {"body": "drum", "place": [0, y, 0]} for name, y in (("p", -0.9), ("q", 0.9))},
-        "bodies": {"drum": {
-            "initial_guess": [0, 0, 0], "mass": 60.0, "inertia": [12.0, 8.0, 12.0], "centre": [0, 0, -0.15],
-            "damping": [120, 120, 120, 24, 16, 24],
-            "shape": {"kind": "cylinder", "axis": [0, 1, 0], "length": 1.6, "radius": 0.6, "friction": friction,
-                      "damping": damping}}},
-        "lines": {
-            "rope": {"start": "a", "end": "b", "sections": [rope | {"damping": {"mass": 3.0}}], "model": "rod",
-                     "mesh": {"cells": 64}, "initial": {"points": over}} | NO_CONTACT,
-            "one": {"start": "u", "end": "p"} | stays, "two": {"start": "w", "end": "q"} | stays},
-    }  # fmt: skip
+    return network_scene(
+        {name: {"position": x} for name, x in held.items()} | {name: {"body": "drum", "place": [0, y, 0]} for name,
+            y in (("p", -0.9), ("q", 0.9))},
+        {"rope": line_between("a", "b", rope | {"damping": {"mass": 3.0}}, model="rod", mesh=64,
+                              initial={"points": over}) | NO_CONTACT,
+         "one": {"start": "u", "end": "p"} | stays, "two": {"start": "w", "end": "q"} | stays},
+        fluid={"density": 1.0},
+        bodies={"drum": {"initial_guess": [0, 0, 0], "mass": 60.0, "inertia": [12.0, 8.0, 12.0],
+                         "centre": [0, 0, -0.15], "damping": [120, 120, 120, 24, 16, 24],
+                         "shape": {"kind": "cylinder", "axis": [0, 1, 0], "length": 1.6, "radius": 0.6,
+                                   "friction": friction, "damping": damping}}}
+    )  # fmt: skip
 
 
 def over_sheave(friction: float, inertia: float = 0.0) -> Tables:
@@ -55,12 +54,11 @@ def over_sheave(friction: float, inertia: float = 0.0) -> Tables:
                "damping": {"mass": 3.0}}  # fmt: skip
     pipe = {"kind": "cylinder", "at": [4, 0, -2], "axis": [0.1, 1, 0.05], "radius": 0.8, "friction": friction}
     over = [[0, 0, -2.5], [3, 0, -1.3], [4, 0, -1.15], [5, 0.1, -1.3], [8, 0.3, -3]]
-    return {
-        "environment": {"gravity": 9.81}, "points": {"a": {"position": over[0]}, "b": {"position": over[-1]}},
-        "lines": {"rope": {"start": "a", "end": "b", "sections": [section], "model": "rod", "mesh": {"cells": 72},
-                           "initial": {"points": over}} | NO_CONTACT},
-        "obstacles": {"pipe": pipe | ({"bearing": {"inertia": inertia, "damping": 2.0}} if inertia else {})},
-    }  # fmt: skip
+    return network_scene(
+        {"a": {"position": over[0]}, "b": {"position": over[-1]}},
+        {"rope": line_between("a", "b", section, model="rod", mesh=72, initial={"points": over}) | NO_CONTACT},
+        gravity=9.81, obstacles={"pipe": pipe | ({"bearing": {"inertia": inertia, "damping": 2.0}} if inertia else {})}
+    )  # fmt: skip
 
 
 def amplitude(x: Any, times: Any, period: float, per: int = 20) -> Any:

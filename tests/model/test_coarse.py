@@ -12,6 +12,7 @@ import hybrid
 from hybrid.model.build import build
 from hybrid.model.nearby import FEWEST, coarser, refined
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -77,11 +78,9 @@ def test_of_very_many_cells_the_coarser_equilibrium_comes_first(monkeypatch):
 def test_a_fold_in_its_plane_is_not_twisted(cells):
     """Both ends at one place, and a bend far sharper than a cell of the start: plane and space agree in the moment."""
     section = {"length": 10.0, "mass": 0.6, "diameter": 0.01, "bending_stiffness": 6e-5, "axial_stiffness": 6e6}
-    loop = {
-        "environment": {"gravity": 9.81}, "cable": {"sections": [section | {"max_strain": 1e9}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [0, 0, 0]}},
-        "model": "rod", "mesh": {"cells": cells}, "initial": "equilibrium",
-    }  # fmt: skip
+    loop = cable_scene(
+        section | {"max_strain": 1e9}, pinned_at(0, 0, 0), pinned_at(0, 0, 0), gravity=9.81, model="rod", mesh=cells
+    )
     flat, space = (hybrid.static(loop | {"dimension": n}) for n in (2, 3))
     assert flat.bending_moment.max() == pytest.approx(space.bending_moment.max(), rel=1e-6)
     assert flat.curvature.max() == pytest.approx(space.curvature.max(), rel=1e-6)

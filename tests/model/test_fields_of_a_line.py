@@ -22,6 +22,7 @@ from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.scene.read import one_line
 from tests.inside import OnlyLine
+from tests.scenes import cable_scene, pinned_at
 
 ROUND = 1e-12
 # Fields in which the time counts: lengths on their way to their true ones, and what balances a node that has entered.
@@ -48,22 +49,16 @@ SEA = {
 def tether(**more: Any) -> hybrid.Scene:
     """60 m of line with two sections and a float, and all forces on."""
     sections = [SECTION | FORCES | {"length": 40}, SECTION | FORCES | {"length": 20, "mass": 2.0, "diameter": 0.04}]
-    tables = {
-        "environment": SEA,
-        "cable": {"sections": sections, "attachments": [CLUMP, FLOAT]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -40]},
-            "end": {
-                "kind": "pinned",
-                "position": [30, 0, -3],
-                "motion": {"heave": {"amplitude": 1.5, "period": 3}, "ramp": 3},
-            },
-        },
-        "initial": "equilibrium",
-        "model": "adaptive",
-        "mesh": {"cells": 24},
-        "time": {"duration": 3, "step": 0.02},
-    }
+    tables = cable_scene(
+        sections,
+        pinned_at(0, 0, -40),
+        pinned_at(30, 0, -3, motion={"heave": {"amplitude": 1.5, "period": 3}, "ramp": 3}),
+        attachments=[CLUMP, FLOAT],
+        environment=SEA,
+        model="adaptive",
+        mesh=24,
+        time=(3, 0.02),
+    )
     return hybrid.validate_scene(tables | more)
 
 

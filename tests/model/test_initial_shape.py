@@ -11,6 +11,7 @@ from hybrid.kernels.machine.compile import kernel
 from hybrid.model.build import build
 from hybrid.model.initial_shape import current_drag
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 
 
 @kernel
@@ -25,27 +26,18 @@ def drag_of_a_body(u, c):
 
 def test_drag_on_the_first_shape_is_that_of_the_kernels():
     scene = hybrid.validate_scene(
-        {
-            "environment": {
-                "fluid": {
-                    "density": 1025,
-                    "current": [{"z": -50, "velocity": [0.2, 0.1, 0]}, {"z": 0, "velocity": [1, -1, 0]}],
-                }
+        cable_scene(
+            {"length": 60, "mass": 3, "diameter": 0.05, "drag": {"normal": 1.2, "tangential": 0.1}},
+            pinned_at(0, 0, 0),
+            pinned_at(30, 0, -40),
+            attachments=[{"kind": "clump", "at": 30, "mass": 20, "drag_area": 0.3}],
+            fluid={
+                "density": 1025,
+                "current": [{"z": -50, "velocity": [0.2, 0.1, 0]}, {"z": 0, "velocity": [1, -1, 0]}],
             },
-            "cable": {
-                "sections": [
-                    {"length": 60, "mass": 3, "diameter": 0.05, "drag": {"normal": 1.2, "tangential": 0.1}},
-                ],
-                "attachments": [{"kind": "clump", "at": 30, "mass": 20, "drag_area": 0.3}],
-            },
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, 0]},
-                "end": {"kind": "pinned", "position": [30, 0, -40]},
-            },
-            "initial": "equilibrium",
-            "model": "catenary",
-            "mesh": {"cells": 6},
-        }
+            model="catenary",
+            mesh=6,
+        )
     )
     model = build(one_line(scene))
     line, sea, r = model.line, model.sea.values, model.start.r
@@ -66,16 +58,14 @@ def test_a_line_that_falls_into_a_point_has_no_first_shape_of_loads():
     """Hardly any axial stiffness, a current: the catenary stretches until its cells have no directions."""
     section = {"length": 800, "mass": 1.5, "diameter": 0.03, "axial_stiffness": 1e-30, "drag": {"normal": 1.2}}
     scene = hybrid.validate_scene(
-        {
-            "environment": {
-                "fluid": {"density": 1025, "surface": 0, "current": [-2, 0, 0]},
-                "seabed": {"z": -200, "stiffness": 2000},
-            },
-            "cable": {"sections": [section]},
-            "ends": {"start": "free", "end": {"kind": "pinned", "position": [0, 0, 0]}},
-            "initial": "equilibrium",
-            "model": "catenary",
-            "mesh": {"cells": 16},
-        }
+        cable_scene(
+            section,
+            "free",
+            pinned_at(0, 0, 0),
+            fluid={"density": 1025, "surface": 0, "current": [-2, 0, 0]},
+            seabed={"z": -200, "stiffness": 2000},
+            model="catenary",
+            mesh=16,
+        )
     )
     assert np.isfinite(build(one_line(scene)).start.r).all()

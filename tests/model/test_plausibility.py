@@ -12,6 +12,7 @@ from hybrid.errors import SceneError
 from hybrid.model.plausibility import implausible
 from hybrid.scene.read import one_line, read_scene
 from hybrid.scene.root import Scene
+from tests.scenes import cable_scene, pinned_at
 
 ROOT = Path(__file__).parents[2]
 CHAIN = {"mass": 20.0, "diameter": 0.05, "axial_stiffness": 8.5e7, "bending_stiffness": 50.0}
@@ -24,18 +25,11 @@ PIPE = {
 def scene(section: dict[str, Any] | None = None, **changes: Any) -> Scene:
     """A line from the seabed, 100 m deep, to a vessel that heaves."""
     heave = {"heave": {"amplitude": 2.0, "period": 8.0}, "ramp": 16.0}
-    data: dict[str, Any] = {
-        "environment": {
-            "fluid": {"density": 1025, "surface": 0.0, "current": [0.5, 0, 0]},
-            "seabed": {"z": -100.0, "stiffness": 1e4, "friction": 0.5},
-        },
-        "cable": {"sections": [{"length": 50.0} | CHAIN, {"length": 200.0} | (section or CHAIN)]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -100.0]},
-            "end": {"kind": "pinned", "position": [205.0, 0, 0], "motion": heave},
-        },
-        "initial": "equilibrium", "model": "catenary", "time": {"duration": 60.0, "step": 0.05},
-    }  # fmt: skip
+    data: dict[str, Any] = cable_scene(
+        [{"length": 50.0} | CHAIN, {"length": 200.0} | (section or CHAIN)], pinned_at(0, 0, -100.0),
+        pinned_at(205.0, 0, 0, motion=heave), fluid={"density": 1025, "surface": 0.0, "current": [0.5, 0, 0]},
+        seabed={"z": -100.0, "stiffness": 1e4, "friction": 0.5}, model="catenary", time=(60.0, 0.05)
+    )  # fmt: skip
     return hybrid.validate_scene(data | changes)
 
 
@@ -53,12 +47,7 @@ def environment(**changes: Any) -> dict[str, Any]:
 
 def moved(**harmonic: Any) -> dict[str, Any]:
     motion = {"surge": harmonic, "ramp": 16.0}
-    return {
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -100.0]},
-            "end": {"kind": "pinned", "position": [205.0, 0, 0], "motion": motion},
-        }
-    }
+    return {"ends": {"start": pinned_at(0, 0, -100.0), "end": pinned_at(205.0, 0, 0, motion=motion)}}
 
 
 SECTIONS = {
@@ -147,10 +136,9 @@ SURROUNDINGS = {
     "a bed in kPa": (environment(stiffness=10.0), "sinks"),
     "gravity in cm/s2": (environment(gravity=981.0), "a gravity of 981"),
     "a period in minutes": (moved(amplitude=20.0, period=0.5), "an end that moves at"),
-    "depth in cm": ({
-        **environment(z=-20_000.0), "cable": {"sections": [{"length": 25_000.0} | CHAIN]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -20_000.0]},
-                 "end": {"kind": "pinned", "position": [205.0, 0, 0]}}}, "a depth of 20000 m"),
+    "depth in cm": ({**environment(z=-20_000.0), "cable": {"sections": [{"length": 25_000.0} | CHAIN]},
+                     "ends": {"start": pinned_at(0, 0, -20_000.0), "end": pinned_at(205.0, 0, 0)}},
+                    "a depth of 20000 m")
 }  # fmt: skip
 
 
@@ -183,21 +171,20 @@ def test_the_note_is_an_event_where_the_section_is() -> None:
 
 REFUSED = {
     "friction of 50": (environment(friction=50.0), "environment.seabed.friction", "not percent: 0.5"),
-    "a force of 2^63 N": ({"ends": {
-        "start": {"kind": "pinned", "position": [0, 0, -100.0]},
-        "end": {"kind": "free", "force": [0, 0, 2.0**63]}}}, "ends.end.force", "less than 1e+13 N"),
-    "a thrust of 2^63 N": ({"ends": {
-        "start": {"kind": "pinned", "position": [0, 0, -100.0]},
-        "end": {"kind": "body", "mass": 500.0, "thrust": [2.0**63, 0, 0]}}}, "ends.end.thrust", "forces are in N"),
-    "an end that heaves into the bed": ({"ends": {
-        "start": {"kind": "pinned", "position": [205.0, 0, 0]},
-        "end": {"kind": "pinned", "position": [0, 0, -100.0],
-                "motion": {"heave": {"amplitude": 2.0, "period": 8.0}, "ramp": 16.0}}}},
+    "a force of 2^63 N": ({"ends": {"start": pinned_at(0, 0, -100.0), "end": {"kind": "free", "force": [0, 0, 2.0**63]}}},
+                          "ends.end.force", "less than 1e+13 N"),
+    "a thrust of 2^63 N": ({"ends": {"start": pinned_at(0, 0, -100.0),
+                                     "end": {"kind": "body", "mass": 500.0, "thrust": [2.0**63, 0, 0]}}},
+                           "ends.end.thrust", "forces are in N"),
+    "an end that heaves into the bed": ({"ends": {"start": pinned_at(205.0, 0, 0),
+                                                  "end": pinned_at(0, 0, -100.0,
+                                                                   motion={"heave": {"amplitude": 2.0, "period": 8.0},
+                                                                           "ramp": 16.0})}},
         "ends.end.motion", "exchange start and end"),
-    "an end that sinks into the bed": ({"ends": {
-        "start": {"kind": "pinned", "position": [100.0, 0, -97.0]},
-        "end": {"kind": "pinned", "position": [0, 0, -97.0], "motion": {"velocity": [0, 0, -0.1], "ramp": 5.0}}}},
-        "ends.end.motion", "under the seabed"),
+    "an end that sinks into the bed": ({"ends": {"start": pinned_at(100.0, 0, -97.0),
+                                                 "end": pinned_at(0, 0, -97.0,
+                                                                  motion={"velocity": [0, 0, -0.1], "ramp": 5.0})}},
+        "ends.end.motion", "under the seabed")
 }  # fmt: skip
 
 
@@ -235,13 +222,7 @@ def test_the_seabed_end_of_a_mooring_whose_ends_are_exchanged_is_refused() -> No
 
 def between(apart: float, *sections: dict[str, Any]) -> list[Any]:
     """Notes on a line between ends that are `apart`, m."""
-    changes = {
-        "cable": {"sections": list(sections)},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -50.0]},
-            "end": {"kind": "pinned", "position": [apart, 0, -50.0]},
-        },
-    }
+    changes = cable_scene(list(sections), pinned_at(0, 0, -50.0), pinned_at(apart, 0, -50.0), initial=None)
     return list(implausible(one_line(scene(**changes))))
 
 

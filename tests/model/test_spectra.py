@@ -30,6 +30,7 @@ from hybrid.scene.wave_theory import (
     SumOfWaves,
     TorsethaugenWaves,
 )
+from tests.scenes import cable_scene, pinned_at
 
 G = 9.81
 SWELL = {"kind": "jonswap", "significant_height": 2.0, "peak_period": 14.0, "gamma": 6, "direction": 200.0}
@@ -228,12 +229,10 @@ def test_realisations_within_their_confidence():
 
 
 def scene(waves, **more):
-    return hybrid.validate_scene({
-        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": waves}},
-        "cable": {"sections": [{"length": 20, "mass": 5, "diameter": 0.05, "drag": {"normal": 1.0}}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 5},
-    } | more)  # fmt: skip
+    return hybrid.validate_scene(
+        cable_scene({"length": 20, "mass": 5, "diameter": 0.05, "drag": {"normal": 1.0}}, pinned_at(0, 0, 0), "free",
+                    fluid={"density": 1025, "surface": 0, "waves": waves}, model="catenary", mesh=5) | more
+    )  # fmt: skip
 
 
 def test_waves_one_by_one(tmp_path: Path):
@@ -362,13 +361,11 @@ HIGH = {"kind": "stream_function", "height": 4.0, "period": 7.0, "direction": 35
 
 
 def test_a_line_in_high_waves_is_one_of_several_and_is_turned_with_them():
-    tables = {
-        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": HIGH}},
-        "cable": {"sections": [{"length": 20, "mass": 5, "diameter": 0.05, "drag": {"normal": 1.0}}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": {"follow": "waves"}}, "end": "free"},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10},
-        "time": {"duration": 4.0, "step": 0.1}, "output": {"every": 0.5},
-    }  # fmt: skip
+    tables = cable_scene(
+        {"length": 20, "mass": 5, "diameter": 0.05, "drag": {"normal": 1.0}},
+        pinned_at(0, 0, 0, motion={"follow": "waves"}), "free", fluid={"density": 1025, "surface": 0, "waves": HIGH},
+        model="catenary", mesh=10, time=(4.0, 0.1), output=0.5
+    )  # fmt: skip
     one = hybrid.run(tables)
     line = {"sections": tables["cable"]["sections"], "start": "a", "end": "b", "model": "catenary"}
     points = {

@@ -12,6 +12,7 @@ from numpy.polynomial import Polynomial
 import hybrid
 from hybrid.model.resolution import first_resolution, longest_period, start_vibrations
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 
 LENGTH, EA, MASS = 12.0, 1e5, 2.0
 PERIOD = 4.0 * LENGTH * (MASS / EA) ** 0.5
@@ -19,18 +20,12 @@ PERIOD = 4.0 * LENGTH * (MASS / EA) ** 0.5
 
 def sag(motion: dict[str, Any], duration: float = 3.0, **more: Any) -> dict[str, Any]:
     """A line that sags between two pins, one of which moves."""
-    return {
-        "environment": {"fluid": {"density": 1025}},
-        "cable": {"sections": [{
-            "length": LENGTH, "diameter": 0.03, "mass": MASS, "axial_stiffness": EA, "bending_stiffness": 20.0,
-            "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
-        }]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -5]},
-            "end": {"kind": "pinned", "position": [10, 0, -5], "motion": motion},
-        },
-        "initial": "equilibrium", "model": "rod", "time": {"duration": duration}, "output": {"every": 0.1, "points": 25},
-    } | more  # fmt: skip
+    return cable_scene(
+        {"length": LENGTH, "diameter": 0.03, "mass": MASS, "axial_stiffness": EA, "bending_stiffness": 20.0,
+         "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}},
+        pinned_at(0, 0, -5), pinned_at(10, 0, -5, motion=motion), fluid={"density": 1025}, model="rod",
+        time={"duration": duration}, output=(0.1, 25)
+    ) | more  # fmt: skip
 
 
 def heave(ramp: float, phase: float = 0.0) -> dict[str, Any]:

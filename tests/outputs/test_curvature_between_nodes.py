@@ -9,6 +9,7 @@ import pytest
 from problems import order
 
 import hybrid
+from tests.scenes import cable_scene
 
 LENGTH = 20.0
 
@@ -23,11 +24,10 @@ def beam(cells: int, dimension: int) -> hybrid.Result:
         "torsional_stiffness": 1e4,
     }
     held = {"kind": "clamped", "tangent": [1, 0, 0]}
-    what: dict[str, Any] = {
-        "cable": {"sections": [section]},
-        "ends": {"start": held | {"position": [0, 0, 0]}, "end": held | {"position": [19.995, 0, 0]}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells}, "output": {"points": 1601, "errors": False},
-    }  # fmt: skip
+    what: dict[str, Any] = cable_scene(
+        section, held | {"position": [0, 0, 0]}, held | {"position": [19.995, 0, 0]}, model="rod", mesh=cells,
+        output={"points": 1601, "errors": False}
+    )  # fmt: skip
     return hybrid.static(what | {"dimension": dimension})
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 BED = -50.0
@@ -34,19 +35,16 @@ def swung(cells: int, model: str, dimension: int = 3) -> hybrid.Result:
     surge = {"surge": {"amplitude": 1.0, "period": 4}, "ramp": 4}
     return hybrid.run(
         hybrid.validate_scene(
-            {
-                "environment": {"fluid": {"density": RHO}},
-                "cable": {"sections": [section | {"drag": {"normal": 1.2}, "added_mass": {"normal": 1}}]},
-                "ends": {
-                    "start": {"kind": "pinned", "position": [0, 0, 0], "motion": surge},
-                    "end": {"kind": "body", "mass": 60, "volume": 0.01, "drag_area": 0.1, "added_mass": 8},
-                },
-                "initial": "equilibrium",
-                "model": model,
-                "mesh": {"cells": cells},
-                "dimension": dimension,
-                "time": {"duration": 6, "step": 0.02},
-            }
+            cable_scene(
+                section | {"drag": {"normal": 1.2}, "added_mass": {"normal": 1}},
+                pinned_at(0, 0, 0, motion=surge),
+                {"kind": "body", "mass": 60, "volume": 0.01, "drag_area": 0.1, "added_mass": 8},
+                fluid={"density": RHO},
+                model=model,
+                mesh=cells,
+                dimension=dimension,
+                time=(6, 0.02),
+            )
         )
     )
 
@@ -67,17 +65,15 @@ def moored(cells: int, **more: Any) -> hybrid.Scene:
     """A chain from an anchor on the seabed; its last 140 m hang."""
     section = CHAIN | more.pop("section", {})
     return hybrid.validate_scene(
-        {
-            "environment": {"fluid": {"density": RHO}, "seabed": {"z": BED, "stiffness": 1e4}},
-            "cable": {"sections": [section]},
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, BED]} | more.pop("start", {}),
-                "end": more.pop("end", {"kind": "pinned", "position": [286, 0, 0]}),
-            },
-            "initial": "equilibrium",
-            "model": "catenary",
-            "mesh": {"cells": cells},
-        }
+        cable_scene(
+            section,
+            pinned_at(0, 0, BED) | more.pop("start", {}),
+            more.pop("end", pinned_at(286, 0, 0)),
+            fluid={"density": RHO},
+            seabed={"z": BED, "stiffness": 1e4},
+            model="catenary",
+            mesh=cells,
+        )
         | more
     )
 

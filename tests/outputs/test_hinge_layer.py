@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, clamped_at
 
 LENGTH, JOINT = 100.0, 40.0
 EI, WEIGHT = 5e4, 20.0 * 9.81  # N m2, N/m
@@ -33,13 +34,10 @@ def sagging(model: Any, cells: int, turned: bool = False, across: Any = 0.0, up:
         one, two = two, one
         if isinstance(model, dict):
             model = {"kind": "zones", "zones": model["zones"][::-1]}
-    return {
-        "environment": {
-            "fluid": {"density": 1025, "current": [0, across, 0] if isinstance(across, float) else across}
-        },
-        "cable": {"sections": [section]}, "ends": {"start": one, "end": two}, "initial": "equilibrium",
-        "model": model, "mesh": {"cells": cells}, "output": {"points": 2 * cells + 1},
-    }  # fmt: skip
+    return cable_scene(
+        section, one, two, fluid={"density": 1025, "current": [0, across, 0] if isinstance(across, float) else across},
+        model=model, mesh=cells, output={"points": 2 * cells + 1}
+    )  # fmt: skip
 
 
 ZONES = {"kind": "zones", "zones": [{"catenary": JOINT}, {"rod": LENGTH - JOINT}]}
@@ -159,9 +157,7 @@ def test_a_clamp_that_lets_go_leaves_an_end_without_a_moment() -> None:
     (section,) = scene["cable"]["sections"]
     del section["axial_stiffness"]
     section |= {"bending_stiffness": 500.0, "drag": {"normal": 1.2, "tangential": 0.02}}
-    scene["ends"]["end"] = {
-        "kind": "clamped", "position": [0.0, 12.0, -98.5], "tangent": [0.0, 0.4, -1.0], "release_at": {"time": 0.5},
-    }  # fmt: skip
+    scene["ends"]["end"] = clamped_at([0.0, 12.0, -98.5], [0.0, 0.4, -1.0], release_at={"time": 0.5})
     scene |= {"time": {"duration": 1.5, "step": 0.05}}
     scene["output"] |= {"every": 0.25, "points": 51}
     found = hybrid.run(scene)

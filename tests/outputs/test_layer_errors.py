@@ -8,6 +8,7 @@ from scipy.linalg import solve_banded
 
 import hybrid
 from hybrid.outputs.edge_errors import layer_missed, shown_at_clamp
+from tests.scenes import cable_scene, pinned_at
 
 
 @pytest.mark.parametrize("fade", [0.01, 0.3, 3.0, 100.0])
@@ -44,14 +45,10 @@ def test_what_cells_show_of_the_moment_at_a_clamp(x: float, turns: float) -> Non
 
 
 def line(start: dict, EI: float, points: int = 201) -> dict:
-    return {
-        "cable": {"sections": [{"length": 64.0, "mass": 1.0, "bending_stiffness": EI}]},
-        "ends": {
-            "start": {"position": [0, 0, 0], **start},
-            "end": {"kind": "pinned", "position": [57.0, 0, 5.0]},
-        },
-        "initial": "equilibrium", "output": {"points": points},
-    }  # fmt: skip
+    return cable_scene(
+        {"length": 64.0, "mass": 1.0, "bending_stiffness": EI}, {"position": [0, 0, 0], **start},
+        pinned_at(57.0, 0, 5.0), output={"points": points}
+    )  # fmt: skip
 
 
 def effectivity(result: hybrid.Result, truth: hybrid.Result, name: str) -> float:

@@ -9,20 +9,18 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 
 W = (141.0 - 1025.0 * math.pi / 4 * 0.151**2) * 9.81  # N/m
 
 
 def chain(**changes: Any) -> hybrid.Result:
     """A chain of 700 m in 100 m of water, at rest; its bed takes it up over sqrt(T/k) = 3 m."""
-    data: dict[str, Any] = {
-        "environment": {"fluid": {"density": 1025, "surface": 0}, "seabed": {"z": -100, "stiffness": 5e4}},
-        "cable": {"sections": [{"length": 700, "mass": 141, "diameter": 0.151, "axial_stiffness": 6e8}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -100]}, "end": {"kind": "pinned", "position": [655, 0, -12]},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 100}, "output": {"points": 101},
-    }  # fmt: skip
+    data: dict[str, Any] = cable_scene(
+        {"length": 700, "mass": 141, "diameter": 0.151, "axial_stiffness": 6e8}, pinned_at(0, 0, -100),
+        pinned_at(655, 0, -12), fluid={"density": 1025, "surface": 0}, seabed={"z": -100, "stiffness": 5e4},
+        model="catenary", mesh=100, output={"points": 101}
+    )  # fmt: skip
     return hybrid.static(data | changes)
 
 
@@ -39,9 +37,7 @@ def test_an_anchor_is_lifted_by_what_the_weight_does_not_balance() -> None:
     lying = chain()
     assert lying.uplift("start")[0] == 0.0 and lying.uplift("start")[1] == 0.0
     short = {"length": 655.0, "mass": 141, "diameter": 0.151, "axial_stiffness": 6e8}
-    taut = chain(cable={"sections": [short]}, ends={
-        "start": {"kind": "pinned", "position": [0, 0, -100]}, "end": {"kind": "pinned", "position": [658.5, 0, -12]},
-    })  # fmt: skip
+    taut = chain(cable={"sections": [short]}, ends={"start": pinned_at(0, 0, -100), "end": pinned_at(658.5, 0, -12)})
     force, angle = taut.uplift("start")
     top = taut["reaction_end"][0]
     assert force[0] == pytest.approx(top[2] - W * 655.0 + float(taut.contact_force[0]), rel=1e-6)

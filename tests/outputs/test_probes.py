@@ -13,6 +13,7 @@ import hybrid
 from hybrid.kernels.state.state import Batch, Floats
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
+from tests.scenes import cable_scene, pinned_at
 
 # Round-off of sums in another order, as a part of the largest value of a field in the run.
 SAME = 1e-13
@@ -31,16 +32,11 @@ def touchdown(model: Any, motion: dict[str, Any] = MOTION, loads: Sequence[Any] 
     section = {"length": 250.0, "diameter": 0.05, "mass": 20.0, "axial_stiffness": 2e8, "bending_stiffness": 2e4,
                "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0}}  # fmt: skip
     bed = {"z": -100.0, "stiffness": 5e3, "damping": 5e2}
-    return {
-        "environment": {"fluid": {"density": 1025.0}, "seabed": bed},
-        "cable": {"sections": [section], "attachments": list(loads)},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -100]},
-            "end": {"kind": "pinned", "position": [205, 0, 0], "motion": motion},
-        },
-        "initial": "equilibrium", "model": model, "time": {"duration": 4.0, "step": 0.1},
-        "output": {"every": 0.2, "points": 77, **output},
-    } | ({} if isinstance(model, dict) and "zones" in model else {"mesh": {"cells": 50}})  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, -100), pinned_at(205, 0, 0, motion=motion), attachments=list(loads),
+        fluid={"density": 1025.0}, seabed=bed, model=model, time=(4.0, 0.1),
+        output={"every": 0.2, "points": 77, **output}
+    ) | ({} if isinstance(model, dict) and "zones" in model else {"mesh": {"cells": 50}})  # fmt: skip
 
 
 def hanging(model: str, *loads: dict[str, Any], **output: Any) -> dict[str, Any]:
@@ -50,12 +46,10 @@ def hanging(model: str, *loads: dict[str, Any], **output: Any) -> dict[str, Any]
     if model != "rod":
         section["bending_stiffness"] = 1e-3
     held = {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1], "normal": [1, 0, 0]}
-    return {
-        "cable": {"sections": [section], "attachments": list(loads)},
-        "ends": {"start": held | {"motion": ACROSS | {"ramp": 16.0}}, "end": "free"},
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 30}, "time": {"duration": 0.4, "step": 0.01},
-        "output": {"every": 0.02, "points": 41, **output},
-    }  # fmt: skip
+    return cable_scene(
+        section, held | {"motion": ACROSS | {"ramp": 16.0}}, "free", attachments=list(loads), model=model, mesh=30,
+        time=(0.4, 0.01), output={"every": 0.02, "points": 41, **output}
+    )  # fmt: skip
 
 
 def clump(at: float) -> dict[str, Any]:

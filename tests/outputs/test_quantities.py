@@ -20,6 +20,7 @@ from hybrid.scene.quantities import TAKEN
 from hybrid.scene.read import read_text
 from hybrid.store.limits import held_of
 from hybrid.view.summary import facts_of
+from tests.scenes import cable_scene, pinned_at
 
 MASS, DIAMETER, DEPTH, LENGTH, SPAN = 141.0, 0.151, 88.0, 700.0, 655.0
 W = (MASS - 1025.0 * math.pi / 4 * DIAMETER**2) * 9.81  # N/m
@@ -28,15 +29,11 @@ W = (MASS - 1025.0 * math.pi / 4 * DIAMETER**2) * 9.81  # N/m
 def chain(quantities: dict[str, Any], **changes: Any) -> hybrid.Result:
     """A chain from an anchor to a fairlead that lies 40 degrees off the x axis, at rest on a hard bed."""
     x, y = SPAN * math.cos(math.radians(40.0)), SPAN * math.sin(math.radians(40.0))
-    data: dict[str, Any] = {
-        "environment": {"fluid": {"density": 1025, "surface": 0}, "seabed": {"z": -100, "stiffness": 1e6}},
-        "cable": {"sections": [{"length": LENGTH, "mass": MASS, "diameter": DIAMETER, "axial_stiffness": 1e12}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -100]}, "end": {"kind": "pinned", "position": [x, y, -12]},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 700},
-        "output": {"points": 11, "quantities": quantities},
-    }  # fmt: skip
+    data: dict[str, Any] = cable_scene(
+        {"length": LENGTH, "mass": MASS, "diameter": DIAMETER, "axial_stiffness": 1e12}, pinned_at(0, 0, -100),
+        pinned_at(x, y, -12), fluid={"density": 1025, "surface": 0}, seabed={"z": -100, "stiffness": 1e6},
+        model="catenary", mesh=700, output={"points": 11, "quantities": quantities}
+    )  # fmt: skip
     return hybrid.static(data | changes)
 
 
@@ -86,10 +83,7 @@ def test_uplift_is_that_of_the_method_of_results() -> None:
     taut = chain(
         {"lift": {"kind": "uplift", "end": "start"}, "angle": {"kind": "uplift_angle", "end": "start"}},
         cable={"sections": [{"length": 655.0, "mass": MASS, "diameter": DIAMETER, "axial_stiffness": 6e8}]},
-        ends={
-            "start": {"kind": "pinned", "position": [0, 0, -100]},
-            "end": {"kind": "pinned", "position": [x, 0, -12]},
-        },
+        ends={"start": pinned_at(0, 0, -100), "end": pinned_at(x, 0, -12)},
     )
     force, angle = taut.uplift("start")
     assert force[0] > 1e4
@@ -98,21 +92,17 @@ def test_uplift_is_that_of_the_method_of_results() -> None:
 
 def test_clearances_of_a_straight_line() -> None:
     """A taut line along x without weight: distances are those of the axis less both radii."""
-    scene = {
-        "environment": {"gravity": 0.0},
-        "cable": {"sections": [{"length": 10, "mass": 1, "diameter": 0.02, "axial_stiffness": 1e5}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [10.001, 0, 0]},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 7},
-        "output": {"points": 3, "quantities": {
-            "point": {"kind": "clearance", "point": [4.0, 3.0, 4.0], "diameter": 1.0},
-            "beyond": {"kind": "clearance", "point": [14.001, 3.0, 0.0]},
-            "wall": {"kind": "clearance", "point": [13.001, 0, 0], "normal": [-2, 0, 0]},
-            "path": {"kind": "clearance", "path": [[2, -5, 1], [2, 5, 1], [2, 5, 9]], "diameter": 0.2},
-            "part": {"kind": "clearance", "point": [0, 1, 0], "range": [5, 10]},
-        }},
-    }  # fmt: skip
+    scene = cable_scene(
+        {"length": 10, "mass": 1, "diameter": 0.02, "axial_stiffness": 1e5}, pinned_at(0, 0, 0),
+        pinned_at(10.001, 0, 0), gravity=0.0, model="catenary", mesh=7,
+        output={"points": 3,
+                "quantities": {"point": {"kind": "clearance", "point": [4.0, 3.0, 4.0], "diameter": 1.0},
+                               "beyond": {"kind": "clearance", "point": [14.001, 3.0, 0.0]},
+                               "wall": {"kind": "clearance", "point": [13.001, 0, 0], "normal": [-2, 0, 0]},
+                               "path": {"kind": "clearance", "path": [[2, -5, 1], [2, 5, 1], [2, 5, 9]],
+                                        "diameter": 0.2},
+                               "part": {"kind": "clearance", "point": [0, 1, 0], "range": [5, 10]}}}
+    )  # fmt: skip
     result = hybrid.static(scene)
     assert result.point[0] == pytest.approx(5.0 - 0.5 - 0.01, abs=1e-9)
     assert result.point_at[0] == pytest.approx(4.0 / 1.0001, rel=1e-9)
@@ -174,12 +164,10 @@ def hanging_pipe() -> hybrid.Result:
     mass = 7850.0 * STEEL_AREA + CONTENT * BORE
     pipe = {"wall": WALL, "pressure": PRESSURE, "pressure_z": 5.0, "content_density": CONTENT, "max_stress": 2e8}
     section = {"mass": mass, "diameter": OUTER, "axial_stiffness": 1e12, "pipe": pipe}
-    return hybrid.static({
-        "environment": {"fluid": {"density": 1025, "surface": 0}},
-        "cable": {"sections": [{**section, "length": 300}, {**section, "length": 200, "pipe": None}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -20]}, "end": "free"},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 100}, "output": {"points": 51},
-    })  # fmt: skip
+    return hybrid.static(cable_scene(
+        [{**section, "length": 300}, {**section, "length": 200, "pipe": None}], pinned_at(0, 0, -20), "free",
+        fluid={"density": 1025, "surface": 0}, model="catenary", mesh=100, output={"points": 51}
+    ))  # fmt: skip
 
 
 def test_wall_tension_balances_a_pipe_cut_open() -> None:
@@ -188,11 +176,10 @@ def test_wall_tension_balances_a_pipe_cut_open() -> None:
         "length": 500, "mass": 7850.0 * STEEL_AREA + CONTENT * BORE, "diameter": OUTER, "axial_stiffness": 1e12,
         "pipe": {"wall": WALL, "pressure": PRESSURE, "pressure_z": 5.0, "content_density": CONTENT},
     }  # fmt: skip
-    result = hybrid.static({
-        "environment": {"fluid": {"density": 1025, "surface": 0}}, "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -20]}, "end": "free"},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 100}, "output": {"points": 51},
-    })  # fmt: skip
+    result = hybrid.static(cable_scene(
+        section, pinned_at(0, 0, -20), "free", fluid={"density": 1025, "surface": 0}, model="catenary", mesh=100,
+        output={"points": 51}
+    ))  # fmt: skip
     s, bottom = result.s, -520.0
     inside, outside = PRESSURE + CONTENT * 9.81 * (5.0 - bottom), -1025.0 * 9.81 * bottom
     cap = inside * BORE - outside * math.pi / 4 * OUTER**2

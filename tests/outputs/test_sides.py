@@ -11,6 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ResultError
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 G, MASS, CLUMP = 9.81, 2.0, 5.0  # m/s2, kg/m, kg
 AT, LENGTH = 4.1, 10.0  # m
@@ -18,14 +19,10 @@ AT, LENGTH = 4.1, 10.0  # m
 
 def chain(**output: Any) -> dict[str, Any]:
     """A chain of 10 m that hangs straight down, with a clump at 4.1 m."""
-    return {
-        "cable": {
-            "sections": [{"length": LENGTH, "mass": MASS, "axial_stiffness": 1e6}],
-            "attachments": [{"kind": "clump", "at": AT, "mass": CLUMP}],
-        },
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-        "initial": "equilibrium", "model": "catenary", "output": {"points": 11, **output},
-    }  # fmt: skip
+    return cable_scene(
+        {"length": LENGTH, "mass": MASS, "axial_stiffness": 1e6}, pinned_at(0, 0, 0), "free",
+        attachments=[{"kind": "clump", "at": AT, "mass": CLUMP}], model="catenary", output={"points": 11, **output}
+    )  # fmt: skip
 
 
 def weight_below(s: float) -> float:
@@ -122,10 +119,7 @@ def test_errors_are_known_on_both_sides(tmp_path: Path) -> None:
     scene = chain(errors=True, every=0.1) | {"time": {"duration": 0.5, "step": 0.02}, "mesh": {"cells": 20}}
     scene["cable"]["sections"][0]["bending_stiffness"] = 1.0
     heave = {"heave": {"amplitude": 0.1, "period": 2.0}, "ramp": 0.5}
-    scene["ends"] = {
-        "start": scene["ends"]["start"] | {"motion": heave},
-        "end": {"kind": "pinned", "position": [7, 0, 0]},
-    }
+    scene["ends"] = {"start": scene["ends"]["start"] | {"motion": heave}, "end": pinned_at(7, 0, 0)}
     scene["model"] = "catenary"
     found = hybrid.run(hybrid.validate_scene(scene))
     for cause in ("mesh", "time", "model", "total"):
@@ -147,11 +141,10 @@ def test_cycles_are_those_of_the_worse_side(tmp_path: Path) -> None:
     section = {"length": 0.5, "mass": 0.05, "axial_stiffness": 1e5}
     shaken = {"heave": {"amplitude": 0.01, "period": 0.3}, "ramp": 0.2}
     clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "motion": shaken}
-    scene = {
-        "cable": {"sections": [section | {"bending_stiffness": EI} for EI in (2.0, 0.5)]},
-        "ends": {"start": clamp, "end": "free"}, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20},
-        "time": {"duration": 1.0, "step": 0.01}, "output": {"every": 0.02, "points": 10},
-    }  # fmt: skip
+    scene = cable_scene(
+        [section | {"bending_stiffness": EI} for EI in (2.0, 0.5)], clamp, "free", model="rod", mesh=20,
+        time=(1.0, 0.01), output=(0.02, 10)
+    )  # fmt: skip
     found = hybrid.run(hybrid.validate_scene(scene))
     table = hybrid.export(found, tmp_path / "cycles.csv", format="fatigue", at=[0.5]).files[1].read_text().splitlines()
     rows = list(csv.DictReader(line for line in table if not line.startswith("#")))
@@ -171,15 +164,7 @@ def test_curvature_jumps_with_the_stiffness_and_the_moment_does_not() -> None:
         section | {"length": 0.4, "bending_stiffness": soft},
     ]
     found = hybrid.static(
-        hybrid.validate_scene(
-            {
-                "cable": {"sections": parts},
-                "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}, "end": "free"},
-                "initial": "equilibrium",
-                "model": "rod",
-                "mesh": {"cells": 100},
-            }
-        )
+        hybrid.validate_scene(cable_scene(parts, clamped_at([0, 0, 0], [1, 0, 0]), "free", model="rod", mesh=100))
     )
     before, after = (found.at(s=0.6, t=0.0, side=side) for side in ("left", "right"))
     moment = 0.05 * G * 0.4**2 / 2  # N m, of a beam that bends little

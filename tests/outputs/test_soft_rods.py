@@ -14,6 +14,7 @@ from hybrid.model.material import Material
 from hybrid.scene.read import one_line, validate_scene
 from tests.combinations.pairs import BASE, END, FEATURES, SECTION, as_network
 from tests.problems import tables_with
+from tests.scenes import cable_scene, pinned_at
 
 MOVES = {"kind": "adaptive", "always_move": True}
 LINES: dict[str, dict[str, Any]] = {
@@ -41,20 +42,18 @@ def slack(
     cone = {"kind": "bend_stiffener", "range": stiffener, "diameters": [0.05, 0.04], "bore": 0.03, "modulus": 1e7}
     motion = {"heave": {"amplitude": 1.0, "period": 7.0}, "ramp": 7.0}
     held = {"kind": "pinned"} if tangent is None else {"kind": "clamped", "tangent": tangent}
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.3, across, 0]}},
-        "cable": {"sections": sections, "attachments": [cone] * (stiffener is not None)},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0], "motion": motion},
-            "end": held | {"position": end},
-        },
-        "initial": "equilibrium",
-        "contact": {"self": False},
-        "mesh": {"cells": 480},
-        "time": {"duration": 12.0, "step": 0.05},
-        "model": model,
-        "output": {"every": 0.05, "points": 481},
-    }
+    return cable_scene(
+        sections,
+        pinned_at(0, 0, 0, motion=motion),
+        held | {"position": end},
+        attachments=[cone] * (stiffener is not None),
+        fluid={"density": 1025, "current": [0.3, across, 0]},
+        contact={"self": False},
+        mesh=480,
+        time=(12.0, 0.05),
+        model=model,
+        output=(0.05, 481),
+    )
 
 
 @pytest.mark.long

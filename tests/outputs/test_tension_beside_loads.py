@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import line_between, network_scene
 
 HEAVY = {"length": 100, "mass": 2.0, "axial_stiffness": 1e7}
 
@@ -45,13 +46,8 @@ def test_the_tension_of_an_end_beside_a_load(at: float) -> None:
 def test_the_force_of_a_line_on_a_free_point_beside_a_load() -> None:
     """What two lines pull balances the weight of the point between them."""
     lines = {
-        "one": {
-            "start": "a",
-            "end": "k",
-            "sections": [HEAVY],
-            "attachments": [{"kind": "clump", "at": 99, "mass": 1500}],
-        },
-        "two": {"start": "k", "end": "b", "sections": [HEAVY]},
+        "one": line_between("a", "k", HEAVY, attachments=[{"kind": "clump", "at": 99, "mass": 1500}]),
+        "two": line_between("k", "b", HEAVY),
     }
     result = hybrid.static({
         "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [198.5, 0, 0]},
@@ -66,10 +62,9 @@ def test_the_largest_tension_at_an_offset_beside_a_load() -> None:
     """The clump is one cell of 10 m from the upper end, where the tension is largest: the pull there."""
     line = {"start": "a", "end": "k", "sections": [HEAVY], "mesh": {"cells": 10}}
     line["attachments"] = [{"kind": "clump", "at": 10, "mass": 150}]
-    scene = {
-        "points": {"a": {"position": [0, 0, 0]}, "k": {"position": [80, 0, -30]}},
-        "lines": {"one": line | {"model": "catenary"}},
-    }
+    scene = network_scene(
+        {"a": {"position": [0, 0, 0]}, "k": {"position": [80, 0, -30]}}, {"one": line | {"model": "catenary"}}
+    )
     found = hybrid.offsets(scene, "point:k", [0.0])
     pull = np.linalg.norm(hybrid.static(scene).lines["one"]["reaction_start"])
     assert found.tension["one"][0] == pytest.approx(pull, rel=2e-3)

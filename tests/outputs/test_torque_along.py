@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 
 SECTION = {"length": 10, "mass": 3, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 200}
 
@@ -15,15 +16,11 @@ SECTION = {"length": 10, "mass": 3, "diameter": 0.05, "axial_stiffness": 1e7, "b
 def hanging(sections: list[dict[str, Any]], attachments: list[dict[str, Any]]) -> hybrid.Result:
     """A rod with a round section between two pinned ends in a current that turns with depth: nothing twists it."""
     current = [{"z": -6, "velocity": [0.2, -1.0, 0]}, {"z": 0, "velocity": [0.3, 1.2, 0]}]
-    scene = {
-        "environment": {"fluid": {"density": 1025, "current": current}},
-        "cable": {"sections": [x | {"drag": {"normal": 1.2}} for x in sections], "attachments": attachments},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [6, 1, -1]},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 50}, "output": {"points": 201},
-    }  # fmt: skip
+    scene = cable_scene(
+        [x | {"drag": {"normal": 1.2}} for x in sections], pinned_at(0, 0, 0), pinned_at(6, 1, -1),
+        attachments=attachments, fluid={"density": 1025, "current": current}, model="rod", mesh=50,
+        output={"points": 201}
+    )  # fmt: skip
     return hybrid.static(hybrid.validate_scene(scene))
 
 
@@ -53,14 +50,10 @@ def test_torque_at_clamps_is_that_of_their_moments() -> None:
     tangents = np.array([1.0, 0.0, 0.0]), np.array([0.3, 0.0, 1.0]) / np.hypot(0.3, 1.0)
     start = {"kind": "clamped", "position": [-10, 0, -40], "tangent": [1, 0, 0], "normal": [0, 0, 1]}
     end = {"kind": "clamped", "position": [80, 0, 2], "tangent": [0.3, 0, 1], "normal": [1, 0, 0], "turns": 1.5}
-    scene = {
-        "environment": {
-            "fluid": {"density": 1025, "surface": 0},
-            "seabed": {"z": -40, "slope": [0.1, 0], "stiffness": 1e4},
-        },
-        "cable": {"sections": [section]}, "ends": {"start": start, "end": end},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 65}, "output": {"points": 131},
-    }  # fmt: skip
+    scene = cable_scene(
+        section, start, end, fluid={"density": 1025, "surface": 0},
+        seabed={"z": -40, "slope": [0.1, 0], "stiffness": 1e4}, model="rod", mesh=65, output={"points": 131}
+    )  # fmt: skip
     result = hybrid.static(hybrid.validate_scene(scene))
     torque, moments = result.torque[-1], (result.moment_start[-1], result.moment_end[-1])
     assert torque[0] == pytest.approx(-moments[0] @ tangents[0], rel=1e-9)

@@ -17,22 +17,17 @@ from hybrid.scene.network import Network
 from hybrid.scene.read import read_text
 from hybrid.scene.root import Scene
 from tests.problems import tables_with
+from tests.scenes import cable_scene, clamped_at, line_between, network_scene
 
-CABLE: dict[str, Any] = {
-    "environment": {"gravity": 9.81},
-    "cable": {"sections": [
-        {"length": 10, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 10,
-         "torsional_stiffness": 10},
-    ]},
-    "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
-             "end": {"kind": "clamped", "position": [8, 0, 0], "tangent": [1, 0, 0]}},
-    "initial": "equilibrium", "model": "rod", "time": {"duration": 3.0, "step": 0.1},
-}  # fmt: skip
-LINES: dict[str, Any] = {
-    "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [8, 0, 0]}},
-    "lines": {"one": {"start": "a", "end": "b", "sections": CABLE["cable"]["sections"]}},
-    "time": {"duration": 3.0, "step": 0.1},
-}  # fmt: skip
+CABLE: dict[str, Any] = cable_scene(
+    {"length": 10, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 10,
+     "torsional_stiffness": 10},
+    clamped_at([0, 0, 0], [1, 0, 0]), clamped_at([8, 0, 0], [1, 0, 0]), gravity=9.81, model="rod", time=(3.0, 0.1)
+)  # fmt: skip
+LINES: dict[str, Any] = network_scene(
+    {"a": {"position": [0, 0, 0]}, "b": {"position": [8, 0, 0]}},
+    {"one": line_between("a", "b", CABLE["cable"]["sections"])}, time=(3.0, 0.1)
+)  # fmt: skip
 
 SECTION, END, ONE = "cable.sections.0.", "ends.end.", "lines.one."
 TORQUE = {SECTION + "tension_torque": 1e-3}

@@ -12,6 +12,7 @@ from hybrid.cli.plan_tables import plan_rows
 from hybrid.model.plan import output_times, plan, size_of_result
 from hybrid.scene.analysis import OUTPUTS, PER_PERIOD, UNASKED_BYTES
 from hybrid.scene.read import as_scene, one_line, parse_scene
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 LINE = {"length": 30.0, "mass": 2.0, "axial_stiffness": 1e6}
 HEAVE = {"heave": {"amplitude": 0.5, "period": 4.0}, "ramp": 8.0}
@@ -20,21 +21,16 @@ HEAVE = {"heave": {"amplitude": 0.5, "period": 4.0}, "ramp": 8.0}
 def cable(duration: float, motion: dict[str, Any] | None = HEAVE, **output: Any) -> dict[str, Any]:
     """A cable whose end heaves."""
     end = {"kind": "pinned", "position": [20, 0, 0]} | ({"motion": motion} if motion else {})
-    return {
-        "cable": {"sections": [LINE]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -20]}, "end": end},
-        "initial": "equilibrium", "model": "catenary", "time": {"duration": duration}, "output": output,
-    }  # fmt: skip
+    return cable_scene(LINE, pinned_at(0, 0, -20), end, model="catenary", time={"duration": duration}, output=output)
 
 
 def lines(duration: float, **output: Any) -> dict[str, Any]:
     """The same as one of two lines that join at a point."""
     point = {"kind": "fixed", "position": [20, 0, 0], "motion": HEAVE}
-    return {
-        "points": {"a": {"position": [0, 0, -20]}, "b": point, "c": {"position": [20, 20, -20]}},
-        "lines": {x: {"start": x, "end": "b", "sections": [LINE]} for x in "ac"},
-        "time": {"duration": duration, "step": 0.05}, "output": output,
-    }  # fmt: skip
+    return network_scene(
+        {"a": {"position": [0, 0, -20]}, "b": point, "c": {"position": [20, 20, -20]}},
+        {x: line_between(x, "b", LINE) for x in "ac"}, time=(duration, 0.05), output=output
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("made", [cable, lines])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, clamped_at
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 FLAT = {"length": 60.0, "mass": 3.0, "bending_stiffness": [900.0, 300.0], "torsional_stiffness": 150.0}
@@ -22,14 +23,10 @@ def turned(v: list[float], angle: float) -> list[float]:
 def hung(angle: float, **start: Any) -> dict[str, Any]:
     """A flat line, clamped at one end, in a scene that is turned about the vertical."""
     clamp = {key: turned(x, angle) if isinstance(x, list) else x for key, x in start.items()}
-    return {
-        "cable": {"sections": [FLAT]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": turned([1, 0.5, 0.2], angle)} | clamp,
-            "end": {"kind": "pinned", "position": turned([36, 12, 8], angle)},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 30},
-    }  # fmt: skip
+    return cable_scene(
+        FLAT, clamped_at([0, 0, 0], turned([1, 0.5, 0.2], angle)) | clamp,
+        {"kind": "pinned", "position": turned([36, 12, 8], angle)}, model="rod", mesh=30
+    )  # fmt: skip
 
 
 def system(angle: float, **start: Any) -> dict[str, Any]:

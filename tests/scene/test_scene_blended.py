@@ -10,6 +10,7 @@ import pytest
 import hybrid
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Motion
+from tests.scenes import cable_scene, pinned_at
 
 PLACE = np.array([3.0, 0.0, 1.0])
 RAMP, W = 5.0, 2.0
@@ -26,13 +27,11 @@ def table(folder: Path, kink: bool = False) -> str:
 
 
 def scene(file: str, **motion: float) -> hybrid.Scene:
-    return hybrid.validate_scene({
-        "cable": {"sections": [{"length": 5.0, "mass": 0.5, "axial_stiffness": 1e4}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
-                 "end": {"kind": "pinned", "position": PLACE.tolist(), "motion": {"file": file, **motion}}},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
-        "time": {"duration": 10.0, "step": 0.05}, "output": {"every": 0.5},
-    })  # fmt: skip
+    return hybrid.validate_scene(cable_scene(
+        {"length": 5.0, "mass": 0.5, "axial_stiffness": 1e4}, pinned_at(0, 0, 0),
+        {"kind": "pinned", "position": PLACE.tolist(), "motion": {"file": file, **motion}}, model="catenary", mesh=20,
+        time=(10.0, 0.05), output=0.5
+    ))  # fmt: skip
 
 
 def test_it_starts_at_rest_and_is_the_file_after_the_ramp(tmp_path: Path) -> None:

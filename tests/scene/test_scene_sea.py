@@ -40,6 +40,7 @@ from hybrid.scene.schema import (
 )
 from hybrid.scene.start_checks import net_weight
 from hybrid.scene.wave_theory import wavenumber
+from tests.scenes import cable_scene, pinned_at
 
 # --- what is read ------------------------------------------------------------------------------
 
@@ -499,13 +500,7 @@ def test_waves_as_long_as_tides_are_refused() -> None:
     """At 1.2e19 s the formulas of waves in shallow water have no digits left: the tension was not a number."""
     waves = {"kind": "regular", "height": 2.0, "period": 1.2e19, "depth": 20.0}
     with pytest.raises(SceneError, match=r"waves\.period[\s\S]*at most 100000 s[\s\S]*current"):
-        validate_scene(
-            {
-                "environment": {"fluid": {"density": 1025.0, "surface": 0.0, "waves": waves}},
-                "cable": {"sections": [{"length": 30, "mass": 1, "diameter": 0.03, "axial_stiffness": 1e6}]},
-                "ends": {
-                    "start": {"kind": "pinned", "position": [0, 0, -20]}, "end": {"kind": "pinned", "position": [5, 0, 5]},
-                },
-                "time": {"duration": 1, "step": 0.1},
-            }
-        )  # fmt: skip
+        validate_scene(cable_scene(
+            {"length": 30, "mass": 1, "diameter": 0.03, "axial_stiffness": 1e6}, pinned_at(0, 0, -20),
+            pinned_at(5, 0, 5), fluid={"density": 1025.0, "surface": 0.0, "waves": waves}, time=(1, 0.1), initial=None
+        ))  # fmt: skip

@@ -12,6 +12,7 @@ import pytest
 import hybrid
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 
 WAVES = {"kind": "regular", "height": 2.0, "period": 9.0, "direction": 30.0, "phase": 25.0, "ramp": 18.0}
 SEA = {
@@ -46,15 +47,12 @@ def scene(rao: str, waves: dict[str, Any] = WAVES, clamped: bool = False, **vess
     if clamped:
         end |= {"kind": "clamped", "tangent": [0, 0, 1]}
     given = {"rao": rao, "origin": ORIGIN, "heading": HEADING, "fairlead": FAIRLEAD} | vessel
-    return hybrid.validate_scene({
-        "environment": {"fluid": {"density": 1025, "surface": 0.0, "waves": waves | {"depth": 200.0}}},
-        "cable": {"sections": [{"length": 120.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e7,
-                                "bending_stiffness": 10.0}]},
-        "ends": {"start": {"kind": "pinned", "position": [place[0] - 40, place[1], -95.0]},
-                 "end": end | {"motion": {"vessel": given}}},
-        "initial": "equilibrium", "model": "rod" if clamped else "catenary", "mesh": {"cells": 30},
-        "time": {"duration": 40.0, "step": 0.1}, "output": {"every": 0.5},
-    })  # fmt: skip
+    return hybrid.validate_scene(cable_scene(
+        {"length": 120.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 10.0},
+        pinned_at(place[0] - 40, place[1], -95.0), end | {"motion": {"vessel": given}},
+        fluid={"density": 1025, "surface": 0.0, "waves": waves | {"depth": 200.0}},
+        model="rod" if clamped else "catenary", mesh=30, time=(40.0, 0.1), output=0.5
+    ))  # fmt: skip
 
 
 def test_a_vessel_that_heaves_with_the_surface_at_its_origin(tmp_path: Path) -> None:

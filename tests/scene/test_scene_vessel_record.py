@@ -13,6 +13,7 @@ import hybrid
 from hybrid.model.build import build
 from hybrid.scene.motion_file import RecordRefused, continuous, matrices_of, read_record, vectors_of
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 
 ORIGIN, HEADING, FAIRLEAD = np.array([5.0, -3.0, 0.5]), 30.0, np.array([20.0, 4.0, -2.0])
 T = np.arange(0.0, 31.0, 0.1)
@@ -48,13 +49,11 @@ def scene(file: str, clamped: bool = False, ramp: float | None = None, **vessel:
         end |= {"kind": "clamped", "tangent": [0, 0, 1]}
     given = {"origin": ORIGIN.tolist(), "heading": HEADING, "fairlead": FAIRLEAD.tolist()} | vessel
     moved = {"file": file, "vessel": given} | ({"ramp": ramp} if ramp else {})
-    return hybrid.validate_scene({
-        "cable": {"sections": [{"length": 60.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e6,
-                                "bending_stiffness": 100.0}]},
-        "ends": {"start": {"kind": "pinned", "position": [place[0] - 30, place[1], -35.0]}, "end": end | {"motion": moved}},
-        "initial": "equilibrium", "model": "rod" if clamped else "catenary", "mesh": {"cells": 30},
-        "time": {"duration": 30.0, "step": 0.1}, "output": {"every": 1.0},
-    })  # fmt: skip
+    return hybrid.validate_scene(cable_scene(
+        {"length": 60.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e6, "bending_stiffness": 100.0},
+        pinned_at(place[0] - 30, place[1], -35.0), end | {"motion": moved}, model="rod" if clamped else "catenary",
+        mesh=30, time=(30.0, 0.1), output=1.0
+    ))  # fmt: skip
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from hybrid.model.plausibility import implausible
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.motion_tables import Harmonic, Motion, Travel, farthest, shift
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, network_scene, pinned_at
 
 ROPE = {"length": 105.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e7}
 CHAIN = {"length": 105.0, "mass": 100.0, "diameter": 0.076, "axial_stiffness": 5e8}
@@ -23,10 +24,7 @@ SURGE = {"surge": {"amplitude": 15.0, "period": 10.0}, "ramp": 10.0}
 def moved(section: dict[str, Any], motion: dict[str, Any], **end: Any) -> hybrid.Scene:
     """A line to an end 100 m away that moves."""
     there = {"kind": "pinned", "position": [100, 0, 0], "motion": motion} | end
-    return hybrid.validate_scene({
-        "cable": {"sections": [section]}, "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": there},
-        "initial": {"kind": "equilibrium"}, "model": "catenary", "time": {"duration": 20.0, "step": 0.02},
-    })  # fmt: skip
+    return hybrid.validate_scene(cable_scene(section, pinned_at(0, 0, 0), there, model="catenary", time=(20.0, 0.02)))
 
 
 def test_the_way_of_an_end_is_that_of_its_motion() -> None:
@@ -73,12 +71,11 @@ def meeting(apart: float, **motion: Any) -> dict[str, Any]:
     """Two lines of 150 m between held points, joined at a free one."""
     section = ROPE | {"length": 150.0}
     line = {"sections": [section], "model": "catenary"}
-    return {
-        "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [apart, 0, 0], **motion},
-                   "m": {"mass": 100.0, "initial_guess": [150, 0, -30]}},
-        "lines": {"x": {"start": "a", "end": "m"} | line, "y": {"start": "m", "end": "b"} | line},
-        "time": {"duration": 30.0, "step": 0.02},
-    }  # fmt: skip
+    return network_scene(
+        {"a": {"position": [0, 0, 0]}, "b": {"position": [apart, 0, 0], **motion},
+         "m": {"mass": 100.0, "initial_guess": [150, 0, -30]}},
+        {"x": {"start": "a", "end": "m"} | line, "y": {"start": "m", "end": "b"} | line}, time=(30.0, 0.02)
+    )  # fmt: skip
 
 
 def test_two_lines_that_cannot_meet_are_refused_with_length_and_distance() -> None:

@@ -11,47 +11,46 @@ import pytest
 from hybrid.errors import SceneError
 from hybrid.scene.base import dotted
 from hybrid.scene.read import as_scene
+from tests.scenes import line_between, network_scene
 
 SECTION = {"length": 185.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 40.0}
 MOTION = {"heave": {"amplitude": 1.0, "period": 9.0}, "roll": {"amplitude": 2.0, "period": 9.0}, "ramp": 9.0}
-SCENE: dict[str, Any] = {
-    "title": "all keys",
-    "environment": {"fluid": {"density": 1025.0, "surface": 30.0, "waves": {"kind": "regular", "height": 1.0, "period": 7.0}}, "seabed": {"z": -101.0, "stiffness": 1e4}},
-    "points": {
-        "west": {"position": [-150.0, 0.0, -100.0], "break_at": {"time": 5.0}},
-        "east": {"kind": "fixed", "position": [150.0, 0.0, -100.0], "motion": {"travel": {"by": [1.0, 0.0, 0.0], "over": 9.0}}},
-        "buoy": {"kind": "free", "initial_guess": [0.0, 0.0, 5.0], "mass": 900.0, "volume": 9.0, "height": 2.0,
-                 "shape": "cylinder", "drag_area": 1.0, "added_mass": 5.0, "force": [1.0, 0.0, 0.0]},
-        "low": {"position": [10.0, 0.0, -100.0]},
-        "lead": {"body": "float", "place": [1.0, 0.0, -1.0]},
-        "hangoff": {"kind": "fairlead", "body": "ship", "place": [0.0, 5.0, -1.0], "break_at": {"tension": 5e5}},
-    },
-    "bodies": {
-        "float": {"initial_guess": [60.0, 0.0, 20.0], "initial_rotation": [1.0, 2.0, 3.0], "mass": 4e3,
-                  "centre": [0.1, 0.0, -0.2], "inertia": [2e4, 3e4, 2e4], "added_mass": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
-                  "damping": [[2.0 * (i == j) for j in range(6)] for i in range(6)], "volume": 5.0,
-                  "centre_of_buoyancy": [0.0, 0.0, 0.3], "force": {"value": [1.0, 0.0, 0.0], "until": 4.0},
-                  "moment": [0.0, 0.0, 2.0],
-                  "members": [{"start": [0.0, 0.0, -2.0], "end": [0.0, 1.0, 2.0], "diameter": 0.4, "drag": 1.0,
-                               "axial_drag": 0.01, "added_mass": 1.0, "pieces": 3}]},
-        "ship": {"position": [-60.0, 0.0, 32.0], "rotation": [0.0, 0.0, 30.0], "motion": MOTION},
-        "spar": {"initial_guess": [0.0, 80.0, 30.0], "mass": 4e3, "inertia": [2e4, 3e4, 2e4],
-                 "hydrostatics": {"level": 30.0, "heave": 1e4, "roll": 2e4, "pitch": 2e4}},
-    },
-    "lines": {
-        "one": {"start": "west", "end": "buoy", "sections": [SECTION], "model": "rod", "mesh": {"cells": 20}},
-        "six": {"start": "low", "end": "lead", "sections": [SECTION], "model": "rod", "mesh": {"cells": 20},
-                "connections": {"start": {"tangent": [0.0, 0.0, 1.0], "normal": [1.0, 0.0, 0.0], "swivel": False},
-                                "end": {"kind": "clamped", "tangent": [0.0, 1.0, 1.0], "bend_stiffness": 5e3}}},
-        "two": {"start": "buoy", "end": "east", "sections": [SECTION], "attachments": [{"kind": "clump", "at": 5.0, "mass": 3.0, "volume": 0.001}]},
-        "three": {"start": "buoy", "end": "lead", "sections": [SECTION | {"length": 80.0}]},
-        "four": {"start": "lead", "end": "hangoff", "sections": [SECTION | {"length": 150.0}]},
-        "five": {"start": "buoy", "end": "mast", "sections": [SECTION | {"length": 110.0}],
-                 "break_at": {"time": 4.0, "tension": 4e5, "end": "start"}},
-    },
-    "time": {"duration": 10.0, "step": 0.05},
-    "output": {"every": 1.0, "points": 11, "errors": True, "exact": True, "elevation": [[1.0, 2.0], [3.0, 4.0]], "history": {"one": [20.0, 30.0]}},
-}  # fmt: skip
+SCENE: dict[str, Any] = network_scene(
+    {"west": {"position": [-150.0, 0.0, -100.0], "break_at": {"time": 5.0}},
+     "east": {"kind": "fixed", "position": [150.0, 0.0, -100.0],
+              "motion": {"travel": {"by": [1.0, 0.0, 0.0], "over": 9.0}}},
+     "buoy": {"kind": "free", "initial_guess": [0.0, 0.0, 5.0], "mass": 900.0, "volume": 9.0, "height": 2.0,
+              "shape": "cylinder", "drag_area": 1.0, "added_mass": 5.0, "force": [1.0, 0.0, 0.0]},
+     "low": {"position": [10.0, 0.0, -100.0]}, "lead": {"body": "float", "place": [1.0, 0.0, -1.0]},
+     "hangoff": {"kind": "fairlead", "body": "ship", "place": [0.0, 5.0, -1.0], "break_at": {"tension": 5e5}}},
+    {"one": line_between("west", "buoy", SECTION, model="rod", mesh=20),
+     "six": line_between("low", "lead", SECTION, model="rod", mesh=20,
+                         connections={"start": {"tangent": [0.0, 0.0, 1.0], "normal": [1.0, 0.0, 0.0], "swivel": False},
+                                      "end": {"kind": "clamped", "tangent": [0.0, 1.0, 1.0], "bend_stiffness": 5e3}}),
+     "two": line_between("buoy", "east", SECTION,
+                         attachments=[{"kind": "clump", "at": 5.0, "mass": 3.0, "volume": 0.001}]),
+     "three": line_between("buoy", "lead", SECTION | {"length": 80.0}),
+     "four": line_between("lead", "hangoff", SECTION | {"length": 150.0}),
+     "five": line_between("buoy", "mast", SECTION | {"length": 110.0},
+                          break_at={"time": 4.0, "tension": 4e5, "end": "start"})},
+    title="all keys",
+    fluid={"density": 1025.0, "surface": 30.0, "waves": {"kind": "regular", "height": 1.0, "period": 7.0}},
+    seabed={"z": -101.0, "stiffness": 1e4},
+    bodies={"float": {"initial_guess": [60.0, 0.0, 20.0], "initial_rotation": [1.0, 2.0, 3.0], "mass": 4e3,
+                      "centre": [0.1, 0.0, -0.2], "inertia": [2e4, 3e4, 2e4],
+                      "added_mass": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+                      "damping": [[2.0 * (i == j) for j in range(6)] for i in range(6)], "volume": 5.0,
+                      "centre_of_buoyancy": [0.0, 0.0, 0.3], "force": {"value": [1.0, 0.0, 0.0], "until": 4.0},
+                      "moment": [0.0, 0.0, 2.0],
+                      "members": [{"start": [0.0, 0.0, -2.0], "end": [0.0, 1.0, 2.0], "diameter": 0.4, "drag": 1.0,
+                                   "axial_drag": 0.01, "added_mass": 1.0, "pieces": 3}]},
+            "ship": {"position": [-60.0, 0.0, 32.0], "rotation": [0.0, 0.0, 30.0], "motion": MOTION},
+            "spar": {"initial_guess": [0.0, 80.0, 30.0], "mass": 4e3, "inertia": [2e4, 3e4, 2e4],
+                     "hydrostatics": {"level": 30.0, "heave": 1e4, "roll": 2e4, "pitch": 2e4}}},
+    time=(10.0, 0.05),
+    output={"every": 1.0, "points": 11, "errors": True, "exact": True, "elevation": [[1.0, 2.0], [3.0, 4.0]],
+            "history": {"one": [20.0, 30.0]}}
+)  # fmt: skip
 SCENE["points"]["mast"] = {"body": "spar", "place": [0.0, 0.0, -2.0]}
 NONSENSE = (
     "nonsense",

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, clamped_at
 
 # Discretisation of fourth order at 80 and 160 cells on the sharpest bend here (the clamp).
 PLACE, TENSION, MOMENT = 1e-7, 2e-4, 1e-6  # of the length, the applied force, the moment
@@ -31,17 +32,16 @@ def scene(zones, cells, **changes):
         "length": 1.0, "mass": 0.1, "diameter": 0.01, "bending_stiffness": 0.5, "torsional_stiffness": 0.4,
         "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0}, "damping": 0.5,
     }  # fmt: skip
-    data = {
-        "environment": {"gravity": 9.81, "fluid": {"density": 1000.0, "current": [0.0, 2.0, 0.5]}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0.3, -0.2]},
-            "end": {"kind": "free", "force": [20.0, 3.0, 2.0]},
-        },
-        "initial": {"kind": "equilibrium", "direction": [1, 0.1, 0.1]},
-        "model": {"kind": "zones", "zones": [{kind: x, "cells": max(2, round(x * cells))} for kind, x in zones]},
-        "output": {"points": 11},
-    }
+    data = cable_scene(
+        section,
+        clamped_at([0, 0, 0], [1, 0.3, -0.2]),
+        {"kind": "free", "force": [20.0, 3.0, 2.0]},
+        gravity=9.81,
+        fluid={"density": 1000.0, "current": [0.0, 2.0, 0.5]},
+        initial={"kind": "equilibrium", "direction": [1, 0.1, 0.1]},
+        model={"kind": "zones", "zones": [{kind: x, "cells": max(2, round(x * cells))} for kind, x in zones]},
+        output={"points": 11},
+    )
     return hybrid.validate_scene(data | changes)
 
 

@@ -26,6 +26,7 @@ from hybrid.scene.accuracy import amount
 from hybrid.scene.read import one_line
 from hybrid.scene.root import LINE, in_full
 from hybrid.simulation.run_sample import RunSample, cubic_spline
+from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -44,26 +45,12 @@ def test_amounts(text, what, size):
 
 def swinging(**more):
     """A chain that is let go from 40 degrees and swings in water; smooth, and of no particular period."""
-    data = {
-        "environment": {"gravity": 9.81, "fluid": {"density": 1000.0}},
-        "cable": {
-            "sections": [
-                {"length": 2.0, "mass": 0.5, "diameter": 0.02, "bending_stiffness": 0.01, "axial_stiffness": 1e5,
-                 "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}
-            ]
-        },
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {
-                "kind": "pinned", "position": [1.5, 0, 0],
-                "motion": {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0},
-            },
-        },
-        "initial": "equilibrium",
-        "model": "rod",
-        "time": {"duration": 6.0},
-        "output": {"every": 0.1, "points": 21},
-    }  # fmt: skip
+    data = cable_scene(
+        {"length": 2.0, "mass": 0.5, "diameter": 0.02, "bending_stiffness": 0.01, "axial_stiffness": 1e5,
+         "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}},
+        pinned_at(0, 0, 0), pinned_at(1.5, 0, 0, motion={"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}),
+        gravity=9.81, fluid={"density": 1000.0}, model="rod", time={"duration": 6.0}, output=(0.1, 21)
+    )  # fmt: skip
     return hybrid.validate_scene(data | more)
 
 
@@ -468,10 +455,9 @@ def test_rods_of_a_coarse_mesh_have_fewer_cells():
     a mesh of half the cells (39 base cells of 78 rod cells beside 79 of 79): no difference, and an error of 1/12."""
     section = {"length": 100, "mass": 1.0, "bending_stiffness": 1e5}
     end = {"kind": "pinned", "position": [60, 0, 0]}
-    scene = hybrid.validate_scene({
-        "cable": {"sections": [section]}, "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
-        "initial": "equilibrium", "model": "adaptive", "time": {"duration": 1.0}, "accuracy": "1%",
-    })  # fmt: skip
+    scene = hybrid.validate_scene(
+        cable_scene(section, pinned_at(0, 0, 0), end, model="adaptive", time={"duration": 1.0}, accuracy="1%")
+    )
     s = np.linspace(0.0, 100.0, 201)
     bends = grading(s, 0.02 + 0.05 * np.exp(-(((s - 50.0) / 15.0) ** 2)), np.zeros(SAMPLES), 100.0)
     meshes = [build(one_line(scene), Resolution(x, 0.1, None, 1e-3, bends)).layout for x in (0.375, 0.75, 1.5, 3.0)]
@@ -618,10 +604,7 @@ def test_steps_see_what_a_motion_file_does(tmp_path):
     t = np.arange(0.0, 100.01, 0.02)
     rows = [f"{x:.2f},1.5,0,{0.3 * np.exp(-(((x - 48.0) / 0.3) ** 2)):.9f}" for x in t]
     (tmp_path / "pulse.csv").write_text("t,x,y,z\n" + "\n".join(rows) + "\n")
-    ends = {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": {"file": str(tmp_path / "pulse.csv")}},
-    }
+    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(1.5, 0, 0, motion={"file": str(tmp_path / "pulse.csv")})}
     scene = swinging(ends=ends, time={"duration": 100.0}, output={"every": 10.0}, accuracy="1%")
     assert first_resolution(scene).step < 0.2
     slow = swinging()

@@ -11,6 +11,7 @@ from hybrid.model.resolution import Resolution
 from hybrid.scene.read import one_line
 from hybrid.simulation.mesh_survey import PERIODS, survey_duration
 from hybrid.simulation.run_sample import RunSample
+from tests.scenes import cable_scene, pinned_at
 
 FIRST = Resolution(1.0, 0.1, 1e-3, 1e-3)
 
@@ -47,12 +48,10 @@ def storm(duration: float, **more) -> hybrid.Scene:
     """A line whose end follows irregular waves of 10 s that grow for 60 s."""
     waves = {"kind": "jonswap", "significant_height": 2.0, "peak_period": 10.0, "ramp": 60.0}
     start = {"kind": "pinned", "position": [0, 0, -5], "motion": {"follow": "waves", **more}}
-    return hybrid.validate_scene({
-        "environment": {"fluid": {"density": 1025, "surface": 0.0, "waves": waves}},
-        "cable": {"sections": [{"length": 30, "mass": 3, "diameter": 0.03, "drag": {"normal": 1.2}}]},
-        "ends": {"start": start, "end": {"kind": "pinned", "position": [20, 0, -8]}},
-        "initial": "equilibrium", "time": {"duration": duration},
-    })  # fmt: skip
+    return hybrid.validate_scene(cable_scene(
+        {"length": 30, "mass": 3, "diameter": 0.03, "drag": {"normal": 1.2}}, start, pinned_at(20, 0, -8),
+        fluid={"density": 1025, "surface": 0.0, "waves": waves}, time={"duration": duration}
+    ))  # fmt: skip
 
 
 def test_a_long_storm_has_a_short_pre_run():

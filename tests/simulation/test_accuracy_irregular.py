@@ -18,11 +18,11 @@ from hybrid.model.sections import output_points
 from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.integrity import pack, unpack
+from tests.scenes import cable_scene, pinned_at
 
-SCENE = hybrid.validate_scene({
-    "cable": {"sections": [{"length": 1.0, "mass": 1.0}]}, "model": "catenary", "time": {"duration": 1.0},
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"}, "initial": "equilibrium",
-})  # fmt: skip
+SCENE = hybrid.validate_scene(
+    cable_scene({"length": 1.0, "mass": 1.0}, pinned_at(0, 0, 0), "free", model="catenary", time={"duration": 1.0})
+)
 FINENESS = Resolution(1.0, 0.1, 1e-3, 1e-3)
 
 
@@ -319,20 +319,13 @@ def test_means_over_windows_that_do_not_converge_are_not_refined():
     assert len(missed) == 1 and "windows' largest" in missed[0] and "several seeds" in missed[0]
 
 
-SEA = {
-    "environment": {
-        "fluid": {
-            "density": 1025, "surface": 0,
-            "waves": {"kind": "jonswap", "significant_height": 2, "peak_period": 6, "ramp": 6, "seed": 2},
-        }
-    },
-    "cable": {"sections": [{"length": 30, "mass": 3, "diameter": 0.03, "bending_stiffness": 5, "drag": {"normal": 1.2}}]},
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, -25]},
-        "end": {"kind": "pinned", "position": [18, 0, -4], "motion": {"follow": "waves"}},
-    },
-    "initial": "equilibrium", "model": "rod", "time": {"duration": 30.0}, "output": {"every": 0.1},
-}  # fmt: skip
+SEA = cable_scene(
+    {"length": 30, "mass": 3, "diameter": 0.03, "bending_stiffness": 5, "drag": {"normal": 1.2}}, pinned_at(0, 0, -25),
+    pinned_at(18, 0, -4, motion={"follow": "waves"}),
+    fluid={"density": 1025, "surface": 0,
+           "waves": {"kind": "jonswap", "significant_height": 2, "peak_period": 6, "ramp": 6, "seed": 2}},
+    model="rod", time={"duration": 30.0}, output=0.1
+)  # fmt: skip
 
 
 @pytest.mark.long

@@ -22,6 +22,7 @@ from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.solve.stability import is_stable
 from tests.inside import OnlyLine
+from tests.scenes import cable_scene, clamped_at, network_scene, pinned_at
 
 TABLE = [[0, 0], [0.01, 1000], [0.02, 3000], [0.03, 9000]]
 DYNAMIC = {"constant": 4e5, "per_tension": 20.0, "relaxation_time": 3.0}
@@ -38,16 +39,12 @@ def bar(section: dict[str, Any], history: list[list[float]], **tables: Any) -> d
     """A bar of 10 m along x, under a force along it that changes."""
     kind = tables.pop("model", "catenary")
     stiff = {"bending_stiffness": 1.0} if kind == "rod" else {}
-    return {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [{"length": 10, "mass": 1e-4} | stiff | section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "free", "force": {"history": history}},
-        },
-        "initial": {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, 0]}, "model": kind,
-        "mesh": {"cells": 5}, "time": {"duration": history[-1][0], "step": 0.05}, "output": {"every": 0.5},
-    } | tables  # fmt: skip
+    return cable_scene(
+        {"length": 10, "mass": 1e-4} | stiff | section, pinned_at(0, 0, 0),
+        {"kind": "free", "force": {"history": history}}, gravity=0,
+        initial={"kind": "equilibrium", "guess": "straight", "direction": [1, 0, 0]}, model=kind, mesh=5,
+        time=(history[-1][0], 0.05), output=0.5
+    ) | tables  # fmt: skip
 
 
 HISTORY = [
@@ -135,11 +132,10 @@ def test_energy_balances_and_nothing_is_gained(which: str) -> None:
 
 def test_a_hanging_rope_has_the_length_of_its_table() -> None:
     """Under its own weight: the strain of the tension above, integrated along it."""
-    scene: dict[str, Any] = {
-        "cable": {"sections": [{"length": 100, "mass": 6, "tension_strain": TABLE}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [0, 0, -900]}},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 400},
-    }  # fmt: skip
+    scene: dict[str, Any] = cable_scene(
+        {"length": 100, "mass": 6, "tension_strain": TABLE}, pinned_at(0, 0, 0),
+        {"kind": "free", "force": [0, 0, -900]}, model="catenary", mesh=400
+    )  # fmt: skip
     found = hybrid.static(scene)
     weight = 6 * 9.81
     longer, _ = quad(lambda s: strain_at_rest(900 + weight * (100 - s)), 0, 100, points=[63, 97], epsabs=1e-10)
@@ -161,10 +157,7 @@ def two_lines(section: dict[str, Any], cut: bool, heave: float = 0.3) -> dict[st
             "rope": {"start": "anchor", "end": "knot"} | half,
             "upper": {"start": "vessel", "end": "knot"} | half,
         }  # fmt: skip
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.5, 0, 0]}}, "points": points, "lines": lines,
-        "time": {"duration": 6, "step": 0.05}, "output": {"every": 0.5},
-    }  # fmt: skip
+    return network_scene(points, lines, fluid={"density": 1025, "current": [0.5, 0, 0]}, time=(6, 0.05), output=0.5)
 
 
 SOFT = {"tension_strain": [[0, 0], [0.01, 800], [0.03, 6000], [0.2, 9e4]]}
@@ -218,19 +211,16 @@ def heaved(law: dict[str, Any], model: Any) -> dict[str, Any]:
     wet = {"drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}
     section = {"length": 60, "diameter": 0.03, "mass": 1.5, "bending_stiffness": 60} | wet | law
     heave = {"heave": {"amplitude": 1.5, "period": 3}, "ramp": 1}
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, -40], "tangent": [0, 0, 1]},
-            "end": {"kind": "pinned", "position": [30, 0, -3], "motion": heave},
-        },
-        "initial": "equilibrium",
-        "model": model,
-        "mesh": {"cells": 20},
-        "time": {"duration": 2.0, "step": 0.02},
-        "output": {"every": 0.1},
-    }
+    return cable_scene(
+        section,
+        clamped_at([0, 0, -40], [0, 0, 1]),
+        pinned_at(30, 0, -3, motion=heave),
+        fluid={"density": 1025, "surface": 0},
+        model=model,
+        mesh=20,
+        time=(2.0, 0.02),
+        output=0.1,
+    )
 
 
 @pytest.mark.parametrize("model", ZONES, ids=["zones", "cells"])
@@ -277,20 +267,17 @@ def touching(law: dict[str, Any], model: Any, cells: int, step: float = 0.05) ->
     """100 m over 80 m that touch the seabed, in a plane, from a clamp that heaves by 1 m in 4 s."""
     section = {"length": 100, "mass": 5, "diameter": 0.05, "bending_stiffness": 500} | law
     heave = {"heave": {"amplitude": 1, "period": 4}, "ramp": 4}
-    return {
-        "dimension": 2,
-        "environment": {"seabed": {"z": -18, "stiffness": 5e3, "damping": 5e2}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "clamped", "position": [80, 0, 0], "tangent": [1, 0, 0.5], "motion": heave},
-        },
-        "initial": "equilibrium",
-        "model": model,
-        "mesh": {"cells": cells},
-        "time": {"duration": 6.0, "step": step},
-        "output": {"every": 0.5, "points": 41},
-    }
+    return cable_scene(
+        section,
+        pinned_at(0, 0, 0),
+        clamped_at([80, 0, 0], [1, 0, 0.5], motion=heave),
+        dimension=2,
+        seabed={"z": -18, "stiffness": 5e3, "damping": 5e2},
+        model=model,
+        mesh=cells,
+        time=(6.0, step),
+        output=(0.5, 41),
+    )
 
 
 def zones(tolerance: float) -> dict[str, Any]:
@@ -340,13 +327,10 @@ CREEP = {"axial_stiffness": EA, "creep": {"per_decade": PER, "loaded": LOADED}}
 
 
 def rope(end: Any, step: float, over: float, **section: Any) -> dict[str, Any]:
-    return {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [{"length": LENGTH, "mass": 1.0, "damping": 20.0} | CREEP | section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10},
-        "time": {"duration": over, "step": step}, "output": {"every": 10.0, "points": 11},
-    }  # fmt: skip
+    return cable_scene(
+        {"length": LENGTH, "mass": 1.0, "damping": 20.0} | CREEP | section, pinned_at(0, 0, 0), end, gravity=0,
+        model="catenary", mesh=10, time=(over, step), output=(10.0, 11)
+    )  # fmt: skip
 
 
 def crept(t: Any) -> Any:

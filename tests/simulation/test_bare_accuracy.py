@@ -16,25 +16,18 @@ from hybrid.model.resolution import Reach, Resolution, first_resolution, for_mot
 from hybrid.scene.read import as_scene, one_line, parse_scene, scene_text
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_sample import RunSample
+from tests.scenes import cable_scene, network_scene, pinned_at
 
 LENGTH, DIAMETER = 100.0, 0.04
 
 
 def scene(accuracy: Any = "2%", model: str | None = None, **section: Any) -> hybrid.Scene:
-    table: dict[str, Any] = {
-        "cable": {"sections": [
-            {"length": LENGTH, "mass": 3.0, "diameter": DIAMETER, "bending_stiffness": 50.0,
-             "drag": {"normal": 1.2}, **section}
-        ]},
-        "environment": {"fluid": {"density": 1025, "surface": 20}},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {
-                "kind": "pinned", "position": [80, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period": 4}, "ramp": 4}
-            },
-        },
-        "initial": "equilibrium", "time": {"duration": 8.0}, "output": {"points": 11, "every": 0.5},
-    }  # fmt: skip
+    table: dict[str, Any] = cable_scene(
+        {"length": LENGTH, "mass": 3.0, "diameter": DIAMETER, "bending_stiffness": 50.0, "drag": {"normal": 1.2},
+         **section},
+        pinned_at(0, 0, 0), pinned_at(80, 0, 0, motion={"heave": {"amplitude": 0.5, "period": 4}, "ramp": 4}),
+        fluid={"density": 1025, "surface": 20}, time={"duration": 8.0}, output=(0.5, 11)
+    )  # fmt: skip
     table |= {"accuracy": accuracy} if accuracy else {}
     table |= {"model": model} if model else {}
     return hybrid.validate_scene(table)
@@ -209,13 +202,12 @@ def test_a_limit_that_is_nearly_reached_is_settled_at_a_loose_accuracy() -> None
 def test_lines_of_a_system_ask_the_same(accuracy: str | None) -> None:
     """Each of what it moves by itself; a line that names no model, a rod as well, asks for no curvature."""
     line = {"sections": [{"length": LENGTH, "mass": 3.0, "bending_stiffness": 50.0, "diameter": DIAMETER}]}
-    system = as_scene({
-        "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [80, 0, 0]}, "c": {"position": [0, 80, 0]}},
-        "lines": {
-            "plain": {"start": "a", "end": "b", **line}, "named": {"start": "a", "end": "c", "model": "rod", **line}
-        },
-        "time": {"duration": 4.0},
-    } | ({"accuracy": accuracy} if accuracy else {}))  # fmt: skip
+    system = as_scene(
+        network_scene({"a": {"position": [0, 0, 0]}, "b": {"position": [80, 0, 0]}, "c": {"position": [0, 80, 0]}},
+                      {"plain": {"start": "a", "end": "b", **line},
+                       "named": {"start": "a", "end": "c", "model": "rod", **line}},
+                      time={"duration": 4.0}) | ({"accuracy": accuracy} if accuracy else {})
+    )  # fmt: skip
     for name in ("plain", "named"):
         asking = system.scene_of(name)
         assert asking.model.kind == "rod"

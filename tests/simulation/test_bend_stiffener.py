@@ -15,6 +15,7 @@ from test_moment_tables import taut as with_law
 
 import hybrid
 from hybrid.errors import SceneError
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 EI = 1e4  # N m2
 CONE = {"kind": "bend_stiffener", "range": [0, 3], "diameters": [0.3, 0.15], "bore": 0.12, "modulus": 2.5e8}
@@ -88,12 +89,10 @@ def test_a_sleeve_that_bends_evenly() -> None:
 def test_a_sleeve_weighs_floats_and_is_dragged_as_a_cone() -> None:
     """Pull of a line that hangs in a current: all weight less buoyancy; across it the drag on the larger diameter."""
     section = {"length": 8, "mass": 60, "diameter": 0.12, "bending_stiffness": EI, "drag": {"normal": 1.0}}
-    hung = {
-        "environment": {"fluid": {"density": 1000, "current": [0.2, 0, 0]}},
-        "cable": {"sections": [section], "attachments": [CONE | {"density": 1200}]},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1]}, "end": "free"},
-        "initial": "equilibrium", "model": "rod", "contact": {"self": False}, "mesh": {"cells": 80},
-    }  # fmt: skip
+    hung = cable_scene(
+        section, clamped_at([0, 0, 0], [0, 0, -1]), "free", attachments=[CONE | {"density": 1200}],
+        fluid={"density": 1000, "current": [0.2, 0, 0]}, model="rod", contact={"self": False}, mesh=80
+    )  # fmt: skip
     found = hybrid.static(hung)
     volume = pi / 4 * (0.12**2 * 8 + ((0.3**2 + 0.3 * 0.15 + 0.15**2) / 3 - 0.12**2) * 3)
     mass = 60 * 8 + 1200 * (volume - pi / 4 * 0.12**2 * 8)
@@ -109,16 +108,11 @@ def test_zones_keep_a_stiffened_clamp_a_rod() -> None:
         "drag": {"normal": 1.2}, "added_mass": {"normal": 1},
     }  # fmt: skip
     sway = {"surge": {"amplitude": 1.0, "period": 6}, "ramp": 6}
-    scene = {
-        "environment": {"fluid": {"density": 1025}},
-        "cable": {"sections": [section], "attachments": [CONE | {"density": 1150}]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1], "motion": sway},
-            "end": {"kind": "pinned", "position": [60, 0, -60]},
-        },
-        "initial": "equilibrium", "time": {"duration": 10, "step": 0.05}, "mesh": {"cells": 120},
-        "contact": {"self": False},
-    }  # fmt: skip
+    scene = cable_scene(
+        section, clamped_at([0, 0, 0], [0, 0, -1], motion=sway), pinned_at(60, 0, -60),
+        attachments=[CONE | {"density": 1150}], fluid={"density": 1025}, time=(10, 0.05), mesh=120,
+        contact={"self": False}
+    )  # fmt: skip
     rods, zones, cells = (
         hybrid.run(scene | {"model": model} | more)
         for model, more in (

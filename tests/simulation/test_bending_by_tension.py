@@ -12,6 +12,7 @@ from test_moment_tables import taut as with_law
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
+from tests.scenes import cable_scene
 
 EI, GROWS = 1e4, 0.3  # N m2, m2
 BEGIN, END = 5e4, 2e4  # N
@@ -80,12 +81,11 @@ def heaved(grows: float) -> dict[str, Any]:
     }
     motion = {"heave": {"amplitude": 0.5, "period": 2.0}, "ramp": 2.0}
     clamp = {"kind": "clamped", "tangent": [1, 0, 0]}
-    return {
-        "cable": {"sections": [section | {"stiffness_per_tension": grows}]},
-        "ends": {"start": clamp | {"position": [0, 0, 0]}, "end": clamp | {"position": [9.85, 0, 0], "motion": motion}},
-        "initial": "equilibrium", "model": "rod", "contact": {"self": False}, "mesh": {"cells": 40},
-        "time": {"duration": 4.0, "step": 0.005}, "output": {"every": 0.1, "points": 21},
-    }  # fmt: skip
+    return cable_scene(
+        section | {"stiffness_per_tension": grows}, clamp | {"position": [0, 0, 0]},
+        clamp | {"position": [9.85, 0, 0], "motion": motion}, model="rod", contact={"self": False}, mesh=40,
+        time=(4.0, 0.005), output=(0.1, 21)
+    )  # fmt: skip
 
 
 def test_energy_that_the_law_creates_is_told_or_stops_the_run() -> None:

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import hybrid
 from hybrid.errors import SceneError
+from tests.scenes import cable_scene, clamped_at
 
 Floats = NDArray[np.float64]
 EI, STUCK, SLIP = 9.67e3, 87.2e3, 872.0  # N m2, N m2, N m: it slips at 0.01 1/m
@@ -21,17 +22,12 @@ LENGTH, CELLS, PERIOD = 2.0, 8, 40.0
 
 def bent(moments: list[list[float]], step: float, mass: float = 0.1, **section: Any) -> dict[str, Any]:
     """A cantilever without weight under a moment at its end, rows [t, x, y, z]: bent evenly, and slowly."""
-    return {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [{"length": LENGTH, "mass": mass, "axial_stiffness": 1e8, "damping": 20.0} | section]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 1, 0]},
-            "end": {"kind": "free", "moment": {"history": moments}},
-        },
-        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]},
-        "model": "rod", "contact": {"self": False}, "mesh": {"cells": CELLS},
-        "time": {"duration": moments[-1][0], "step": step}, "output": {"every": step, "points": CELLS + 1, "exact": True},
-    }  # fmt: skip
+    return cable_scene(
+        {"length": LENGTH, "mass": mass, "axial_stiffness": 1e8, "damping": 20.0} | section,
+        clamped_at([0, 0, 0], [1, 0, 0], normal=[0, 1, 0]), {"kind": "free", "moment": {"history": moments}}, gravity=0,
+        initial={"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}, model="rod", contact={"self": False},
+        mesh=CELLS, time=(moments[-1][0], step), output={"every": step, "points": CELLS + 1, "exact": True}
+    )  # fmt: skip
 
 
 def cycled(most: float, dimension: int, **section: Any) -> hybrid.Result:
@@ -164,19 +160,12 @@ CABLE = {
 
 def swung(step: float, *sections: dict[str, Any], **tables: Any) -> dict[str, Any]:
     """A clamped cable that falls from a straight line, without damping, and bends across what it has slipped to."""
-    return {
-        "cable": {"sections": list(sections) or [CABLE]},
-        "ends": {
-            "start": {
-                "kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0.3, 0],
-                "motion": {"sway": {"amplitude": 0.4, "period": 0.8}, "ramp": 0.4},
-            },
-            "end": "free",
-        },
-        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0.3, 0]},
-        "model": "rod", "contact": {"self": False}, "mesh": {"cells": 24},
-        "time": {"duration": 1.0, "step": step, "rho_inf": 1.0}, "output": {"every": 0.04, "exact": True},
-    } | tables  # fmt: skip
+    return cable_scene(
+        list(sections) or [CABLE],
+        clamped_at([0, 0, 0], [1, 0.3, 0], motion={"sway": {"amplitude": 0.4, "period": 0.8}, "ramp": 0.4}), "free",
+        initial={"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0.3, 0]}, model="rod",
+        contact={"self": False}, mesh=24, time=(1.0, step, 1.0), output={"every": 0.04, "exact": True}
+    ) | tables  # fmt: skip
 
 
 def test_energy_is_kept_or_booked() -> None:

@@ -16,6 +16,7 @@ from hybrid.accuracy.run_forecast import OUTPUT, POINT, Budget
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
 from hybrid.simulation.run_sample import RunSample
+from tests.scenes import cable_scene, pinned_at
 
 FIRST = Resolution(1.0, 0.1, 1e-3, 1e-3)
 
@@ -52,15 +53,11 @@ def test_short_runs_are_refined_whatever_it_takes_and_outputs_count() -> None:
 
 def test_what_is_beyond_is_not_computed_and_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The result that there is stays, and says what it meets; resumed from its first step it is refined no more."""
-    scene: dict[str, Any] = {
-        "cable": {"sections": [{"length": 2.0, "mass": 0.5, "axial_stiffness": 1e5}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}},
-        },
-        "initial": "equilibrium", "model": "catenary", "time": {"duration": 2.0}, "accuracy": "0.3%",
-        "output": {"every": 0.1, "points": 11},
-    }  # fmt: skip
+    scene: dict[str, Any] = cable_scene(
+        {"length": 2.0, "mass": 0.5, "axial_stiffness": 1e5}, pinned_at(0, 0, 0),
+        pinned_at(1.5, 0, 0, motion={"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}), model="catenary",
+        time={"duration": 2.0}, accuracy="0.3%", output=(0.1, 11)
+    )  # fmt: skip
     from hybrid.accuracy import passes
 
     surveyed = passes.Passes._surveyed

@@ -15,15 +15,13 @@ from hybrid.scene.root import LINE, in_full
 from hybrid.simulation import line_result
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample
+from tests.scenes import cable_scene, pinned_at
 
-SCENE: dict[str, Any] = {
-    "cable": {"sections": [{"length": 20, "mass": 1.5, "axial_stiffness": 1e6, "bending_stiffness": 50, "diameter": 0.02}]},
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
-             "end": {"kind": "pinned", "position": [15, 0, 2],
-                     "motion": {"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0}}},
-    "initial": "equilibrium", "mesh": {"cells": 40}, "time": {"duration": 0.8}, "output": {"every": 0.05},
-    "accuracy": "1%",
-}  # fmt: skip
+SCENE: dict[str, Any] = cable_scene(
+    {"length": 20, "mass": 1.5, "axial_stiffness": 1e6, "bending_stiffness": 50, "diameter": 0.02}, pinned_at(0, 0, 0),
+    pinned_at(15, 0, 2, motion={"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0}), mesh=40,
+    time={"duration": 0.8}, output=0.05, accuracy="1%"
+)  # fmt: skip
 SAME = 1e-8  # of the scale of a quantity
 
 

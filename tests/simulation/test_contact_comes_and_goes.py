@@ -19,6 +19,7 @@ from hybrid.kernels.step.accept import MANY, collapses
 from hybrid.simulation import run as run_module
 from hybrid.simulation.run_contact import RunContact
 from hybrid.solve.contact import SelfContact
+from tests.scenes import cable_scene, pinned_at
 
 GIVEN_UP, COLLAPSE = "contact given up", "steps collapse"
 
@@ -38,10 +39,7 @@ def test_it_comes_and_goes_with_the_legs(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(RunContact, "_let_touch", noted)
     sway = {"surge": {"amplitude": 0.26, "period": 2.0}, "ramp": 4.0}
-    ends = {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [0.3, 0, 0], "motion": sway},
-    }
+    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(0.3, 0, 0, motion=sway)}
     result = hybrid.run(hybrid.validate_scene(led_through(ends=ends, time={"duration": 7.0, "step": 0.01})))
     assert [name for name, _ in happened] == ["begins", "ends"] * 2
     assert "line touches itself" in kinds(result) and "line meets itself" not in kinds(result)
@@ -96,14 +94,10 @@ def hanging(**output: Any) -> dict[str, Any]:
     """A line of 20 cells that an end shakes, in 12000 steps."""
     section = {"length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e4, "bending_stiffness": 1e-3}
     shaken = {"heave": {"amplitude": 0.1, "period": 1.0}, "ramp": 2.0}
-    return {
-        "cable": {"sections": [section]}, "model": "rod", "mesh": {"cells": 20}, "initial": "equilibrium",
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [3.0, 0, 0], "motion": shaken},
-        },
-        "time": {"duration": 6.0, "step": 0.0005}, "output": {"every": 0.1, "points": 11} | output,
-    }  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(3.0, 0, 0, motion=shaken), model="rod", mesh=20, time=(6.0, 0.0005),
+        output={"every": 0.1, "points": 11} | output
+    )  # fmt: skip
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from hybrid.errors import Outcome
 from hybrid.simulation import equilibrium
 from hybrid.simulation.lines_contact import gauss_integral
 from hybrid.solve.stepper import LineFailed
+from tests.scenes import cable_scene, pinned_at
 
 WIDTH, LENGTH = 0.02, 8.0
 LEGS = {"zones": [{"catenary": 3.0}, {"rod": 2.0}, {"catenary": 3.0}]}
@@ -26,12 +27,11 @@ def hanging(model: Any, **more: Any) -> dict[str, Any]:
     }  # fmt: skip
     y = 0.9 * WIDTH
     open_ = [[0, 0, 0], [-1, 0, -2], [0, 0.5 * y, -3.7], [1, y, -2], [0, y, 0]]
-    return {
-        "cable": {"sections": [section], "attachments": [{"kind": "clump", "at": 4.0, "mass": 1.0}]}, "model": model,
-        "contact": {"self": True, "friction": 0.3}, "initial": {"kind": "equilibrium", "points": open_},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [0, y, 0]}},
-        "time": {"duration": 0.3, "step": 0.01}, "output": {"every": 0.1, "points": 81},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(0, y, 0), attachments=[{"kind": "clump", "at": 4.0, "mass": 1.0}],
+        model=model, contact={"self": True, "friction": 0.3}, initial={"kind": "equilibrium", "points": open_},
+        time=(0.3, 0.01), output=(0.1, 81)
+    ) | more  # fmt: skip
 
 
 def twisted(model: Any) -> dict[str, Any]:
@@ -41,11 +41,10 @@ def twisted(model: Any) -> dict[str, Any]:
         "torsional_stiffness": 0.4,
     }  # fmt: skip
     clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 0, 1]}
-    return {
-        "environment": {"gravity": 0.5}, "cable": {"sections": [section]}, "model": model, "contact": {"self": True},
-        "initial": "equilibrium",
-        "ends": {"start": clamp | {"position": [0, 0, 0]}, "end": clamp | {"position": [2.0, 0, 0], "turns": 3}},
-    }  # fmt: skip
+    return cable_scene(
+        section, clamp | {"position": [0, 0, 0]}, clamp | {"position": [2.0, 0, 0], "turns": 3}, gravity=0.5,
+        model=model, contact={"self": True}
+    )  # fmt: skip
 
 
 def apart(result: hybrid.Result) -> float:
@@ -140,12 +139,11 @@ def knotted(**more: Any) -> dict[str, Any]:
         "length": float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()), "mass": 0.1, "diameter": 0.012,
         "axial_stiffness": 2e4, "bending_stiffness": 1e-4,
     }  # fmt: skip
-    return {
-        "environment": {"gravity": 5.0}, "model": "rod", "mesh": {"cells": 280}, "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": points[0].tolist()},
-                 "end": {"kind": "pinned", "position": points[-1].tolist()}},
-        "contact": {"self": True}, "initial": {"kind": "equilibrium", "points": points.tolist()},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, {"kind": "pinned", "position": points[0].tolist()},
+        {"kind": "pinned", "position": points[-1].tolist()}, gravity=5.0, model="rod", mesh=280, contact={"self": True},
+        initial={"kind": "equilibrium", "points": points.tolist()}
+    ) | more  # fmt: skip
 
 
 @pytest.mark.long

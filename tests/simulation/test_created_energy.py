@@ -14,16 +14,11 @@ from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.watches import FIRST_MOMENTS, GAIN_NOTED, SchemeWatch
+from tests.scenes import cable_scene, pinned_at
 
-MODEL = build(
-    one_line(hybrid.validate_scene(
-        {
-            "cable": {"sections": [{"length": 10, "mass": 1.0}]},
-            "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-            "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10},
-        }
-    ))
-)  # fmt: skip
+MODEL = build(one_line(hybrid.validate_scene(cable_scene(
+    {"length": 10, "mass": 1.0}, pinned_at(0, 0, 0), "free", model="catenary", mesh=10
+))))  # fmt: skip
 
 
 def watched(gained: list[float], work: list[float], strain: float = 0.0, batches: int = 1) -> tuple[list[Any], Any]:

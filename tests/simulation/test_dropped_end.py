@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 
 LENGTH, MASS, STIFFNESS, HEIGHT, GRAVITY = 6.0, 4.0, 5e4, 0.4, 9.81  # m, kg/m, N/m per m, m, m/s2
 
@@ -25,12 +26,11 @@ def bouncing(t: np.ndarray) -> np.ndarray:
 
 def scene(**tables: Any) -> dict[str, Any]:
     section = {"length": LENGTH, "mass": MASS, "axial_stiffness": 1e6, "bending_stiffness": 80.0, "diameter": 0.05}
-    return {
-        "cable": {"sections": [section | {"torsional_stiffness": 60.0}]},
-        "ends": {"start": "free", "end": "free"}, "environment": {"seabed": {"z": 2.0, "stiffness": STIFFNESS}},
-        "initial": {"kind": "straight", "direction": [1, 0, 0], "origin": [0, 0, 2.0 + HEIGHT]}, "model": "rod",
-        "mesh": {"cells": 12}, "time": {"duration": 1.9, "step": 5e-4}, "output": {"every": 0.01},
-    } | tables  # fmt: skip
+    return cable_scene(
+        section | {"torsional_stiffness": 60.0}, "free", "free", seabed={"z": 2.0, "stiffness": STIFFNESS},
+        initial={"kind": "straight", "direction": [1, 0, 0], "origin": [0, 0, 2.0 + HEIGHT]}, model="rod", mesh=12,
+        time=(1.9, 5e-4), output=0.01
+    ) | tables  # fmt: skip
 
 
 @pytest.mark.parametrize("step", [1e-3, 5e-4])
@@ -52,9 +52,8 @@ def test_an_end_that_is_released_over_a_deck_comes_to_rest_on_it() -> None:
                "torsional_stiffness": 40.0, "damping": {"stiffness": 0.02, "mass": 0.3}}  # fmt: skip
     result = hybrid.run(scene(
         cable={"sections": [section]}, environment={"seabed": damped}, initial="equilibrium", mesh={"cells": 40},
-        ends={"start": {"kind": "pinned", "position": [0, 0, 8]},
-              "end": {"kind": "pinned", "position": [12, 0, 3], "release_at": {"time": 0.5}}},
-        time={"duration": 20.0, "step": 0.01}, output={"every": 0.05},
+        ends={"start": pinned_at(0, 0, 8), "end": pinned_at(12, 0, 3, release_at={"time": 0.5})},
+        time={"duration": 20.0, "step": 0.01}, output={"every": 0.05}
     ))  # fmt: skip
     assert "end released" in {e.kind for e in result.events}
     height = result.position[:, -1, 2]

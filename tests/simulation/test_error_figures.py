@@ -14,6 +14,7 @@ from hybrid.model.material import material
 from hybrid.model.resolution import Resolution
 from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import RunSample
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 # Estimated over true error, as asked of the project; where it is below, an event must say that it is uncertain.
 SHARP = 0.7, 3.0
@@ -35,22 +36,16 @@ def at_outputs(result, truth, name="position"):
 
 def tether(model, accuracy):
     """A short tether, swayed, held by a clamp: zones of a coarse mesh are rod where those of a fine one need not be."""
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.295773, 0.219286, 0.0]}},
-        "cable": {"sections": [{
-            "length": 16.9236, "mass": 0.923006, "diameter": 0.0254979, "bending_stiffness": 11.6023,
-            "drag": {"normal": 1.53475, "tangential": 0.0554847}, "added_mass": {"normal": 0.522405},
-            "axial_stiffness": 1761290.0,
-        }]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0.0, 0.0, 0.0],
-                      "motion": {"ramp": 14.1502, "sway": {"amplitude": 0.275069, "period": 10.1191, "phase": 104.756}}},
-            "end": {"kind": "clamped", "position": [3.41804, -5.11608, 0.0193178],
-                    "tangent": [0.926661, -0.709372, 0.0865805]},
-        },
-        "initial": "equilibrium", "model": model, "time": {"duration": 12.6028},
-        "output": {"every": 0.630141, "points": 201}, "accuracy": accuracy,
-    }  # fmt: skip
+    return cable_scene(
+        {"length": 16.9236, "mass": 0.923006, "diameter": 0.0254979, "bending_stiffness": 11.6023,
+         "drag": {"normal": 1.53475, "tangential": 0.0554847}, "added_mass": {"normal": 0.522405},
+         "axial_stiffness": 1761290.0},
+        pinned_at(0.0, 0.0, 0.0,
+                  motion={"ramp": 14.1502, "sway": {"amplitude": 0.275069, "period": 10.1191, "phase": 104.756}}),
+        clamped_at([3.41804, -5.11608, 0.0193178], [0.926661, -0.709372, 0.0865805]),
+        fluid={"density": 1025, "current": [0.295773, 0.219286, 0.0]}, model=model, time={"duration": 12.6028},
+        output=(0.630141, 201), accuracy=accuracy
+    )  # fmt: skip
 
 
 @pytest.mark.long  # 1.1 s
@@ -84,31 +79,20 @@ def test_the_figure_of_a_swayed_line_with_a_clump_is_not_too_small():
     zones have changed at the clamp the linear estimate of 1.0 said 0.32 of what the tension is off, and that it was not
     known; rods in its place say all of it.
     """
-    scene = {
-        "environment": {"fluid": {"density": 1025, "current": {
-            "kind": "power_law", "velocity": [-0.0734406, -0.134609, 0.0], "top": 20.0, "bottom": -151.0,
-            "exponent": 0.376843, "veer": 45.63,
-        }}},
-        "cable": {
-            "sections": [{
-                "length": 170.512, "mass": 0.30553, "diameter": 0.0165355, "bending_stiffness": 2.31291,
-                "drag": {"normal": 1.52742, "tangential": 0.0514878}, "added_mass": {"normal": 0.501979},
-                "axial_stiffness": 603948.0, "damping": {"mass": 0.0128977, "stiffness": 0.000833792},
-            }],
-            "attachments": [{"kind": "clump", "at": 95.498, "mass": 0.61106, "volume": 0.0}],
-        },
-        "ends": {
-            "start": {"kind": "pinned", "position": [0.0, 0.0, 0.0]},
-            "end": {
-                "kind": "clamped", "position": [-79.3646, 16.0996, 28.8296], "tangent": [-0.997574, 0.244729, 0.175252],
-                "motion": {
-                    "ramp": 8.64356, "sway": {"amplitude": 1.36513, "period": 4.69202, "phase": 78.9804},
-                    "surge": {"amplitude": 1.28262, "period": 5.45903, "phase": 280.382},
-                },
-            },
-        },
-        "initial": "equilibrium", "time": {"duration": 8.0066}, "output": {"every": 0.40033, "points": 201},
-    }  # fmt: skip
+    scene = cable_scene(
+        {"length": 170.512, "mass": 0.30553, "diameter": 0.0165355, "bending_stiffness": 2.31291,
+         "drag": {"normal": 1.52742, "tangential": 0.0514878}, "added_mass": {"normal": 0.501979},
+         "axial_stiffness": 603948.0, "damping": {"mass": 0.0128977, "stiffness": 0.000833792}},
+        pinned_at(0.0, 0.0, 0.0),
+        clamped_at([-79.3646, 16.0996, 28.8296], [-0.997574, 0.244729, 0.175252],
+                   motion={"ramp": 8.64356, "sway": {"amplitude": 1.36513, "period": 4.69202, "phase": 78.9804},
+                           "surge": {"amplitude": 1.28262, "period": 5.45903, "phase": 280.382}}),
+        attachments=[{"kind": "clump", "at": 95.498, "mass": 0.61106, "volume": 0.0}],
+        fluid={"density": 1025,
+               "current": {"kind": "power_law", "velocity": [-0.0734406, -0.134609, 0.0], "top": 20.0, "bottom": -151.0,
+                           "exponent": 0.376843, "veer": 45.63}},
+        time={"duration": 8.0066}, output=(0.40033, 201)
+    )  # fmt: skip
     truth = hybrid.run(scene | {"model": "rod", "accuracy": {"position": "0.1%", "tension": "0.1%"}})
     result = hybrid.run(
         scene | {"model": {"kind": "adaptive", "always_move": True}, "accuracy": {"position": "1%", "tension": "1%"}}
@@ -125,20 +109,14 @@ def test_the_figure_is_sharp_where_a_run_has_come_to_rest():
 
     It rests from 15 s on; the truth is its equilibrium, on a fine mesh.
     """
-    scene = {
-        "environment": {"gravity": 9.8, "fluid": {"density": 1.0}},
-        "cable": {"sections": [{
-            "length": 2.0, "diameter": 0.001, "mass": 0.0007853981633974482,
-            "bending_stiffness": 0.00024543692606170255, "torsional_stiffness": 0.00019634954084936205,
-            "drag": {"normal": 1.5, "tangential": 0.05}, "damping": 2.0,
-        }]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "guided", "tangent": [0.8660254037844387, 0, 0.5], "force": [0.005, 0, -0.00866025403784]},
-        },
-        "initial": {"kind": "straight", "direction": [1, 0, 0]},
-        "time": {"duration": 20.0}, "output": {"every": 0.5},
-    }  # fmt: skip
+    scene = cable_scene(
+        {"length": 2.0, "diameter": 0.001, "mass": 0.0007853981633974482, "bending_stiffness": 0.00024543692606170255,
+         "torsional_stiffness": 0.00019634954084936205, "drag": {"normal": 1.5, "tangential": 0.05}, "damping": 2.0},
+        pinned_at(0, 0, 0),
+        {"kind": "guided", "tangent": [0.8660254037844387, 0, 0.5], "force": [0.005, 0, -0.00866025403784]},
+        gravity=9.8, fluid={"density": 1.0}, initial={"kind": "straight", "direction": [1, 0, 0]},
+        time={"duration": 20.0}, output=0.5
+    )  # fmt: skip
     result = hybrid.run(scene)
     rest = hybrid.static(scene | {"initial": "equilibrium", "model": "rod", "mesh": {"cells": 2000}})
     late = result.t >= 15.0
@@ -167,21 +145,16 @@ def test_zones_that_change_are_those_of_the_result():
 
     What leaving bending out does is that of the result itself.
     """
-    scene = {
-        "environment": {"fluid": {"density": 1025, "current": [0.0178539, -0.0125168, 0]}},
-        "cable": {"sections": [{
-            "length": 28.0759, "mass": 2.02593, "diameter": 0.0293229, "bending_stiffness": 25.9265,
-            "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0},
-        }]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [24.6080, 0, 3.62212], "motion": {
-                "heave": {"amplitude": 0.997574, "period": 5.14669}, "surge": {"amplitude": 0.784406, "period": 6.6907},
-                "ramp": 10.2934,
-            }},
-        },
-        "initial": "equilibrium", "time": {"duration": 25.7335}, "output": {"every": 0.643336, "points": 51},
-    }  # fmt: skip
+    scene = cable_scene(
+        {"length": 28.0759, "mass": 2.02593, "diameter": 0.0293229, "bending_stiffness": 25.9265,
+         "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0}},
+        pinned_at(0, 0, 0),
+        pinned_at(24.6080, 0, 3.62212,
+                  motion={"heave": {"amplitude": 0.997574, "period": 5.14669},
+                          "surge": {"amplitude": 0.784406, "period": 6.6907}, "ramp": 10.2934}),
+        fluid={"density": 1025, "current": [0.0178539, -0.0125168, 0]}, time={"duration": 25.7335},
+        output=(0.643336, 51)
+    )  # fmt: skip
     # One of 1142 cells and half the step, which an accuracy of 0.1 % comes to, changes no ratio below by 0.04.
     fine = {"model": "rod", "mesh": {"cells": 400}, "time": scene["time"] | {"step": 0.012}}
     truth = hybrid.run(scene | fine | {"output": scene["output"] | {"errors": False}})
@@ -196,35 +169,28 @@ def test_zones_that_change_are_those_of_the_result():
 @pytest.mark.parametrize("cells", [25, 100, 400])
 def test_tension_beside_a_float_in_a_catenary(cells):
     """A rod's tension falls towards the float, by M^2/(2 EI): 16 % of the largest, of which 0.05 were estimated."""
-    scene = {
-        "environment": {"fluid": {"density": 1025}},
-        "cable": {
-            "sections": [{"length": 100, "diameter": 0.025, "mass": 1, "axial_stiffness": 1e6, "bending_stiffness": 2}],
-            "attachments": [{"kind": "float", "at": 50, "buoyancy": 200}],
-        },
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -10]},
-            "end": {"kind": "pinned", "position": [90, 0, -10]},
-        },
-        "initial": "equilibrium",
-        "output": {"points": 1001, "errors": True},
-    }
+    scene = cable_scene(
+        {"length": 100, "diameter": 0.025, "mass": 1, "axial_stiffness": 1e6, "bending_stiffness": 2},
+        pinned_at(0, 0, -10),
+        pinned_at(90, 0, -10),
+        attachments=[{"kind": "float", "at": 50, "buoyancy": 200}],
+        fluid={"density": 1025},
+        output={"points": 1001, "errors": True},
+    )
     truth = hybrid.static(scene | {"model": "rod", "mesh": {"cells": 10000}})
     result = hybrid.static(scene | {"model": "catenary", "mesh": {"cells": cells}})
     for name in ("position", "tension", "curvature"):
         assert SHARP[0] <= effectivity(result, truth, name) <= SHARP[1], name
 
 
-TOUCHDOWN = {
-    "environment": {"gravity": 10.0, "seabed": {"z": 0, "stiffness": 1e9}},
-    "cable": {"sections": [{"length": 37.520597, "mass": 1.0, "bending_stiffness": 4.0}]},
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [33.371257775207795, 0, 10.0]},
-    },
-    "initial": "equilibrium",
-    "output": {"points": 2001},
-}
+TOUCHDOWN = cable_scene(
+    {"length": 37.520597, "mass": 1.0, "bending_stiffness": 4.0},
+    pinned_at(0, 0, 0),
+    pinned_at(33.371257775207795, 0, 10.0),
+    gravity=10.0,
+    seabed={"z": 0, "stiffness": 1e9},
+    output={"points": 2001},
+)
 
 
 @pytest.mark.parametrize("model", [None, {"kind": "adaptive", "always_move": True}])
@@ -250,14 +216,10 @@ def test_a_moment_asked_of_a_catenary_is_refused():
 def test_cells_to_a_layer():
     """As many cells as asked to sqrt(EI/T) beside a clamp, whatever the accuracy."""
     T, EI = 1000.0, 10.0
-    scene = {
-        "cable": {"sections": [{"length": 10, "mass": 1, "bending_stiffness": EI}]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0.2]},
-            "end": {"kind": "free", "force": [T, 0, 0]},
-        },
-        "initial": "equilibrium", "model": "rod",
-    }  # fmt: skip
+    scene = cable_scene(
+        {"length": 10, "mass": 1, "bending_stiffness": EI}, clamped_at([0, 0, 0], [1, 0, 0.2]),
+        {"kind": "free", "force": [T, 0, 0]}, model="rod"
+    )  # fmt: skip
     layer = np.sqrt(EI / T)
     for cells in (2.0, 8.0):
         for more in ({}, {"accuracy": {"all": "1%", "curvature": "none"}}):
@@ -268,14 +230,10 @@ def test_cells_to_a_layer():
 
 def test_cells_show_a_twist_by_a_moment():
     """A moment on the end of a shaft twists it by 40 rad: no more than 2 rad to a cell, which stops a run."""
-    result = hybrid.static({
-        "cable": {"sections": [{"length": 20, "mass": 1, "bending_stiffness": 1, "torsional_stiffness": 1}]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
-            "end": {"kind": "free", "moment": [2.0, 0, 0], "force": [2000.0, 0, 0]},
-        },
-        "initial": "equilibrium", "model": "rod", "environment": {"gravity": 0.0},
-    })  # fmt: skip
+    result = hybrid.static(cable_scene(
+        {"length": 20, "mass": 1, "bending_stiffness": 1, "torsional_stiffness": 1}, clamped_at([0, 0, 0], [1, 0, 0]),
+        {"kind": "free", "moment": [2.0, 0, 0], "force": [2000.0, 0, 0]}, model="rod", gravity=0.0
+    ))  # fmt: skip
     assert result.attributes["cells"] >= 160
     np.testing.assert_allclose(result["twist"][0], 2.0, rtol=1e-3)
 
@@ -295,11 +253,10 @@ def test_a_moment_twists_only_what_takes_its_torque(start, more, twisted):
     """Torque is uniform along round sections without inertia: an end that turns freely makes it 0."""
     section = {"length": 20, "mass": 1, "bending_stiffness": 1, "torsional_stiffness": 1} | more
     straight = {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}
-    scene = hybrid.validate_scene({
-        "cable": {"sections": [section]}, "model": "rod", "time": {"duration": 1.0, "step": 0.1},
-        "initial": "equilibrium" if "position" in start else straight,
-        "ends": {"start": start, "end": {"kind": "free", "moment": [0, 2.0, 0]}},
-    })  # fmt: skip
+    scene = hybrid.validate_scene(cable_scene(
+        section, start, {"kind": "free", "moment": [0, 2.0, 0]}, model="rod", time=(1.0, 0.1),
+        initial="equilibrium" if "position" in start else straight
+    ))  # fmt: skip
     rate = twist_rate(one_line(scene), material(one_line(scene)), np.array([10.0]))
     assert rate[0] == pytest.approx((4.0 if "moment" in start else 2.0) if twisted else 0.0)
 
@@ -308,15 +265,10 @@ def free_to_turn(cells=None):
     """Half of it is curved without load, and the other half, without torsional stiffness, lets it turn as it likes."""
     half = {"length": 10, "mass": 0.8, "diameter": 0.025, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
     curved = half | {"bending_stiffness": 10, "intrinsic_curvature": [0, 0.5, 0], "torsional_stiffness": 8}
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.3, 0.2, 0]}},
-        "cable": {"sections": [curved, half | {"bending_stiffness": 1}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "clamped", "position": [12, 0, 0], "tangent": [1, 0, 1]},
-        },
-        "initial": "equilibrium", "output": {"points": 41},
-    } | ({"model": "rod", "mesh": {"cells": cells}} if cells else {})  # fmt: skip
+    return cable_scene(
+        [curved, half | {"bending_stiffness": 1}], pinned_at(0, 0, 0), clamped_at([12, 0, 0], [1, 0, 1]),
+        fluid={"density": 1025, "current": [0.3, 0.2, 0]}, output={"points": 41}
+    ) | ({"model": "rod", "mesh": {"cells": cells}} if cells else {})  # fmt: skip
 
 
 @pytest.mark.long

@@ -25,6 +25,7 @@ from hybrid.scene.read import one_line
 from hybrid.simulation.progress import ESTIMATION, REFINEMENT
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.limits import EXTREME_ERRORS, extremes_about
+from tests.scenes import line_between, network_scene
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 S = np.linspace(0.0, 10.0, 6)
@@ -200,14 +201,10 @@ def network(**output: Any) -> dict[str, Any]:
         "min_bend_radius": 0.2, "max_tension": 6000.0, "min_tension": -1.0,
     }  # fmt: skip
     heave = {"heave": {"amplitude": 1, "period": 4}, "ramp": 4}
-    return {
-        "points": {
-            "a": {"kind": "fixed", "position": [0, 0, 0]},
-            "b": {"kind": "fixed", "position": [25, 0, 0], "motion": heave},
-        },
-        "lines": {"l": {"start": "a", "end": "b", "sections": [section], "model": "rod", "mesh": {"cells": 24}}},
-        "time": {"duration": 2, "step": 0.05}, "output": {"every": 0.1} | output,
-    }  # fmt: skip
+    return network_scene(
+        {"a": {"kind": "fixed", "position": [0, 0, 0]}, "b": {"kind": "fixed", "position": [25, 0, 0], "motion": heave}},
+        {"l": line_between("a", "b", section, model="rod", mesh=24)}, time=(2, 0.05), output={"every": 0.1} | output
+    )  # fmt: skip
 
 
 @pytest.mark.long  # 1 s: five runs

@@ -17,6 +17,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample
+from tests.scenes import cable_scene, pinned_at
 
 ASKED = RequestedAccuracy(0.005, None, None)
 
@@ -157,15 +158,10 @@ def test_of_several_lines_the_worst_decides() -> None:
 def swinging(accuracy: str) -> hybrid.Scene:
     section = {"length": 2.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e5, "drag": {"normal": 1.2}}
     motion = {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}
-    return hybrid.validate_scene({
-        "environment": {"fluid": {"density": 1000.0}}, "cable": {"sections": [section]}, "model": "catenary",
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": motion},
-        },
-        "initial": "equilibrium", "time": {"duration": 3.0}, "output": {"every": 0.1, "points": 21},
-        "accuracy": accuracy,
-    })  # fmt: skip
+    return hybrid.validate_scene(cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(1.5, 0, 0, motion=motion), fluid={"density": 1000.0}, model="catenary",
+        time={"duration": 3.0}, output=(0.1, 21), accuracy=accuracy
+    ))  # fmt: skip
 
 
 @pytest.mark.long

@@ -15,6 +15,7 @@ from hybrid import Result
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.simulation.watches import Loops, note_hockling, note_loops
+from tests.scenes import cable_scene, network_scene
 
 HEIGHT = 2.0  # m
 
@@ -24,15 +25,12 @@ def two_chains(volume: float, **more: Any) -> dict[str, Any]:
     chain = {"length": 60, "mass": 40, "diameter": 0.08, "axial_stiffness": 1.7e8, "drag": {"normal": 1.3}}
     line = {"end": "buoy", "sections": [chain], "mesh": {"cells": 20}}
     buoy = {"mass": 2500, "volume": volume, "height": HEIGHT, "shape": "cylinder"} | more
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0}},
-        "points": {
-            "east": {"position": [20, 0, -35]}, "west": {"position": [-20, 0, -35]},
-            "buoy": {"initial_guess": [0, 0, 0], "drag_area": 3, "added_mass": 3000} | buoy,
-        },
-        "lines": {"east": {"start": "east"} | line, "west": {"start": "west"} | line},
-        "time": {"duration": 2.0, "step": 0.1}, "output": {"every": 0.5},
-    }  # fmt: skip
+    return network_scene(
+        {"east": {"position": [20, 0, -35]}, "west": {"position": [-20, 0, -35]},
+         "buoy": {"initial_guess": [0, 0, 0], "drag_area": 3, "added_mass": 3000} | buoy},
+        {"east": {"start": "east"} | line, "west": {"start": "west"} | line}, fluid={"density": 1025, "surface": 0},
+        time=(2.0, 0.1), output=0.5
+    )  # fmt: skip
 
 
 def pulled(result: Result) -> list[str]:
@@ -98,11 +96,8 @@ def twisted(turns: float, over: float = 0.0, model: Any = "rod", away: float = 0
         time = {"time": {"duration": over + 2.0, "step": 0.02}, "output": {"every": 0.2, "points": 41}}
     mesh = {} if isinstance(model, dict) else {"mesh": {"cells": 80}}
     return hybrid.validate_scene(
-        {
-            "environment": {"gravity": 2.0}, "cable": {"sections": [section]}, "model": model,
-            "initial": {"kind": "equilibrium"}, "ends": {"start": clamp | {"position": [0, 0, 0]}, "end": end},
-        } | mesh | time
-    )  # fmt: skip
+        cable_scene(section, clamp | {"position": [0, 0, 0]}, end, gravity=2.0, model=model) | mesh | time
+    )
 
 
 def told(result: hybrid.Result) -> list[Any]:

@@ -11,6 +11,7 @@ import pytest
 import hybrid
 from hybrid.kernels.state.report import FORCE_A
 from tests.inside import OnlyLine
+from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHIFT = 1e-5  # m
@@ -21,10 +22,7 @@ CLAMPED = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1]}
 
 
 def scene(section: dict[str, Any], start: dict[str, Any], model: str, **more: Any) -> dict[str, Any]:
-    return {
-        "cable": {"sections": [section]}, "ends": {"start": start, "end": {"kind": "pinned", "position": [15, 1, -2]}},
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 24}, "time": {"duration": 2.0, "step": 0.05},
-    } | more  # fmt: skip
+    return cable_scene(section, start, pinned_at(15, 1, -2), model=model, mesh=24, time=(2.0, 0.05)) | more
 
 
 BED = {"fluid": {"density": 1025.0}, "seabed": {"z": -5.0, "stiffness": 2e4, "damping": 500.0, "friction": 0.6}}
@@ -33,11 +31,8 @@ SCENES = {
     "inextensible": scene({k: v for k, v in SECTION.items() if k != "axial_stiffness"}, PINNED, "catenary"),
     "rod": scene(STIFF, CLAMPED, "rod"),
     "seabed": scene(STIFF | {"drag": {"normal": 1.2}}, PINNED, "rod", environment=BED),
-    "in a plane": scene(
-        STIFF, CLAMPED, "rod", dimension=2,
-        ends={"start": CLAMPED, "end": {"kind": "pinned", "position": [15, 0, -2]}},
-    ),
-}  # fmt: skip
+    "in a plane": scene(STIFF, CLAMPED, "rod", dimension=2, ends={"start": CLAMPED, "end": pinned_at(15, 0, -2)}),
+}
 
 
 def report_now(cable: Any) -> np.ndarray:

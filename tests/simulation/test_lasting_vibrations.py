@@ -12,6 +12,7 @@ from hybrid.accuracy.error_estimate import Estimate
 from hybrid.model.resolution import Resolution, requested_accuracy
 from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import RunSample
+from tests.scenes import cable_scene, clamped_at
 
 
 def taut(duration, periods, **more):
@@ -106,13 +107,7 @@ def test_forces_after_a_shock_fall_slowly_anyway():
 def straight(**more):
     """A rod without weight, held at one end."""
     section = {"length": 2.0, "mass": 1.0, "bending_stiffness": 10.0, "torsional_stiffness": 8.0}
-    return {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [section | more]},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}, "end": "free"},
-        "initial": "equilibrium",
-        "accuracy": "0.3%",
-    }
+    return cable_scene(section | more, clamped_at([0, 0, 0], [1, 0, 0]), "free", gravity=0, accuracy="0.3%")
 
 
 @pytest.mark.parametrize("more", [{}, {"intrinsic_curvature": [0, 2, 0]}])

@@ -18,6 +18,7 @@ from hybrid.store import whole_file, writer
 from hybrid.store.format import ArrayContents
 from hybrid.store.records import FileContents
 from hybrid.store.whole_file import LateFile
+from tests.scenes import cable_scene, pinned_at
 
 TIMES = ("cpu", "created", "effort_cpu")  # that differ from run to run
 
@@ -25,15 +26,10 @@ TIMES = ("cpu", "created", "effort_cpu")  # that differ from run to run
 def described(errors: bool = False) -> dict[str, Any]:
     section = {"length": 2.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e5}
     motion = {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}
-    return {
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": motion},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 16},
-        "time": {"duration": 2.0, "step": 0.05}, "output": {"every": 0.1, "points": 11, "errors": errors},
-    }  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(1.5, 0, 0, motion=motion), model="catenary", mesh=16, time=(2.0, 0.05),
+        output={"every": 0.1, "points": 11, "errors": errors}
+    )  # fmt: skip
 
 
 def contents(path: Path) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import pytest
 import hybrid
 from hybrid.cli.tables import equilibrium_facts
 from hybrid.errors import ComputationError
+from tests.scenes import cable_scene, network_scene, pinned_at
 
 SECTION = {"length": 300.0, "mass": 100.0, "diameter": 0.1, "axial_stiffness": 8e8}
 W = 9.80665 * (100.0 - 1025.0 * 0.25 * math.pi * 0.1**2)  # N/m
@@ -28,15 +29,10 @@ def around(depth: float, **bed: Any) -> dict[str, Any]:
 
 def slack(depth: float = 50.0, start: tuple[float, ...] = (), bed: Any = None, **more: Any) -> dict[str, Any]:
     """A chain from an anchor to a fairlead 200 m beside it, too long for them."""
-    return {
-        "environment": around(depth, **(bed or {})),
-        "cable": {"sections": [SECTION]},
-        "ends": {
-            "start": {"kind": "pinned", "position": start or (-200.0, 0.0, -depth)},
-            "end": {"kind": "pinned", "position": (0.0, 0.0, 0.0)},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 30}, **more,
-    }  # fmt: skip
+    return (
+        cable_scene(SECTION, {"kind": "pinned", "position": start or (-200.0, 0.0, -depth)}, pinned_at(0.0, 0.0, 0.0),
+                    environment=around(depth, **(bed or {})), model="catenary", mesh=30) | more
+    )  # fmt: skip
 
 
 def forces_of(result: hybrid.Result) -> dict[str, list[float]]:
@@ -70,14 +66,12 @@ def test_an_accuracy_that_is_asked_is_met() -> None:
 
 def test_lines_of_a_network_lie_slack_as_well() -> None:
     line = {"end": "b", "model": "catenary", "mesh": {"cells": 60}}
-    result = hybrid.static({
-        "environment": around(50.0),
-        "points": {"a": {"position": (-200, 0, -50)}, "b": {"position": (0, 0, 0)}, "c": {"position": (200, 0, -50)}},
-        "lines": {
-            "slack": line | {"start": "a", "sections": [SECTION]},
-            "taut": line | {"start": "c", "sections": [SECTION | {"length": 212.0}]},
-        },
-    })  # fmt: skip
+    result = hybrid.static(network_scene(
+        {"a": {"position": (-200, 0, -50)}, "b": {"position": (0, 0, 0)}, "c": {"position": (200, 0, -50)}},
+        {"slack": line | {"start": "a", "sections": [SECTION]},
+         "taut": line | {"start": "c", "sections": [SECTION | {"length": 212.0}]}},
+        environment=around(50.0)
+    ))  # fmt: skip
     of = {name: [x for x in line.events if x.kind == "slack"] for name, line in result.lines.items()}
     assert len(of["slack"]) == 1 and not of["taut"]
     assert result.lines["slack"].tension[-1].max() == pytest.approx(50.0 * W, rel=0.05)

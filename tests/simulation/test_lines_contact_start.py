@@ -14,6 +14,7 @@ import hybrid
 from hybrid.kernels.state.books import PARTS_ITSELF
 from hybrid.model.network import build_system
 from hybrid.simulation import run_checkpoint
+from tests.scenes import line_between, network_scene
 from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, crossing, lowered
 from tests.validation.test_validation_obstacles_of_lines import system_of
 
@@ -111,15 +112,13 @@ def bight(away: float) -> Tables:
     points = [[0, 0, 0], [0, 0, 0.2], [away, 0.01035, 0.2], [away, 0.01035, -0.2], [0.2, 0.2, -0.2]]
     length = float(np.linalg.norm(np.diff(np.array(points, float), axis=0), axis=1).sum())
     taut = {"kind": "straight", "direction": [1, 0, 0]}
-    return {
-        "environment": {"gravity": 0}, "time": {"duration": 0.002, "step": 0.001}, "output": {"points": 21},
-        "points": {"knot": {"position": [0, 0, 0]}, "e": {"position": [0.8, 0, 0]}, "f": {"position": points[-1]}},
-        "lines": {
-            "taut": rope | {"start": "knot", "end": "e", "sections": [ROPE | {"length": 0.8}], "initial": taut},
-            "loose": rope | {"start": "knot", "end": "f", "sections": [ROPE | {"length": length}],
-                             "initial": {"kind": "points", "points": points}},
-        },
-    }  # fmt: skip
+    return network_scene(
+        {"knot": {"position": [0, 0, 0]}, "e": {"position": [0.8, 0, 0]}, "f": {"position": points[-1]}},
+        {"taut": rope | line_between("knot", "e", ROPE | {"length": 0.8}, initial=taut),
+         "loose": rope | line_between("knot", "f", ROPE | {"length": length},
+                                      initial={"kind": "points", "points": points})},
+        gravity=0, time=(0.002, 0.001), output={"points": 21}
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(("away", "begins"), [(0.02, False), (0.4, True)])

@@ -11,18 +11,18 @@ from bits import Stopping
 import hybrid
 from hybrid.scene.read import one_line, scene_text
 from hybrid.simulation.run_sample import jolts
+from tests.scenes import cable_scene, pinned_at
 
 ROWS: list[list[float]] = [[0, 0, 0, 0], [0.5, 3, 0, -1], [0.7, -2, 0, 0], [1.4, 1, 0, 0]]
 
 
 def scene(force: object, step: float = 0.01, **changes: object) -> hybrid.Scene:
-    data = {
-        "environment": {"gravity": 0.0},
-        "cable": {"sections": [{"length": 2.0, "mass": 0.5, "axial_stiffness": 2e3, "bending_stiffness": 0.4}]},
-        "ends": {"start": {"kind": "free"}, "end": {"kind": "free", "force": force}},
-        "initial": {"kind": "straight", "direction": [0, 0, 1], "origin": [0, 0, 0]},
-        "model": "rod", "mesh": {"cells": 16}, "time": {"duration": 2.0, "step": step}, "output": {"every": 0.1, "points": 17},
-    }  # fmt: skip
+    data = cable_scene(
+        {"length": 2.0, "mass": 0.5, "axial_stiffness": 2e3, "bending_stiffness": 0.4}, {"kind": "free"},
+        {"kind": "free", "force": force}, gravity=0.0,
+        initial={"kind": "straight", "direction": [0, 0, 1], "origin": [0, 0, 0]}, model="rod", mesh=16,
+        time=(2.0, step), output=(0.1, 17)
+    )  # fmt: skip
     return hybrid.validate_scene(data | changes)
 
 
@@ -110,8 +110,7 @@ def test_a_file_that_has_changed_is_not_resumed(tmp_path: Path, monkeypatch) -> 
 
 
 def test_an_equilibrium_takes_the_load_at_the_start() -> None:
-    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": {"history": [
-        [0, 0, 0, -7], [1, 9, 0, -7]]}}}  # fmt: skip
+    ends = {"start": pinned_at(0, 0, 0), "end": {"kind": "free", "force": {"history": [[0, 0, 0, -7], [1, 9, 0, -7]]}}}
     with hybrid.static(scene([0, 0, 0], ends=ends, initial="equilibrium")) as result:
         np.testing.assert_allclose(result.reaction_start[-1], [0, 0, 7], atol=1e-6)
 

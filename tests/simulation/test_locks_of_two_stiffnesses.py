@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 EI, OTHER, LOCKED, RADIUS = 20.0, 50.0, 300.0, 3.0
 TABLE = [[0.0, 0.0], [0.1, 4.0], [0.3, 8.0], [1.0, 36.0]]
@@ -17,12 +18,10 @@ def bent(axis: int, sections: list[dict[str, Any]], attachments: list[dict[str, 
     """Six metres between a clamp and a pin, sagging in the plane in which it bends about one of its axes."""
     plain = {"mass": 2.0, "axial_stiffness": 1e5, "torsional_stiffness": 30.0, "damping": {"mass": 1.0}}
     normal = [0, 1, 0] if axis == 0 else [0, 0, 1]
-    return {
-        "cable": {"sections": [plain | x for x in sections], "attachments": attachments},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": normal},
-                 "end": {"kind": "pinned", "position": [4.5, 0, 0.5]}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells}, "output": {"points": 25, "exact": True},
-    } | more  # fmt: skip
+    return cable_scene(
+        [plain | x for x in sections], clamped_at([0, 0, 0], [1, 0, 0], normal=normal), pinned_at(4.5, 0, 0.5),
+        attachments=attachments, model="rod", mesh=cells, output={"points": 25, "exact": True}
+    ) | more  # fmt: skip
 
 
 def about(axis: int) -> list[float]:

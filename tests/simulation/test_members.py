@@ -9,6 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
+from tests.scenes import line_between, network_scene
 
 RHO, G = 1025.0, 9.81
 SOFT = {"length": 99.0, "mass": 0.01, "diameter": 0.003, "axial_stiffness": 50.0, "max_strain": 0.9}
@@ -29,14 +30,12 @@ def body(**more: Any) -> dict[str, Any]:
 
 def scene(fluid: dict[str, Any], given: dict[str, Any], **more: Any) -> dict[str, Any]:
     """The body on two soft lines that hardly hold it."""
-    return {
-        "environment": {"fluid": {"density": RHO} | fluid, "gravity": G},
-        "points": {"west": {"position": [-101, 0, -30]}, "east": {"position": [101, 0, -30]},
-                   "port": {"body": "it", "place": [-1, 0, 0]}, "board": {"body": "it", "place": [1, 0, 0]}},
-        "bodies": {"it": given},
-        "lines": {"w": {"start": "west", "end": "port", "sections": [SOFT], "mesh": {"cells": 4}},
-                  "e": {"start": "east", "end": "board", "sections": [SOFT], "mesh": {"cells": 4}}},
-    } | more  # fmt: skip
+    return network_scene(
+        {"west": {"position": [-101, 0, -30]}, "east": {"position": [101, 0, -30]},
+         "port": {"body": "it", "place": [-1, 0, 0]}, "board": {"body": "it", "place": [1, 0, 0]}},
+        {"w": line_between("west", "port", SOFT, mesh=4), "e": line_between("east", "board", SOFT, mesh=4)},
+        fluid={"density": RHO} | fluid, gravity=G, bodies={"it": given}
+    ) | more  # fmt: skip
 
 
 @pytest.mark.long

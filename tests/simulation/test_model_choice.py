@@ -20,16 +20,13 @@ from hybrid.scene.read import one_line
 from hybrid.scene.root import LINE
 from hybrid.simulation.case import Case
 from tests.said import both_ways, line_of, said
+from tests.scenes import cable_scene, pinned_at
 
-TAUT = {
-    "environment": {"fluid": {"density": 1025}},
-    "cable": {"sections": [{"length": 52, "mass": 3, "diameter": 0.03, "bending_stiffness": 1, "drag": {"normal": 1.2}}]},
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [48, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period": 5}, "ramp": 5}},
-    },
-    "initial": "equilibrium", "time": {"duration": 10.0}, "output": {"every": 0.5},
-}  # fmt: skip
+TAUT = cable_scene(
+    {"length": 52, "mass": 3, "diameter": 0.03, "bending_stiffness": 1, "drag": {"normal": 1.2}}, pinned_at(0, 0, 0),
+    pinned_at(48, 0, 0, motion={"heave": {"amplitude": 0.5, "period": 5}, "ramp": 5}), fluid={"density": 1025},
+    time={"duration": 10.0}, output=0.5
+)  # fmt: skip
 MOVING = {"kind": "adaptive", "always_move": True}
 CLAMPED = TAUT | {"ends": TAUT["ends"] | {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1]}}}
 

@@ -18,31 +18,21 @@ from hybrid.scene.root import LINE, in_full
 from hybrid.simulation.run_sample import RunSample, restored_sample
 from hybrid.store.integrity import pack, unpack
 from hybrid.store.stored_rows import MissingRows
+from tests.scenes import cable_scene, pinned_at
 
 
 def span(EI: float, model: Any, **more: Any) -> hybrid.Scene:
     """A span of 20 m that sags by 1.5 m, its end driven; errors on."""
     return hybrid.validate_scene(
-        {
-            "cable": {
-                "sections": [
-                    {"length": 20.3, "mass": 1.0, "axial_stiffness": 1e6, "bending_stiffness": EI, "damping": 0.3}
-                ]
-            },
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, 0]},
-                "end": {
-                    "kind": "pinned",
-                    "position": [20, 0, 0],
-                    "motion": {"heave": {"amplitude": 0.3, "period": 2.5}, "ramp": 3},
-                },
-            },
-            "initial": "equilibrium",
-            "model": model,
-            "mesh": {"cells": 80},
-            "time": {"duration": 5.0, "step": 0.02},
-            "output": {"every": 0.1, "errors": True},
-        }
+        cable_scene(
+            {"length": 20.3, "mass": 1.0, "axial_stiffness": 1e6, "bending_stiffness": EI, "damping": 0.3},
+            pinned_at(0, 0, 0),
+            pinned_at(20, 0, 0, motion={"heave": {"amplitude": 0.3, "period": 2.5}, "ramp": 3}),
+            model=model,
+            mesh=80,
+            time=(5.0, 0.02),
+            output={"every": 0.1, "errors": True},
+        )
         | more
     )
 
@@ -194,20 +184,11 @@ def test_model_error_beside_a_float(cells):
 
     That of 25 cells is less than bending does, 0.072 m, because their own error, 0.035 m, has the other sign.
     """
-    scene = {
-        "environment": {"fluid": {"density": 1025}},
-        "cable": {
-            "sections": [
-                {"length": 100, "mass": 1, "diameter": 0.025, "axial_stiffness": 1e6, "bending_stiffness": 2}
-            ],
-            "attachments": [{"kind": "float", "at": 50, "buoyancy": 200}],
-        },
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -10]}, "end": {"kind": "pinned", "position": [90, 0, -10]},
-        },
-        "initial": "equilibrium", "mesh": {"cells": cells}, "model": "catenary",
-        "output": {"errors": True, "points": 201},
-    }  # fmt: skip
+    scene = cable_scene(
+        {"length": 100, "mass": 1, "diameter": 0.025, "axial_stiffness": 1e6, "bending_stiffness": 2},
+        pinned_at(0, 0, -10), pinned_at(90, 0, -10), attachments=[{"kind": "float", "at": 50, "buoyancy": 200}],
+        fluid={"density": 1025}, mesh=cells, model="catenary", output={"errors": True, "points": 201}
+    )  # fmt: skip
     rod = hybrid.static(scene | {"model": "rod", "mesh": {"cells": 3000}, "output": {"points": 201}})
     line = hybrid.static(scene)
     true = np.linalg.norm(line.position[0] - rod.position[0], axis=1)
@@ -230,16 +211,14 @@ def beginning(model: Any, errors: bool, across: float) -> hybrid.Result:
 
     across: m/s, of a current that leads it out of its plane.
     """
-    return hybrid.run({
-        "environment": {"fluid": {"density": 1025, "current": [0.0, across, 0.0]},
-                        "seabed": {"z": -100, "stiffness": 5e3, "damping": 5e2}},
-        "cable": {"sections": [{"length": LENGTH, "diameter": 0.05, "mass": 20, "axial_stiffness": 2e8,
-                                "bending_stiffness": 2e3, "drag": {"normal": 1.2, "tangential": 0.05}}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -100]},
-                 "end": {"kind": "pinned", "position": [205, 0, 0]}},
-        "initial": "equilibrium", "contact": {"self": False}, "model": model, "mesh": {"nodes": [float(x) for x in NODES]},
-        "time": {"duration": 0.02, "step": 0.01}, "output": {"every": 0.02, "points": NODES, "errors": errors},
-    })  # fmt: skip
+    return hybrid.run(cable_scene(
+        {"length": LENGTH, "diameter": 0.05, "mass": 20, "axial_stiffness": 2e8, "bending_stiffness": 2e3,
+         "drag": {"normal": 1.2, "tangential": 0.05}},
+        pinned_at(0, 0, -100), pinned_at(205, 0, 0), fluid={"density": 1025, "current": [0.0, across, 0.0]},
+        seabed={"z": -100, "stiffness": 5e3, "damping": 5e2}, contact={"self": False}, model=model,
+        mesh={"nodes": [float(x) for x in NODES]}, time=(0.02, 0.01),
+        output={"every": 0.02, "points": NODES, "errors": errors}
+    ))  # fmt: skip
 
 
 @pytest.mark.parametrize("across", [0.0, 0.5], ids=["plane", "space"])

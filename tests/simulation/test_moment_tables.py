@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 import hybrid
 from hybrid.errors import SceneError
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 PULL, ANGLE, LENGTH = 5e4, radians(20.0), 8.0
 TABLES: dict[str, list[list[float]]] = {
@@ -26,15 +27,10 @@ def taut(
 ) -> dict[str, Any]:
     """A line that is clamped at 20 degrees to its pull, without weight."""
     pull = [PULL * cos(ANGLE), 0, PULL * sin(ANGLE)] if force is None else force
-    return {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [{"length": LENGTH, "mass": 1} | law], "attachments": list(attached)},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
-            "end": {"kind": "free", "force": pull},
-        },
-        "initial": "equilibrium", "model": "rod", "contact": {"self": False}, "mesh": {"cells": cells},
-    } | tables  # fmt: skip
+    return cable_scene(
+        {"length": LENGTH, "mass": 1} | law, clamped_at([0, 0, 0], [1, 0, 0]), {"kind": "free", "force": pull},
+        attachments=list(attached), gravity=0, model="rod", contact={"self": False}, mesh=cells
+    ) | tables  # fmt: skip
 
 
 def by_table(cells: int, table: list[list[float]] | None, *attached: dict[str, Any], **tables: Any) -> dict[str, Any]:
@@ -185,13 +181,11 @@ CABLE = {
 
 def swung(step: float, **section: Any) -> dict[str, Any]:
     """A clamped cable that falls from a straight line, without damping: it bends through all of its table."""
-    return {
-        "cable": {"sections": [CABLE | section]},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0.3, 0]}, "end": "free"},
-        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0.3, 0]},
-        "model": "rod", "contact": {"self": False}, "mesh": {"cells": 24},
-        "time": {"duration": 1.0, "step": step, "rho_inf": 1.0}, "output": {"every": 0.05, "exact": True},
-    }  # fmt: skip
+    return cable_scene(
+        CABLE | section, clamped_at([0, 0, 0], [1, 0.3, 0]), "free",
+        initial={"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0.3, 0]}, model="rod",
+        contact={"self": False}, mesh=24, time=(1.0, step, 1.0), output={"every": 0.05, "exact": True}
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("tau", [0.0, 0.01])
@@ -216,15 +210,10 @@ def test_zones_that_move_bend_as_rods_do(model: Any) -> None:
         "added_mass": {"normal": 1}, "moment_curvature": [[0, 0], [0.05, 500], [0.2, 1000], [0.5, 6000]],
     }  # fmt: skip
     sway = {"surge": {"amplitude": 1.0, "period": 5}, "ramp": 5}
-    scene = {
-        "environment": {"fluid": {"density": 1025}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1], "motion": sway},
-            "end": {"kind": "pinned", "position": [30, 0, -35]},
-        },
-        "initial": "equilibrium", "time": {"duration": 8, "step": 0.02}, "contact": {"self": False},
-    }  # fmt: skip
+    scene = cable_scene(
+        section, clamped_at([0, 0, 0], [0, 0, -1], motion=sway), pinned_at(30, 0, -35), fluid={"density": 1025},
+        time=(8, 0.02), contact={"self": False}
+    )  # fmt: skip
     rods = hybrid.run(scene | {"model": "rod", "mesh": {"cells": 120}})
     found = hybrid.run(scene | {"model": model, "mesh": {"cells": 120 if model == "adaptive" else 30}})
     assert model != "adaptive" or any(zone.kind == "catenary" for zones in found.zones for zone in zones)

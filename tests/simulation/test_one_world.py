@@ -17,6 +17,7 @@ from tests.combinations.networks import both, differences, events_differ
 from tests.combinations.pairs import CLAMP, DRAG, END, FEATURES, START, WATER, S, scene_of
 from tests.problems import tables_with
 from tests.said import line_of
+from tests.scenes import cable_scene, pinned_at
 
 FREE = {"kind": "free", "force": [40, 3, 30]}
 GUIDED = {"kind": "guided", "tangent": [1, 0.1, 0.2], "normal": [0, 1, 0], "force": [60, 3, 30]}
@@ -39,16 +40,13 @@ SCENES: dict[str, dict[str, Any]] = {
         "environment.seabed": {"z": -0.2, "stiffness": 5e5, "damping": 5e3},
         END: {"kind": "free"},
         "initial": {"kind": "straight", "origin": [0, 0, 1.0], "direction": [1, 0, 0.02]},
-        START: {"kind": "pinned", "position": [0, 0, 1.0]},
+        START: pinned_at(0, 0, 1.0),
         "time": {"duration": 1.2, "step": 0.04},
         "output": {"every": 0.2, "points": 13},
     },
     "torque of tension through catenary zones": FEATURES["zones"][0]
     | FEATURES["turns"][0]
-    | {
-        S + "tension_torque": 2e-3,
-        END + ".motion": {"heave": {"amplitude": 0.05, "period": 1.0}, "ramp": 0.3},
-    },
+    | {S + "tension_torque": 2e-3, END + ".motion": {"heave": {"amplitude": 0.05, "period": 1.0}, "ramp": 0.3}},
     "zones that move": {"model": {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[4, 8]]}},
     "zones that move, with a step that is tried again": FEATURES["zones that move"][0] | FEATURES["release"][0],
     "zones of which some stay catenary": {"model": {"kind": "adaptive", "hold_time": 0.1, "force_catenary": [[4, 8]]}}
@@ -89,10 +87,7 @@ def test_a_winch_at_rest_holds_its_line() -> None:
     """With a free end: nothing but springs without force holds the network that is made of it."""
     section = {"length": 60.0, "mass": 2.0, "axial_stiffness": 1e7}
     winch = {"kind": "pinned", "position": [0, 0, 0], "payout": {"rate": 0.5, "ramp": 2.0}}
-    tables = {
-        "cable": {"sections": [section]}, "ends": {"start": {"kind": "free"}, "end": winch}, "mesh": {"cells": 30},
-        "initial": "equilibrium", "model": "catenary", "time": {"duration": 5.0, "step": 0.1},
-    }  # fmt: skip
+    tables = cable_scene(section, {"kind": "free"}, winch, mesh=30, model="catenary", time=(5.0, 0.1))
     network = hybrid.static(in_full(hybrid.validate_scene(tables))).lines[LINE]
     cable = hybrid.static(tables)
     np.testing.assert_allclose(network.tension, cable.tension, rtol=1e-9)

@@ -19,18 +19,17 @@ from hybrid.simulation import line_result
 from hybrid.simulation.line_result import LineResult, OutputsAside
 from hybrid.simulation.payout_nodes import NodeChanges
 from tests.inside import OnlyLine
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 G = 9.81
 
 
 def hanging(payout: dict[str, Any], duration: float, **more: Any) -> dict[str, Any]:
     """40 m of 2 kg/m that hang from a winch; their lower end is free."""
-    return {
-        "cable": {"sections": [{"length": 40.0, "mass": 2.0}]},
-        "ends": {"start": {"kind": "free"}, "end": {"kind": "pinned", "position": [0, 0, 0], "payout": payout}},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
-        "time": {"duration": duration, "step": 0.05}, "output": {"every": 0.5}, **more,
-    }  # fmt: skip
+    return (
+        cable_scene({"length": 40.0, "mass": 2.0}, {"kind": "free"}, pinned_at(0, 0, 0, payout=payout),
+                    model="catenary", mesh=20, time=(duration, 0.05), output=0.5) | more
+    )  # fmt: skip
 
 
 def sagging(
@@ -41,15 +40,12 @@ def sagging(
     section: dict[str, Any] = {"length": 100.0, "mass": 5.0, "diameter": 0.05}
     section |= {"axial_stiffness": EA} if EA else {}
     section |= {"bending_stiffness": EI} if EI else {}
-    winch = {
-        "kind": "pinned", "position": [80, 0, 0], "payout": {"rate": rate, "ramp": 4.0},
-        "motion": {"surge": {"amplitude": 1.0, "period": 7.0}, "ramp": 7.0},
-    }  # fmt: skip
-    return {
-        "cable": {"sections": [section]}, "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": winch},
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 40}, "time": {"duration": duration, "step": step},
-        "output": {"every": 0.5}, **more,
-    }  # fmt: skip
+    winch = pinned_at(
+        80, 0, 0, payout={"rate": rate, "ramp": 4.0}, motion={"surge": {"amplitude": 1.0, "period": 7.0}, "ramp": 7.0}
+    )
+    return (
+        cable_scene(section, pinned_at(0, 0, 0), winch, model=model, mesh=40, time=(duration, step), output=0.5) | more
+    )
 
 
 # --- exact solutions --------------------------------------------------------------------------------
@@ -120,16 +116,11 @@ def test_a_steady_rate_changes_nothing_but_the_weight() -> None:
 
 def pendulum(step: float, duration: float, payout: dict[str, Any]) -> dict[str, Any]:
     """A bob of 100 kg on 10 m of a line that weighs next to nothing, let go at 0.3 rad."""
-    return {
-        "cable": {"sections": [{"length": 10.0, "mass": 1e-4}]},
-        "ends": {
-            "start": {"kind": "body", "mass": 100.0, "volume": 0.0},
-            "end": {"kind": "pinned", "position": [0, 0, 0], "payout": payout},
-        },
-        "initial": {"kind": "straight", "direction": [-np.sin(0.3), 0, np.cos(0.3)]},
-        "model": {"kind": "catenary", "slack": "warn"}, "mesh": {"cells": 10},
-        "time": {"duration": duration, "step": step}, "output": {"every": 0.2},
-    }  # fmt: skip
+    return cable_scene(
+        {"length": 10.0, "mass": 1e-4}, {"kind": "body", "mass": 100.0, "volume": 0.0},
+        pinned_at(0, 0, 0, payout=payout), initial={"kind": "straight", "direction": [-np.sin(0.3), 0, np.cos(0.3)]},
+        model={"kind": "catenary", "slack": "warn"}, mesh=10, time=(duration, step), output=0.2
+    )  # fmt: skip
 
 
 @pytest.mark.long
@@ -496,9 +487,7 @@ def test_another_word_for_a_key_of_payout_is_understood(key: str, meant: str) ->
 def test_a_far_end_that_is_let_go_stays_free_when_nodes_enter() -> None:
     """A clamp that has been let go does not come back with the next node."""
     scene = sagging("rod", 2e6, 2e4, duration=7.0)
-    scene["ends"]["start"] = {
-        "kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -0.5], "release_at": {"time": 2.0}
-    }  # fmt: skip
+    scene["ends"]["start"] = clamped_at([0, 0, 0], [1, 0, -0.5], release_at={"time": 2.0})
     result = hybrid.run(scene)
     assert result["payout/length"][-1] > 103.0
     moment = np.linalg.norm(result["moment_start"], axis=1)

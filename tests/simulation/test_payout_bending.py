@@ -12,6 +12,7 @@ from test_payout import clamped, sagging
 import hybrid
 from hybrid.errors import SceneError
 from tests.problems import tables_with
+from tests.scenes import cable_scene
 
 EI = 2e4
 SAME = {"moment_curvature": [[0, 0], [0.01, 0.01 * EI], [0.1, 0.1 * EI]]}
@@ -119,12 +120,10 @@ NEAR = {"kind": "clamped", "position": [6, 0, 1], "tangent": [1, 0, 0.6], "norma
 
 def curled(rate: float | None, duration: float, near: dict[str, Any], **changes: Any) -> dict[str, Any]:
     paid = {} if rate is None else {"payout": {"rate": rate, "ramp": 4.0}}
-    scene = {
-        "environment": {"gravity": 9.81}, "cable": {"sections": [SECTION]},
-        "ends": {"start": FAR, "end": near | paid}, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40},
-        "contact": {"self": False}, "time": {"duration": duration, "step": duration / 800},
-        "output": {"every": duration / 10, "points": 17},
-    }  # fmt: skip
+    scene = cable_scene(
+        SECTION, FAR, near | paid, gravity=9.81, model="rod", mesh=40, contact={"self": False},
+        time=(duration, duration / 800), output=(duration / 10, 17)
+    )  # fmt: skip
     return dict(tables_with(scene, changes))
 
 
@@ -134,12 +133,10 @@ def test_a_curved_rod_that_is_paid_out_freely_follows_its_own_arc() -> None:
     section = {"length": begin, "mass": 1.0, "diameter": 0.05, "axial_stiffness": 1e6, "bending_stiffness": EI,
                "torsional_stiffness": EI, "intrinsic_curvature": [0, kappa, 0]}  # fmt: skip
     winch = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 0, 1]}
-    result = hybrid.run({
-        "environment": {"gravity": 0}, "cable": {"sections": [section]}, "initial": "equilibrium", "model": "rod",
-        "ends": {"start": {"kind": "free"}, "end": winch | {"payout": {"rate": rate, "ramp": 4.0}}},
-        "mesh": {"cells": 20}, "contact": {"self": False}, "time": {"duration": 12.0, "step": 0.01},
-        "output": {"every": 2.0, "points": 5},
-    })  # fmt: skip
+    result = hybrid.run(cable_scene(
+        section, {"kind": "free"}, winch | {"payout": {"rate": rate, "ramp": 4.0}}, gravity=0, model="rod", mesh=20,
+        contact={"self": False}, time=(12.0, 0.01), output=(2.0, 5)
+    ))  # fmt: skip
     out = result["payout/length"]
     assert out[-1] == pytest.approx(begin + rate * 10.0, abs=1e-9)
     way = np.array([np.sin(kappa * out), 0.0 * out, 1.0 - np.cos(kappa * out)]).T / kappa

@@ -14,6 +14,7 @@ from hybrid.cli.tables import zones_over_time
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
 from tests.inside import OnlyLine
+from tests.scenes import clamped_at, pinned_at
 from tests.simulation.test_payout import G, hanging
 from tests.simulation.test_payout_zones import touching
 
@@ -84,16 +85,9 @@ def test_cells_behind_a_clamped_winch_are_short_where_no_mesh_is_given(rate: flo
     section = {"length": 100.0, "mass": 8.0, "axial_stiffness": 1e7, "bending_stiffness": 1e3}
     scene: dict[str, Any] = {
         "cable": {"sections": [section]},
-        "ends": {
-            other: {"kind": "pinned", "position": [0, 0, -45]},
-            side: {
-                "kind": "clamped", "position": [75, 0, 0], "tangent": tangent,
-                "payout": {"rates": [[0, 0], [1, rate]]},
-            },
-        },
-        "initial": "equilibrium",
-        "time": {"duration": 4.0, "step": 0.1},
-        "output": {"every": 1.0, "errors": False},
+        "ends": {other: pinned_at(0, 0, -45),
+                 side: clamped_at([75, 0, 0], tangent, payout={"rates": [[0, 0], [1, rate]]})},
+        "initial": "equilibrium", "time": {"duration": 4.0, "step": 0.1}, "output": {"every": 1.0, "errors": False}
     }  # fmt: skip
     found = hybrid.run(scene | {"model": {"kind": "adaptive", "curvature_error": 0.05}})
     fine = hybrid.run(scene | {"model": "rod", "mesh": {"cells": 400}})

@@ -10,6 +10,7 @@ import pytest
 from test_payout import G, clamped, hanging, refused, sagging
 
 import hybrid
+from tests.scenes import cable_scene, clamped_at
 
 TAU = 0.05
 
@@ -51,16 +52,11 @@ def test_the_bend_behind_a_clamp_flows_with_the_material(rate: float) -> None:
     """
     EI, pull, mass, phi, tau = 4000.0, 1000.0, 1.0, 0.05, 0.5
     section = {"length": 20.0, "mass": mass, "bending_stiffness": EI, "damping": {"stiffness": tau, "mass": 1.0}}
-    scene = {
-        "environment": {"gravity": 0.0}, "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "free", "force": [-pull, 0, 0]},
-            "end": {"kind": "clamped", "position": [0, 0, 0], "tangent": [np.cos(phi), 0, np.sin(phi)],
-                    "payout": {"rate": rate, "ramp": 4.0}},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40}, "time": {"duration": 12.0, "step": 0.04},
-        "output": {"every": 1.0},
-    }  # fmt: skip
+    scene = cable_scene(
+        section, {"kind": "free", "force": [-pull, 0, 0]},
+        clamped_at([0, 0, 0], [np.cos(phi), 0, np.sin(phi)], payout={"rate": rate, "ramp": 4.0}), gravity=0.0,
+        model="rod", mesh=40, time=(12.0, 0.04), output=1.0
+    )  # fmt: skip
     square, flow = EI / (pull - mass * rate**2), tau * rate
     roots = np.roots([flow * square, square, 0.0, -1.0])
     roots = np.sort(roots[np.abs(roots.imag) < 1e-9].real)

@@ -13,6 +13,7 @@ from test_payout import clamped, exchanged, sagging
 
 import hybrid
 from hybrid.errors import SceneError
+from tests.scenes import cable_scene, clamped_at, network_scene
 
 LAYERS = [{"stiffness": 1e4, "moment": 60.0}, {"stiffness": 8e3, "moment": 100.0, "per_tension": 1e-2}]
 SECTIONS: dict[str, dict[str, Any]] = {
@@ -51,17 +52,12 @@ def taut(rate: float, cells: int, dimension: int = 2, **section: Any) -> dict[st
         "bending_slip": [{"stiffness": STUCK, "moment": SLIP}],
         "torsional_stiffness": 500.0,
     }
-    return {
-        "environment": {"gravity": 0.0},
-        "cable": {"sections": [{"length": 24.0, "mass": MASS, "damping": {"mass": 2.0}} | own | section]},
-        "ends": {
-            "start": {"kind": "free", "force": [-PULL, 0, 0]},
-            "end": {"kind": "clamped", "position": [0, 0, 0], "tangent": [np.cos(PHI), 0, np.sin(PHI)],
-                    "payout": {"rate": rate, "ramp": 2.0}},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells}, "dimension": dimension,
-        "time": {"duration": 20.0, "step": 0.02}, "output": {"every": 1.0},
-    }  # fmt: skip
+    return cable_scene(
+        {"length": 24.0, "mass": MASS, "damping": {"mass": 2.0}} | own | section,
+        {"kind": "free", "force": [-PULL, 0, 0]},
+        clamped_at([0, 0, 0], [np.cos(PHI), 0, np.sin(PHI)], payout={"rate": rate, "ramp": 2.0}), gravity=0.0,
+        model="rod", mesh=cells, dimension=dimension, time=(20.0, 0.02), output=1.0
+    )  # fmt: skip
 
 
 def at_the_clamp(rate: float) -> float:
@@ -164,20 +160,16 @@ def from_a_buoy(step: float, **section: Any) -> hybrid.Result:
     own = {"length": 30.0, "mass": 3.0, "axial_stiffness": 1e6, "torsional_stiffness": 400.0, "damping": {"mass": 0.3}}
     clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 1, 0]}
     rod = {"sections": [own | section], "model": "rod", "mesh": {"cells": 30}}
-    return hybrid.run({
-        "points": {
-            "a": {"position": [0, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period": 4.0}, "ramp": 4.0}},
-            "b": {"position": [56, 3, 0]},
-            "l": {"body": "buoy", "place": [-1, 0, 0]}, "r": {"body": "buoy", "place": [1, 0, 0]},
-        },
-        "bodies": {"buoy": {"mass": 300.0, "inertia": [100, 200, 200], "initial_guess": [28, 1, -8]}},
-        "lines": {
-            "left": rod | {"start": "a", "end": "l",
-                           "connections": {"end": clamp | {"payout": {"rate": 0.5, "ramp": 2.0}}}},
-            "right": rod | {"start": "r", "end": "b", "connections": {"start": clamp}},
-        },
-        "time": {"duration": 6.0, "step": step}, "output": {"every": 0.5},
-    })  # fmt: skip
+    return hybrid.run(network_scene(
+        {"a": {"position": [0, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period": 4.0}, "ramp": 4.0}},
+         "b": {"position": [56, 3, 0]}, "l": {"body": "buoy", "place": [-1, 0, 0]},
+         "r": {"body": "buoy", "place": [1, 0, 0]}},
+        {"left": rod | {"start": "a", "end": "l",
+                        "connections": {"end": clamp | {"payout": {"rate": 0.5, "ramp": 2.0}}}},
+         "right": rod | {"start": "r", "end": "b", "connections": {"start": clamp}}},
+        bodies={"buoy": {"mass": 300.0, "inertia": [100, 200, 200], "initial_guess": [28, 1, -8]}}, time=(6.0, step),
+        output=0.5
+    ))  # fmt: skip
 
 
 def test_from_a_clamp_that_turns_with_its_lines() -> None:

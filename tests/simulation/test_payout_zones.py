@@ -13,6 +13,7 @@ from test_payout_laws import ROPE, SAME, STIFF, TABLE
 
 import hybrid
 from tests.combinations.pairs import scene_of, seen_by
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 ADAPTIVE = {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0}
 CHANGES = ("grow", "split", "shrink", "merge")
@@ -25,11 +26,10 @@ def touching(rate: float = 0.8, model: Any = ADAPTIVE, side: str = "end", **more
         "torsional_stiffness": 400.0,
     }  # fmt: skip
     sign = 1.0 if side == "end" else -1.0
-    winch = {
-        "kind": "clamped", "position": [80, 0, 0], "tangent": [sign, 0, 0.5 * sign],
-        "payout": {"rate": rate, "ramp": 4.0, "longest": 110.0},
-        "motion": {"heave": {"amplitude": 1.0, "period": 4.0}, "ramp": 4.0},
-    }  # fmt: skip
+    winch = clamped_at(
+        [80, 0, 0], [sign, 0, 0.5 * sign], payout={"rate": rate, "ramp": 4.0, "longest": 110.0},
+        motion={"heave": {"amplitude": 1.0, "period": 4.0}, "ramp": 4.0}
+    )  # fmt: skip
     far = {"kind": "pinned", "position": [0, 0, 0]}
     return {
         "environment": {"seabed": {"z": -18, "stiffness": 5e3, "damping": 5e2}},
@@ -111,15 +111,10 @@ def twisted(model: Any = "catenary", **more: Any) -> dict[str, Any]:
                "torsional_stiffness": 40.0, "drag": {"normal": 1.2}}  # fmt: skip
     paid = {"rate": 0.5, "begin": 0.2, "ramp": 0.5, "longest": 11.0}
     start = {"kind": "clamped", "position": [6, 0, -7.5], "tangent": [-1, 0, 0.2], "turns": 0.3}
-    return {
-        "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]}, "contact": {"self": False},
-        "ends": {
-            "start": start,
-            "end": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, 1], "payout": paid},
-        },
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 24}, "dimension": 3,
-        "time": {"duration": 1.2, "step": 0.03}, "output": {"every": 0.3},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, start, clamped_at([0, 0, 0], [0, 0, 1], payout=paid), fluid={"density": 1025}, contact={"self": False},
+        model=model, mesh=24, dimension=3, time=(1.2, 0.03), output=0.3
+    ) | more  # fmt: skip
 
 
 def test_outputs_that_wait_have_the_torque() -> None:
@@ -135,18 +130,14 @@ def test_outputs_that_wait_have_the_torque() -> None:
 
 # --- zones after a step that was taken back ---
 
-SCENE: dict[str, Any] = {
-    "environment": {
-        "fluid": {"density": 1025, "surface": 0, "current": [0.3, 0, 0]},
-        "seabed": {"z": -40, "stiffness": 1e4, "damping": 100, "friction": 0.4},
-    },
-    "cable": {"sections": [{"length": 85, "mass": 8, "diameter": 0.04, "axial_stiffness": 5e6, "bending_stiffness": 300,
-                            "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}]},
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, -40]},
-             "end": {"kind": "pinned", "position": [60, 0, 0], "payout": {"longest": 110}}},
-    "initial": "equilibrium", "model": "adaptive", "mesh": {"cells": 43},
-    "time": {"duration": 10, "step": 0.05}, "output": {"every": 0.05},
-}  # fmt: skip
+SCENE: dict[str, Any] = cable_scene(
+    {"length": 85, "mass": 8, "diameter": 0.04, "axial_stiffness": 5e6, "bending_stiffness": 300,
+     "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}},
+    pinned_at(0, 0, -40), pinned_at(60, 0, 0, payout={"longest": 110}),
+    fluid={"density": 1025, "surface": 0, "current": [0.3, 0, 0]},
+    seabed={"z": -40, "stiffness": 1e4, "damping": 100, "friction": 0.4}, model="adaptive", mesh=43, time=(10, 0.05),
+    output=0.05
+)  # fmt: skip
 
 
 def driven(again: int) -> hybrid.Result:

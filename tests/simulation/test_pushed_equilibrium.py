@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 import hybrid
+from tests.scenes import cable_scene, network_scene
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 
@@ -19,10 +20,7 @@ GREENHILL = 7.8373  # w L^3/EI at which a column that is clamped at its foot buc
 def test_the_side_that_nothing_chooses(load: float, cells: int, falls: bool) -> None:
     section = {"length": 1.0, "mass": load * GREENHILL / 9.81, "diameter": 0.01, "bending_stiffness": 1.0}
     clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, 1]}
-    what = {
-        "environment": {"gravity": 9.81}, "cable": {"sections": [section]}, "model": "rod", "mesh": {"cells": cells},
-        "ends": {"start": clamp, "end": {"kind": "free"}}, "initial": "equilibrium",
-    }  # fmt: skip
+    what = cable_scene(section, clamp, {"kind": "free"}, gravity=9.81, model="rod", mesh=cells)
     result = hybrid.static(what)
     said = [x.text for x in result.events if x.kind == "several equilibria"]
     assert bool(said) == falls == (result.position[-1, -1, 2] < 0.9)
@@ -61,14 +59,11 @@ def test_a_twist_that_a_moment_makes_is_no_news() -> None:
     line = {"mass": 1, "diameter": 0.02, "axial_stiffness": 1e6, "bending_stiffness": 100, "torsional_stiffness": 50}
     ends = {"start": {"tangent": [1, 0, 0]}, "end": {"tangent": [1, 0, 0]}}
     common = {"connections": ends, "sections": [{"length": 5, **line}], "mesh": {"cells": 10}}
-    system = {
-        "environment": {"gravity": 0},
-        "points": {
-            "low": {"position": [0, 0, 0]}, "high": {"position": [10.01, 0, 0]},
-            "middle": {"kind": "free", "initial_guess": [5, 0, 0], "moment": [60, 0, 0]},
-        },
-        "lines": {"a": {"start": "low", "end": "middle", **common}, "b": {"start": "middle", "end": "high", **common}},
-    }  # fmt: skip
+    system = network_scene(
+        {"low": {"position": [0, 0, 0]}, "high": {"position": [10.01, 0, 0]},
+         "middle": {"kind": "free", "initial_guess": [5, 0, 0], "moment": [60, 0, 0]}},
+        {"a": {"start": "low", "end": "middle", **common}, "b": {"start": "middle", "end": "high", **common}}, gravity=0
+    )  # fmt: skip
     result = hybrid.static(system)
     for name, torque in (("a", 30.0), ("b", -30.0)):  # 3 rad between its ends
         assert result.lines[name].torque[-1] == pytest.approx(torque, rel=1e-6)

@@ -11,6 +11,7 @@ from bits import Stopping, differences, went_on
 
 import hybrid
 from tests.problems import tables_with
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 SECTION = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0}
 CLAMP = {"kind": "clamped", "position": [8, 0, 0], "tangent": [1, 0, 0]}
@@ -18,12 +19,9 @@ HEAVE = {"travel": {"by": [1.99, 0, 0], "over": 1.0}}
 
 
 def scene(end: dict[str, Any], start: dict[str, Any] | None = None, **changes: Any) -> hybrid.Scene:
-    data: dict[str, Any] = {
-        "cable": {"sections": [SECTION]},
-        "ends": {"start": start or {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20},
-        "time": {"duration": 1.5, "step": 0.01}, "output": {"every": 0.1, "points": 21},
-    }  # fmt: skip
+    data: dict[str, Any] = cable_scene(
+        SECTION, start or pinned_at(0, 0, 0), end, model="rod", mesh=20, time=(1.5, 0.01), output=(0.1, 21)
+    )
     return hybrid.validate_scene(data | changes)
 
 
@@ -39,9 +37,7 @@ def masses() -> np.ndarray:
 
 def test_a_cable_whose_ends_are_both_let_go_falls_as_a_body() -> None:
     """Its centre of mass is on the parabola of free fall to round-off; its angular momentum stays to second order."""
-    both = scene(
-        pinned(release_at={"time": 0.5}), {"kind": "pinned", "position": [0, 0, 0], "release_at": {"time": 0.5}}
-    )
+    both = scene(pinned(release_at={"time": 0.5}), pinned_at(0, 0, 0, release_at={"time": 0.5}))
     with hybrid.run(both) as result:
         after = result.t > 0.5 + 1e-9
         t, r, v, m = result.t[after] - 0.5, result.position[after], result.velocity[after], masses()
@@ -158,17 +154,15 @@ ZONES = {"kind": "zones", "zones": [{"rod": 2.0, "cells": 6}, {"catenary": 6.0, 
 def test_a_twisted_catenary_is_let_go_with_its_twist(model: str, tmp_path: Path) -> None:
     """Its torque is gone, its energy in the event, and it is resumed."""
     GJ, turns = 3.0, 1.5
-    tables: dict[str, Any] = {
-        "environment": {"gravity": 9.81}, "initial": "equilibrium", "contact": {"self": False},
-        "cable": {"sections": [{"length": 10.0, "mass": 1.0, "diameter": 0.03, "axial_stiffness": 1e5,
-                                "bending_stiffness": 5.0, "torsional_stiffness": GJ, "damping": {"mass": 1.0}}],
-                  "attachments": [{"kind": "clump", "at": 9.0, "mass": 15.0}]},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1], "normal": [0, 1, 0]},
-                 "end": {"kind": "clamped", "position": [0.4, 0, -9.99], "tangent": [0, 0, -1], "normal": [0, 1, 0],
-                         "turns": turns, "release_at": {"time": 0.5}}},
-        "model": ZONES if model == "zones" else {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[0, 2], [8, 10]]},
-        "time": {"duration": 1.0, "step": 1 / 128}, "output": {"every": 0.125, "exact": True, "points": 21},
-    }  # fmt: skip
+    tables: dict[str, Any] = cable_scene(
+        {"length": 10.0, "mass": 1.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 5.0,
+         "torsional_stiffness": GJ, "damping": {"mass": 1.0}},
+        clamped_at([0, 0, 0], [0, 0, -1], normal=[0, 1, 0]),
+        clamped_at([0.4, 0, -9.99], [0, 0, -1], normal=[0, 1, 0], turns=turns, release_at={"time": 0.5}),
+        attachments=[{"kind": "clump", "at": 9.0, "mass": 15.0}], gravity=9.81, contact={"self": False},
+        model=ZONES if model == "zones" else {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[0, 2], [8, 10]]},
+        time=(1.0, 1 / 128), output={"every": 0.125, "exact": True, "points": 21}
+    )  # fmt: skip
     if model == "adaptive":
         tables["mesh"] = {"cells": 30}
     with hybrid.run(tables, tmp_path / "run.h5") as result:

@@ -30,6 +30,7 @@ from hybrid.store.whole_file import LateFile
 from hybrid.view.notebook import card
 from hybrid.view.panels import page_of
 from hybrid.view.summary import facts_of
+from tests.scenes import line_between, network_scene
 
 ERRORS, FINER = "its errors are not estimated yet", "the finer result that its accuracy asks for is not computed yet"
 
@@ -45,14 +46,12 @@ def two_lines(accuracy: str = "0.3%") -> dict[str, Any]:
     """The same of two lines that meet."""
     section = {"length": 1.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e5}
     motion = {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}
-    return {
-        "points": {
-            "a": {"position": [0, 0, 0]}, "b": {"position": [1.5, 0, 0], "motion": motion},
-            "m": {"initial_guess": [0.75, 0, -0.5], "mass": 0.2},
-        },
-        "lines": {x: {"start": x, "end": "m", "sections": [section], "model": "catenary"} for x in "ab"},
-        "time": {"duration": 1.0}, "accuracy": accuracy, "output": {"every": 0.1, "points": 5},
-    }  # fmt: skip
+    return network_scene(
+        {"a": {"position": [0, 0, 0]}, "b": {"position": [1.5, 0, 0], "motion": motion},
+         "m": {"initial_guess": [0.75, 0, -0.5], "mass": 0.2}},
+        {x: line_between(x, "m", section, model="catenary") for x in "ab"}, time={"duration": 1.0}, accuracy=accuracy,
+        output=(0.1, 5)
+    )  # fmt: skip
 
 
 def rougher(resolution: Resolution) -> Resolution:

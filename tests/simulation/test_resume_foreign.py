@@ -21,12 +21,11 @@ from forge import CONTAINERS
 
 import hybrid
 from hybrid.errors import ResultError
+from tests.scenes import cable_scene, pinned_at
 
-SCENE = {
-    "cable": {"sections": [{"length": 10.0, "mass": 1.0}]},
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [8, 0, 0]}},
-    "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10}, "time": {"duration": 1.0, "step": 0.1},
-}  # fmt: skip
+SCENE = cable_scene(
+    {"length": 10.0, "mass": 1.0}, pinned_at(0, 0, 0), pinned_at(8, 0, 0), model="catenary", mesh=10, time=(1.0, 0.1)
+)
 
 
 @pytest.fixture(scope="module")

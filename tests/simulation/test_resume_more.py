@@ -23,6 +23,7 @@ from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
 from hybrid.store.integrity import pack, unpack
 from hybrid.zones import at_start
+from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -197,10 +198,7 @@ def test_an_end_that_moves_otherwise_is_noticed(tmp_path, monkeypatch):
     t = np.linspace(0.0, 3.0, 301)
     way = 0.1 * np.sin(t) ** 4
     csv.write_text("t,x,y,z\n" + "".join(f"{a:.3f},{b:.9f},0,0\n" for a, b in zip(t, way, strict=True)))
-    ends = {
-        "start": {"kind": "pinned", "position": [0, 0, 0], "motion": {"file": str(csv)}},
-        "end": {"kind": "free"},
-    }
+    ends = {"start": pinned_at(0, 0, 0, motion={"file": str(csv)}), "end": {"kind": "free"}}
     path = stopped(tmp_path / "run.h5", monkeypatch, swinging(ends=ends))
     csv.write_text("t,x,y,z\n" + "".join(f"{a:.3f},{2 * b:.9f},0,0\n" for a, b in zip(t, way, strict=True)))
     with pytest.raises(hybrid.ResultError, match=r"motion\.csv: other than when the run began"):
@@ -382,19 +380,13 @@ def test_a_finer_result_of_another_scene_is_not_taken(tmp_path):
 
 @pytest.mark.parametrize("setting", ["ends.end.motion.pitch.amplitude=-60", "ends.end.motion=null"])
 def test_an_end_that_would_turn_at_once_is_refused(setting, tmp_path):
-    data = {
-        "cable": {"sections": [{"length": 2.0, "mass": 1.0, "bending_stiffness": 5.0, "torsional_stiffness": 5.0}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {
-                "kind": "guided", "tangent": [1, 0, 0], "force": [20, 0, 0],
-                "motion": {"pitch": {"amplitude": 20, "period": 4}, "ramp": 1},
-            },
-        },
-        "environment": {"gravity": 0.0}, "initial": {"kind": "straight", "direction": [1, 0, 0]}, "model": "rod",
-        "mesh": {"cells": 10}, "time": {"duration": 1.0, "step": 0.02},
-        "output": {"every": 0.1, "points": 5, "errors": False},
-    }  # fmt: skip
+    data = cable_scene(
+        {"length": 2.0, "mass": 1.0, "bending_stiffness": 5.0, "torsional_stiffness": 5.0}, pinned_at(0, 0, 0),
+        {"kind": "guided", "tangent": [1, 0, 0], "force": [20, 0, 0],
+         "motion": {"pitch": {"amplitude": 20, "period": 4}, "ramp": 1}},
+        gravity=0.0, initial={"kind": "straight", "direction": [1, 0, 0]}, model="rod", mesh=10, time=(1.0, 0.02),
+        output={"every": 0.1, "points": 5, "errors": False}
+    )  # fmt: skip
     hybrid.run(hybrid.validate_scene(data), tmp_path / "run.h5").close()
     with pytest.raises(hybrid.SceneError, match=r"(?s)jumps by.*rad"):
         hybrid.resume(tmp_path / "run.h5", until=2.0, settings=[setting])

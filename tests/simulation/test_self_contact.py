@@ -16,6 +16,7 @@ from hybrid.kernels.state.books import FRICTION
 from hybrid.kernels.step.newton import NEAR
 from hybrid.view.summary import facts_of
 from tests.inside import OnlyLine
+from tests.scenes import cable_scene, pinned_at
 
 WIDTH, STIFF = 0.02, 0.1
 
@@ -43,12 +44,11 @@ def flying(r: np.ndarray, step: float, duration: float, width: float = WIDTH, **
         "length": float(s[-1]), "mass": 0.4, "diameter": width, "bending_stiffness": STIFF, "axial_stiffness": 2e5,
         "torsional_stiffness": 0.8 * STIFF,
     }  # fmt: skip
-    return hybrid.Simulation(hybrid.validate_scene({
-        "environment": {"gravity": 1e-15}, "cable": {"sections": [section]}, "contact": {"self": True} | contact,
-        "ends": {"start": {"kind": "free"}, "end": {"kind": "free"}}, "model": "rod", "mesh": {"nodes": s.tolist()},
-        "initial": {"kind": "points", "points": r.tolist()}, "dimension": 3,
-        "time": {"duration": duration, "step": step, "rho_inf": 0.9}, "output": {"every": 2.0 * duration, "points": 5},
-    }))  # fmt: skip
+    return hybrid.Simulation(hybrid.validate_scene(cable_scene(
+        section, {"kind": "free"}, {"kind": "free"}, gravity=1e-15, contact={"self": True} | contact, model="rod",
+        mesh={"nodes": s.tolist()}, initial={"kind": "points", "points": r.tolist()}, dimension=3,
+        time=(duration, step, 0.9), output=(2.0 * duration, 5)
+    )))  # fmt: skip
 
 
 def energy(line: OnlyLine) -> float:
@@ -185,15 +185,10 @@ def looped(**more: Any) -> dict[str, Any]:
     }  # fmt: skip
     clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 0, 1]}
     away = {"travel": {"by": [-1.9, 0, 0], "over": 8.0}}
-    return {
-        "environment": {"gravity": 0.5}, "cable": {"sections": [section]}, "model": "rod", "mesh": {"cells": 100},
-        "initial": {"kind": "equilibrium"}, "contact": {"self": True},
-        "ends": {
-            "start": clamp | {"position": [0, 0, 0]},
-            "end": clamp | {"position": [3.9, 0, 0], "turns": 3, "motion": away},
-        },
-        "time": {"duration": 9.0, "step": 0.01}, "output": {"every": 0.1, "points": 41},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, clamp | {"position": [0, 0, 0]}, clamp | {"position": [3.9, 0, 0], "turns": 3, "motion": away},
+        gravity=0.5, model="rod", mesh=100, contact={"self": True}, time=(9.0, 0.01), output=(0.1, 41)
+    ) | more  # fmt: skip
 
 
 @pytest.mark.long
@@ -260,15 +255,10 @@ def closing(model: Any, **more: Any) -> dict[str, Any]:
         "torsional_stiffness": 0.016, "damping": {"mass": 0.5},
     }  # fmt: skip
     closer = {"travel": {"by": [-2.5, 0.95 * WIDTH, 0.0], "over": 5.0}}
-    return {
-        "cable": {"sections": [section]}, "model": model, "contact": {"self": True, "friction": 0.3},
-        "initial": {"kind": "equilibrium"},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [2.5, 0, 0], "motion": closer},
-        },
-        "time": {"duration": 6.0, "step": 0.01}, "output": {"every": 0.1, "points": 81},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(2.5, 0, 0, motion=closer), model=model,
+        contact={"self": True, "friction": 0.3}, time=(6.0, 0.01), output=(0.1, 81)
+    ) | more  # fmt: skip
 
 
 @pytest.mark.long
@@ -372,10 +362,7 @@ def test_ends_that_are_led_through_each_other_are_told() -> None:
 
 def test_an_equilibrium_that_touches_itself_from_a_start_within_itself_is_refused() -> None:
     """A weight pulls the legs of a line straight, 0.95 diameters apart."""
-    ends = {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [0, 0.95 * WIDTH, 0]},
-    }
+    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(0, 0.95 * WIDTH, 0)}
     for model in ("rod", LEGS):
         weighted = closing(model, ends=ends)
         weighted["cable"]["sections"][0]["bending_stiffness"] = 1e-4

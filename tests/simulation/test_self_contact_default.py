@@ -18,6 +18,7 @@ from hybrid.kernels.contact.self_distance import INSIDE
 from hybrid.model.build import build
 from hybrid.model.contents import LOOP, self_reach
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 
@@ -34,14 +35,10 @@ def led_through(**more: Any) -> dict[str, Any]:
         "damping": {"mass": 1.0},
     }  # fmt: skip
     across = {"travel": {"by": [-1.2, 0, 0], "over": 4.0}}
-    return {
-        "cable": {"sections": [section]}, "model": "rod", "mesh": {"cells": 60}, "initial": "equilibrium",
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [0.6, 0, -1.0], "motion": across},
-        },
-        "time": {"duration": 3.0, "step": 0.02}, "output": {"every": 0.02, "points": 101},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(0.6, 0, -1.0, motion=across), model="rod", mesh=60, time=(3.0, 0.02),
+        output=(0.02, 101)
+    ) | more  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import hybrid
 from hybrid.simulation.watches import Knot, crossings_of_knot, note_knot
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 KEYS = [f"self_distance/{name}" for name in ("clearance", "distance", "s_a", "s_b", "time")]
 
@@ -20,10 +21,9 @@ def hanging(end: list[float], diameter: float | None = 0.02, **more: Any) -> dic
     section = {"length": 4.0, "mass": 0.4, "axial_stiffness": 1e4, "bending_stiffness": 1e-3, "damping": {"mass": 1.0}}
     if diameter is not None:
         section["diameter"] = diameter
-    return {
-        "cable": {"sections": [section]}, "model": "catenary", "mesh": {"cells": 60}, "initial": "equilibrium",
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": end}},
-    } | more  # fmt: skip
+    return (
+        cable_scene(section, pinned_at(0, 0, 0), {"kind": "pinned", "position": end}, model="catenary", mesh=60) | more
+    )
 
 
 def meetings(result: hybrid.Result) -> list[Any]:
@@ -79,19 +79,13 @@ LOWER, UPPER = [0, 0, -49.9], [0.5, 0, 0]
 def lowered(duration: float = TIME["duration"]) -> dict[str, Any]:
     """A hose whose upper end is lowered until it lies across itself, and a rope beside it that stays straight."""
     rope = {"start": "deck", "end": "ground", "sections": [{"length": 49, "mass": 1.0, "diameter": 0.02}]}
-    return {
-        "environment": SEA,
-        "points": {
-            "low": {"position": LOWER}, "high": {"position": UPPER, "motion": TRAVEL},
-            "deck": {"position": [9, 0, 0]}, "ground": {"position": [9, 0, -49.9]},
-        },
-        "lines": {
-            "hose": {"start": "low", "end": "high", "model": "rod", "mesh": {"cells": 40}, "sections": [HOSE],
-                     "contact": {"self": False}},
-            "rope": rope | {"mesh": {"cells": 10}, "sections": [rope["sections"][0] | {"axial_stiffness": 1e5}]},
-        },
-        "time": TIME | {"duration": duration}, "output": {"every": 1.0},
-    }  # fmt: skip
+    return network_scene(
+        {"low": {"position": LOWER}, "high": {"position": UPPER, "motion": TRAVEL}, "deck": {"position": [9, 0, 0]},
+         "ground": {"position": [9, 0, -49.9]}},
+        {"hose": line_between("low", "high", HOSE, model="rod", mesh=40, contact={"self": False}),
+         "rope": rope | {"mesh": {"cells": 10}, "sections": [rope["sections"][0] | {"axial_stiffness": 1e5}]}},
+        environment=SEA, time=TIME | {"duration": duration}, output=1.0
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -211,13 +205,12 @@ def over_a_sheave(**more: Any) -> dict[str, Any]:
     section = {"length": 4.02, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e5, "bending_stiffness": 0.5}
     sheave = {"kind": "sheave", "at": [0, 0, -0.3], "axis": [0, 1, 0], "radius": 0.3, "groove": 0.03, "rim": 0.02}
     sheave["motion"] = {"heave": {"amplitude": 0.3, "period": 4.0}, "ramp": 1.0}
-    return {
-        "cable": {"sections": [section | {"damping": {"mass": 1.0}}]}, "obstacles": {"wheel": sheave},
-        "ends": {"start": {"kind": "pinned", "position": [-2, 0, 0]}, "end": {"kind": "pinned", "position": [2, 0, 0]}},
-        "initial": {"kind": "equilibrium", "points": [[-2, 0, 0], [-0.2, 0, -0.05], [0, 0, 0.02], [0.2, 0, -0.05], [2, 0, 0]]},
-        "model": "rod", "mesh": {"cells": 80}, "time": {"duration": 8.0, "step": 0.01},
-        "output": {"every": 0.05, "points": 161},
-    } | more  # fmt: skip
+    return cable_scene(
+        section | {"damping": {"mass": 1.0}}, pinned_at(-2, 0, 0), pinned_at(2, 0, 0), obstacles={"wheel": sheave},
+        initial={"kind": "equilibrium",
+                 "points": [[-2, 0, 0], [-0.2, 0, -0.05], [0, 0, 0.02], [0.2, 0, -0.05], [2, 0, 0]]},
+        model="rod", mesh=80, time=(8.0, 0.01), output=(0.05, 161)
+    ) | more  # fmt: skip
 
 
 def departures(result: Any) -> list[Any]:

@@ -15,6 +15,7 @@ import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.state.state import no_moves
 from hybrid.model.ends import DrivenEnd
+from tests.scenes import cable_scene, pinned_at
 
 Said = Callable[[np.ndarray], Any]
 
@@ -82,11 +83,10 @@ def test_points_of_several_lines(again: bool) -> None:
 def test_obstacles() -> None:
     rope = {"length": 2.2, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.05}
     arm = {"kind": "cylinder", "at": [1, -0.3, 0], "axis": [0, 0, 1], "length": 0.6, "radius": 0.15, "friction": 0.4}
-    tables = {
-        "cable": {"sections": [rope]}, "obstacles": {"arm": arm | {"from_outside": True}},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0.2]}, "end": {"kind": "pinned", "position": [2, 0, 0.2]}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 30}, "time": {"duration": 0.2, "step": 0.01},
-    }  # fmt: skip
+    tables = cable_scene(
+        rope, pinned_at(0, 0, 0.2), pinned_at(2, 0, 0.2), obstacles={"arm": arm | {"from_outside": True}}, model="rod",
+        mesh=30, time=(0.2, 0.01)
+    )  # fmt: skip
     told = {}
     for speed in (0.6, 0.06, None):
         with hybrid.Simulation(tables) as simulation:

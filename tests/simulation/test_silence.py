@@ -9,6 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.cli.plan_tables import plan_rows
+from tests.scenes import line_between
 
 NO_GRAVITY = {"environment": {"gravity": 0.0}}
 TAUT = {"length": 1.0, "mass": 0.1, "bending_stiffness": 0.01, "torsional_stiffness": 0.01, "axial_stiffness": 1e4}
@@ -354,11 +355,8 @@ def test_a_current_that_acts_on_nothing_says_so(drag, clump):
 def test_of_several_lines_a_current_acts_where_any_part_has_drag(drags):
     wire = {"length": 20.0, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e6}
     lines = {
-        name: {
-            "start": name, "end": "buoy", "mesh": {"cells": 8}, "model": "catenary",
-            "sections": [wire | ({"drag": {"normal": 1.2}} if name == drags else {})],
-        }
-        for name in ("west", "east")
+        name: line_between(name, "buoy", wire | ({"drag": {"normal": 1.2}} if name == drags else {}), mesh=8,
+                           model="catenary") for name in ("west", "east")
     }  # fmt: skip
     buoy = {"kind": "free", "initial_guess": [0, 0, -15], "mass": 10.0, "volume": 0.1} | (
         {"drag_area": 0.2} if drags == "buoy" else {}

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 import hybrid
 from hybrid.errors import SceneError
+from tests.scenes import cable_scene, pinned_at
 
 Floats = NDArray[np.float64]
 D, SU, RHO, STEEP, SUCTION = 0.2, 2000.0, 1500.0, 200.0, 0.6
@@ -51,10 +52,7 @@ def history(depths: Floats) -> Floats:
 
 def pressed(bed: dict[str, Any], over: float, step: float, motion: dict[str, Any], **more: Any) -> dict[str, Any]:
     """A stiff rod of a metre, level, both ends of which follow one motion from 2 cm above the bed."""
-    ends = {
-        name: {"kind": "pinned", "position": [x, 0, 0.02], "motion": {"ramp": 1.0} | motion}
-        for name, x in (("start", 0.0), ("end", 1.0))
-    }
+    ends = {name: pinned_at(x, 0, 0.02, motion={"ramp": 1.0} | motion) for name, x in (("start", 0.0), ("end", 1.0))}
     return {
         "environment": {"gravity": 0, "seabed": {"z": 0} | bed},
         "cable": {"sections": [{"length": 1.0, "mass": 20.0, "diameter": D, "axial_stiffness": 1e8,
@@ -94,8 +92,7 @@ def test_a_rest_in_soil_bears_its_weight_at_the_depth_of_first_penetration() -> 
     low, high = {"kind": "pinned", "position": [0, 0, 0]}, {"kind": "pinned", "position": [24.0, 0, 8.0]}
     depth, weight = float(brentq(lambda z: first(z) - 981.0, 1e-6, 1.0)), 981.0
     for model in ("rod", "catenary"):
-        alone = {"environment": bed, "cable": {"sections": [section]}, "ends": {"start": low, "end": high},
-                 "initial": "equilibrium", "model": model, "mesh": {"cells": 120}}  # fmt: skip
+        alone = cable_scene(section, low, high, environment=bed, model=model, mesh=120)
         found = hybrid.static(alone)
         k = int(np.argmin(np.abs(found.s - 5.0)))
         assert found.contact[0, k] == pytest.approx(weight, rel=1e-3)
@@ -115,16 +112,14 @@ def test_friction_breaks_out_and_falls_to_what_is_left(dimension: int) -> None:
     """A line that is drawn along a bed: mu N (r + (1 - r) exp(-w/l)), w the way behind the elastic travel."""
     mu, left, over, travel = 0.5, 0.2, 0.05, 0.002
     friction = {"axial": mu, "lateral": mu, "residual": [left, left], "breakout": over, "travel": travel}
-    tables = {
-        "environment": {"seabed": {"z": 0, "stiffness": 1e5, "friction": friction}},
-        "cable": {"sections": [{"length": 4.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e8,
-                                "damping": 0.5}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": {"travel": {"by": [-0.2, 0, 0], "over": 20.0}}},
-                 "end": "free"},
-        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}, "model": "catenary",
-        "contact": {"self": False}, "mesh": {"cells": 20}, "dimension": dimension,
-        "time": {"duration": 20.0, "step": 0.02}, "output": {"every": 0.02, "points": 21, "exact": True},
-    }  # fmt: skip
+    tables = cable_scene(
+        {"length": 4.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e8, "damping": 0.5},
+        pinned_at(0, 0, 0, motion={"travel": {"by": [-0.2, 0, 0], "over": 20.0}}), "free",
+        seabed={"z": 0, "stiffness": 1e5, "friction": friction},
+        initial={"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}, model="catenary",
+        contact={"self": False}, mesh=20, dimension=dimension, time=(20.0, 0.02),
+        output={"every": 0.02, "points": 21, "exact": True}
+    )  # fmt: skip
     found = hybrid.run(tables)
     way = -found.position[:, 10, 0] + found.position[0, 10, 0]
     drawn = -found["reaction_start"][:, 0]

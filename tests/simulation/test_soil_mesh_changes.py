@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 
 SOIL = {"shear_strength": 1500.0, "gradient": 1500.0}
 FRICTION = {"axial": 0.3, "lateral": 0.5, "residual": [0.15, 0.2], "breakout": 0.05, "travel": 4e-3}
@@ -20,14 +21,11 @@ SECTION = {
 def laid(model: Any, **more: Any) -> dict[str, Any]:
     """A line of 80 m from the bed to 20 m above it, whose upper end heaves by 0.6 m and moves on by 1 m."""
     motion = {"heave": {"amplitude": 0.6, "period": 8.0}, "travel": {"by": [-1.0, 0.0, 0.0], "over": 12.0}, "ramp": 4.0}
-    return {
-        "environment": {"gravity": 9.81, "seabed": {"z": 0, "soil": SOIL | {"lateral": {}}, "friction": FRICTION}},
-        "cable": {"sections": [SECTION]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
-                 "end": {"kind": "pinned", "position": [70.0, 0, 20.0], "motion": motion}},
-        "initial": "equilibrium", "model": model, "contact": {"self": False}, "mesh": {"cells": 80},
-        "time": {"duration": 16.0, "step": 0.02}, "output": {"every": 0.5, "points": 81},
-    } | more  # fmt: skip
+    return cable_scene(
+        SECTION, pinned_at(0, 0, 0), pinned_at(70.0, 0, 20.0, motion=motion), gravity=9.81,
+        seabed={"z": 0, "soil": SOIL | {"lateral": {}}, "friction": FRICTION}, model=model, contact={"self": False},
+        mesh=80, time=(16.0, 0.02), output=(0.5, 81)
+    ) | more  # fmt: skip
 
 
 def kinds(result: hybrid.Result) -> int:

@@ -18,6 +18,7 @@ from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.state.state import no_moves
 from hybrid.model.ends import PATH, DrivenEnd, rotation, rotation_vector
 from tests.said import both_ways, line_of, said
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PINNED = "ends.end={kind: pinned, position: [205, 0, 0]}"
@@ -84,15 +85,11 @@ def test_what_is_taken_back_in_a_plane_leaves_nothing() -> None:
 def test_an_end_that_is_turned_counts_its_turns() -> None:
     """Three turns of a clamp about a straight rod, 0.3 rad a step: torque GJ 6 pi / L."""
     line = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e6, "bending_stiffness": 5.0, "torsional_stiffness": 4.0}
-    tables = {
-        "environment": {"gravity": 0.0},
-        "cable": {"sections": [line | {"diameter": 0.02, "damping": {"mass": 1.0, "stiffness": 0.2}}]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 0, 1]},
-            "end": {"kind": "clamped", "position": [10.01, 0, 0], "tangent": [1, 0, 0], "normal": [0, 0, 1]},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 80}, "time": {"duration": 40.0, "step": 0.1},
-    }  # fmt: skip
+    tables = cable_scene(
+        line | {"diameter": 0.02, "damping": {"mass": 1.0, "stiffness": 0.2}},
+        clamped_at([0, 0, 0], [1, 0, 0], normal=[0, 0, 1]), clamped_at([10.01, 0, 0], [1, 0, 0], normal=[0, 0, 1]),
+        gravity=0.0, model="rod", mesh=80, time=(40.0, 0.1)
+    )  # fmt: skip
     with hybrid.Simulation(tables) as simulation:
         first = np.column_stack([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
         for k in range(1, 101):
@@ -106,12 +103,11 @@ def test_an_end_that_is_turned_counts_its_turns() -> None:
 
 def test_a_free_end_is_pulled() -> None:
     """A hanging chain, its lower end pulled aside by a force: it comes to rest where statics says."""
-    tables: dict[str, Any] = {
-        "cable": {"sections": [{"length": 1.0, "mass": 1.0, "axial_stiffness": 1e4, "damping": {"mass": 6.0}}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-        "initial": {"kind": "equilibrium", "guess": "straight", "direction": [0, 0, -1]}, "model": "catenary",
-        "mesh": {"cells": 20}, "time": {"duration": 15.0, "step": 0.02},
-    }  # fmt: skip
+    tables: dict[str, Any] = cable_scene(
+        {"length": 1.0, "mass": 1.0, "axial_stiffness": 1e4, "damping": {"mass": 6.0}}, pinned_at(0, 0, 0), "free",
+        initial={"kind": "equilibrium", "guess": "straight", "direction": [0, 0, -1]}, model="catenary", mesh=20,
+        time=(15.0, 0.02)
+    )  # fmt: skip
     with hybrid.Simulation(tables) as simulation:
         simulation.set_force("end", [3.0, 0.0, 0.0])
         simulation.advance(15.0)
@@ -184,12 +180,11 @@ def test_a_controller_brings_a_vehicle_to_its_depth() -> None:
 def rod(**tables: Any) -> dict[str, Any]:
     """A hanging rod of 1 m in air, its lower end free."""
     section = {"length": 1.0, "diameter": 0.01, "mass": 0.5, "axial_stiffness": 1e4, "bending_stiffness": 0.05}
-    return {
-        "cable": {"sections": [section | {"torsional_stiffness": 0.04, "damping": {"mass": 1.0}}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-        "initial": {"kind": "equilibrium", "guess": "straight", "direction": [0, 0, -1]}, "model": "rod",
-        "mesh": {"cells": 10}, "time": {"duration": 2.0, "step": 0.1}, **tables,
-    }  # fmt: skip
+    return (
+        cable_scene(section | {"torsional_stiffness": 0.04, "damping": {"mass": 1.0}}, pinned_at(0, 0, 0), "free",
+                    initial={"kind": "equilibrium", "guess": "straight", "direction": [0, 0, -1]}, model="rod", mesh=10,
+                    time=(2.0, 0.1)) | tables
+    )  # fmt: skip
 
 
 def test_the_loop_of_the_manual_ends_at_the_duration() -> None:
@@ -362,11 +357,10 @@ HOSE = {
     "torsional_stiffness": 0.004, "damping": {"mass": 0.5},
 }  # fmt: skip
 FAR = [0, 0, -LENGTH + 0.5 * WIDTH]
-SCENE = {
-    "cable": {"sections": [HOSE]}, "model": "rod", "mesh": {"cells": 80}, "initial": "equilibrium", "dimension": 3,
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": FAR}},
-    "time": {"duration": END, "step": 0.01}, "output": {"every": 0.1},
-}  # fmt: skip
+SCENE = cable_scene(
+    HOSE, pinned_at(0, 0, 0), {"kind": "pinned", "position": FAR}, model="rod", mesh=80, dimension=3, time=(END, 0.01),
+    output=0.1
+)  # fmt: skip
 
 
 def place(t: float) -> np.ndarray:
@@ -414,11 +408,10 @@ NO_ENDS = ["middle", 0, None, 1, "START", [], object(), b"end"]
 
 
 def simulation(cells: int = 10) -> hybrid.Simulation:
-    tables: dict[str, Any] = {
-        "cable": {"sections": [{"length": 10, "mass": 1, "axial_stiffness": 1e5, "bending_stiffness": 5}]},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}, "end": "free"},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells}, "time": {"duration": 2, "step": 0.05},
-    }  # fmt: skip
+    tables: dict[str, Any] = cable_scene(
+        {"length": 10, "mass": 1, "axial_stiffness": 1e5, "bending_stiffness": 5}, clamped_at([0, 0, 0], [1, 0, 0]),
+        "free", model="rod", mesh=cells, time=(2, 0.05)
+    )  # fmt: skip
     return hybrid.Simulation(tables)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, clamped_at
 
 LENGTH, GJ = 20.0, 8.0
 MODELS: dict[str, Any] = {
@@ -22,14 +23,11 @@ def line(swivel: bool, normal: tuple[float, float, float] = (0.0, 1.0, 0.0), mod
     """A sagging line between clamps; normal: of the second one."""
     section = {"length": LENGTH, "mass": 1.0, "diameter": 0.03, "bending_stiffness": 10.0, "torsional_stiffness": GJ,
                "damping": {"mass": 2.0, "stiffness": 0.01}}  # fmt: skip
-    return {
-        "cable": {"sections": [section], "attachments": [{"kind": "swivel", "at": 12.0}] if swivel else []},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0.0] * 3, "tangent": [1.0, 0.0, 0.0], "normal": [0.0, 1.0, 0.0]},
-            "end": {"kind": "clamped", "position": [16.0, 0.0, 2.0], "tangent": [1.0, 0.0, 1.0], "normal": normal},
-        },
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 80}, "output": {"points": 41},
-    }  # fmt: skip
+    return cable_scene(
+        section, clamped_at([0.0] * 3, [1.0, 0.0, 0.0], normal=[0.0, 1.0, 0.0]),
+        clamped_at([16.0, 0.0, 2.0], [1.0, 0.0, 1.0], normal=normal),
+        attachments=[{"kind": "swivel", "at": 12.0}] if swivel else [], model=model, mesh=80, output={"points": 41}
+    )  # fmt: skip
 
 
 def turning(turns: float, folder: Path, swivel: bool = True, model: Any = "rod") -> hybrid.Result:
@@ -94,18 +92,13 @@ def test_a_swivel_end_that_bends_the_line_feels_no_turns(turns: float, tmp_path:
         x = np.clip(t / 8.0, 0.0, 1.0)
         path, angle = tmp_path / "turns.csv", 360.0 * n * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
         np.savetxt(path, np.column_stack([t, angle, 0 * t, 0 * t]), delimiter=",", header="t,rx,ry,rz", comments="")
-        scene = {
-            "environment": {"gravity": 0.0},
-            "cable": {"sections": [{"length": 1.0, "mass": 1.0, "bending_stiffness": 1.0, "torsional_stiffness": 0.8,
-                                    "damping": {"mass": 20.0}}]},
-            "ends": {
-                "start": {"kind": "clamped", "position": [0.0] * 3, "tangent": [1.0, 0.0, 0.0],
-                          "normal": [0.0, 0.0, 1.0], "motion": {"file": str(path)}},
-                "end": {"kind": "clamped", "position": [0.8, 0.0, 0.0], "tangent": [0.8, 0.6, 0.0], "swivel": True},
-            },
-            "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40},
-            "time": {"duration": 10.0, "step": 0.02}, "output": {"every": 1.0, "points": 21},
-        }  # fmt: skip
+        scene = cable_scene(
+            {"length": 1.0, "mass": 1.0, "bending_stiffness": 1.0, "torsional_stiffness": 0.8,
+             "damping": {"mass": 20.0}},
+            clamped_at([0.0] * 3, [1.0, 0.0, 0.0], normal=[0.0, 0.0, 1.0], motion={"file": str(path)}),
+            clamped_at([0.8, 0.0, 0.0], [0.8, 0.6, 0.0], swivel=True), gravity=0.0, model="rod", mesh=40,
+            time=(10.0, 0.02), output=(1.0, 21)
+        )  # fmt: skip
         results.append(hybrid.run(hybrid.validate_scene(scene)))
     still, turned = results
     np.testing.assert_allclose(turned.position[-1], still.position[-1], atol=1e-4)

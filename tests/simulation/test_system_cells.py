@@ -14,6 +14,7 @@ import hybrid
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.solve.network_steps import NetworkSteps
 from tests.said import line_of, said
+from tests.scenes import network_scene
 from tests.validation.test_validation_lines_contact import force_between, lowered
 
 Tables = dict[str, Any]
@@ -119,11 +120,10 @@ def on_a_body(held: str, model: Tables | None = None, count: int = 0) -> Tables:
     push = [[0, 0, 0, 0], [3, 150, 80, 0], [6, 0, 0, 0]]
     body = {"mass": 300, "inertia": [80, 80, 80], "volume": 0.36, "initial_guess": [0, 0, -40],
             "force": {"history": push}}  # fmt: skip
-    return {
-        "environment": SEA, "bodies": {"buoy": body},
-        "points": {"foot": {"position": [30, 0, -80]}, "seat": {"body": "buoy", "place": [0, 0, -0.5]}},
-        "lines": {"leg": line}, "time": {"duration": 6.0, "step": 0.05}, "output": {"every": 0.2, "points": 61},
-    }  # fmt: skip
+    return network_scene(
+        {"foot": {"position": [30, 0, -80]}, "seat": {"body": "buoy", "place": [0, 0, -0.5]}}, {"leg": line},
+        environment=SEA, bodies={"buoy": body}, time=(6.0, 0.05), output=(0.2, 61)
+    )  # fmt: skip
 
 
 @pytest.mark.long

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import line_between, network_scene
 
 WIDTH, RUBS = 0.02, {"self": True, "friction": 0.3}
 HOSE = {
@@ -24,13 +25,11 @@ def system(**more: Any) -> dict[str, Any]:
     """A line hangs in a U between an end that is moved until its legs touch, and a tail; free: where they meet."""
     line = {"start": "low", "end": "free", "model": "rod", "mesh": {"cells": 80}, "sections": [HOSE], "contact": RUBS}
     tail = {"start": "free", "end": "high", "model": "catenary", "mesh": {"cells": 5}, "sections": [TAIL]}
-    return {
-        "points": {
-            "low": {"position": LOW, "motion": CLOSER}, "high": {"position": HIGH},
-            "free": {"kind": "free", "initial_guess": [1.1, 0, 0]},
-        },
-        "lines": {"hose": line | more, "tail": tail}, "time": TIME, "output": OUTPUT,
-    }  # fmt: skip
+    return network_scene(
+        {"low": {"position": LOW, "motion": CLOSER}, "high": {"position": HIGH},
+         "free": {"kind": "free", "initial_guess": [1.1, 0, 0]}},
+        {"hose": line | more, "tail": tail}, time=TIME, output=OUTPUT
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -136,11 +135,9 @@ def beside_a_body(**contact: Any) -> dict[str, Any]:
         "arm-1": {"kind": "free", "initial_guess": ways["arm"][-1]},
     }  # fmt: skip
     lines: dict[str, Any] = {
-        name: {
-            "start": f"{name}0", "end": f"{name}-1", "model": "rod", "mesh": {"cells": 40}, "sections": [sections[name]],
-            "contact": {"self": False}, "initial": {"kind": "points", "points": way},
-        }
-        for name, way in ways.items()
+        name: line_between(f"{name}0", f"{name}-1", sections[name], model="rod", mesh=40, contact={"self": False},
+                           initial={"kind": "points", "points": way}) for name,
+        way in ways.items()
     }  # fmt: skip
     lines["arm"]["connections"] = {"start": {"kind": "clamped", "tangent": [1, 0, 0]}}
     return {
@@ -173,21 +170,14 @@ def in_units(u: float, model: str) -> dict[str, Any]:
     }  # fmt: skip
     closer = {"travel": {"by": [1.22 * u, 0.95 * WIDE * u, 0.0], "over": 1.2}}
     heave = {"heave": {"amplitude": 0.4 * u, "period": 1.0}, "ramp": 1.0}
-    return {
-        "environment": {"gravity": 9.81 * u},
-        "points": {
-            "low": {"position": [0, 0, 0], "motion": closer},
-            "high": {"position": [1.2 * u, 0, 0.45 * u], "motion": heave},
-            "free": {"kind": "free", "initial_guess": [1.1 * u, 0, 0]},
-        },
-        "lines": {
-            "hose": {"start": "low", "end": "free", "model": "rod", "mesh": {"cells": 64}, "sections": [hose],
-                     "contact": {"friction": 0.3}},
-            "tail": {"start": "free", "end": "high", "model": model, "mesh": {"cells": 16},
-                     "sections": [hose | {"length": u}]},
-        },
-        "time": {"duration": 2.5, "step": 2.0**-7}, "output": {"every": 0.125, "points": 65},
-    }  # fmt: skip
+    return network_scene(
+        {"low": {"position": [0, 0, 0], "motion": closer},
+         "high": {"position": [1.2 * u, 0, 0.45 * u], "motion": heave},
+         "free": {"kind": "free", "initial_guess": [1.1 * u, 0, 0]}},
+        {"hose": line_between("low", "free", hose, model="rod", mesh=64, contact={"friction": 0.3}),
+         "tail": line_between("free", "high", hose | {"length": u}, model=model, mesh=16)},
+        gravity=9.81 * u, time=(2.5, 2.0**-7), output=(0.125, 65)
+    )  # fmt: skip
 
 
 @pytest.mark.long

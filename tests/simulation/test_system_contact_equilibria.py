@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import network_scene
 
 WIDTH = 0.02
 HOSE = {
@@ -36,17 +37,13 @@ def at_a_body(y: float = -0.01) -> dict[str, Any]:
     """One leg hangs on a body that two ropes, which end at y (m), pull against the other leg; nothing holds its yaw."""
     rope = {"sections": [{"length": 1.1, "mass": 0.1, "axial_stiffness": 1e5}], "model": "catenary", "start": "free"}
     first = [[0, 0, 0], [-0.3, -0.3, -1.0], [0, 0, -1.8], [0.3, 0.3, -1], [0, 0.3, 0.1]]
-    return COMMON | {
-        "points": {
-            "a": {"position": [0, 0, 0]}, "left": {"position": [-0.6, y, 0.75]},
-            "right": {"position": [0.6, y, 0.75]}, "free": {"kind": "fairlead", "body": "pod", "place": [0, 0, -0.05]},
-        },
-        "bodies": {"pod": {"kind": "free", "mass": 1.0, "inertia": [0.1] * 3, "initial_guess": [0, 0.3, 0.15]}},
-        "lines": {
-            "hose": LINE | {"start": "a", "end": "free", "model": "rod", "initial": {"points": first}},
-            "left": rope | {"end": "left", "mesh": {"cells": 5}}, "right": rope | {"end": "right", "mesh": {"cells": 5}},
-        },
-    }  # fmt: skip
+    return COMMON | network_scene(
+        {"a": {"position": [0, 0, 0]}, "left": {"position": [-0.6, y, 0.75]}, "right": {"position": [0.6, y, 0.75]},
+         "free": {"kind": "fairlead", "body": "pod", "place": [0, 0, -0.05]}},
+        {"hose": LINE | {"start": "a", "end": "free", "model": "rod", "initial": {"points": first}},
+         "left": rope | {"end": "left", "mesh": {"cells": 5}}, "right": rope | {"end": "right", "mesh": {"cells": 5}}},
+        bodies={"pod": {"kind": "free", "mass": 1.0, "inertia": [0.1] * 3, "initial_guess": [0, 0.3, 0.15]}}
+    )  # fmt: skip
 
 
 def stays(scene: dict[str, Any], static: hybrid.Result, name: str) -> None:

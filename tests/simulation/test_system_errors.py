@@ -10,6 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.store.limits import extreme_errors
+from tests.scenes import line_between, network_scene
 
 LEG = {"length": 140, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
 HOSE = {"length": 100, "mass": 6, "diameter": 0.08, "axial_stiffness": 5e6, "bending_stiffness": 3000}
@@ -19,21 +20,15 @@ def mooring(cells: int = 20, step: float = 0.1, **output: Any) -> dict[str, Any]
     """Two legs to a float and a hose from there to a vessel that heaves; the hose has a clump on it."""
     heave = {"heave": {"amplitude": 0.5, "period": 8}, "ramp": 8}
     clump = [{"kind": "clump", "at": 37.0, "mass": 20.0}]
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.4, 0.1, 0]}},
-        "points": {
-            "west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
-            "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 2, "drag_area": 3},
-            "vessel": {"position": [70, 0, 2], "motion": heave},
-        },
-        "lines": {
-            "west": {"start": "west", "end": "float", "sections": [LEG], "mesh": {"cells": cells}},
-            "east": {"start": "float", "end": "east", "sections": [LEG], "mesh": {"cells": cells}},
-            "hose": {"start": "float", "end": "vessel", "mesh": {"cells": 2 * cells}, "sections": [HOSE],
-                     "attachments": clump},
-        },
-        "time": {"duration": 8.0, "step": step}, "output": {"every": 0.4, "points": 11} | output,
-    }  # fmt: skip
+    return network_scene(
+        {"west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
+         "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 2, "drag_area": 3},
+         "vessel": {"position": [70, 0, 2], "motion": heave}},
+        {"west": line_between("west", "float", LEG, mesh=cells), "east": line_between("float", "east", LEG, mesh=cells),
+         "hose": line_between("float", "vessel", HOSE, mesh=2 * cells, attachments=clump)},
+        fluid={"density": 1025, "current": [0.4, 0.1, 0]}, time=(8.0, step),
+        output={"every": 0.4, "points": 11} | output
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

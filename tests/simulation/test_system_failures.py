@@ -11,6 +11,7 @@ from bits import differences
 
 import hybrid
 from hybrid.errors import SceneError
+from tests.scenes import line_between
 
 SECTION = {"length": 12.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 20.0}
 
@@ -147,10 +148,9 @@ def test_a_mooring_of_a_body_breaks() -> None:
         "starboard": {"body": "float", "place": [0.3, 0, 0.2]},
     }  # fmt: skip
     lines = {
-        "a": {"start": "left", "end": "port", "sections": [SECTION], "mesh": {"cells": 12}},
-        "b": {"start": "starboard", "end": "right", "sections": [SECTION], "mesh": {"cells": 12},
-              "break_at": {"time": 0.8, "end": "start"}},
-    }  # fmt: skip
+        "a": line_between("left", "port", SECTION, mesh=12),
+        "b": line_between("starboard", "right", SECTION, mesh=12, break_at={"time": 0.8, "end": "start"}),
+    }
     time = {"duration": 1.2, "step": 0.01}
     made = {"points": points, "bodies": bodies, "lines": lines, "time": time}
     with hybrid.run(made) as result:

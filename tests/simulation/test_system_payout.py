@@ -15,6 +15,7 @@ from test_payout_zones import touching
 import hybrid
 from hybrid.errors import SceneError
 from tests.combinations.pairs import as_network, scene_of
+from tests.scenes import line_between, network_scene
 
 G = 9.81
 
@@ -34,25 +35,19 @@ def crane(law: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
     sling = {"sections": [wire[0] | {"length": 6.0}], "mesh": {"cells": 6}}
     heave = {"heave": {"amplitude": 0.5, "period": 6.0}, "ramp": 6.0}
     law = law or {"rate": 0.8, "ramp": 2.0}
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.3, 0.1, 0]}},
-        "points": {
-            "tip": {"position": [0, 0, 0], "motion": heave}, "shore": {"position": [40, 5, -20]},
-            "hook": {"kind": "free", "mass": 50.0, "volume": 0.01, "initial_guess": [0, 0, -30]},
-            "left": {"body": "bar", "place": [-3, 0, 0]}, "right": {"body": "bar", "place": [3, 0, 0]},
-        },
-        "bodies": {
-            "bar": {"mass": 400.0, "volume": 0.1, "inertia": [100, 1200, 1200], "initial_guess": [0, 0, -35.2]}
-        },
-        "lines": {
-            "wire": {"start": "hook", "end": "tip", "sections": wire, "mesh": {"cells": 24},
-                     "connections": {"end": {"payout": law}}},
-            "a": {"start": "left", "end": "hook", **sling}, "b": {"start": "right", "end": "hook", **sling},
-            "tug": {"start": "shore", "end": "right", "sections": [wire[0] | {"length": 50.0}], "mesh": {"cells": 25},
-                    "connections": {"start": {"payout": {"rate": -0.5, "ramp": 2.0}}}},
-        },
-        "time": {"duration": 6.0, "step": 0.02}, "output": {"every": 0.25}, **more,
-    }  # fmt: skip
+    return (
+        network_scene({"tip": {"position": [0, 0, 0], "motion": heave}, "shore": {"position": [40, 5, -20]},
+                       "hook": {"kind": "free", "mass": 50.0, "volume": 0.01, "initial_guess": [0, 0, -30]},
+                       "left": {"body": "bar", "place": [-3, 0, 0]}, "right": {"body": "bar", "place": [3, 0, 0]}},
+                      {"wire": line_between("hook", "tip", wire, mesh=24, connections={"end": {"payout": law}}),
+                       "a": {"start": "left", "end": "hook", **sling}, "b": {"start": "right", "end": "hook", **sling},
+                       "tug": line_between("shore", "right", wire[0] | {"length": 50.0}, mesh=25,
+                                           connections={"start": {"payout": {"rate": -0.5, "ramp": 2.0}}})},
+                      fluid={"density": 1025, "current": [0.3, 0.1, 0]},
+                      bodies={"bar": {"mass": 400.0, "volume": 0.1, "inertia": [100, 1200, 1200],
+                                      "initial_guess": [0, 0, -35.2]}},
+                      time=(6.0, 0.02), output=0.25) | more
+    )  # fmt: skip
 
 
 @cache
@@ -136,20 +131,16 @@ def frame(sign: float) -> dict[str, Any]:
     wire = {"mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e9}
     own = {"model": "catenary", "contact": {"self": False}}
     law = {"lengths": [[0, 30], [4, 30 + 3 * sign], [8, 30 + 6 * sign]]}
-    return {
-        "points": {
-            "top": {"position": [0, 0, 0]}, "eye": {"body": "frame", "place": [0, 0, 1.0]},
-            "winch": {"body": "frame", "place": [0, 0, -1.0]},
-            "load": {"kind": "free", "mass": 500.0, "initial_guess": [0, 0, -52]},
-        },
-        "bodies": {"frame": {"mass": 1000.0, "inertia": [100, 100, 100], "initial_guess": [0, 0, -21]}},
-        "lines": {
-            "up": {"start": "eye", "end": "top", "sections": [wire | {"length": 20.0}], "mesh": {"cells": 10}, **own},
-            "down": {"start": "load", "end": "winch", "sections": [wire | {"length": 30.0}], "mesh": {"cells": 20},
-                     "connections": {"end": {"payout": law}}, **own},
-        },
-        "time": {"duration": 8.0, "step": 0.02}, "output": {"every": 0.02},
-    }  # fmt: skip
+    return network_scene(
+        {"top": {"position": [0, 0, 0]}, "eye": {"body": "frame", "place": [0, 0, 1.0]},
+         "winch": {"body": "frame", "place": [0, 0, -1.0]},
+         "load": {"kind": "free", "mass": 500.0, "initial_guess": [0, 0, -52]}},
+        {"up": (line_between("eye", "top", wire | {"length": 20.0}, mesh=10) | own),
+         "down": (line_between("load", "winch", wire | {"length": 30.0}, mesh=20,
+                               connections={"end": {"payout": law}}) | own)},
+        bodies={"frame": {"mass": 1000.0, "inertia": [100, 100, 100], "initial_guess": [0, 0, -21]}}, time=(8.0, 0.02),
+        output=0.02
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -192,10 +183,7 @@ def to_a_buoy(rate: float = 0.8) -> Tables:
     scene["environment"]["fluid"] = {"density": 1025, "current": [0.1, 0.2, 0]}
     scene["points"]["start"] = {"kind": "free", "initial_guess": [0, 0, -3], "mass": 50, "volume": 0.6}
     scene["points"]["ground"] = {"position": [-60, 0, -18]}
-    scene["lines"]["stay"] = {
-        "start": "ground", "end": "start", "sections": [section | {"length": 64.0}], "model": line["model"],
-        "mesh": {"cells": 26},
-    }  # fmt: skip
+    scene["lines"]["stay"] = line_between("ground", "start", section | {"length": 64.0}, model=line["model"], mesh=26)
     return scene
 
 

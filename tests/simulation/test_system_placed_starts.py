@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 import hybrid
 from hybrid.errors import SceneError
 from tests.problems import tables_with
+from tests.scenes import cable_scene, network_scene, pinned_at
 
 EA, LENGTH, MASS, GRAVITY = 4e4, 4.0, 60.0, 9.81
 SECTION = {"length": LENGTH, "mass": 0.01, "axial_stiffness": EA, "bending_stiffness": 1e3, "diameter": 0.02}
@@ -20,13 +21,12 @@ DOWN = {"kind": "straight", "direction": [0, 0, -1]}
 def between_springs(**changes: Any) -> dict[str, Any]:
     """A weight between two light rods, one above it and one below, both straight and without tension at first."""
     line = {"sections": [SECTION], "initial": DOWN, "mesh": {"cells": 2}, "model": "rod"}
-    scene = {
-        "environment": {"gravity": GRAVITY},
-        "points": {"top": {"position": [0, 0, 0]}, "foot": {"position": [0, 0, -2 * LENGTH]},
-                   "weight": {"initial_guess": [0, 0, -LENGTH], "mass": MASS}},
-        "lines": {"upper": {"start": "top", "end": "weight"} | line, "lower": {"start": "weight", "end": "foot"} | line},
-        "time": {"duration": 0.6, "step": 0.002, "rho_inf": 1.0}, "output": {"every": 0.02},
-    }  # fmt: skip
+    scene = network_scene(
+        {"top": {"position": [0, 0, 0]}, "foot": {"position": [0, 0, -2 * LENGTH]},
+         "weight": {"initial_guess": [0, 0, -LENGTH], "mass": MASS}},
+        {"upper": {"start": "top", "end": "weight"} | line, "lower": {"start": "weight", "end": "foot"} | line},
+        gravity=GRAVITY, time=(0.6, 0.002, 1.0), output=0.02
+    )  # fmt: skip
     return dict(tables_with(scene, changes))
 
 
@@ -82,12 +82,11 @@ def test_such_a_start_is_where_the_search_of_a_rest_begins() -> None:
         name: line | {"start": name, "end": "weight", "initial": {"kind": "straight", "direction": [side * away, 0, -down]}}
         for name, side in (("west", 1), ("east", -1))
     }  # fmt: skip
-    result = hybrid.static({
-        "environment": {"gravity": GRAVITY},
-        "points": {"west": {"position": [-away, 0, 0]}, "east": {"position": [away, 0, 0]},
-                   "weight": {"initial_guess": [0, 0, -down], "mass": MASS}},
-        "lines": lines,
-    })  # fmt: skip
+    result = hybrid.static(network_scene(
+        {"west": {"position": [-away, 0, 0]}, "east": {"position": [away, 0, 0]},
+         "weight": {"initial_guess": [0, 0, -down], "mass": MASS}},
+        lines, gravity=GRAVITY
+    ))  # fmt: skip
 
     def missing(z: float) -> float:
         long = np.hypot(away, z)
@@ -108,12 +107,11 @@ def hanging(model: str, cells: int, **initial: Any) -> dict[str, Any]:
     s = 2.0 * np.linspace(0.0, 1.0, 9) ** 1.3
     depth = s + (PULL * s + w * (2.0 * s - 0.5 * s**2)) / HANG["axial_stiffness"]
     corners = np.column_stack([0.0 * s, 0.0 * s, -depth])
-    return {
-        "environment": {"gravity": GRAVITY}, "mesh": {"cells": cells}, "model": model, "time": {"duration": 0.5, "step": 0.005},
-        "cable": {"sections": [HANG | {"bending_stiffness": 0.1}]}, "output": {"every": 0.01},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [0, 0, -PULL]}},
-        "initial": {"kind": "points", "points": corners.tolist(), **initial}, "dimension": 3,
-    } | ({"s": s.tolist()} if not initial else {})  # fmt: skip
+    return cable_scene(
+        HANG | {"bending_stiffness": 0.1}, pinned_at(0, 0, 0), {"kind": "free", "force": [0, 0, -PULL]},
+        gravity=GRAVITY, mesh=cells, model=model, time=(0.5, 0.005), output=0.01,
+        initial={"kind": "points", "points": corners.tolist(), **initial}, dimension=3
+    ) | ({"s": s.tolist()} if not initial else {})  # fmt: skip
 
 
 @pytest.mark.parametrize("model", ["rod", "catenary"])
@@ -136,14 +134,12 @@ def test_a_line_that_starts_stretched_as_it_hangs_stays_there(model: str) -> Non
 def test_lines_that_nothing_holds_fall_and_have_no_equilibrium() -> None:
     """Two lines that meet at a free point: their middle falls by g t^2/2; at rest they are refused."""
     line = {"sections": [SECTION | {"length": 2.0}], "mesh": {"cells": 4}, "model": "rod"}
-    scene = {
-        "environment": {"gravity": GRAVITY}, "time": {"duration": 0.5, "step": 0.01},
-        "points": {x: {"kind": "free", "initial_guess": [k, 0, 0]} for x, k in (("a", 0), ("b", 2), ("c", 4))},
-        "lines": {
-            "left": {"start": "a", "end": "b", "initial": {"kind": "straight", "direction": [1, 0, 0]}} | line,
-            "right": {"start": "b", "end": "c", "initial": {"kind": "straight", "direction": [1, 0, 0]}} | line,
-        },
-    }  # fmt: skip
+    scene = network_scene(
+        {x: {"kind": "free", "initial_guess": [k, 0, 0]} for x, k in (("a", 0), ("b", 2), ("c", 4))},
+        {"left": {"start": "a", "end": "b", "initial": {"kind": "straight", "direction": [1, 0, 0]}} | line,
+         "right": {"start": "b", "end": "c", "initial": {"kind": "straight", "direction": [1, 0, 0]}} | line},
+        gravity=GRAVITY, time=(0.5, 0.01)
+    )  # fmt: skip
     result = hybrid.run(scene, progress=None)
     for name in scene["lines"]:
         fallen = result.lines[name]["position"][:, :, 2]

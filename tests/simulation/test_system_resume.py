@@ -12,6 +12,7 @@ from bits import Stopping
 import hybrid
 import hybrid.simulation.run_record
 from hybrid.errors import ResultError, SceneError
+from tests.scenes import line_between, network_scene
 
 WAVES = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 5.0}
 SEA = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0, "waves": WAVES}}
@@ -30,21 +31,15 @@ def mooring(**tables: Any) -> dict[str, Any]:
     """Two legs with friction on the bed, a float with a force that stops, and a rod to a vessel that heaves."""
     heave = {"heave": {"amplitude": 1.5, "period": 8}, "ramp": 6}
     force = {"value": [200, 0, 0], "until": 3.1}
-    return {
-        "title": "float", "environment": SEA | {"seabed": {"z": -100, "stiffness": 5000, "friction": 0.5}},
-        "points": {
-            "west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
-            "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 6, "drag_area": 3,
-                      "force": force},
-            "vessel": {"position": [70, 0, 2], "motion": heave},
-        },
-        "lines": {
-            "west": {"start": "west", "end": "float", "sections": [LEG], "mesh": {"cells": 30}},
-            "east": {"start": "float", "end": "east", "sections": [LEG], "mesh": {"cells": 30}},
-            "hose": {"start": "float", "end": "vessel", "mesh": {"cells": 30}, "sections": [HOSE]},
-        },
-        "time": {"duration": 8.0, "step": 0.05},
-    } | tables  # fmt: skip
+    return network_scene(
+        {"west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
+         "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 6, "drag_area": 3,
+                   "force": force},
+         "vessel": {"position": [70, 0, 2], "motion": heave}},
+        {"west": line_between("west", "float", LEG, mesh=30), "east": line_between("float", "east", LEG, mesh=30),
+         "hose": line_between("float", "vessel", HOSE, mesh=30)},
+        title="float", environment=SEA | {"seabed": {"z": -100, "stiffness": 5000, "friction": 0.5}}, time=(8.0, 0.05)
+    ) | tables  # fmt: skip
 
 
 def spar() -> dict[str, Any]:
@@ -54,22 +49,19 @@ def spar() -> dict[str, Any]:
         "mesh": {"cells": 20},
     }
     places = {"east": (400, 0), "north": (-200, 346), "south": (-200, -346)}
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.4, 0, 0], "surface": 0.0}},
-        "points": {name: {"position": [x, y, -150]} for name, (x, y) in places.items()}
-        | {f"to_{name}": {"body": "spar", "place": [x / 80, y / 80, -20]} for name, (x, y) in places.items()},
-        "bodies": {
-            "spar": {
-                "initial_guess": [0, 0, 9], "mass": 3e6, "centre": [0, 0, -25], "inertia": [8e8, 8e8, 4e7],
-                "added_mass": [2.6e6, 2.6e6, 3e5, 1.5e9, 1.5e9, 0], "damping": [2e5, 2e5, 1e5, 2e7, 2e7, 1e7],
-                "hydrostatics": {"heave": 7.8e5, "roll": 1.2e8, "pitch": 1.2e8},
-                "force": {"value": [3e5, 0, 0], "until": 5},
-                "members": [{"start": [0, 0, -50], "end": [0, 0, 20], "diameter": 8, "drag": 1, "added_mass": 1}],
-            }
-        },
-        "lines": {name: {"start": name, "end": f"to_{name}"} | line for name in places},
-        "time": {"duration": 7, "step": 0.1},
-    }  # fmt: skip
+    return network_scene(
+        {name: {"position": [x, y, -150]} for name, (x, y) in places.items()} | {
+            f"to_{name}": {"body": "spar", "place": [x / 80, y / 80, -20]} for name, (x, y) in places.items()},
+        {name: {"start": name, "end": f"to_{name}"} | line for name in places},
+        fluid={"density": 1025, "current": [0.4, 0, 0], "surface": 0.0},
+        bodies={"spar": {"initial_guess": [0, 0, 9], "mass": 3e6, "centre": [0, 0, -25], "inertia": [8e8, 8e8, 4e7],
+                         "added_mass": [2.6e6, 2.6e6, 3e5, 1.5e9, 1.5e9, 0], "damping": [2e5, 2e5, 1e5, 2e7, 2e7, 1e7],
+                         "hydrostatics": {"heave": 7.8e5, "roll": 1.2e8, "pitch": 1.2e8},
+                         "force": {"value": [3e5, 0, 0], "until": 5},
+                         "members": [{"start": [0, 0, -50], "end": [0, 0, 20], "diameter": 8, "drag": 1,
+                                      "added_mass": 1}]}},
+        time=(7, 0.1)
+    )  # fmt: skip
 
 
 def clamped() -> dict[str, Any]:
@@ -77,26 +69,20 @@ def clamped() -> dict[str, Any]:
     pipe = {"mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "bending_stiffness": 300, "drag": {"normal": 1.2}}
     turns = {"roll": {"amplitude": 4, "period": 5}, "heave": {"amplitude": 0.3, "period": 4}, "ramp": 4}
     up = {"tangent": [0, 0, 1]}
-    return {
-        "environment": SEA,
-        "points": {
-            "foot": {"position": [0, 0, -40]}, "tee": {"initial_guess": [1, 0, -21], "mass": 20, "volume": 0.2},
-            "lug": {"body": "ship", "place": [1, 0, -4]}, "eye": {"body": "float", "place": [0, 0, -1]},
-        },
-        "bodies": {
-            "ship": {"position": [1, 0, 2], "motion": turns},
-            "float": {"initial_guess": [9, 0, -14], "mass": 200, "volume": 0.4, "inertia": [90, 90, 60]},
-        },
-        "lines": {
-            "low": {"start": "foot", "end": "tee", "connections": {"start": up, "end": up}, "mesh": {"cells": 20},
-                    "sections": [pipe | {"length": 20}]},
-            "high": {"start": "lug", "end": "tee", "mesh": {"cells": 20}, "sections": [pipe | {"length": 19.5}],
-                     "connections": {"start": {"tangent": [0, 0, -1], "bend_stiffness": 5e3}, "end": {"tangent": [0, 0, -1]}}},
-            "branch": {"start": "tee", "end": "eye", "connections": {"start": {"tangent": [1, 0, 0]}, "end": up},
-                       "mesh": {"cells": 20}, "sections": [pipe | {"length": 12}]},
-        },
-        "time": {"duration": 2.0, "step": 0.05},
-    }  # fmt: skip
+    return network_scene(
+        {"foot": {"position": [0, 0, -40]}, "tee": {"initial_guess": [1, 0, -21], "mass": 20, "volume": 0.2},
+         "lug": {"body": "ship", "place": [1, 0, -4]}, "eye": {"body": "float", "place": [0, 0, -1]}},
+        {"low": line_between("foot", "tee", pipe | {"length": 20}, connections={"start": up, "end": up}, mesh=20),
+         "high": line_between("lug", "tee", pipe | {"length": 19.5}, mesh=20,
+                              connections={"start": {"tangent": [0, 0, -1], "bend_stiffness": 5e3},
+                                           "end": {"tangent": [0, 0, -1]}}),
+         "branch": line_between("tee", "eye", pipe | {"length": 12},
+                                connections={"start": {"tangent": [1, 0, 0]}, "end": up}, mesh=20)},
+        environment=SEA,
+        bodies={"ship": {"position": [1, 0, 2], "motion": turns},
+                "float": {"initial_guess": [9, 0, -14], "mass": 200, "volume": 0.4, "inertia": [90, 90, 60]}},
+        time=(2.0, 0.05)
+    )  # fmt: skip
 
 
 SCENES = {"mooring": mooring(), "spar": spar(), "clamped": clamped()}
@@ -111,13 +97,11 @@ def stopping(monkeypatch: pytest.MonkeyPatch) -> Stopping:
 def test_rotations_go_on_beyond_half_a_turn(tmp_path: Path) -> None:
     """The yaw of a body that is turned, through 180 deg and across a resume, is that of its motion."""
     turns = {"yaw": {"amplitude": 20.0, "period": 2.0}, "ramp": 1.0}
-    scene = {
-        "environment": SEA,
-        "points": {"foot": {"position": [0, 0, -30]}, "lug": {"body": "ship", "place": [0.1, 0, -1]}},
-        "bodies": {"ship": {"position": [1, 0, 0], "rotation": [0, 0, 180], "motion": turns}},
-        "lines": {"leg": {"start": "foot", "end": "lug", "sections": [LEG | {"length": 32}], "mesh": {"cells": 6}}},
-        "time": {"duration": 1.3, "step": 0.1}, "output": {"every": 0.1},
-    }  # fmt: skip
+    scene = network_scene(
+        {"foot": {"position": [0, 0, -30]}, "lug": {"body": "ship", "place": [0.1, 0, -1]}},
+        {"leg": line_between("foot", "lug", LEG | {"length": 32}, mesh=6)}, environment=SEA,
+        bodies={"ship": {"position": [1, 0, 0], "rotation": [0, 0, 180], "motion": turns}}, time=(1.3, 0.1), output=0.1
+    )  # fmt: skip
     path = tmp_path / "run.h5"
     hybrid.run(scene, path).close()
     with hybrid.resume(path, until=4.0) as result:

@@ -10,6 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, ResultError, SceneError
+from tests.scenes import line_between, network_scene
 
 WAVES = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 5.0}
 SEA = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0, "waves": WAVES}}
@@ -33,24 +34,17 @@ def mooring(**tables: Any) -> dict[str, Any]:
     """Two legs from the seabed to a float, and a hose with bending from there to a vessel that heaves."""
     leg = SECTION | {"length": 140, "added_mass": {"normal": 1.0}}
     heave = {"heave": {"amplitude": 1.5, "period": 8}, "ramp": 6}
-    return {
-        "title": "float", "environment": SEA | {"seabed": {"z": -100, "stiffness": 5000}},
-        "points": {
-            "west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
-            "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 6, "drag_area": 3},
-            "vessel": {"position": [70, 0, 2], "motion": heave},
-        },
-        "lines": {
-            "west": {"start": "west", "end": "float", "sections": [leg], "mesh": {"cells": 30}},
-            "east": {"start": "float", "end": "east", "sections": [leg], "mesh": {"cells": 30}},
-            "hose": {
-                "start": "float", "end": "vessel", "mesh": {"cells": 30},
-                "sections": [{"length": 100, "mass": 6, "diameter": 0.08, "axial_stiffness": 5e6,
-                              "bending_stiffness": 300, "drag": {"normal": 1.1}, "max_tension": 3000}],
-            },
-        },
-        "time": TIME,
-    } | tables  # fmt: skip
+    return network_scene(
+        {"west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
+         "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 6, "drag_area": 3},
+         "vessel": {"position": [70, 0, 2], "motion": heave}},
+        {"west": line_between("west", "float", leg, mesh=30), "east": line_between("float", "east", leg, mesh=30),
+         "hose": line_between("float", "vessel",
+                              {"length": 100, "mass": 6, "diameter": 0.08, "axial_stiffness": 5e6,
+                               "bending_stiffness": 300, "drag": {"normal": 1.1}, "max_tension": 3000},
+                              mesh=30)},
+        title="float", environment=SEA | {"seabed": {"z": -100, "stiffness": 5000}}, time=TIME
+    ) | tables  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -152,17 +146,12 @@ def test_a_file_is_what_memory_is(tmp_path: Path, moved: hybrid.Result) -> None:
 def test_chains_on_the_seabed_bear_what_they_weigh() -> None:
     """A float on two chains: what the anchors and the bed bear is the weight less the lift of the float, to 1e-6."""
     chain = {"length": 190, "mass": 20.0, "diameter": 0.05, "axial_stiffness": 1e7}
-    tables = {
-        "environment": {"fluid": {"density": 1025}, "seabed": {"z": -100, "stiffness": 5000}},
-        "points": {
-            "west": {"position": [-150, 0, -100]}, "east": {"position": [150, 10, -100]},
-            "float": {"kind": "free", "initial_guess": [10, 0, -20], "mass": 900, "volume": 3.5},
-        },
-        "lines": {
-            "west": {"start": "west", "end": "float", "sections": [chain], "mesh": {"cells": 60}},
-            "east": {"start": "float", "end": "east", "sections": [chain], "mesh": {"cells": 60}},
-        },
-    }  # fmt: skip
+    tables = network_scene(
+        {"west": {"position": [-150, 0, -100]}, "east": {"position": [150, 10, -100]},
+         "float": {"kind": "free", "initial_guess": [10, 0, -20], "mass": 900, "volume": 3.5}},
+        {"west": line_between("west", "float", chain, mesh=60), "east": line_between("float", "east", chain, mesh=60)},
+        fluid={"density": 1025}, seabed={"z": -100, "stiffness": 5000}
+    )  # fmt: skip
     result = hybrid.static(tables)
     assert all(line.grounded_length[-1] > 20.0 for line in result.lines.values())
     g = 9.81
@@ -201,14 +190,10 @@ def test_end_forces_of_a_damped_rod_do_not_depend_on_which_line_carries_the_poin
     hose = {"length": 8, "mass": 5, "diameter": 0.1, "axial_stiffness": 1e6, "bending_stiffness": 2000}
     hose["damping"] = {"stiffness": 0.5}
     lines = {
-        "rod": {"start": "ship", "end": "float", "sections": [hose], "model": "rod", "mesh": {"cells": 32}},
-        "leg": {
-            "start": "anchor",
-            "end": "float",
-            "sections": [{"length": 8, "mass": 2, "axial_stiffness": 1e6}],
-            "model": "catenary",
-            "mesh": {"cells": 8},
-        },
+        "rod": line_between("ship", "float", hose, model="rod", mesh=32),
+        "leg": line_between(
+            "anchor", "float", {"length": 8, "mass": 2, "axial_stiffness": 1e6}, model="catenary", mesh=8
+        ),
     }
     moved = {"heave": {"amplitude": 0.5, "period": 2.0}, "ramp": 1.0}
     scene = {

@@ -14,6 +14,7 @@ from hybrid.kernels.state import books
 from hybrid.model.plan import SAME_STOP, falls_on
 from hybrid.simulation import progress
 from hybrid.simulation import run as run_module
+from tests.scenes import line_between, network_scene
 
 ROPE = {"mass": 20.0, "diameter": 0.06, "axial_stiffness": 2e7, "drag": {"normal": 1.2}}
 HEAVE = {"heave": {"amplitude": 1.0, "period": 4.0}, "ramp": 4}
@@ -110,35 +111,24 @@ def test_progress_is_told_between_outputs_where_python_looks_at_every_step(monke
 
 # A ship that moves and turns, with a line that is clamped to it and one that turns freely, and a buoy that is loaded by
 # a force that grows until it stops, and by a moment that follows a table.
-TOWED = {
-    "environment": {"fluid": {"density": 1025, "current": [0.3, 0.1, 0]}},
-    "points": {
-        "foot": {"position": [-60, 0, -50]},
-        "bow": {"body": "ship", "place": [3, 1, -2]},
-        "stern": {"body": "ship", "place": [-20, 0.5, -3]},
-        "top": {"body": "buoy", "place": [0, 0, 1]},
-        "anchor": {"position": [-20, 10, -60]},
-    },
-    "bodies": {
-        "ship": {
-            "position": [60, 5, 0], "rotation": [5, 0, 30],
-            "motion": {"heave": {"amplitude": 1.0, "period": 4.0}, "surge": {"amplitude": 0.4, "period": 5.0},
-                       "pitch": {"amplitude": 3.0, "period": 4.5}, "yaw": {"amplitude": 5.0, "period": 6.0}, "ramp": 2},
-        },
-        "buoy": {
-            "initial_guess": [0, 0, -10], "mass": 300, "volume": 1.2, "inertia": [200, 200, 200],
-            "force": {"value": [300, 200, 0], "ramp": 1.0, "until": 1.5},
-            "moment": {"history": [[0, 0, 0, 0], [0.7, 80, 20, 0], [3, -50, 0, 30]]},
-        },
-    },
-    "lines": {
-        "first": {"start": "foot", "end": "top", "sections": [ROPE | {"length": 75}], "mesh": {"cells": 8}},
-        "last": {"start": "top", "end": "bow", "sections": [ROPE | {"length": 72}], "mesh": {"cells": 8}},
-        "hose": {"start": "anchor", "end": "stern", "sections": [ROPE | {"length": 85, "bending_stiffness": 2e4}],
-                 "connections": {"end": {"tangent": [0.6, 0, 0.8]}}, "mesh": {"cells": 10}},
-    },
-    "time": {"duration": 2.0, "step": 0.05}, "output": {"every": 0.1, "points": 7},
-}  # fmt: skip
+TOWED = network_scene(
+    {"foot": {"position": [-60, 0, -50]}, "bow": {"body": "ship", "place": [3, 1, -2]},
+     "stern": {"body": "ship", "place": [-20, 0.5, -3]}, "top": {"body": "buoy", "place": [0, 0, 1]},
+     "anchor": {"position": [-20, 10, -60]}},
+    {"first": line_between("foot", "top", ROPE | {"length": 75}, mesh=8),
+     "last": line_between("top", "bow", ROPE | {"length": 72}, mesh=8),
+     "hose": line_between("anchor", "stern", ROPE | {"length": 85, "bending_stiffness": 2e4},
+                          connections={"end": {"tangent": [0.6, 0, 0.8]}}, mesh=10)},
+    fluid={"density": 1025, "current": [0.3, 0.1, 0]},
+    bodies={"ship": {"position": [60, 5, 0], "rotation": [5, 0, 30],
+                     "motion": {"heave": {"amplitude": 1.0, "period": 4.0}, "surge": {"amplitude": 0.4, "period": 5.0},
+                                "pitch": {"amplitude": 3.0, "period": 4.5}, "yaw": {"amplitude": 5.0, "period": 6.0},
+                                "ramp": 2}},
+            "buoy": {"initial_guess": [0, 0, -10], "mass": 300, "volume": 1.2, "inertia": [200, 200, 200],
+                     "force": {"value": [300, 200, 0], "ramp": 1.0, "until": 1.5},
+                     "moment": {"history": [[0, 0, 0, 0], [0.7, 80, 20, 0], [3, -50, 0, 30]]}}},
+    time=(2.0, 0.05), output=(0.1, 7)
+)  # fmt: skip
 
 
 def in_waves() -> dict[str, Any]:

@@ -15,6 +15,7 @@ from hybrid.errors import SceneError
 from hybrid.simulation.run_zones import RunKinds
 from tests.combinations.pairs import as_network
 from tests.said import ONE, both_ways, line_of, said
+from tests.scenes import cable_scene, network_scene, pinned_at
 
 ROPE = {
     "length": 60, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100,
@@ -28,12 +29,10 @@ LINE = {"sections": [ROPE], "mesh": {"cells": 30}, "model": MODEL}
 def slackening(duration: float, section: dict[str, Any] = ROPE, **more: Any) -> dict[str, Any]:
     """A rope whose end moves towards its start."""
     end = {"kind": "pinned", "position": [50, 0, 10], "motion": {"travel": {"by": [-14, 0, 0], "over": 3.0}}}
-    return {
-        "environment": SEA, "time": {"duration": duration, "step": 0.02}, "cable": {"sections": [section]},
-        "mesh": {"cells": 30}, "model": MODEL, "initial": "equilibrium", "contact": {"self": False}, "dimension": 3,
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
-        "output": {"every": 0.1, "points": 31, "criteria": True, "exact": True},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), end, environment=SEA, time=(duration, 0.02), mesh=30, model=MODEL,
+        contact={"self": False}, dimension=3, output={"every": 0.1, "points": 31, "criteria": True, "exact": True}
+    ) | more  # fmt: skip
 
 
 def mooring(**more: Any) -> dict[str, Any]:
@@ -43,12 +42,11 @@ def mooring(**more: Any) -> dict[str, Any]:
     free = {"initial_guess": [0, 0, -50], "mass": 300, "volume": 0.36, "drag_area": 1, "force": {"history": rows}}
     angle = {"kind": "end_angle", "end": "end", "direction": [0, 0, -1]}
     asked = {"angle": angle | {"line": "north"}, "carrying": angle | {"line": "east"}}
-    return {
-        "environment": SEA,
-        "points": {name: {"position": x} for name, x in feet.items()} | {"float": free},
-        "lines": {name: {"start": name, "end": "float"} | LINE for name in feet},
-        "time": {"duration": 5.0, "step": 0.02}, "output": {"every": 0.1, "points": 31, "quantities": asked, "criteria": True},
-    } | more  # fmt: skip
+    return network_scene(
+        {name: {"position": x} for name, x in feet.items()} | {"float": free},
+        {name: {"start": name, "end": "float"} | LINE for name in feet}, environment=SEA, time=(5.0, 0.02),
+        output={"every": 0.1, "points": 31, "quantities": asked, "criteria": True}
+    ) | more  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import pytest
 
 import hybrid
 from tests.inside import OnlyLine
+from tests.scenes import cable_scene
 
 C, EA, GJ, L, G = 2e-3, 1e5, 20.0, 200.0, 9.81
 W = 2.0 * G  # N/m
@@ -22,15 +23,9 @@ def section(**more):
 def hanging(model, end, force, **more):
     sections = more.pop("sections", [section()])
     return hybrid.validate_scene(
-        {
-            "environment": {"gravity": more.pop("gravity", G)},
-            "cable": {"sections": sections},
-            "ends": {
-                "start": {"kind": "clamped", "position": [0, 0, 0], **DOWN},
-                "end": {"kind": end, "force": [0, 0, -force], **(DOWN if end == "guided" else {})},
-            },
-            "initial": "equilibrium", "model": model, "mesh": {"cells": 200}, "output": {"points": 41}, **more,
-        }
+        cable_scene(sections, {"kind": "clamped", "position": [0, 0, 0], **DOWN},
+                     {"kind": end, "force": [0, 0, -force], **(DOWN if end == "guided" else {})},
+                     gravity=more.pop("gravity", G), model=model, mesh=200, output={"points": 41}) | more
     )  # fmt: skip
 
 
@@ -77,16 +72,9 @@ def sag(model, step, turns=0.0, **more):
     part = section(length=60.0, mass=0.6, diameter=0.02, bending_stiffness=2.0, torsional_stiffness=8.0,
                    axial_stiffness=5e4, tension_torque=5e-3)  # fmt: skip
     return hybrid.validate_scene(
-        {
-            "environment": {"gravity": G},
-            "cable": {"sections": [part]},
-            "ends": {
-                "start": {**ends[0], "position": [0, 0, 0]},
-                "end": {**ends[1], "position": [52, 0, 0], "motion": swing, "turns": turns},
-            },
-            "initial": "equilibrium", "model": model, "mesh": {"cells": 120},
-            "time": {"duration": 6.0, "step": step, "rho_inf": 0.9}, "output": {"every": 0.5, "points": 61}, **more,
-        }
+        cable_scene(part, {**ends[0], "position": [0, 0, 0]},
+                     {**ends[1], "position": [52, 0, 0], "motion": swing, "turns": turns}, gravity=G, model=model,
+                     mesh=120, time=(6.0, step, 0.9), output=(0.5, 61)) | more
     )  # fmt: skip
 
 
@@ -146,11 +134,10 @@ def test_cells_that_follow_the_curvature_carry_it():
 
     def run(model, cells, torque):
         tether = section(length=30.0, mass=3.0, bending_stiffness=40.0, tension_torque=torque, damping={"mass": 0.2})
-        return hybrid.run({
-            "environment": {"gravity": G}, "cable": {"sections": [tether]}, "ends": {"start": clamp, "end": far},
-            "initial": "equilibrium", "contact": {"self": False}, "model": model, "mesh": {"cells": cells},
-            "time": {"duration": 3.0, "step": 0.02}, "output": {"every": 0.5, "points": 31},
-        })  # fmt: skip
+        return hybrid.run(cable_scene(
+            tether, clamp, far, gravity=G, contact={"self": False}, model=model, mesh=cells, time=(3.0, 0.02),
+            output=(0.5, 31)
+        ))  # fmt: skip
 
     fine, plain = run("rod", 400, 5e-3), run("rod", 400, 0.0)
     found, without = run(follows, 40, 5e-3), run(follows, 40, 0.0)
@@ -172,15 +159,13 @@ def simulation():
     section = {"length": 6.0, "mass": 0.6, "diameter": 0.02, "bending_stiffness": 10.0, "torsional_stiffness": 8.0}
     sway = {"motion": {"sway": {"amplitude": 0.5, "period": 4.0}, "ramp": 1.0}}
     clamp = {"kind": "clamped", "normal": [0, 1, 0]}
-    scene = hybrid.validate_scene(
-        {
-            "environment": {"gravity": 9.81}, "cable": {"sections": [section | {"damping": {"mass": 0.2}}]},
-            "ends": {"start": clamp | {"position": [0, 0, 0], "tangent": [0.75, 0, -0.66]},
-                     "end": clamp | {"position": [5.5, 0, 0], "tangent": [0.75, 0, 0.66], "turns": 2.0} | sway},
-            "initial": "equilibrium", "time": {"duration": 5.0, "step": 0.01}, "output": {"every": 1.0},
-            "model": {"kind": "zones", "zones": [{"rod": 1.5, "cells": 6}, {"catenary": 3, "cells": 12}, {"rod": 1.5, "cells": 6}]},
-        }
-    )  # fmt: skip
+    scene = hybrid.validate_scene(cable_scene(
+        section | {"damping": {"mass": 0.2}}, clamp | {"position": [0, 0, 0], "tangent": [0.75, 0, -0.66]},
+        clamp | {"position": [5.5, 0, 0], "tangent": [0.75, 0, 0.66], "turns": 2.0} | sway, gravity=9.81,
+        time=(5.0, 0.01), output=1.0,
+        model={"kind": "zones",
+               "zones": [{"rod": 1.5, "cells": 6}, {"catenary": 3, "cells": 12}, {"rod": 1.5, "cells": 6}]}
+    ))  # fmt: skip
     return hybrid.Simulation(scene)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene
 
 C, EA, GJ, L = 5e-3, 5e4, 8.0, 60.0
 TABLE = [[0, 0], [0.002, 100], [0.004, 240], [0.02, 2500]]
@@ -66,12 +67,11 @@ def pulled(law: dict[str, Any], model: Any, end: str, force: Any, turns: float =
     """A straight line without weight that is pulled along x, and twisted."""
     far = {"kind": end, "force": force if isinstance(force, dict) else [force, 0, 0]}
     far |= ALONG | {"turns": turns} if end == "guided" else {}
-    return {
-        "environment": {"gravity": 0}, "cable": {"sections": more.pop("sections", [section(law)])},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], **ALONG}, "end": far},
-        "initial": {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, 0]}, "model": model,
-        "mesh": {"cells": 30}, "output": {"points": 21},
-    } | more  # fmt: skip
+    return cable_scene(
+        more.pop("sections", [section(law)]), {"kind": "clamped", "position": [0, 0, 0], **ALONG}, far, gravity=0,
+        initial={"kind": "equilibrium", "guess": "straight", "direction": [1, 0, 0]}, model=model, mesh=30,
+        output={"points": 21}
+    ) | more  # fmt: skip
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -162,16 +162,11 @@ def sag(law: dict[str, Any], model: Any = "rod", step: float = 0.01, **more: Any
     ends = [{"kind": "clamped", "tangent": [0.6, 0, z], "normal": [0, 1, 0]} for z in (-0.8, 0.8)]
     damping = {"damping": {"stiffness": more.pop("damped")}} if "damped" in more else {}
     turns = more.pop("turns", 0.0)
-    return {
-        "environment": {"gravity": 9.81},
-        "cable": {"sections": [section(law, **damping)]},
-        "ends": {
-            "start": {**ends[0], "position": [0, 0, 0]},
-            "end": {**ends[1], "position": [52, 0, 0], "motion": swing, "turns": turns},
-        },
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 120},
-        "time": {"duration": 6.0, "step": step, "rho_inf": 0.9}, "output": {"every": 0.5, "points": 61}, **more,
-    }  # fmt: skip
+    return (
+        cable_scene(section(law, **damping), {**ends[0], "position": [0, 0, 0]},
+                    {**ends[1], "position": [52, 0, 0], "motion": swing, "turns": turns}, gravity=9.81, model=model,
+                    mesh=120, time=(6.0, step, 0.9), output=(0.5, 61)) | more
+    )  # fmt: skip
 
 
 TAU = 0.01  # s, of damping

@@ -19,6 +19,7 @@ from hybrid.scene.root import in_full
 from hybrid.scene.schema import Motion
 from hybrid.simulation import equilibrium
 from tests.said import both_ways, line_of, said
+from tests.scenes import cable_scene, pinned_at
 
 GJ, LENGTH = 0.789, 100.0
 SECTION = {"length": LENGTH, "mass": 1.0, "axial_stiffness": 1e4, "bending_stiffness": 1.345,
@@ -103,12 +104,11 @@ def test_an_equilibrium_that_has_lost_a_turn_is_refused(monkeypatch):
 
 REFUSED = {
     "swivel": ({"first": {"swivel": True}}, r"ends.start turns freely"),
-    "free": ({"ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": clamped([100, 0, 0], turns=2)}},
-             r"ends.start turns freely"),
+    "free": ({"ends": {"start": pinned_at(0, 0, 0), "end": clamped([100, 0, 0], turns=2)}}, r"ends.start turns freely"),
     "torsion": ({"section": {"torsional_stiffness": None}}, r"torsional_stiffness(?s:.*)ends.end.turns"),
     "plane": ({"dimension": 2}, r"ends.end.turns(?s:.*)dimension"),
     "nan": ({"second": {"turns": math.nan}}, r"ends.end.turns"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -227,9 +227,7 @@ def test_cells_that_follow_take_the_twist_of_the_ends():
                "torsional_stiffness": 1.5, "damping": {"mass": 0.5, "stiffness": 0.01}}  # fmt: skip
     travel = {"travel": {"by": [-1.5, 0, 0], "over": 20.0}}
     end = clamped([9.95, 0, 0], turns=turns, motion=travel)
-    scene = {"cable": {"sections": [section]}, "environment": {"fluid": {"density": 1025.0}},
-             "ends": {"start": clamped([0, 0, 0]), "end": end}, "initial": "equilibrium", "model": FOLLOWS,
-             "time": {"duration": 0.4, "step": 0.02}}  # fmt: skip
+    scene = cable_scene(section, clamped([0, 0, 0]), end, fluid={"density": 1025.0}, model=FOLLOWS, time=(0.4, 0.02))
     result = hybrid.run(scene)
     assert "unresolved twist" not in kinds(result)
     assert abs(result["torque"][-1]).max() == pytest.approx(1.5 * 2.0 * math.pi * turns / 10.0, rel=0.02)

@@ -11,6 +11,7 @@ import pytest
 import hybrid
 from hybrid.simulation.failure import kinks_at
 from hybrid.store.verdicts import MET, verdicts_of
+from tests.scenes import cable_scene, pinned_at
 
 KIND = "kink at joint"
 
@@ -18,10 +19,7 @@ KIND = "kink at joint"
 def sagging(border: float, **more: Any) -> dict[str, Any]:
     """A cable of 20 m over 8 m, a stiff rod to the border and a catenary from there on."""
     section = {"length": 20.0, "mass": 1.0, "bending_stiffness": 20.0}
-    ends = {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [8, 0, 0]},
-    }
+    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(8, 0, 0)}
     zones = {"kind": "zones", "zones": [{"rod": border}, {"catenary": 20.0 - border}]}
     tables = {"cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": zones}
     return tables | {"mesh": {"cells": 80}} | more
@@ -224,12 +222,10 @@ def test_it_is_said_once_in_a_motion_and_not_of_one_stiffness() -> None:
 def hanging(cells: int) -> dict[str, Any]:
     """A heavy chain between near ends, whose section changes beside its lowest point."""
     section = {"mass": 30.0, "diameter": 0.1, "axial_stiffness": 1e8, "length": 22.0}
-    return {
-        "environment": {"fluid": {"density": 1025}},
-        "cable": {"sections": [section, section | {"length": 18.0, "mass": 24.0}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [8, 0, -6]}},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": cells}, "dimension": 3,
-    }  # fmt: skip
+    return cable_scene(
+        [section, section | {"length": 18.0, "mass": 24.0}], pinned_at(0, 0, 0), pinned_at(8, 0, -6),
+        fluid={"density": 1025}, model="catenary", mesh=cells, dimension=3
+    )  # fmt: skip
 
 
 def negative(result: hybrid.Result) -> list[float]:

@@ -11,6 +11,7 @@ from hybrid.kernels.state import books as b
 from hybrid.model.resolution import first_resolution
 from hybrid.simulation.vibration_steps import VibrationSteps
 from tests.said import both_ways, line_of, said
+from tests.scenes import cable_scene, pinned_at
 
 PERIOD = 4.0 * 12.0 * (2.0 / 1e5) ** 0.5
 
@@ -22,15 +23,10 @@ def sag(ramp=1.0, accuracy="3%", duration=10.0, period=2.0):
         "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
     }  # fmt: skip
     motion = {"heave": {"amplitude": 0.3, "period": period}, "ramp": ramp}
-    return hybrid.validate_scene({
-        "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -5]},
-            "end": {"kind": "pinned", "position": [10, 0, -5], "motion": motion},
-        },
-        "initial": "equilibrium", "model": "rod", "time": {"duration": duration}, "accuracy": accuracy,
-        "output": {"every": 0.1, "points": 25},
-    })  # fmt: skip
+    return hybrid.validate_scene(cable_scene(
+        section, pinned_at(0, 0, -5), pinned_at(10, 0, -5, motion=motion), fluid={"density": 1025}, model="rod",
+        time={"duration": duration}, accuracy=accuracy, output=(0.1, 25)
+    ))  # fmt: skip
 
 
 def watched(scene=None):

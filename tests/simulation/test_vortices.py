@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import hybrid
 from hybrid.errors import SceneError
+from tests.scenes import cable_scene, pinned_at
 
 # A cylinder of 1 m: kg, N/m, m; kg/m3; coefficients of the model.
 MASS, SPRING, D, RHO, DRAG = 16.79, 1218.0, 0.1, 1000.0, 1.2
@@ -27,16 +28,10 @@ def on_springs(U: float, step: float = 0.02, **more: Any) -> dict[str, Any]:
         "max_strain": 0.2, "drag": {"normal": DRAG}, "added_mass": {"normal": 1.0},
         "vortices": {"lift": LIFT, "center": CENTER, "low": LOW, "high": HIGH},
     }  # fmt: skip
-    return {
-        "environment": {"gravity": 0, "fluid": {"density": RHO, "current": [0, U, 0]}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [2 * half, 0, 0]},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 2},
-        "time": {"duration": 40, "step": step, "rho_inf": 1.0},
-        "output": {"every": 0.04, "points": 3, "exact": True},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(2 * half, 0, 0), gravity=0, fluid={"density": RHO, "current": [0, U, 0]},
+        model="catenary", mesh=2, time=(40, step, 1.0), output={"every": 0.04, "points": 3, "exact": True}
+    ) | more  # fmt: skip
 
 
 def frequency(t: Any, x: Any) -> float:
@@ -120,15 +115,11 @@ def stepped_current(**vortices: float) -> dict[str, Any]:
         "length": length, "mass": mass * L / length, "diameter": wide, "axial_stiffness": stiffness,
         "bending_stiffness": 29.88, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}, "vortices": vortices,
     }  # fmt: skip
-    return {
-        "environment": {"fluid": {"density": RHO, "current": [{"z": z, "velocity": [u, 0, 0]} for z, u in flow]}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [0, 0, L]},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 30}, "contact": {"self": False},
-        "time": {"duration": 30, "step": 0.025}, "output": {"every": 0.05, "points": 51, "exact": True},
-    }  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(0, 0, L),
+        fluid={"density": RHO, "current": [{"z": z, "velocity": [u, 0, 0]} for z, u in flow]}, model="rod", mesh=30,
+        contact={"self": False}, time=(30, 0.025), output={"every": 0.05, "points": 51, "exact": True}
+    )  # fmt: skip
 
 
 @pytest.mark.long
@@ -159,16 +150,11 @@ def catenary(model: Any = "rod", duration: float = 60.0, **more: Any) -> dict[st
         "drag": {"normal": 1.2, "tangential": 0.08}, "added_mass": {"normal": 2.0},
         "vortices": {"lift": 0.7, "center": 0.18, "low": 0.1, "high": 0.26},
     }  # fmt: skip
-    return {
-        "environment": {"gravity": 9.80665, "fluid": {"density": 1000, "current": [0.2, 0, 0]}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [-21.0425, 0, -10]},
-            "end": {"kind": "pinned", "position": [0, 0, -1]},
-        },
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 40}, "contact": {"self": False},
-        "time": {"duration": duration, "step": 0.04}, "output": {"every": 0.08, "points": 51, "exact": True},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, pinned_at(-21.0425, 0, -10), pinned_at(0, 0, -1), gravity=9.80665,
+        fluid={"density": 1000, "current": [0.2, 0, 0]}, model=model, mesh=40, contact={"self": False},
+        time=(duration, 0.04), output={"every": 0.08, "points": 51, "exact": True}
+    ) | more  # fmt: skip
 
 
 @pytest.mark.long

@@ -11,6 +11,7 @@ from test_payout import exchanged
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
+from tests.scenes import cable_scene, pinned_at
 
 G = 9.81
 
@@ -22,11 +23,9 @@ def vertical(
     held = {"tension": 600.0, "inertia": 100.0, **winch}
     end = {"kind": "pinned", "position": [0, 0, 0], "payout": {"longest": 90.0, "winch": held}}
     start: dict[str, Any] = {"kind": "body", "mass": bob, "volume": 0.0} if bob else {"kind": "free"}
-    return {
-        "cable": {"sections": [{"length": 40.0, "mass": m}]}, "ends": {"start": start, "end": end},
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
-        "time": {"duration": duration, "step": step}, "output": {"every": 0.5},
-    }  # fmt: skip
+    return cable_scene(
+        {"length": 40.0, "mass": m}, start, end, model="catenary", mesh=20, time=(duration, step), output=0.5
+    )
 
 
 def sagging(model: str = "rod", duration: float = 20.0, step: float = 0.05) -> dict[str, Any]:
@@ -36,11 +35,7 @@ def sagging(model: str = "rod", duration: float = 20.0, step: float = 0.05) -> d
         "kind": "pinned", "position": [80, 0, 0], "motion": {"surge": {"amplitude": 1.0, "period": 7.0}, "ramp": 7.0},
         "payout": {"longest": 150, "winch": {"tension": 3000.0, "inertia": 200.0, "damping": 100.0}},
     }  # fmt: skip
-    return {
-        "cable": {"sections": [section]}, "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 40}, "time": {"duration": duration, "step": step},
-        "output": {"every": 0.5},
-    }  # fmt: skip
+    return cable_scene(section, pinned_at(0, 0, 0), end, model=model, mesh=40, time=(duration, step), output=0.5)
 
 
 def clamped(scene: dict[str, Any], tangent: list[float]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from test_winch import G, blend
 
 import hybrid
 from tests.combinations.pairs import as_network
+from tests.scenes import line_between, network_scene
 from tests.validation.obstacle_scenes import CENTRELINE
 from tests.validation.test_validation_moving_obstacles import weights
 
@@ -29,15 +30,12 @@ def lowered(winch_first: bool = True, model: str = "catenary", clamp: bool = Fal
     held = {"kind": "clamped", "tangent": [0, 0, -1 if winch_first else 1]} if clamp else {}
     a, b = ("start", "end") if winch_first else ("end", "start")
     line = {a: "top", b: "load", "model": model, "mesh": {"cells": 30}, "sections": [LINE]}
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.3, 0, 0]}},
-        "points": {
-            "top": {"position": [0, 0, 0], "motion": MOVES},
-            "load": {"kind": "free", "mass": 10.0, "initial_guess": [5, 0, -59]},
-        },
-        "lines": {"one": line | {"connections": {a: held | {"payout": WINCH}}}},
-        "time": {"duration": 10.0, "step": STEP}, "output": {"every": 0.5},
-    }  # fmt: skip
+    return network_scene(
+        {"top": {"position": [0, 0, 0], "motion": MOVES},
+         "load": {"kind": "free", "mass": 10.0, "initial_guess": [5, 0, -59]}},
+        {"one": line | {"connections": {a: held | {"payout": WINCH}}}}, fluid={"density": 1025, "current": [0.3, 0, 0]},
+        time=(10.0, STEP), output=0.5
+    )  # fmt: skip
 
 
 def floating(*anchors: float, M: float = 40.0, lift: float = 1000.0) -> Tables:
@@ -45,19 +43,14 @@ def floating(*anchors: float, M: float = 40.0, lift: float = 1000.0) -> Tables:
     hold = {"tension": (lift - M * G - 100.0) / len(anchors), "inertia": 30.0, "damping": 15.0, "ramp": 4.0}
     line = {"length": 50.0, "mass": 1e-6, "axial_stiffness": 1e8}
     payout = {"connections": {"start": {"payout": {"longest": 90.0, "winch": hold}}}}
-    return {
-        "points": {
-            "eye": {"body": "frame", "place": [0, 0, -0.5]},
-            **{f"anchor {k}": {"position": [x, 0, -50.5]} for k, x in enumerate(anchors)},
-        },
-        "bodies": {"frame": {"mass": M, "inertia": [9, 9, 9], "initial_guess": [0, 0, 0], "force": [0, 0, lift]}},
-        "lines": {
-            f"line {k}": payout | {"start": "eye", "end": f"anchor {k}", "model": "catenary", "mesh": {"cells": 10},
-                                   "sections": [line], "contact": {"self": False}}
-            for k in range(len(anchors))
-        },
-        "time": {"duration": 10.0, "step": STEP}, "output": {"every": 0.5},
-    }  # fmt: skip
+    return network_scene(
+        {"eye": {"body": "frame", "place": [0, 0, -0.5]},
+         **{f"anchor {k}": {"position": [x, 0, -50.5]} for k, x in enumerate(anchors)}},
+        {f"line {k}": payout | line_between("eye", f"anchor {k}", line, model="catenary", mesh=10,
+             contact={"self": False}) for k in range(len(anchors))},
+        bodies={"frame": {"mass": M, "inertia": [9, 9, 9], "initial_guess": [0, 0, 0], "force": [0, 0, lift]}},
+        time=(10.0, STEP), output=0.5
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("anchors", [[0.0], [0.0, 0.0]], ids=["one winch", "two winches"])
@@ -180,18 +173,14 @@ def pressed(friction: float, winch_first: bool = True, step: float = 0.01) -> Ta
     rope = {"length": 2.0, "mass": 0.05, "diameter": 0.02, "axial_stiffness": 1e5}
     bar = {"length": 1.99, "mass": 20.0, "diameter": 0.1, "axial_stiffness": 2e7, "damping": {"mass": 5.0}}
     surge = {"surge": {"amplitude": 0.6, "period": 8.0}, "ramp": 0.5}
-    return {
-        "points": {
-            "winch": {"position": [0, 0, 0], "motion": surge}, "left": {"position": [0.08, -1, -0.8]},
-            "right": {"position": [0.08, 1, -0.8]}, "load": {"kind": "free", "mass": 5.0, "initial_guess": [0, 0, -2]},
-        },
-        "lines": {
-            "rope": {a: "winch", b: "load", "model": "catenary", "mesh": {"cells": 60}, "sections": [rope],
-                     "connections": {a: {"payout": {"longest": 4.0, "winch": hold}}}},
-            "bar": {"start": "left", "end": "right", "model": "catenary", "mesh": {"cells": 20}, "sections": [bar]},
-        },
-        "contact": {"friction": friction}, "time": {"duration": 2.5, "step": step}, "output": {"every": 0.1, "points": 81},
-    }  # fmt: skip
+    return network_scene(
+        {"winch": {"position": [0, 0, 0], "motion": surge}, "left": {"position": [0.08, -1, -0.8]},
+         "right": {"position": [0.08, 1, -0.8]}, "load": {"kind": "free", "mass": 5.0, "initial_guess": [0, 0, -2]}},
+        {"rope": {a: "winch", b: "load", "model": "catenary", "mesh": {"cells": 60}, "sections": [rope],
+                  "connections": {a: {"payout": {"longest": 4.0, "winch": hold}}}},
+         "bar": line_between("left", "right", bar, model="catenary", mesh=20)},
+        contact={"friction": friction}, time=(2.5, step), output=(0.1, 81)
+    )  # fmt: skip
 
 
 def held_by_friction(found: hybrid.Result) -> tuple[float, float]:

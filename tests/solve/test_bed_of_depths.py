@@ -14,6 +14,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.laws.seabed import HEIGHTS, planes_under
 from hybrid.kernels.state.state import Sea, no_sea
 from hybrid.scene.sea import Depths
+from tests.scenes import cable_scene, pinned_at
 
 SLOPE = (0.06, 0.03)
 X, Y = [-300.0, -100.0, 50.0, 120.0, 400.0], [-300.0, -50.0, 100.0, 300.0]
@@ -27,14 +28,11 @@ LINE = {
 def mooring(bed: dict[str, Any], **more: Any) -> hybrid.Scene:
     """A line that touches down on a bed of z = -100 m at x = y = 0, its upper end heaving."""
     seabed = {"stiffness": 5e3, "damping": 5e2, "friction": 0.4} | bed
-    data = {
-        "environment": {"fluid": {"density": 1025.0}, "seabed": seabed}, "cable": {"sections": [LINE]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -100]},
-                 "end": {"kind": "pinned", "position": [205, 0, 0],
-                         "motion": {"heave": {"amplitude": 2.0, "period": 8.0}, "ramp": 4}}},
-        "initial": "equilibrium", "model": "rod", "dimension": 3, "mesh": {"cells": 60},
-        "time": {"duration": 6.0, "step": 0.1}, "output": {"every": 1.0},
-    }  # fmt: skip
+    data = cable_scene(
+        LINE, pinned_at(0, 0, -100),
+        pinned_at(205, 0, 0, motion={"heave": {"amplitude": 2.0, "period": 8.0}, "ramp": 4}), fluid={"density": 1025.0},
+        seabed=seabed, model="rod", dimension=3, mesh=60, time=(6.0, 0.1), output=1.0
+    )  # fmt: skip
     return hybrid.validate_scene(data | more)
 
 

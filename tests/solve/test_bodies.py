@@ -18,6 +18,7 @@ from hybrid.scene.bodies import FreeBody
 from hybrid.simulation.new_run import new_run
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 LEG = {"mass": 0.05, "diameter": 0.002, "axial_stiffness": 5e6}
 MASS, ADDED, HEAVE = 5e5, (2e5, 2e5, 3e5, 2e6, 2e6, 1e6), 8e5
@@ -34,12 +35,7 @@ def moored(**body: Any) -> dict[str, Any]:
             f"on_{name}": {"body": "buoy", "place": [5 * x, 5 * y, -4]},
         }
         ends = (f"on_{name}", name) if name == "b" else (name, f"on_{name}")
-        tables["lines"][name] = {
-            "start": ends[0],
-            "end": ends[1],
-            "sections": [LEG | {"length": length}],
-            "mesh": {"cells": 10},
-        }
+        tables["lines"][name] = line_between(ends[0], ends[1], LEG | {"length": length}, mesh=10)
     tables["bodies"] = {
         "buoy": {
             "initial_guess": [0, 0, 0], "mass": MASS, "inertia": [8e6, 8e6, 6e6], "added_mass": list(ADDED),
@@ -280,11 +276,10 @@ def test_offsets_are_equilibria_beside_the_place() -> None:
 
 def test_an_end_of_a_cable_is_a_point() -> None:
     """Its stiffness is the slope of the force at offsets, of an end that is held; it is in a plane."""
-    tables = {
-        "cable": {"sections": [{"length": 12.0, "mass": 2.0, "axial_stiffness": 1e4}]}, "model": "catenary",
-        "mesh": {"cells": 40}, "initial": "equilibrium",
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [9, 0, 2]}},
-    }  # fmt: skip
+    tables = cable_scene(
+        {"length": 12.0, "mass": 2.0, "axial_stiffness": 1e4}, pinned_at(0, 0, 0), pinned_at(9, 0, 2), model="catenary",
+        mesh=40
+    )  # fmt: skip
     curve, found = hybrid.offsets(tables, "point:end", [-1e-3, 1e-3]), hybrid.stiffness(tables, "point:end").matrix
     assert (curve.restoring[1] - curve.restoring[0]) / 2e-3 == pytest.approx(found[0, 0], rel=1e-6)
     assert curve.tension["cable"][1] == pytest.approx(154.45, abs=0.01) and found[1, 1] > 0.0
@@ -362,15 +357,13 @@ def test_bodies_and_fairleads_that_do_not_fit_are_refused() -> None:
 def test_a_submerged_body_that_rises_out_of_the_water_is_noted() -> None:
     """All of its buoyancy acts wherever it is: 10 m3 of 2 t are above the surface at the equilibrium."""
     line = {"sections": [{"length": 60, "mass": 10, "diameter": 0.05, "axial_stiffness": 1e7}]}
-    scene = {
-        "environment": {"fluid": {"density": 1025, "surface": 0}},
-        "points": {
-            "a": {"position": [20, 0, -40]}, "b": {"position": [-20, 0, -40]}, "to_a": {"body": "buoy", "place": [1, 0, 0]},
-            "to_b": {"body": "buoy", "place": [-1, 0, 0]},
-        },
-        "bodies": {"buoy": {"initial_guess": [0, 0, 0], "mass": 2000, "inertia": [1e3, 1e3, 1e3], "volume": 10}},
-        "lines": {"one": {"start": "a", "end": "to_a"} | line, "two": {"start": "b", "end": "to_b"} | line},
-    }  # fmt: skip
+    scene = network_scene(
+        {"a": {"position": [20, 0, -40]}, "b": {"position": [-20, 0, -40]},
+         "to_a": {"body": "buoy", "place": [1, 0, 0]}, "to_b": {"body": "buoy", "place": [-1, 0, 0]}},
+        {"one": {"start": "a", "end": "to_a"} | line, "two": {"start": "b", "end": "to_b"} | line},
+        fluid={"density": 1025, "surface": 0},
+        bodies={"buoy": {"initial_guess": [0, 0, 0], "mass": 2000, "inertia": [1e3, 1e3, 1e3], "volume": 10}}
+    )  # fmt: skip
     result = hybrid.static(scene)
     assert result["bodies/buoy/position"][0, 2] > 0.0
     (event,) = [x for x in result.events if x.kind == "body out of water"]

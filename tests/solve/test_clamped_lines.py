@@ -22,6 +22,7 @@ from hybrid.scene.read import one_line
 from hybrid.scene.root import in_full
 from hybrid.simulation.new_run import new_run
 from hybrid.simulation.run import Run
+from tests.scenes import cable_scene, clamped_at, line_between, network_scene
 
 LENGTH, CELLS, A, B = 100.0, 40, [0.0, 0.0, 0.0], [70.0, 10.0, -20.0]
 SECTION = {
@@ -39,11 +40,10 @@ def end_of(normal: list[float] | None) -> dict[str, Any]:
 
 def in_one_piece(normal: list[float] | None, motion: dict[str, Any] | None = None) -> dict[str, Any]:
     end = {"kind": "clamped", "position": B, **end_of(normal)} | ({"motion": motion} if motion else {})
-    return {
-        "environment": WATER, "cable": {"sections": [SECTION | {"length": LENGTH}]}, "initial": "equilibrium",
-        "ends": {"start": {"kind": "clamped", "position": A, **START}, "end": end}, "model": "rod",
-        "mesh": {"cells": CELLS}, "output": {"points": CELLS + 1},
-    }  # fmt: skip
+    return cable_scene(
+        SECTION | {"length": LENGTH}, {"kind": "clamped", "position": A, **START}, end, environment=WATER, model="rod",
+        mesh=CELLS, output={"points": CELLS + 1}
+    )  # fmt: skip
 
 
 def in_pieces(
@@ -127,8 +127,7 @@ MOTION = {"heave": {"amplitude": 0.3, "period": 2.0}, "pitch": {"amplitude": 20,
 @pytest.mark.parametrize("holder", ["body", "point"])
 def test_a_cantilever_on_a_body_or_point_is_the_clamped_line(holder: str) -> None:
     """Held, and moved and turned; the moment on the body is about its origin."""
-    line = {"start": "root", "end": "tip", "connections": {"start": {"tangent": [1, 0, 0]}}, "sections": [STRIP],
-            "mesh": {"cells": 20}}  # fmt: skip
+    line = line_between("root", "tip", STRIP, connections={"start": {"tangent": [1, 0, 0]}}, mesh=20)
     points: dict[str, Any] = {"tip": {"initial_guess": [9, 0, -3], "mass": 2.0}}
     tables: dict[str, Any] = {"points": points, "lines": {"line": line}}
     if holder == "body":  # turned by -90 deg of yaw at rest, so that its own axis is another
@@ -138,8 +137,7 @@ def test_a_cantilever_on_a_body_or_point_is_the_clamped_line(holder: str) -> Non
     else:
         points["root"] = {"position": [0, 0, 0]}
     clamp: dict[str, Any] = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
-    one = {"cable": {"sections": [STRIP]}, "ends": {"start": clamp, "end": {"kind": "body", "mass": 2.0}},
-           "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20}}  # fmt: skip
+    one = cable_scene(STRIP, clamp, {"kind": "body", "mass": 2.0}, model="rod", mesh=20)
     alone, joined = hybrid.static(one), hybrid.static(tables)
     assert np.abs(joined.lines["line"]["position"] - alone["position"]).max() < 1e-9 * STRIP["length"]
     moment = joined["points/root/moment"][-1]
@@ -381,8 +379,7 @@ def test_three_rods_that_meet_rigidly_balance_their_moments() -> None:
         x, y = np.cos(2 * np.pi * k / 3), np.sin(2 * np.pi * k / 3)
         points[name] = {"position": [15 * x, 15 * y, 0]}
         held = {"start": {"tangent": [x, y, 0.0]}}
-        lines[name] = {"start": "knot", "end": name, "connections": held, "sections": [SECTION | {"length": 20.0}],
-                       "mesh": {"cells": 20}}  # fmt: skip
+        lines[name] = line_between("knot", name, SECTION | {"length": 20.0}, connections=held, mesh=20)
     tables = {"environment": {"fluid": {"density": 1025}}, "points": points, "lines": lines}
     result = hybrid.static(tables)
     moments = [result.lines[x]["moment_start"][-1] for x in "abc"]
@@ -401,18 +398,13 @@ def beam(moment: Any, **more: Any) -> dict[str, Any]:
     piece = {"mass": 1.0, "diameter": 0.03, "axial_stiffness": 1e7, "bending_stiffness": 200.0, "length": 1.0}
     ends = {"a": {"tangent": [1, 0, 0]}, "b": {"tangent": [1, 0, 0]}}
     line = {"model": "rod", "mesh": {"cells": 40}, "sections": [piece]}
-    return {
-        "environment": {"gravity": 0},
-        "points": {
-            "a": {"position": [0, 0, 0]}, "b": {"position": [2, 0, 0]},
-            "middle": {"initial_guess": [1, 0, 0], "moment": moment},
-        },
-        "lines": {
-            "one": line | {"start": "a", "end": "middle", "connections": {"start": ends["a"], "end": "clamped"}},
-            "two": line | {"start": "middle", "end": "b", "connections": {"start": "clamped", "end": ends["b"]}},
-        },
-        "output": {"points": 2},
-    } | more  # fmt: skip
+    return network_scene(
+        {"a": {"position": [0, 0, 0]}, "b": {"position": [2, 0, 0]},
+         "middle": {"initial_guess": [1, 0, 0], "moment": moment}},
+        {"one": line | {"start": "a", "end": "middle", "connections": {"start": ends["a"], "end": "clamped"}},
+         "two": line | {"start": "middle", "end": "b", "connections": {"start": "clamped", "end": ends["b"]}}},
+        gravity=0, output={"points": 2}
+    ) | more  # fmt: skip
 
 
 def test_a_moment_on_a_point_turns_it() -> None:
@@ -485,15 +477,13 @@ def test_a_point_that_turns_must_turn_something() -> None:
 def test_between_held_points_the_first_shape_carries_the_frame(points: dict[str, Any]) -> None:
     """Clamps without a normal twist nothing along the first shape, as in the short form before it was a network."""
     scene = hybrid.validate_scene(
-        {
-            "cable": {"sections": [{"length": 14, "mass": 1, "bending_stiffness": 20, "torsional_stiffness": 10}]},
-            "ends": {
-                "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0.3, 1, 0.5]},
-                "end": {"kind": "clamped", "position": [7, 0, 2], "tangent": [0.5, 0.2, -1]},
-            },
-            "initial": {"kind": "equilibrium"} | points,
-            "model": "rod",
-        }
+        cable_scene(
+            {"length": 14, "mass": 1, "bending_stiffness": 20, "torsional_stiffness": 10},
+            clamped_at([0, 0, 0], [0.3, 1, 0.5]),
+            clamped_at([7, 0, 2], [0.5, 0.2, -1]),
+            initial={"kind": "equilibrium"} | points,
+            model="rod",
+        )
     )
     alone, joined = build(one_line(scene)), build_system(in_full(scene)).models[0]
     assert np.allclose(joined.ends.values.frame, alone.ends.values.frame, rtol=0, atol=1e-12)

@@ -14,6 +14,7 @@ from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.solve.contact_statics import ContactStability, contact_stiffness
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.search import PUSHED
+from tests.scenes import line_between, network_scene
 from tests.validation.test_validation_lines_contact import crossing
 from tests.validation.test_validation_obstacles_of_lines import system_of
 
@@ -31,14 +32,12 @@ def on_top(joined: bool = False, aside: float = 0.0) -> Tables:
     """
     base = {"model": "rod", "contact": {"self": False}}
     a, b, middle = [-0.5, aside, 0.012], [0.5, aside, 0.012], [0.0, aside, 0.06]
-    tables: Tables = {
-        "points": {"a": {"position": a}, "b": {"position": b},
-                   "c": {"position": [-0.5, 0, 0]}, "d": {"position": [0.5, 0, 0]}},
-        "lines": {"lower": base | {"start": "c", "end": "d", "sections": [TAUT], "mesh": {"cells": 50}},
-                  "upper": base | {"start": "a", "end": "b", "sections": [SLACK], "mesh": {"cells": 50},
-                                   "initial": {"points": [a, middle, b]}}},
-        "contact": {"between": [["lower", "upper"]]}, "output": {"points": 51},
-    }  # fmt: skip
+    tables: Tables = network_scene(
+        {"a": {"position": a}, "b": {"position": b}, "c": {"position": [-0.5, 0, 0]}, "d": {"position": [0.5, 0, 0]}},
+        {"lower": base | line_between("c", "d", TAUT, mesh=50),
+         "upper": base | line_between("a", "b", SLACK, mesh=50, initial={"points": [a, middle, b]})},
+        contact={"between": [["lower", "upper"]]}, output={"points": 51}
+    )  # fmt: skip
     if joined:
         upper = tables["lines"].pop("upper") | {"sections": [SLACK | {"length": 0.505}], "mesh": {"cells": 25}}
         tables["points"]["m"] = {"kind": "free", "initial_guess": middle}
@@ -116,10 +115,9 @@ def test_a_slack_chain_over_a_taut_rope_is_refused_because_it_is_slack() -> None
     a, b = [0, -0.3, 0.02], [0, 0.3, 0.02]
     tables = on_top()
     tables["points"] |= {"a": {"position": a}, "b": {"position": b}}
-    tables["lines"]["upper"] = {
-        "start": "a", "end": "b", "sections": [chain], "mesh": {"cells": 40}, "contact": {"self": False},
-        "initial": {"points": [a, [0, 0, 0.95], b]},
-    }  # fmt: skip
+    tables["lines"]["upper"] = line_between(
+        "a", "b", chain, mesh=40, contact={"self": False}, initial={"points": [a, [0, 0, 0.95], b]}
+    )
     with pytest.raises(ComputationError, match="are compressed") as failed:
         hybrid.static(tables)
     assert failed.value.outcome == Outcome.SLACK

@@ -20,6 +20,7 @@ from hybrid.kernels.run.entry import block_rows, correction
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.solve.stepper import Stepper
+from tests.scenes import cable_scene, pinned_at
 
 LENGTH, FAR = 1000.0, 1000.0
 EPS = 2.2e-16
@@ -36,17 +37,10 @@ def hanging(kind, cells, stiffness):
             {"rod": 300.0, "cells": part},
         ],
     }[kind]
-    return hybrid.validate_scene(
-        {
-            "cable": {"sections": [{"length": LENGTH, "mass": 1.0, "bending_stiffness": stiffness, "torsional_stiffness": stiffness}]},
-            "ends": {
-                "start": {"kind": "pinned", "position": [FAR, FAR, FAR]},
-                "end": {"kind": "pinned", "position": [FAR + 900.0, FAR, FAR + 100.0]},
-            },
-            "initial": {"kind": "equilibrium"},
-            "model": {"kind": "zones", "zones": zones},
-        }
-    )  # fmt: skip
+    return hybrid.validate_scene(cable_scene(
+        {"length": LENGTH, "mass": 1.0, "bending_stiffness": stiffness, "torsional_stiffness": stiffness},
+        pinned_at(FAR, FAR, FAR), pinned_at(FAR + 900.0, FAR, FAR + 100.0), model={"kind": "zones", "zones": zones}
+    ))  # fmt: skip
 
 
 def banded(rows, tension):
@@ -122,17 +116,11 @@ def test_converges_and_agrees_with_lapack(kind, cells, stiffness):
 @pytest.mark.parametrize("tension", [1e4, 1e2, 1.0])
 def test_long_line_at_low_tension(stiffness, tension):
     """1000 m, 5000 cells, pulled by `tension`: at most four iterations a step."""
-    scene = hybrid.validate_scene(
-        {
-            "environment": {"gravity": 0.0},
-            "cable": {"sections": [{"length": 1000.0, "mass": 0.5, "bending_stiffness": stiffness, "torsional_stiffness": stiffness}]},
-            "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [tension, 0, 0]}},
-            "initial": {"kind": "straight", "direction": [1, 0, 0]},
-            "model": {"kind": "rod"},
-            "mesh": {"cells": 5000},
-            "time": {"duration": 1.0, "step": 0.01},
-        }
-    )  # fmt: skip
+    scene = hybrid.validate_scene(cable_scene(
+        {"length": 1000.0, "mass": 0.5, "bending_stiffness": stiffness, "torsional_stiffness": stiffness},
+        pinned_at(0, 0, 0), {"kind": "free", "force": [tension, 0, 0]}, gravity=0.0,
+        initial={"kind": "straight", "direction": [1, 0, 0]}, model={"kind": "rod"}, mesh=5000, time=(1.0, 0.01)
+    ))  # fmt: skip
     model = build(one_line(scene))
     stepper = Stepper(model.line, model.length, model.tension_scale, model.slack_floor)
     state = model.start.copy()

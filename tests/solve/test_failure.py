@@ -9,6 +9,7 @@ from hybrid.model.build import build
 from hybrid.scene.read import one_line, read_text, scene_text
 from hybrid.solve.stepper import Stepper
 from tests.said import ONE, both_ways, line_of, said
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 SECTION = {"length": 2.0, "mass": 0.5, "bending_stiffness": 0.01, "torsional_stiffness": 0.01}
 
@@ -16,18 +17,15 @@ SECTION = {"length": 2.0, "mass": 0.5, "bending_stiffness": 0.01, "torsional_sti
 def scene(model="catenary", **changes):
     """A line hanging between two points, one of which is pushed towards the other."""
     motion = {"surge": {"amplitude": -0.4, "period": 0.8}, "ramp": 0.4}
-    data = {
-        "cable": {"sections": [SECTION]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": motion},
-        },
-        "initial": {"kind": "equilibrium"},
-        "model": model,
-        "mesh": {"cells": 40},
-        "time": {"duration": 2.0, "step": 0.01},
-        "output": {"every": 0.05},
-    }
+    data = cable_scene(
+        SECTION,
+        pinned_at(0, 0, 0),
+        pinned_at(1.5, 0, 0, motion=motion),
+        model=model,
+        mesh=40,
+        time=(2.0, 0.01),
+        output=0.05,
+    )
     return hybrid.validate_scene(data | changes)
 
 
@@ -62,18 +60,15 @@ def heaving(step, heave=2.0, model="catenary", **time):
     section = {"length": 200, "mass": 1.0, "diameter": 0.03, "axial_stiffness": 2e6, "bending_stiffness": 20}
     water = {"drag": {"normal": 1.2, "tangential": 0.01}, "added_mass": {"normal": 1.0}}
     motion = {"heave": {"amplitude": heave, "period": 6.0}, "ramp": 6.0}
-    return {
-        "cable": {"sections": [section | water]},
-        "environment": {"fluid": {"density": 1025}},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0], "motion": motion},
-            "end": {"kind": "free", "force": [0, 0, -10]},
-        },
-        "initial": "equilibrium",
-        "model": model,
-        "mesh": {"cells": 40},
-        "time": {"duration": 12.0, "step": step} | time,
-    }
+    return cable_scene(
+        section | water,
+        pinned_at(0, 0, 0, motion=motion),
+        {"kind": "free", "force": [0, 0, -10]},
+        fluid={"density": 1025},
+        model=model,
+        mesh=40,
+        time={"duration": 12.0, "step": step} | time,
+    )
 
 
 @both_ways
@@ -160,13 +155,7 @@ HUNG = {"length": 50.0, "mass": 20.0, "axial_stiffness": 1e5}  # 9.8 kN of weigh
 def hung(**more):
     """A line that hangs from its start; by default its weight stretches it beyond 5 %."""
     return hybrid.validate_scene(
-        {
-            "cable": {"sections": [HUNG | more]},
-            "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
-            "initial": {"kind": "equilibrium"},
-            "model": "catenary",
-            "mesh": {"cells": 50},
-        }
+        cable_scene(HUNG | more, pinned_at(0, 0, 0), {"kind": "free"}, model="catenary", mesh=50)
     )
 
 
@@ -186,18 +175,15 @@ def test_a_line_that_is_pulled_beyond_what_it_bears_stops(tmp_path):
     """Stretched by 4 % at rest; its end moves on until it is 7 %."""
     line = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5}
     motion = surging(tmp_path, 20.8, 0.6, 8.0)
-    data = {
-        "environment": {"gravity": 0.0},
-        "cable": {"sections": [line, line | {"max_strain": 0.2}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [20.8, 0, 0], "motion": motion},
-        },
-        "initial": "equilibrium",
-        "model": "catenary",
-        "mesh": {"cells": 20},
-        "time": {"duration": 2.0, "step": 0.01},
-    }
+    data = cable_scene(
+        [line, line | {"max_strain": 0.2}],
+        pinned_at(0, 0, 0),
+        pinned_at(20.8, 0, 0, motion=motion),
+        gravity=0.0,
+        model="catenary",
+        mesh=20,
+        time=(2.0, 0.01),
+    )
     with pytest.raises(hybrid.ComputationError) as stop:
         hybrid.run(data, tmp_path / "run.h5")
     error = stop.value
@@ -218,14 +204,11 @@ def test_a_strut_that_is_pushed_beyond_what_it_bears_stops(tmp_path):
     """A stiff rod of 10 m between two ends of which one moves in by 0.6 m: 5 % are borne, and 1.2 m were silent once."""
     strut = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 1e7}
     held = {"kind": "clamped", "tangent": [1, 0, 0]}
-    data = {
-        "environment": {"gravity": 0.0}, "cable": {"sections": [strut]}, "model": "rod", "mesh": {"cells": 10},
-        "ends": {
-            "start": held | {"position": [0, 0, 0]},
-            "end": held | {"position": [10.0, 0, 0], "motion": {"travel": {"by": [-0.6, 0, 0], "over": 2.0}}},
-        },
-        "initial": "equilibrium", "time": {"duration": 2.0, "step": 0.01},
-    }  # fmt: skip
+    data = cable_scene(
+        strut, held | {"position": [0, 0, 0]},
+        held | {"position": [10.0, 0, 0], "motion": {"travel": {"by": [-0.6, 0, 0], "over": 2.0}}}, gravity=0.0,
+        model="rod", mesh=10, time=(2.0, 0.01)
+    )  # fmt: skip
     with pytest.raises(hybrid.ComputationError) as stop:
         hybrid.run(data, tmp_path / "run.h5")
     assert stop.value.outcome is hybrid.Outcome.OVERSTRETCHED and "a strain of -5" in stop.value.detail
@@ -270,10 +253,7 @@ def test_nothing_holds_the_line():
 
 def test_a_coarse_bend_is_noted():
     """A cantilever rolled up on eight cells bends by 90 degrees from cell to cell."""
-    ends = {
-        "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
-        "end": {"kind": "free", "moment": [0.0, 0.01 * 2 * np.pi, 0.0]},
-    }
+    ends = {"start": clamped_at([0, 0, 0], [1, 0, 0]), "end": {"kind": "free", "moment": [0.0, 0.01 * 2 * np.pi, 0.0]}}
     result = hybrid.static(scene("rod", environment={"gravity": 0.0}, ends=ends, mesh={"cells": 5}, time=None))
     assert {e.kind for e in result.events} == {"unresolved bend", "stability not judged"}
     assert any("would do" in e.text for e in result.events)
@@ -290,12 +270,11 @@ def test_undamped_inextensible_is_noted():
 def test_outputs_that_wait_are_written_before_a_run_stops(tmp_path):
     """A load falls into an unstretched rope, which bears its weight but not its fall: no output before that is missing."""
     section = {"length": 10.0, "mass": 0.1, "axial_stiffness": 4e4, "max_strain": 0.02}
-    scene = {
-        "cable": {"sections": [section], "attachments": [{"kind": "clump", "at": 10.0, "mass": 50.0}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
-        "initial": {"kind": "straight", "direction": [0, 0, -1]}, "model": {"kind": "catenary", "slack": "warn"},
-        "mesh": {"cells": 20}, "time": {"duration": 1.0, "step": 0.005}, "output": {"every": 0.01},
-    }  # fmt: skip
+    scene = cable_scene(
+        section, pinned_at(0, 0, 0), "free", attachments=[{"kind": "clump", "at": 10.0, "mass": 50.0}],
+        initial={"kind": "straight", "direction": [0, 0, -1]}, model={"kind": "catenary", "slack": "warn"}, mesh=20,
+        time=(1.0, 0.005), output=0.01
+    )  # fmt: skip
     with pytest.raises(hybrid.ComputationError) as caught:
         hybrid.run(scene, tmp_path / "run.h5")
     assert caught.value.outcome is hybrid.Outcome.OVERSTRETCHED

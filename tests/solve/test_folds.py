@@ -18,15 +18,13 @@ from hybrid.solve.flaws import FOLDED, folds
 from hybrid.solve.lines_at_rest import lines_at_rest
 from hybrid.solve.network_solver import NO_BODIES
 from hybrid.solve.stepper import NetworkState
+from tests.scenes import pinned_at
 
 
 def hairpin(cells: int, model: str = "rod", apart: float = 0.0, **more: Any) -> dict[str, Any]:
     """A line of 20 m between points next to each other, which bends over (EI/w)^(1/3) = 0.3 m where it is a rod."""
     section = {"length": 20.0, "mass": 1.0, "diameter": 0.01, "bending_stiffness": 0.25}
-    ends = {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [apart, 0, 0]},
-    }
+    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(apart, 0, 0)}
     cable = {"sections": [section]} | more
     return {"cable": cable, "ends": ends, "initial": "equilibrium", "model": model, "mesh": {"cells": cells}}
 

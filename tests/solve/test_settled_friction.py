@@ -13,6 +13,7 @@ import hybrid
 from hybrid.errors import Outcome
 from hybrid.scene.analysis import RodModel
 from hybrid.solve.stepper import LineFailed
+from tests.scenes import cable_scene, network_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 MU, WEIGHT, EA = 0.8, 1000.0, 6.0e8
@@ -24,18 +25,12 @@ def chain(length: float = 700.0, stiffness: float = EA, cells: int = 1400, **cha
     diameter = 0.15
     mass = WEIGHT / 9.81 + 1000.0 * math.pi * diameter**2 / 4.0
     section = {"length": length, "mass": mass, "diameter": diameter, "axial_stiffness": stiffness}
-    return {
-        "environment": {"gravity": 9.81, "fluid": {"density": 1000.0, "surface": 100.0},
-                        "seabed": {"z": 0.0, "stiffness": 5.0e4, "friction": MU}},
-        "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
-                 "end": {"kind": "pinned", "position": [0.936 * length, 0, 88.0]}},
-        "initial": {"kind": "equilibrium", "friction": "settled"},
-        "mesh": {"cells": cells},
-        "model": "catenary",
-        "output": {"errors": False, "points": 701},
-        "time": {"duration": 10.0},
-    } | changes  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(0.936 * length, 0, 88.0), gravity=9.81,
+        fluid={"density": 1000.0, "surface": 100.0}, seabed={"z": 0.0, "stiffness": 5.0e4, "friction": MU},
+        initial={"kind": "equilibrium", "friction": "settled"}, mesh=cells, model="catenary",
+        output={"errors": False, "points": 701}, time={"duration": 10.0}
+    ) | changes  # fmt: skip
 
 
 def static(scene: dict[str, Any]) -> hybrid.Result:
@@ -74,9 +69,7 @@ def test_lateral_place_is_that_of_the_equilibrium_without_friction() -> None:
 def test_a_stretch_between_two_hanging_ones_keeps_its_middle() -> None:
     """A line whose two ends hang lies on the bed between: tension falls towards the middle from both sides."""
     scene = chain(length=1000.0, cells=1000)
-    scene["ends"] = {
-        "start": {"kind": "pinned", "position": [0, 0, 88.0]}, "end": {"kind": "pinned", "position": [900, 0, 88.0]}
-    }  # fmt: skip
+    scene["ends"] = {"start": pinned_at(0, 0, 88.0), "end": pinned_at(900, 0, 88.0)}
     result = static(scene)
     T = np.ravel(result.tension)
     assert T[500 * 701 // 1001 :][::-1] == pytest.approx(T[: T.size - 500 * 701 // 1001], rel=1e-5, abs=0.1)
@@ -165,11 +158,10 @@ def buoy(friction: str | None) -> dict[str, Any]:
     buoy = {"initial_guess": [0, 0, 85], "mass": 2e5, "volume": 560.0, "drag_area": 20, "force": [3e4, 0, 0]}
     initial = {"kind": "equilibrium"} | ({"friction": friction} if friction else {})
     line = {"end": "buoy", "sections": [section], "mesh": {"cells": 100}, "model": "catenary", "initial": initial}
-    return {
-        "environment": chain()["environment"], "points": feet | {"buoy": buoy},
-        "lines": {f"leg{k}": line | {"start": foot} for k, foot in enumerate(feet)},
-        "time": {"duration": 10.0, "step": 0.1}, "output": {"every": 5.0, "points": 101},
-    }  # fmt: skip
+    return network_scene(
+        feet | {"buoy": buoy}, {f"leg{k}": line | {"start": foot} for k, foot in enumerate(feet)},
+        environment=chain()["environment"], time=(10.0, 0.1), output=(5.0, 101)
+    )  # fmt: skip
 
 
 def test_a_buoy_on_lines_with_settled_friction_stays_where_it_is() -> None:
@@ -289,10 +281,7 @@ def test_friction_is_neglected_where_something_lies_that_has_some(
     length: float, changes: dict[str, Any], bed: float | None, where: str
 ) -> None:
     section = {"length": length, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6}
-    ends = {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [25, 0, 15]},
-    }
+    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(25, 0, 15)}
     scene: dict[str, Any] = {"cable": {"sections": [section]}, "ends": ends, "obstacles": {"pipe": PIPE | changes}}
     scene |= {"initial": NEGLECTED, "model": "catenary", "mesh": {"cells": 120}}
     if bed is not None:

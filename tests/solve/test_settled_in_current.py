@@ -9,6 +9,7 @@ import pytest
 from random_scenes import random_network
 
 import hybrid
+from tests.scenes import cable_scene
 
 Tables = dict[str, Any]
 CHAIN = {
@@ -28,11 +29,10 @@ def sea(ramp: float = 0.0) -> Tables:
 
 def chain(friction: str = "settled", **more: Any) -> Tables:
     """A chain along x, most of it on the bed, in a current along y."""
-    return {
-        "environment": sea(), "cable": {"sections": [CHAIN]}, "model": "catenary", "mesh": {"cells": 90},
-        "ends": {"start": {"kind": "pinned", "position": ANCHOR}, "end": {"kind": "pinned", "position": TOP}},
-        "initial": {"kind": "equilibrium", "friction": friction}, "output": {"points": 91},
-    } | more  # fmt: skip
+    return cable_scene(
+        CHAIN, {"kind": "pinned", "position": ANCHOR}, {"kind": "pinned", "position": TOP}, environment=sea(),
+        model="catenary", mesh=90, initial={"kind": "equilibrium", "friction": friction}, output={"points": 91}
+    ) | more  # fmt: skip
 
 
 def test_a_chain_across_a_current_lies_where_it_was_laid() -> None:

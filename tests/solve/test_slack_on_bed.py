@@ -15,6 +15,7 @@ from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.scene.sea import Depths
 from hybrid.solve.stability import Stability
+from tests.scenes import cable_scene, pinned_at
 
 SPAN, WEIGHT = 100.0, 50.0 * 9.81
 
@@ -106,14 +107,11 @@ def test_a_line_is_found_across_rough_ground(seed: int) -> None:
 def test_the_softest_motion_of_a_strut_is_that_of_euler(cells: int) -> None:
     """w^2 = (EI q^2 - P) q^2/m, q = pi/L; of many cells without a dense matrix."""
     length, EI, P, mass = 10.0, 200.0, 60.0, 2.0
-    scene = hybrid.validate_scene({
-        "environment": {"gravity": 0.0}, "cable": {"sections": [{
-            "length": length, "mass": mass, "bending_stiffness": EI, "torsional_stiffness": 150.0,
-            "axial_stiffness": 1e6}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [10, 0, 0]}},
-        "initial": {"kind": "straight", "direction": [1, 0, 0]}, "model": "rod", "mesh": {"cells": cells},
-        "dimension": 3, "time": {"duration": 1.0, "step": 0.1},
-    })  # fmt: skip
+    scene = hybrid.validate_scene(cable_scene(
+        {"length": length, "mass": mass, "bending_stiffness": EI, "torsional_stiffness": 150.0, "axial_stiffness": 1e6},
+        pinned_at(0, 0, 0), pinned_at(10, 0, 0), gravity=0.0, initial={"kind": "straight", "direction": [1, 0, 0]},
+        model="rod", mesh=cells, dimension=3, time=(1.0, 0.1)
+    ))  # fmt: skip
     model = build(one_line(scene))
     state = model.start.copy()
     state.T[:] = -P

@@ -13,6 +13,7 @@ from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import build
 from hybrid.model.line import ABOUT_CHORDS, line_on
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, line_between
 
 LENGTH, CELLS = 30.0, 20
 SECTION = {
@@ -46,8 +47,7 @@ def one(start: dict[str, Any], end: dict[str, Any], **more: Any) -> dict[str, An
 def as_a_system(start: dict[str, Any], end: dict[str, Any]) -> dict[str, Any]:
     """The same line in a scene of several."""
     points = {"a": {"position": A}, "b": {"position": B, "motion": MOTION}}
-    line = {"start": "a", "end": "b", "connections": {"start": start, "end": end}, "sections": [SECTION], "model": "rod",
-            "mesh": {"cells": CELLS}}  # fmt: skip
+    line = line_between("a", "b", SECTION, connections={"start": start, "end": end}, model="rod", mesh=CELLS)
     return COMMON | {"points": points, "lines": {"line": line}}
 
 
@@ -119,10 +119,7 @@ def test_the_tension_at_a_spring_is_that_of_the_line_beside_it(spring: float | N
     """A line of 5 m hangs from a clamp that points sideways: its own tangent there is not that of the clamp."""
     section = {"length": 5.0, "mass": 1.0, "bending_stiffness": 20.0}
     start = {"kind": "clamped", "position": A, "tangent": [1, 0, 0], "bend_stiffness": spring}
-    scene = {
-        "cable": {"sections": [section]}, "ends": {"start": start, "end": {"kind": "free"}}, "model": "rod",
-        "mesh": {"cells": 400}, "initial": "equilibrium", "output": {"points": 401},
-    }  # fmt: skip
+    scene = cable_scene(section, start, {"kind": "free"}, model="rod", mesh=400, output={"points": 401})
     tension = hybrid.static(scene)["tension"][0]
     near = 3.0 * tension[1] - 3.0 * tension[2] + tension[3]
     assert tension[0] == pytest.approx(near, abs=2e-3 * tension.max())

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import pinned_at
 
 SEEDS = range(50)
 
@@ -125,9 +126,6 @@ def test_refused_with_the_reason():
     data["cable"] |= {"attachments": []}
     data["cable"]["sections"] = [data["cable"]["sections"][0] | {"length": length, "mass": 10.0}]
     data |= {"model": {"kind": "catenary"}, "dimension": 2}  # in space it lies slack beside the span
-    data["ends"] = {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [0.4 * length, 0, 0.3 * length]},
-    }
+    data["ends"] = {"start": pinned_at(0, 0, 0), "end": pinned_at(0.4 * length, 0, 0.3 * length)}
     with pytest.raises(hybrid.ComputationError, match="longer than from end to end along the seabed and straight up"):
         hybrid.static(hybrid.validate_scene(data))

@@ -20,6 +20,7 @@ from hybrid.simulation.new_run import new_run
 from hybrid.simulation.run import Run
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState, Stepper, joined_ends
+from tests.scenes import line_between, network_scene
 
 LENGTH, CELLS = 100.0, 40
 A, B = np.zeros(3), np.array([70.0, 10.0, -20.0])
@@ -147,20 +148,13 @@ def test_a_bridle_without_weight_against_its_force_polygon() -> None:
         sections = [{"length": length, "mass": 0.5, "axial_stiffness": EA}]
         return {"start": start, "end": end, "sections": sections, "mesh": {"cells": 4}}
 
-    found = equilibrium(
-        {
-            "environment": {"gravity": 0.0},
-            "points": {
-                "a": {"position": a.tolist()}, "b": {"position": b.tolist()},
-                "knot": {"kind": "free", "initial_guess": [1, 0, -9]},
-                "load": {"kind": "free", "initial_guess": [2, 1, -17], "force": force.tolist()},
-            },
-            "lines": {
-                "left": line("a", "knot", legs[0]), "right": line("knot", "b", legs[1]),
-                "down": line("knot", "load", legs[2]),
-            },
-        }
-    )  # fmt: skip
+    found = equilibrium(network_scene(
+        {"a": {"position": a.tolist()}, "b": {"position": b.tolist()},
+         "knot": {"kind": "free", "initial_guess": [1, 0, -9]},
+         "load": {"kind": "free", "initial_guess": [2, 1, -17], "force": force.tolist()}},
+        {"left": line("a", "knot", legs[0]), "right": line("knot", "b", legs[1]), "down": line("knot", "load", legs[2])},
+        gravity=0.0
+    ))  # fmt: skip
 
     def pull(span: np.ndarray, length: float) -> np.ndarray:
         distance = np.linalg.norm(span)
@@ -215,17 +209,13 @@ def test_a_symmetric_mooring_of_three_lines_against_one_of_them(flipped: int) ->
 def test_lines_that_go_slack_are_refused_with_their_name() -> None:
     """A point that is pulled along one line leaves the other, too long for it, without tension."""
     section = {"mass": 1.0, "axial_stiffness": 1e6}
-    tables = {
-        "environment": {"gravity": 0.0},
-        "points": {
-            "a": {"position": [0, 0, 0]}, "b": {"position": [10, 0, 0]},
-            "knot": {"kind": "free", "initial_guess": [5, 0, -1], "force": [-100, 0, 0]},
-        },
-        "lines": {
-            "short": {"start": "a", "end": "knot", "sections": [section | {"length": 6}], "mesh": {"cells": 4}},
-            "long": {"start": "knot", "end": "b", "sections": [section | {"length": 18}], "mesh": {"cells": 4}},
-        },
-    }  # fmt: skip
+    tables = network_scene(
+        {"a": {"position": [0, 0, 0]}, "b": {"position": [10, 0, 0]},
+         "knot": {"kind": "free", "initial_guess": [5, 0, -1], "force": [-100, 0, 0]}},
+        {"short": line_between("a", "knot", section | {"length": 6}, mesh=4),
+         "long": line_between("knot", "b", section | {"length": 18}, mesh=4)},
+        gravity=0.0
+    )  # fmt: skip
     with pytest.raises(ComputationError) as refused:
         equilibrium(tables)
     assert refused.value.outcome in (Outcome.SLACK, Outcome.SINGULAR, Outcome.NOT_CONVERGED)
@@ -237,18 +227,15 @@ def test_a_first_place_that_is_forgotten_at_the_origin_is_named(ship: bool) -> N
     """Anchors in coordinates of a map, and `initial_guess` left at zero: shapes of `initial` were said to help."""
     place = {"initial_guess": [0, 0, 0], "mass": 500.0, "volume": 2.0}
     section = {"length": 70.0, "mass": 3.0, "diameter": 0.03, "axial_stiffness": 1e6}
-    tables: dict[str, Any] = {
-        "environment": {"fluid": {"density": 1025.0}},
-        "points": {
+    tables: dict[str, Any] = network_scene(
+        {
             "west": {"position": [500_000, 6.7e6, -40]},
             "east": {"position": [500_100, 6.7e6, -40]},
             "buoy": {"body": "ship", "place": [0, 0, 0]} if ship else place,
         },
-        "lines": {
-            name: {"start": name, "end": "buoy", "sections": [section], "mesh": {"cells": 20}}
-            for name in ("west", "east")
-        },
-    }
+        {name: line_between(name, "buoy", section, mesh=20) for name in ("west", "east")},
+        fluid={"density": 1025.0},
+    )
     if ship:
         tables["bodies"] = {"ship": place | {"inertia": [500.0, 500.0, 500.0]}}
     with pytest.raises(ComputationError) as refused:

@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 import hybrid
+from tests.scenes import network_scene
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 LEG = {"length": 10.0, "mass": 1e-3, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
@@ -78,12 +79,10 @@ def tripod(load: float) -> dict[str, Any]:
     """A head that is pressed down on three straight legs: each bears load / (3 cos), and pi^2 EI/L^2 = 9.87 N at most."""
     places = {"a": [-6.0, 0.0, 0.0], "b": [3.0, 5.196152423, 0.0], "c": [3.0, -5.196152423, 0.0]}
     leg = {"sections": [LEG], "model": "rod", "mesh": {"cells": 20}, "end": "head"}
-    return {
-        "environment": {"gravity": 1e-6},
-        "points": {"head": {"initial_guess": [0.0, 0.0, 8.0], "force": [0, 0, -load]}}
-        | {name: {"position": place} for name, place in places.items()},
-        "lines": {f"leg_{name}": leg | {"start": name} for name in places},
-    }  # fmt: skip
+    return network_scene(
+        {"head": {"initial_guess": [0.0, 0.0, 8.0], "force": [0, 0, -load]}} | {name: {"position": place} for name, place in places.items()},
+        {f"leg_{name}": leg | {"start": name} for name in places}, gravity=1e-6
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(("load", "height"), [(20.0, 8.0), (30.0, -8.0)])
@@ -125,31 +124,25 @@ def slack_mooring() -> dict[str, Any]:
     leg = {"sections": [section], "model": {"kind": "catenary", "slack": "warn"}, "mesh": {"cells": 40}, "end": "buoy"}
     anchors = [[-33.5025, -96.2728, -65.215], [100.689, 15.8936, -55.7141], [-71.8795, 72.2787, -66.1411]]
     buoy = {"mass": 800.0, "volume": 6.0, "drag_area": 2.0, "initial_guess": [0, 0, -2]}
-    return {
-        "environment": {
-            "fluid": {"density": 1025, "surface": 0.0, "current": [0.6, 0.0, 0.0]},
-            "seabed": {"z": -62.2335, "stiffness": 3000.0, "slope": [0.0633392, 0.00892696]},
-        },
-        "points": {"buoy": buoy} | {f"a{k}": {"position": place} for k, place in enumerate(anchors)},
-        "lines": {f"l{k}": leg | {"start": f"a{k}"} for k in range(3)},
-    }
+    return network_scene(
+        {"buoy": buoy} | {f"a{k}": {"position": place} for k, place in enumerate(anchors)},
+        {f"l{k}": leg | {"start": f"a{k}"} for k in range(3)},
+        fluid={"density": 1025, "surface": 0.0, "current": [0.6, 0.0, 0.0]},
+        seabed={"z": -62.2335, "stiffness": 3000.0, "slope": [0.0633392, 0.00892696]},
+    )
 
 
 def test_a_leg_that_lies_slack_hangs_down_from_its_buoy() -> None:
     """A leg 10 m longer than along the bed and up to the buoy that a taut one holds: it lies without tension."""
     section = {"mass": 8.0, "diameter": 0.05, "axial_stiffness": 5e6}
     leg = {"model": "catenary", "mesh": {"cells": 20}, "end": "buoy"}
-    scene = {
-        "environment": {"fluid": {"density": 1025, "surface": 0.0}, "seabed": {"z": -30.0, "stiffness": 3000.0}},
-        "points": {
-            "a": {"position": [0, 0, -30]}, "b": {"position": [20, 0, -30]},
-            "buoy": {"mass": 100.0, "volume": 1.0, "initial_guess": [0, 0, -10]},
-        },
-        "lines": {
-            "taut": leg | {"start": "a", "sections": [section | {"length": 20.0}]},
-            "long": leg | {"start": "b", "sections": [section | {"length": 50.0}]},
-        },
-    }  # fmt: skip
+    scene = network_scene(
+        {"a": {"position": [0, 0, -30]}, "b": {"position": [20, 0, -30]},
+         "buoy": {"mass": 100.0, "volume": 1.0, "initial_guess": [0, 0, -10]}},
+        {"taut": leg | {"start": "a", "sections": [section | {"length": 20.0}]},
+         "long": leg | {"start": "b", "sections": [section | {"length": 50.0}]}},
+        fluid={"density": 1025, "surface": 0.0}, seabed={"z": -30.0, "stiffness": 3000.0}
+    )  # fmt: skip
     result = hybrid.static(scene)
     w, long = 9.80665 * (8.0 - 1025.0 * 0.25 * math.pi * 0.05**2), result.lines["long"]
     assert abs(long.tension[-1][-1] - 20.0 * w) <= 0.5 * 2.5 * w, "half a cell"

@@ -11,6 +11,7 @@ import pytest
 import hybrid
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.simulation import lines_stiffness
+from tests.scenes import line_between, network_scene
 
 LENGTH, CELLS, GJ = 40.0, 40, 150.0
 SECTION = {
@@ -51,8 +52,7 @@ def line(start: str, end: str, zones: Any, connections: dict[str, Any]) -> dict[
     length = sum(x for _, x in zones)
     model = zoned(zones) if len(zones) > 1 else "rod"
     mesh = {} if len(zones) > 1 else {"mesh": {"cells": length}}
-    return {"start": start, "end": end, "connections": connections, "sections": [SECTION | {"length": float(length)}],
-            "model": model, **mesh}  # fmt: skip
+    return line_between(start, end, SECTION | {"length": float(length)}, connections=connections, model=model) | mesh
 
 
 def several(lines: dict[str, Any], **points: Any) -> dict[str, Any]:
@@ -223,11 +223,10 @@ def test_a_line_that_breaks_passes_no_torque_any_more(tmp_path: Path) -> None:
     down = {"tangent": [0, 0, -1]}
     hanging = line("top", "low", [("rod", 4), ("catenary", 12), ("rod", 4)], {})
     hanging["connections"] = {"start": down | {"normal": [1, 0, 0]}, "end": down | {"normal": [1, 1, 0]}}
-    scene = {
-        "environment": {"fluid": {"density": 1025}}, "time": {"duration": 0.06, "step": 0.001},
-        "points": {"top": {"position": [0, 0, 0]}, "low": {"position": [0, 0, -20.0026]}}, "output": {"every": 0.005},
-        "lines": {"line": hanging | {"break_at": {"time": 0.02}}},
-    }  # fmt: skip
+    scene = network_scene(
+        {"top": {"position": [0, 0, 0]}, "low": {"position": [0, 0, -20.0026]}},
+        {"line": hanging | {"break_at": {"time": 0.02}}}, fluid={"density": 1025}, time=(0.06, 0.001), output=0.005
+    )  # fmt: skip
     with hybrid.run(scene, tmp_path / "whole.h5") as result:
         (told,) = (x for x in result.events if x.kind == "end released")
         hung = result.lines["line"]
@@ -251,11 +250,10 @@ def test_a_rod_that_breaks_spins_with_the_energy_that_it_has() -> None:
     down = {"tangent": [0, 0, -1]}
     clamps = {"start": down | {"normal": [1, 0, 0]}, "end": down | {"normal": [1, 1, 0]}}
     hanging = line("top", "low", [("rod", 20)], clamps)
-    result = hybrid.run({
-        "environment": {"fluid": {"density": 1025}}, "time": {"duration": 1.0, "step": 0.02},
-        "points": {"top": {"position": [0, 0, 0]}, "low": {"position": [0, 0, -20.0026]}}, "output": {"every": 0.02},
-        "lines": {"line": hanging | {"break_at": {"time": 0.02}}},
-    })  # fmt: skip
+    result = hybrid.run(network_scene(
+        {"top": {"position": [0, 0, 0]}, "low": {"position": [0, 0, -20.0026]}},
+        {"line": hanging | {"break_at": {"time": 0.02}}}, fluid={"density": 1025}, time=(1.0, 0.02), output=0.02
+    ))  # fmt: skip
     hung = result.lines["line"]
     alive = hung["energy/kinetic"] + hung["energy/torsion"]
     assert alive[0] == pytest.approx(0.5 * GJ * (0.25 * np.pi) ** 2 / 20.0, rel=1e-3)

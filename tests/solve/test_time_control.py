@@ -17,6 +17,7 @@ from hybrid.kernels.step.step_law import FIRST, LEAST, MOST, REFUSED, step_end
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.solve.stepper import Stepper
+from tests.scenes import cable_scene, pinned_at
 
 DURATION = 2.0  # s
 REFERENCE = 64 * 16  # steps
@@ -300,15 +301,10 @@ def test_parts_of_a_halved_step_end_with_it_however_late(begin):
 def test_a_line_without_drag_that_is_thrown_about_for_minutes_does_not_gain_energy_by_halved_steps():
     """It stopped at 200 s with "the computation creates energy": halved steps had the weights of equal ones."""
     section = {"length": 30, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e7, "bending_stiffness": 60}
-    result = hybrid.run({
-        "environment": {"seabed": {"z": -20, "stiffness": 2e3}}, "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -20]},
-            "end": {"kind": "pinned", "position": [14, 0, 0],
-                    "motion": {"heave": {"amplitude": 0.5, "period": 4}, "ramp": 4}},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40}, "time": {"duration": 220, "step": 0.05},
-        "output": {"every": 10},
-    })  # fmt: skip
+    result = hybrid.run(cable_scene(
+        section, pinned_at(0, 0, -20),
+        pinned_at(14, 0, 0, motion={"heave": {"amplitude": 0.5, "period": 4}, "ramp": 4}),
+        seabed={"z": -20, "stiffness": 2e3}, model="rod", mesh=40, time=(220, 0.05), output=10
+    ))  # fmt: skip
     assert np.array(result["steps/repeats"]).max() > 0, "steps are halved in it"
     assert "gains energy" not in {x.kind for x in result.events}

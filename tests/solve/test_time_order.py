@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 
 MODELS = {
     "rod": {"kind": "zones", "zones": [{"rod": 2.0, "cells": 40}]},
@@ -33,18 +34,16 @@ def scene(model, step, rho):
         "ramp": 2.0,
     }
     return hybrid.validate_scene(
-        {
-            "environment": {"gravity": 9.81, "fluid": {"density": 1000.0}},
-            "cable": {"sections": [section]},
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, 0]},
-                "end": {"kind": "pinned", "position": [1.2, 0.3, 0.2], "motion": motion},
-            },
-            "initial": {"kind": "equilibrium"},
-            "model": MODELS[model],
-            "time": {"duration": 2.0, "step": step, "rho_inf": rho},
-            "output": {"every": 0.1},
-        }
+        cable_scene(
+            section,
+            pinned_at(0, 0, 0),
+            pinned_at(1.2, 0.3, 0.2, motion=motion),
+            gravity=9.81,
+            fluid={"density": 1000.0},
+            model=MODELS[model],
+            time=(2.0, step, rho),
+            output=0.1,
+        )
     )
 
 

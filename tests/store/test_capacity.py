@@ -12,6 +12,7 @@ import hybrid
 from hybrid.cli.commands import app
 from hybrid.errors import SceneError
 from hybrid.store.capacity import most_used, used
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 TRIANGLE, BOX = [[100.0, 0.0], [0.0, 2.0]], [[100.0, 0.0], [100.0, 2.0], [0.0, 2.0]]
 BOTH_WAYS = [[100.0, 0.0], [0.0, 2.0], [-50.0, 0.0]]
@@ -68,18 +69,12 @@ POLYGON = [[6000.0, 0.0], [4000.0, 2.4], [0.0, 4.0]]
 def hung(**more):
     """A rod that is led to and fro, of two sections, the first of which has a capacity."""
     steel = {"mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e6, "bending_stiffness": 200.0, "damping": 0.5}
-    return {
-        "cable": {"sections": [steel | {"length": 12.0, "capacity": POLYGON}, steel | {"length": 8.0, "mass": 8.0}]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0.2]},
-            "end": {
-                "kind": "pinned", "position": [17, 0, 0],
-                "motion": {"surge": {"amplitude": 0.5, "period": 4.0}, "ramp": 4},
-            },
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40}, "contact": {"self": False},
-        "time": {"duration": 8.0, "step": 0.05}, "output": {"every": 0.25},
-    } | more  # fmt: skip
+    return cable_scene(
+        [steel | {"length": 12.0, "capacity": POLYGON}, steel | {"length": 8.0, "mass": 8.0}],
+        clamped_at([0, 0, 0], [1, 0, 0.2]),
+        pinned_at(17, 0, 0, motion={"surge": {"amplitude": 0.5, "period": 4.0}, "ramp": 4}), model="rod", mesh=40,
+        contact={"self": False}, time=(8.0, 0.05), output=0.25
+    ) | more  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ from hybrid.cli.commands import app
 from hybrid.errors import SceneError
 from hybrid.store.capacity import E301, F201, Row, code_of_steps, collapse, of_riser, use
 from hybrid.store.statistics_table import rows_of
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 PIPE = {"outer": 0.2731, "wall": 0.0159, "modulus": 207e9, "yields": 430.08e6, "breaks": 509.76e6}
 RISER = Row(
@@ -86,19 +87,12 @@ MOORED = {"kind": "E301", "strength": 3e6, "pretension_factor": 1.2, "environmen
 def hung(**more):
     """A pipe that is led to and fro, and a mooring line beyond it."""
     sections = [LINE | WALL | {"length": 60.0, "code": CODE}, LINE | {"length": 40.0, "code": MOORED}]
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0.0}},
-        "cable": {"sections": sections},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, -5], "tangent": [1, 0, -0.3]},
-            "end": {
-                "kind": "pinned", "position": [99, 0, -10],
-                "motion": {"surge": {"amplitude": 0.2, "period": 8.0}, "ramp": 8},
-            },
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 50}, "contact": {"self": False},
-        "time": {"duration": 16.0, "step": 0.1}, "output": {"every": 0.5},
-    } | more  # fmt: skip
+    return cable_scene(
+        sections, clamped_at([0, 0, -5], [1, 0, -0.3]),
+        pinned_at(99, 0, -10, motion={"surge": {"amplitude": 0.2, "period": 8.0}, "ramp": 8}),
+        fluid={"density": 1025, "surface": 0.0}, model="rod", mesh=50, contact={"self": False}, time=(16.0, 0.1),
+        output=0.5
+    ) | more  # fmt: skip
 
 
 @pytest.fixture(scope="module")

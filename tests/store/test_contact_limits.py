@@ -12,6 +12,7 @@ from hybrid.cli.tables import extremes_facts
 from hybrid.store.envelope import largest_contact, limits_of
 from hybrid.store.limits import extreme_errors
 from hybrid.view.summary import facts_of
+from tests.scenes import cable_scene, network_scene, pinned_at
 from tests.validation.obstacle_scenes import CENTRELINE, capstan
 
 PULL = 10.0  # N, along a weightless rope over a smooth drum
@@ -94,11 +95,7 @@ def test_the_limit_is_of_all_that_touches() -> None:
 def test_a_line_at_rest_on_the_bed_is_held_against_it() -> None:
     """A chain that lies on the bed bears its weight per length there."""
     section = {"length": 120.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "max_contact_force": 50.0}
-    scene = {
-        "environment": {"seabed": {"z": 0.0, "stiffness": 1e4}}, "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [95, 0, 40]}},
-        "initial": "equilibrium", "mesh": {"cells": 60},
-    }  # fmt: skip
+    scene = cable_scene(section, pinned_at(0, 0, 0), pinned_at(95, 0, 40), seabed={"z": 0.0, "stiffness": 1e4}, mesh=60)
     result = hybrid.static(hybrid.validate_scene(scene))
     (event,) = [x for x in result.events if x.kind == "contact force above limit"]
     assert "of the seabed" in event.text and 0.98 * 98.1 < event.value < 1.3 * 98.1
@@ -110,15 +107,12 @@ def crossing() -> dict[str, Any]:
     section |= {"max_contact_force": 100.0}
     rope = {"sections": [section], "mesh": {"cells": 20}}
     over, under = [[0, -1, -0.3], [0, 0, 0.05], [0, 1, -0.3]], [[-1, 0, 0], [0, 0, -0.05], [1, 0, 0]]
-    return {
-        "environment": {"gravity": 0}, "contact": {}, "output": {"points": 4},
-        "points": {f"{name}{k}": {"position": x[-k]} for name, x in (("a", under), ("b", over)) for k in (0, 1)},
-        "lines": {
-            "a": {"start": "a0", "end": "a1", "initial": {"points": under}} | rope,
-            "b": {"start": "b0", "end": "b1", "initial": {"points": over}} | rope,
-        },
-        "time": {"duration": 0.005, "step": 0.005},
-    }  # fmt: skip
+    return network_scene(
+        {f"{name}{k}": {"position": x[-k]} for name, x in (("a", under), ("b", over)) for k in (0, 1)},
+        {"a": {"start": "a0", "end": "a1", "initial": {"points": under}} | rope,
+         "b": {"start": "b0", "end": "b1", "initial": {"points": over}} | rope},
+        gravity=0, contact={}, output={"points": 4}, time=(0.005, 0.005)
+    )  # fmt: skip
 
 
 def test_an_equilibrium_of_crossing_lines_is_judged_at_its_nodes_as_a_run_is() -> None:

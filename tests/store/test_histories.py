@@ -17,29 +17,14 @@ from hybrid.errors import ResultError
 from hybrid.statistics import fatigue, moments
 from hybrid.store.histories import bends_of, extreme_of, history_of
 from hybrid.store.statistics_table import rows_of, values_of
+from tests.scenes import cable_scene, pinned_at
 
-SCENE = {
-    "environment": {"fluid": {"density": 1025.0}},
-    "cable": {
-        "sections": [
-            {
-                "length": 60.0, "mass": 8.0, "diameter": 0.04, "axial_stiffness": 1e7, "bending_stiffness": 500.0,
-                "drag": {"normal": 1.2},
-            }
-        ]
-    },
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, -40]},
-        "end": {
-            "kind": "pinned", "position": [35, 0, 0], "motion": {"heave": {"amplitude": 1.0, "period": 5.0}, "ramp": 5.0},
-        },
-    },
-    "initial": "equilibrium",
-    "model": "rod",
-    "mesh": {"cells": 20},
-    "time": {"duration": 130.0, "step": 0.1},
-    "output": {"every": 0.25},
-}  # fmt: skip
+SCENE = cable_scene(
+    {"length": 60.0, "mass": 8.0, "diameter": 0.04, "axial_stiffness": 1e7, "bending_stiffness": 500.0,
+     "drag": {"normal": 1.2}},
+    pinned_at(0, 0, -40), pinned_at(35, 0, 0, motion={"heave": {"amplitude": 1.0, "period": 5.0}, "ramp": 5.0}),
+    fluid={"density": 1025.0}, model="rod", mesh=20, time=(130.0, 0.1), output=0.25
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import pytest
 import hybrid
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.store.capacity import formation_tension, kink_torque, pop_out, strand_distance
+from tests.scenes import cable_scene
 
 
 def loop(m: float, s: np.ndarray) -> np.ndarray:
@@ -98,10 +99,7 @@ def test_the_plan_names_the_torque_from_which_a_hanging_line_can_throw_a_loop() 
     section = {"length": length, "mass": 2.0, "diameter": 0.02, "bending_stiffness": EI, "torsional_stiffness": 8.0}
     clamp = {"kind": "clamped", "tangent": [1.0, 0.0, -1.0], "position": [0.0] * 3, "normal": [0.0, 1.0, 0.0]}
     end = {"kind": "clamped", "tangent": [1.0, 0.0, 1.0], "position": [span, 0.0, 0.0], "normal": [0.0, 1.0, 0.0]}
-    scene = {
-        "cable": {"sections": [section]}, "ends": {"start": clamp, "end": end}, "initial": "equilibrium",
-        "model": "rod", "mesh": {"cells": 200}, "time": {"duration": 1.0, "step": 0.02},
-    }  # fmt: skip
+    scene = cable_scene(section, clamp, end, model="rod", mesh=200, time=(1.0, 0.02))
     critical = hybrid.plan(hybrid.validate_scene(scene)).critical_torque
     assert critical is not None
     assert critical.torque == pytest.approx(2.0 * np.sqrt(EI * c * weight), rel=1e-3)

@@ -8,19 +8,15 @@ import numpy as np
 
 import hybrid
 from hybrid.store.format import MemoryTarget
+from tests.scenes import line_between, network_scene
 
 ROPE = {"length": 60, "mass": 4, "diameter": 0.04, "axial_stiffness": 1e7}
-SCENE = {
-    "title": "A float on two legs",
-    "environment": {"fluid": {"density": 1025}},
-    "points": {
-        "west": {"position": [-40, 0, -50]}, "east": {"position": [40, 0, -50]},
-        "float": {"initial_guess": [0, 0, -10], "mass": 200, "volume": 1.0},
-    },
-    "lines": {
-        name: {"start": name, "end": "float", "sections": [ROPE], "mesh": {"cells": 8}} for name in ("west", "east")
-    },
-}  # fmt: skip
+SCENE = network_scene(
+    {"west": {"position": [-40, 0, -50]}, "east": {"position": [40, 0, -50]},
+     "float": {"initial_guess": [0, 0, -10], "mass": 200, "volume": 1.0}},
+    {name: line_between(name, "float", ROPE, mesh=8) for name in ("west", "east")}, title="A float on two legs",
+    fluid={"density": 1025}
+)  # fmt: skip
 
 
 def test_arrays_equal_those_of_a_file(tmp_path: Path) -> None:

@@ -10,23 +10,21 @@ from hybrid.errors import ResultError
 from hybrid.simulation.case import Case
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.run_zones import RunKinds
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 
 def swinging(model, **more):
     """A line whose end swings so fast at first that zones change."""
     section = {"length": 20.0, "mass": 1.0, "bending_stiffness": 5.0, "axial_stiffness": 1e5}
     motion = {"surge": {"amplitude": 3.0, "period": 4.0}, "ramp": 2.0}
-    data = {
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1]},
-            "end": {"kind": "pinned", "position": [8, 0, 0], "motion": motion},
-        },
-        "initial": "equilibrium",
-        "model": model,
-        "time": {"duration": 6.0, "step": 0.02},
-        "output": {"every": 0.1, "points": 7},
-    }
+    data = cable_scene(
+        section,
+        clamped_at([0, 0, 0], [0, 0, -1]),
+        pinned_at(8, 0, 0, motion=motion),
+        model=model,
+        time=(6.0, 0.02),
+        output=(0.1, 7),
+    )
     return hybrid.validate_scene(data | more)
 
 

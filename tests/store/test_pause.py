@@ -14,6 +14,7 @@ from hybrid.simulation import run as run_module
 from hybrid.simulation.line_result import LineResult
 from hybrid.store import writer
 from hybrid.store.format import Header, MemoryTarget
+from tests.scenes import line_between, network_scene
 
 GIVEN = Header(np.zeros(1), (), (), {})
 
@@ -51,10 +52,7 @@ def test_outputs_of_lines_are_made_together(monkeypatch: pytest.MonkeyPatch) -> 
     rope = {"length": 101.0, "mass": 5.0, "diameter": 0.03, "axial_stiffness": 1e6}
     points = {"a": {"position": [0, 0, 0]}, "b": {"position": [100, 0, 0]}}
     points["b"]["motion"] = {"heave": {"amplitude": 0.5, "period": 5.0}, "ramp": 10.0}
-    scene = {
-        "points": points, "lines": {"l": {"start": "a", "end": "b", "sections": [rope], "mesh": {"cells": 10}}},
-        "time": {"duration": 1.0, "step": 0.05}, "output": {"every": 0.05, "points": 5},
-    }  # fmt: skip
+    scene = network_scene(points, {"l": line_between("a", "b", rope, mesh=10)}, time=(1.0, 0.05), output=(0.05, 5))
     calls: list[int] = []
     write_down = LineResult.write_down
 

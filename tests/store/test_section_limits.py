@@ -16,6 +16,7 @@ from hybrid.store.envelope import extreme, extremes_of_outputs, farthest, judged
 from hybrid.store.recorder import _PIECE
 from hybrid.studies.workers import collected
 from hybrid.view.curves import extent
+from tests.scenes import cable_scene, pinned_at
 
 
 def envelope(tension: list[float]) -> dict[str, np.ndarray]:
@@ -81,12 +82,10 @@ def released(**limits: float) -> dict[str, Any]:
     """A chain with a clump, let go at one end: compression runs along it, strongest inside a cell."""
     section = {"length": 40.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 5.0} | limits
     end = {"kind": "pinned", "position": [30, 0, 0], "release_at": {"time": 0.3}}
-    return {
-        "cable": {"sections": [section], "attachments": [{"kind": "clump", "at": 20, "mass": 15}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}, "initial": "equilibrium",
-        "model": "rod", "mesh": {"cells": 20}, "time": {"duration": 1.5, "step": 0.01},
-        "output": {"every": 0.02, "points": 501},
-    }  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), end, attachments=[{"kind": "clump", "at": 20, "mass": 15}], model="rod", mesh=20,
+        time=(1.5, 0.01), output=(0.02, 501)
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ["memory", "file", "resumed"])

@@ -22,6 +22,7 @@ from hybrid.store.verdicts import DOUBTS, OF_ACCURACY, Asked, accuracy_text, dou
 from hybrid.studies.workers import collected
 from hybrid.view.report_parts import verdict_html
 from hybrid.view.summary import facts_of
+from tests.scenes import cable_scene, pinned_at
 
 LIMITS = ("min_bend_radius", "max_tension", "min_tension")
 CLAMPED = {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1]}
@@ -35,12 +36,9 @@ def scene(**more: Any) -> dict[str, Any]:
     section |= {x: more.pop(x) for x in (*LIMITS, "pipe") if x in more}
     heave = {"heave": {"amplitude": 1, "period": 4}, "ramp": 4}
     start = more.pop("start", {"kind": "pinned", "position": [0, 0, 0]})
-    return {
-        "cable": {"sections": [section]},
-        "ends": {"start": start, "end": {"kind": "pinned", "position": [25, 0, 0], "motion": heave}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 30}, "time": {"duration": 2, "step": 0.05},
-        "output": {"every": 0.1},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, start, pinned_at(25, 0, 0, motion=heave), model="rod", mesh=30, time=(2, 0.05), output=0.1
+    ) | more  # fmt: skip
 
 
 def limits(tension: float, radius: float, least: float = -1.0) -> dict[str, float]:

@@ -18,20 +18,14 @@ from hybrid.scene.root import in_full
 from hybrid.store.tradeoff_table import FAILED, Row
 from hybrid.studies import runs
 from hybrid.studies.tradeoff import ALONG, LEVELS, LevelRow, LevelTable, level_row, status_of
+from tests.scenes import cable_scene, pinned_at
 
-SAG: dict[str, Any] = {
-    "title": "a line that sags",
-    "environment": {"fluid": {"density": 1025}},
-    "cable": {"sections": [{
-        "length": 12.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0,
-        "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
-    }]},
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, -5]},
-        "end": {"kind": "pinned", "position": [10, 0, -5], "motion": {"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 2}},
-    },
-    "initial": "equilibrium", "time": {"duration": 1.0}, "output": {"every": 0.1, "points": 25},
-}  # fmt: skip
+SAG: dict[str, Any] = cable_scene(
+    {"length": 12.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0,
+     "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}},
+    pinned_at(0, 0, -5), pinned_at(10, 0, -5, motion={"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 2}),
+    title="a line that sags", fluid={"density": 1025}, time={"duration": 1.0}, output=(0.1, 25)
+)  # fmt: skip
 
 
 def values(

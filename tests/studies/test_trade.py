@@ -22,31 +22,17 @@ from hybrid.scene.root import in_full
 from hybrid.store.tradeoff_table import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
 from hybrid.studies import runs, tradeoff
 from hybrid.view.study_report import plot_trade
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 # A second of a line that hangs in water: every model can do it, and a run is some 0.1 s.
-SAG: dict[str, Any] = {
-    "title": "a line that sags",
-    "environment": {"fluid": {"density": 1025}},
-    "cable": {
-        "sections": [
-            {
-                "length": 12.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0,
-                "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
-            }
-        ]
-    },
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, -5]},
-        "end": {
-            "kind": "pinned", "position": [10, 0, -5], "motion": {"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 1},
-        },
-    },
-    "initial": "equilibrium",
-    "model": {"kind": "adaptive", "tolerance": 1e-4, "force_rod": [[0.0, 1.0]]},
-    "mesh": {"cells": 20},
-    "time": {"duration": 1.0, "step": 0.05},
-    "output": {"every": 0.1, "points": 25},
-}  # fmt: skip
+SAG: dict[str, Any] = cable_scene(
+    {"length": 12.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0,
+     "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}},
+    pinned_at(0, 0, -5), pinned_at(10, 0, -5, motion={"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 1}),
+    title="a line that sags", fluid={"density": 1025},
+    model={"kind": "adaptive", "tolerance": 1e-4, "force_rod": [[0.0, 1.0]]}, mesh=20, time=(1.0, 0.05),
+    output=(0.1, 25)
+)  # fmt: skip
 
 
 def scene(**changes: Any) -> hybrid.Scene:
@@ -344,20 +330,14 @@ def joined(**of_chain: Any) -> dict[str, Any]:
     """A rope and a shorter chain that hang in water and meet at a free point; `of_chain`: more of the chain's table."""
     section = SAG["cable"]["sections"][0]
     chain = {k: x for k, x in section.items() if k != "bending_stiffness"} | {"length": 3.0, "mass": 4.0}
-    return {
-        "environment": SAG["environment"],
-        "points": {
-            "left": {"kind": "fixed", "position": [0, 0, -5]},
-            "knot": {"kind": "free", "initial_guess": [7, 0, -9], "mass": 5.0},
-            "right": {"kind": "fixed", "position": [10, 0, -5], "motion": SAG["ends"]["end"]["motion"]},
-        },
-        "lines": {
-            "rope": {"start": "left", "end": "knot", "sections": [section | {"length": 9.0}], "model": "catenary"},
-            "chain": {"start": "knot", "end": "right", "sections": [chain]} | of_chain,
-        },
-        "time": {"duration": 0.5},
-        "output": {"every": 0.1, "points": 11},
-    }  # fmt: skip
+    return network_scene(
+        {"left": {"kind": "fixed", "position": [0, 0, -5]},
+         "knot": {"kind": "free", "initial_guess": [7, 0, -9], "mass": 5.0},
+         "right": {"kind": "fixed", "position": [10, 0, -5], "motion": SAG["ends"]["end"]["motion"]}},
+        {"rope": line_between("left", "knot", section | {"length": 9.0}, model="catenary"),
+         "chain": line_between("knot", "right", chain) | of_chain},
+        environment=SAG["environment"], time={"duration": 0.5}, output=(0.1, 11)
+    )  # fmt: skip
 
 
 @pytest.mark.long

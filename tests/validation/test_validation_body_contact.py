@@ -25,6 +25,7 @@ from hybrid.scene.read import as_scene, one_line
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState
+from tests.scenes import cable_scene, line_between, network_scene
 
 RADIUS, STRAND, SPAN, APART, MASS = 0.6, 0.01, 10.0, 0.2, 20.0
 Tables = dict[str, Any]
@@ -40,11 +41,10 @@ def on_two_lines(**body: Any) -> Tables:
     }
     ball = {"initial_guess": [5.0, 0.0, 0.58], "mass": MASS, "inertia": [3.0, 3.0, 3.0],
             "shape": {"kind": "sphere", "radius": RADIUS}}  # fmt: skip
-    return {
-        "points": points, "bodies": {"ball": ball | body},
-        "lines": {side: {"start": f"0{side}", "end": f"10{side}", **line} for side in ("left", "right")},
-        "time": {"duration": 0.2, "step": 0.01}, "output": {"every": 0.05, "points": 41},
-    }  # fmt: skip
+    return network_scene(
+        points, {side: {"start": f"0{side}", "end": f"10{side}", **line} for side in ("left", "right")},
+        bodies={"ball": ball | body}, time=(0.2, 0.01), output=(0.05, 41)
+    )  # fmt: skip
 
 
 # --- at rest ----------------------------------------------------------------------------------------
@@ -356,14 +356,13 @@ def test_a_line_ignores_the_body_that_it_is_fixed_to_until_it_has_left_it() -> N
     """A buoy on its mooring, fixed to its bottom or to its middle: as without a shape; laid over the buoy it is not."""
     section = {"length": 12.0, "mass": 1.0, "diameter": 0.04, "axial_stiffness": 1e6, "bending_stiffness": 1.0}
     for place in ([0, 0, -0.5], [0, 0, 0]):
-        tables: Tables = {
-            "environment": {"fluid": {"density": 1025}},
-            "points": {"anchor": {"position": [0, 0, -12]}, "eye": {"body": "buoy", "place": place}},
-            "bodies": {"buoy": {"initial_guess": [0.2, 0, 0.5], "mass": 300.0, "inertia": [40.0, 40.0, 40.0],
-                                "volume": 0.5, "centre_of_buoyancy": [0, 0, 0.1]}},
-            "lines": {"leg": {"start": "anchor", "end": "eye", "sections": [section], "model": "rod",
-                              "contact": {"self": False}, "mesh": {"cells": 60}}},
-        }  # fmt: skip
+        tables: Tables = network_scene(
+            {"anchor": {"position": [0, 0, -12]}, "eye": {"body": "buoy", "place": place}},
+            {"leg": line_between("anchor", "eye", section, model="rod", contact={"self": False}, mesh=60)},
+            fluid={"density": 1025},
+            bodies={"buoy": {"initial_guess": [0.2, 0, 0.5], "mass": 300.0, "inertia": [40.0, 40.0, 40.0],
+                             "volume": 0.5, "centre_of_buoyancy": [0, 0, 0.1]}}
+        )  # fmt: skip
         bare = hybrid.static(tables)
         tables["bodies"]["buoy"]["shape"] = {"kind": "sphere", "radius": 0.5, "friction": 0.2}
         shaped = hybrid.static(tables)
@@ -382,12 +381,11 @@ def thrown(friction: float, step: float) -> tuple[Any, list[float], Any, float]:
         initial_guess=(1.2, 0.3, 0.0), initial_rotation=(10, 20, 30), mass=2.0, inertia=(0.1, 0.2, 0.25),
         centre=(0.05, 0.02, -0.03), shape={"kind": "sphere", "radius": 0.3, "friction": friction, "stiffness": 1e4},
     )  # fmt: skip
-    model = build(one_line(hybrid.validate_scene({
-        "environment": {"gravity": 1e-15}, "cable": {"sections": [section]}, "contact": {"self": False},
-        "ends": {"start": "free", "end": "free"}, "model": "rod", "mesh": {"cells": 60}, "dimension": 3,
-        "initial": {"kind": "points", "points": [[0, 0, 0.35], [3, 0, 0.35]]}, "obstacles": body.surface("ball"),
-        "time": {"duration": 1.0, "step": 0.1},
-    })))  # fmt: skip
+    model = build(one_line(hybrid.validate_scene(cable_scene(
+        section, "free", "free", gravity=1e-15, contact={"self": False}, model="rod", mesh=60, dimension=3,
+        initial={"kind": "points", "points": [[0, 0, 0.35], [3, 0, 0.35]]}, obstacles=body.surface("ball"),
+        time=(1.0, 0.1)
+    ))))  # fmt: skip
     state = model.start.copy()
     state.v[:] = (0.5, 0.0, -4.0)
     one = body_model("ball", body, 0.0, 0.0)
@@ -489,20 +487,16 @@ def test_bodies_that_are_in_each_other_or_in_what_is_around_are_told(tmp_path: P
     ball, bar = {"kind": "sphere", "radius": 0.3}, {"kind": "cylinder", "axis": [1, 0, 0], "length": 1.0, "radius": 0.1}
     crate = {"kind": "box", "size": [0.4, 0.4, 0.4], "rounding": 0.05}
     section = {"length": 2.0, "mass": 0.2, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.02}
-    scene = {
-        "environment": {"seabed": {"z": -1.0, "stiffness": 1e4}},
-        "obstacles": {"pile": {"kind": "cylinder", "at": [9, 5, 0], "axis": [0, 0, 1], "radius": 0.2}},
-        "points": {"a": {"position": [0, 0, 2]}, "b": {"position": [2, 0, 2]}},
-        "bodies": {
-            "one": body(0.0, 0.0, ball), "two": body(0.5, 0.0, ball), "apart": body(2.0, 0.0, ball),
-            "bar": body(8.5, 0.0, bar), "low": body(4.0, -0.85, crate), "high": body(6.0, -0.5, crate),
-        },
-        "lines": {
-            "l": {"start": "a", "end": "b", "sections": [section], "model": "rod", "mesh": {"cells": 20},
-                  "initial": {"kind": "straight", "direction": [1, 0, 0]}},
-        },
-        "time": {"duration": 0.02, "step": 0.01},
-    }  # fmt: skip
+    scene = network_scene(
+        {"a": {"position": [0, 0, 2]}, "b": {"position": [2, 0, 2]}},
+        {"l": line_between("a", "b", section, model="rod", mesh=20,
+                           initial={"kind": "straight", "direction": [1, 0, 0]})},
+        seabed={"z": -1.0, "stiffness": 1e4},
+        obstacles={"pile": {"kind": "cylinder", "at": [9, 5, 0], "axis": [0, 0, 1], "radius": 0.2}},
+        bodies={"one": body(0.0, 0.0, ball), "two": body(0.5, 0.0, ball), "apart": body(2.0, 0.0, ball),
+                "bar": body(8.5, 0.0, bar), "low": body(4.0, -0.85, crate), "high": body(6.0, -0.5, crate)},
+        time=(0.02, 0.01)
+    )  # fmt: skip
     expected = {
         "body one is 0.1 m deep in body two", "body low is 0.05 m deep in the seabed",
         "body bar is 0.3 m deep in obstacle pile",

@@ -25,6 +25,7 @@ from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import shared_of
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
+from tests.scenes import line_between, network_scene
 from tests.validation.test_validation_body_contact import MASS, on_two_lines, pushed
 from tests.validation.thrown_lines import WIDTH, straight, throw
 
@@ -114,15 +115,14 @@ def test_legs_of_a_line_cross_below_the_body_that_it_hangs_over() -> None:
     across = {"a": [0.65, 0.015, -0.2], "b": [-0.65, -0.015, -0.2]}
     ends = {name: {"position": at, "motion": {"travel": {"by": across[name], "over": 0.4}}}
             for name, at in (("a", legs[0]), ("b", legs[3]))}  # fmt: skip
-    tables: Tables = {
-        "points": ends,
-        "bodies": {"pin": {"initial_guess": [0, 0, 0], "mass": 1e12, "inertia": [1e12, 1e12, 1e12], "shape": pin,
-                           "force": [0, 0, 9.81e12]}},
-        "lines": {"rope": {"start": "a", "end": "b", "sections": [section | {"length": length}], "model": "rod",
-                           "contact": {"friction": 0.2}, "initial": {"kind": "points", "points": legs},
-                           "mesh": {"cells": 60}}},
-        "time": {"duration": 0.5, "step": 0.002}, "output": {"every": 0.05, "points": 61},
-    }  # fmt: skip
+    tables: Tables = network_scene(
+        ends,
+        {"rope": line_between("a", "b", section | {"length": length}, model="rod", contact={"friction": 0.2},
+                              initial={"kind": "points", "points": legs}, mesh=60)},
+        bodies={"pin": {"initial_guess": [0, 0, 0], "mass": 1e12, "inertia": [1e12, 1e12, 1e12], "shape": pin,
+                        "force": [0, 0, 9.81e12]}},
+        time=(0.5, 0.002), output=(0.05, 61)
+    )  # fmt: skip
     by_body = hybrid.run(tables).lines["rope"]
     assert by_body["self_contact"].max() > 1.0 and np.abs(by_body["obstacles/pin/force"]).max() > 1.0
     del tables["bodies"]

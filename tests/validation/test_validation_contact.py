@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 
 import hybrid
 from hybrid.store import capacity
+from tests.scenes import cable_scene
 
 Floats = np.ndarray
 D = 0.02
@@ -37,16 +38,10 @@ def driven(turns: float, motion: dict[str, Any], duration: float, damping: float
     }  # fmt: skip
     clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 0, 1]}
     end = clamp | {"position": [0.97, 0, 0], "turns": turns, "motion": motion}
-    return hybrid.run(
-        hybrid.validate_scene(
-            {
-                "environment": {"gravity": 0.0}, "cable": {"sections": [rod | section]},
-                "ends": {"start": clamp | {"position": [0, 0, 0]}, "end": end}, "initial": "equilibrium",
-                "contact": {"self": True}, "model": "rod", "mesh": {"cells": 320},
-                "time": {"duration": duration, "step": 0.02}, "output": {"every": 0.05, "points": 321},
-            }
-        )
-    )  # fmt: skip
+    return hybrid.run(hybrid.validate_scene(cable_scene(
+        rod | section, clamp | {"position": [0, 0, 0]}, end, gravity=0.0, contact={"self": True}, model="rod", mesh=320,
+        time=(duration, 0.02), output=(0.05, 321)
+    )))  # fmt: skip
 
 
 def by_file(path: Path, t: Floats, slack: Floats, turn: Floats) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import pytest
 import hybrid
 from hybrid.cli.tables import extremes_facts
 from hybrid.view.summary import facts_of
+from tests.scenes import cable_scene, pinned_at
 from tests.validation.test_validation_lines_contact import FORCES, ROPE, WEIGHT, crossing, force_between
 
 G, MASS, LENGTH = 9.81, 0.5, 4.0
@@ -25,11 +26,10 @@ PIPES = {
 
 def laid(**more: Any) -> dict[str, Any]:
     """A cord whose ends are held, over two pipes of different size."""
-    return {
-        "cable": {"sections": [CORD]}, "obstacles": PIPES, "model": "catenary", "mesh": {"cells": 400},
-        "ends": {"start": {"kind": "pinned", "position": [-1.6, 0, 0.0]}, "end": {"kind": "pinned", "position": [1.5, 0, -0.1]}},
-        "initial": "equilibrium", "output": {"points": 401},
-    } | more  # fmt: skip
+    return cable_scene(
+        CORD, pinned_at(-1.6, 0, 0.0), pinned_at(1.5, 0, -0.1), obstacles=PIPES, model="catenary", mesh=400,
+        output={"points": 401}
+    ) | more  # fmt: skip
 
 
 @pytest.fixture(scope="module")

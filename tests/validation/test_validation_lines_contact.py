@@ -22,6 +22,7 @@ from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
+from tests.scenes import line_between, network_scene
 from tests.simulation.test_system_contact import HOSE, system
 from tests.validation.test_validation_obstacles_of_lines import system_of
 from tests.validation.thrown_lines import WIDTH as D
@@ -45,13 +46,12 @@ def crossing(drop: float, **more: Any) -> Tables:
     """Two ropes of 1 m whose pins are 0.8 m apart, the upper one looked for from above the lower."""
     line = {"sections": [ROPE], "model": "rod", "mesh": {"cells": 80}, "contact": {"self": False}}
     above = {"points": [[-0.4, 0, -drop], [0, 0, 0.1], [0.4, 0, -drop]]}
-    return {
-        "points": {"a": {"position": [-0.4, 0, -drop]}, "b": {"position": [0.4, 0, -drop]},
-                   "c": {"position": [0, -0.4, 0]}, "d": {"position": [0, 0.4, 0]}},
-        "lines": {"upper": line | {"start": "a", "end": "b", "initial": above},
-                  "lower": line | {"start": "c", "end": "d"}},
-        "contact": {}, "output": {"points": 81},
-    } | more  # fmt: skip
+    return network_scene(
+        {"a": {"position": [-0.4, 0, -drop]}, "b": {"position": [0.4, 0, -drop]}, "c": {"position": [0, -0.4, 0]},
+         "d": {"position": [0, 0.4, 0]}},
+        {"upper": line | {"start": "a", "end": "b", "initial": above}, "lower": line | {"start": "c", "end": "d"}},
+        contact={}, output={"points": 81}
+    ) | more  # fmt: skip
 
 
 def force_between(result: Any, row: int) -> tuple[float, float]:
@@ -162,14 +162,12 @@ def test_crossing_fibres_push_each_other_by_their_tension() -> None:
              "bending_stiffness": stiff, "max_strain": 0.1}  # fmt: skip
     line = {"sections": [fibre], "model": "rod", "mesh": {"cells": 200}, "contact": {"self": False}}
     above = {"points": [[-half, 0, 0], [0, 0, 0.03], [half, 0, 0]]}
-    result = hybrid.static({
-        "environment": {"gravity": 0},
-        "points": {"a": {"position": [-half, 0, 0]}, "b": {"position": [half, 0, 0]},
-                   "c": {"position": [0, -half, 0]}, "d": {"position": [0, half, 0]}},
-        "lines": {"upper": line | {"start": "a", "end": "b", "initial": above},
-                  "lower": line | {"start": "c", "end": "d"}},
-        "contact": {}, "output": {"points": 201},
-    })  # fmt: skip
+    result = hybrid.static(network_scene(
+        {"a": {"position": [-half, 0, 0]}, "b": {"position": [half, 0, 0]}, "c": {"position": [0, -half, 0]},
+         "d": {"position": [0, half, 0]}},
+        {"upper": line | {"start": "a", "end": "b", "initial": above}, "lower": line | {"start": "c", "end": "d"}},
+        gravity=0, contact={}, output={"points": 201}
+    ))  # fmt: skip
     upper, lower = result.lines["upper"], result.lines["lower"]
     apart = upper.position[0, 100, 2] - lower.position[0, 100, 2]
     T, lam = upper.tension[0, 0], np.sqrt(stiff / upper.tension[0, 0])
@@ -429,17 +427,14 @@ def clash(speed: float) -> Tables:
     chain = {"length": 210, "mass": 60, "diameter": 0.1, "axial_stiffness": 3e8, "bending_stiffness": 0,
              "drag": {"normal": 2.0, "tangential": 0.3}, "added_mass": {"normal": 1.0}}  # fmt: skip
     places = {"anchor": [180, 30, -90], "unit": [60, 10, -90], "fairlead": [12, -3, 0], "hangoff": [0, 0, -5]}
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0, "current": [speed, 0, 0]},
-                        "seabed": {"z": -90, "stiffness": 1e4}},
-        "points": {name: {"position": place} for name, place in places.items()},
-        "contact": {"between": [["umbilical", "mooring"]]},
-        "lines": {
-            "umbilical": {"start": "unit", "end": "hangoff", "sections": [umbilical], "mesh": {"cells": 65}},
-            "mooring": {"start": "anchor", "end": "fairlead", "sections": [chain], "mesh": {"cells": 75}},
-        },
-        "output": {"points": 76, "quantities": {"gap": {"kind": "clearance", "line": "umbilical", "other": "mooring"}}},
-    }  # fmt: skip
+    return network_scene(
+        {name: {"position": place} for name, place in places.items()},
+        {"umbilical": line_between("unit", "hangoff", umbilical, mesh=65),
+         "mooring": line_between("anchor", "fairlead", chain, mesh=75)},
+        fluid={"density": 1025, "surface": 0, "current": [speed, 0, 0]}, seabed={"z": -90, "stiffness": 1e4},
+        contact={"between": [["umbilical", "mooring"]]},
+        output={"points": 76, "quantities": {"gap": {"kind": "clearance", "line": "umbilical", "other": "mooring"}}}
+    )  # fmt: skip
 
 
 @pytest.mark.long

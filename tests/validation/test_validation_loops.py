@@ -10,6 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.store.capacity import formation_tension
+from tests.scenes import cable_scene
 
 
 def clamped(slack: float, turns: float) -> hybrid.Result:
@@ -18,17 +19,14 @@ def clamped(slack: float, turns: float) -> hybrid.Result:
     clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 0, 1]}
     return hybrid.static(
         hybrid.validate_scene(
-            {
-                "environment": {"gravity": 0.0},
-                "cable": {"sections": [section]},
-                "ends": {
-                    "start": {**clamp, "position": [0, 0, 0]},
-                    "end": {**clamp, "position": [1.0 - slack, 0, 0], "turns": turns},
-                },
-                "initial": "equilibrium",
-                "model": "rod",
-                "mesh": {"cells": 320},
-            }
+            cable_scene(
+                section,
+                {**clamp, "position": [0, 0, 0]},
+                {**clamp, "position": [1.0 - slack, 0, 0], "turns": turns},
+                gravity=0.0,
+                model="rod",
+                mesh=320,
+            )
         )
     )
 

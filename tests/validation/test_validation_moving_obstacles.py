@@ -13,6 +13,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
+from tests.scenes import cable_scene, pinned_at
 from tests.validation.obstacle_scenes import CENTRELINE, STRAND, Tables, capstan, half_turn
 
 MU = 0.3
@@ -62,10 +63,9 @@ def running(v: float, spin: float = 0.0) -> Tables:
     section = tables["cable"]["sections"][0]
     section |= {"length": 4.0 + np.pi * CENTRELINE, "damping": {"stiffness": 1e-3}}
     tables["ends"] = {
-        "start": {"kind": "pinned", "position": [-CENTRELINE, 0, -0.5],
-                  "motion": {"velocity": [0, 0, -v], "ramp": 0.3}},
+        "start": pinned_at(-CENTRELINE, 0, -0.5, motion={"velocity": [0, 0, -v], "ramp": 0.3}),
         "end": {"kind": "free", "force": [0, 0, -10.0]},
-    }  # fmt: skip
+    }
     tables["initial"] = {"kind": "equilibrium", "points": half_turn(CENTRELINE, 0.5, 3.5)}
     if spin:
         tables["obstacles"]["drum"]["spin"] = {"rate": spin, "ramp": 0.3}
@@ -91,12 +91,11 @@ def conveyor(**more: Any) -> Tables:
     floor = {"kind": "plane", "at": [0, 0, 0], "normal": [0, 0, 1], "friction": MU, "damping": 100.0,
              "motion": {"velocity": [1.0, 0.5, 0], "ramp": 0.05}}  # fmt: skip
     section = {"length": 1.0, "mass": 0.2, "diameter": 0.02, "axial_stiffness": 1e3, "bending_stiffness": 0.02}
-    return {
-        "cable": {"sections": [section]}, "obstacles": {"floor": floor}, "ends": {"start": "free", "end": "free"},
-        "initial": {"kind": "straight", "direction": [1, 0, 0], "origin": [0, 0, 0.01]}, "model": "rod",
-        "mesh": {"cells": 20}, "contact": {"self": False},
-        "time": {"duration": 0.6, "step": 0.002}, "output": {"every": 0.02, "points": 21},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, "free", "free", obstacles={"floor": floor},
+        initial={"kind": "straight", "direction": [1, 0, 0], "origin": [0, 0, 0.01]}, model="rod", mesh=20,
+        contact={"self": False}, time=(0.6, 0.002), output=(0.02, 21)
+    ) | more  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -250,13 +249,12 @@ def falling(moves: bool, step: float = 0.004, **more: Any) -> Tables:
         pipe |= {"at": (at - 0.5 * ramp * V).tolist(), "motion": {"velocity": (-V).tolist(), "ramp": ramp}}
     section = {"length": 2.0, "mass": 0.2, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.02,
                "damping": {"stiffness": 1e-3}}  # fmt: skip
-    return {
-        "cable": {"sections": [section]}, "obstacles": {"pipe": pipe}, "ends": {"start": "free", "end": "free"},
-        "initial": {"kind": "straight", "direction": [1, 0, 0], "origin": [-1.0, 0.3, 0.5],
-                    "velocity": [0, 0, 0] if moves else V.tolist()},
-        "model": "rod", "mesh": {"cells": 80}, "contact": {"self": False},
-        "time": {"duration": 0.3, "step": step}, "output": {"every": 0.02, "points": 81},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, "free", "free", obstacles={"pipe": pipe},
+        initial={"kind": "straight", "direction": [1, 0, 0], "origin": [-1.0, 0.3, 0.5],
+                 "velocity": [0, 0, 0] if moves else V.tolist()},
+        model="rod", mesh=80, contact={"self": False}, time=(0.3, step), output=(0.02, 81)
+    ) | more  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -318,13 +316,10 @@ def pushed(**more: Any) -> Tables:
     bar = {"kind": "cylinder", "at": [1.0, -0.4, 0], "axis": [0.3, 0.1, 1], "length": 0.6, "radius": 0.15,
            "friction": 0.4, "motion": motion}  # fmt: skip
     section = {"length": 2.2, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.05}
-    return {
-        "cable": {"sections": [section]}, "obstacles": {"bar": bar},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0.2]},
-                 "end": {"kind": "pinned", "position": [2, 0, 0.2]}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 60}, "contact": {"self": False},
-        "time": {"duration": 0.8, "step": 0.005}, "output": {"every": 0.05, "points": 61},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0.2), pinned_at(2, 0, 0.2), obstacles={"bar": bar}, model="rod", mesh=60,
+        contact={"self": False}, time=(0.8, 0.005), output=(0.05, 61)
+    ) | more  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 from tests.validation.obstacle_scenes import over_pipe
 
 Tables = dict[str, Any]
@@ -26,12 +27,11 @@ def test_each_section_rests_at_its_own_radius() -> None:
     floor = {"kind": "plane", "at": [0, 0, 0], "normal": [0, 0, 1], "stiffness": STIFFNESS, "friction": 0.5}
     section = {"length": 12.0, "mass": 2.0, "diameter": 0.1, "axial_stiffness": 1e4, "bending_stiffness": 1e-4,
                "damping": {"mass": 5.0}}  # fmt: skip
-    tables: Tables = cut({
-        "cable": {"sections": [section]}, "obstacles": {"floor": floor},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0.05]}, "end": {"kind": "pinned", "position": [12, 0, 0.02]}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 120}, "contact": {"self": False},
-        "output": {"points": 121},
-    }, [6.0, 6.0], [0.1, 0.04])  # fmt: skip
+    tables: Tables = cut(
+        cable_scene(section, pinned_at(0, 0, 0.05), pinned_at(12, 0, 0.02), obstacles={"floor": floor}, model="rod",
+                    mesh=120, contact={"self": False}, output={"points": 121}),
+        [6.0, 6.0], [0.1, 0.04]
+    )  # fmt: skip
     rest = hybrid.static(tables)
     z, weight, onset = rest.position[-1][:, 2], 2.0 * 9.81, 0.01 * 0.04
     p = np.sqrt(2.0 * onset * weight / STIFFNESS)

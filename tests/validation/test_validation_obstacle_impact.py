@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene
 
 WIDTH, SPEED, MASS = 0.02, 10.0, 0.4
 
@@ -16,11 +17,10 @@ def thrown(obstacle: dict[str, Any], height: float, duration: float, speed: floa
     """A rope of 1 m that flies level and down, without gravity."""
     section = {"length": 1.0, "mass": MASS, "diameter": WIDTH, "axial_stiffness": 2e5, "bending_stiffness": 0.1}
     start = {"kind": "straight", "origin": [-0.5, 0, height], "direction": [1, 0, 0], "velocity": [0, 0, -speed]}
-    return hybrid.run({
-        "environment": {"gravity": 0}, "cable": {"sections": [section]}, "obstacles": {"it": obstacle},
-        "ends": {"start": "free", "end": "free"}, "initial": start, "model": "rod", "mesh": {"cells": 100},
-        "time": {"duration": duration, "step": duration / 400}, "output": {"every": duration / 400, "points": 101},
-    })  # fmt: skip
+    return hybrid.run(cable_scene(
+        section, "free", "free", gravity=0, obstacles={"it": obstacle}, initial=start, model="rod", mesh=100,
+        time=(duration, duration / 400), output=(duration / 400, 101)
+    ))  # fmt: skip
 
 
 @pytest.mark.parametrize("speed", [3.0, 10.0])

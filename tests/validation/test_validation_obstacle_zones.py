@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 from tests.validation.test_validation_obstacles_accuracy import DRAGGED, HEAVE, PIPE, as_system
 
 Tables = dict[str, Any]
@@ -60,22 +61,12 @@ def test_cells_that_follow_name_the_obstacle_whose_radius_they_do_not() -> None:
     """What a line knows of obstacles goes along where its cells change."""
     section = {"length": 11.62, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e6, "bending_stiffness": 20.0}
     over = [[0, 0, 0], [0.9, 0, -1.2], [4.4, 0, 0], [5.6, 0, 0], [9.1, 0, -1.2], [10, 0, 0]]
-    result = hybrid.run(
-        {
-            "cable": {"sections": [section | {"damping": {"mass": 1.0}}]},
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, 0]},
-                "end": {
-                    "kind": "pinned", "position": [10, 0, 0],
-                    "motion": {"heave": {"amplitude": 0.2, "period": 2}, "ramp": 2},
-                },
-            },
-            "obstacles": {
-                "pipe": {"kind": "cylinder", "at": [5, 0, -0.6], "axis": [0, 1, 0], "radius": 0.5, "friction": 0.2},
-            },
-            "initial": {"kind": "points", "points": over}, "model": {"kind": "adaptive", "curvature_error": 0.05},
-            "time": {"duration": 1.25, "step": 0.005}, "output": {"every": 0.25},
-        }
-    )  # fmt: skip
+    result = hybrid.run(cable_scene(
+        section | {"damping": {"mass": 1.0}}, pinned_at(0, 0, 0),
+        pinned_at(10, 0, 0, motion={"heave": {"amplitude": 0.2, "period": 2}, "ramp": 2}),
+        obstacles={"pipe": {"kind": "cylinder", "at": [5, 0, -0.6], "axis": [0, 1, 0], "radius": 0.5, "friction": 0.2}},
+        initial={"kind": "points", "points": over}, model={"kind": "adaptive", "curvature_error": 0.05},
+        time=(1.25, 0.005), output=0.25
+    ))  # fmt: skip
     assert len(result.mesh[-1].s) != len(result.mesh[0].s)
     assert any("on obstacle pipe" in x.text for x in result.events)

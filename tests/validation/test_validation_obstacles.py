@@ -16,6 +16,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, capstan, heavy_capstan, over_pipe
 
 MU = 0.3
@@ -128,13 +129,11 @@ def falling(step: float, speed: float = 0.0, **more: Any) -> dict[str, Any]:
     pipe = {"kind": "cylinder", "at": [0, 0, 0], "axis": [0, 1, 0], "radius": 0.1, "friction": 0.5}
     section = {"length": 2.0, "mass": 0.2, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.02,
                "damping": {"mass": 0.2}}  # fmt: skip
-    return {
-        "cable": {"sections": [section]}, "obstacles": {"pipe": pipe},
-        "ends": {"start": "free", "end": "free"},
-        "initial": {"kind": "straight", "direction": [1, 0, 0], "origin": [-1.0, 0.3, 0.5], "velocity": [0, 0, -speed]},
-        "model": "rod", "mesh": {"cells": 100}, "contact": {"self": False},
-        "time": {"duration": 0.6, "step": step}, "output": {"every": 0.02, "points": 101},
-    } | more  # fmt: skip
+    return cable_scene(
+        section, "free", "free", obstacles={"pipe": pipe},
+        initial={"kind": "straight", "direction": [1, 0, 0], "origin": [-1.0, 0.3, 0.5], "velocity": [0, 0, -speed]},
+        model="rod", mesh=100, contact={"self": False}, time=(0.6, step), output=(0.02, 101)
+    ) | more  # fmt: skip
 
 
 @pytest.mark.parametrize("speed", [0.0, 20.0])
@@ -251,19 +250,11 @@ def test_a_thin_pipe_that_may_pass_between_nodes_is_said(cells: int, said: bool)
     """It goes through 31 cells of 0.32 m untouched, at a node in none of 16 outputs; 120 cells of 0.08 m stop it."""
     cable = {"length": 10.02, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e5, "bending_stiffness": 1.0}
     travel = {"travel": {"by": [0, 0, -1.0], "over": 1.0}}
-    result = ran(
-        {
-            "cable": {"sections": [cable | {"damping": {"mass": 0.5}}]},
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [10, 0, 0]},
-            },
-            "obstacles": {
-                "p": {"kind": "cylinder", "at": [5.0, 0, 0.3], "axis": [0, 1, 0], "radius": 0.05, "motion": travel},
-            },
-            "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells},
-            "time": {"duration": 1.5, "step": 0.01}, "output": {"every": 0.1},
-        }
-    )  # fmt: skip
+    result = ran(cable_scene(
+        cable | {"damping": {"mass": 0.5}}, pinned_at(0, 0, 0), pinned_at(10, 0, 0),
+        obstacles={"p": {"kind": "cylinder", "at": [5.0, 0, 0.3], "axis": [0, 1, 0], "radius": 0.05, "motion": travel}},
+        model="rod", mesh=cells, time=(1.5, 0.01), output=0.1
+    ))  # fmt: skip
     assert (result.position[-1, :, 2].min() > -0.7) == said  # it is in the way of the line, or above it
     found = [x for x in result.events if x.kind == "unresolved contact"]
     assert bool(found) == said
@@ -284,9 +275,8 @@ def test_a_start_in_an_obstacle_is_refused(several: bool, z: float) -> None:
         points = {"a": {"initial_guess": [-1, 0, z]}, "b": {"initial_guess": [1, 0, z]}}
         scene = common | {"points": points, "lines": {"l": line | {"start": "a", "end": "b", "initial": straight}}}
     else:
-        scene = common | {
-            "cable": {"sections": line.pop("sections")}, "ends": {"start": "free", "end": "free"},
-            "initial": straight | {"origin": [-1, 0, z]},
-        } | line  # fmt: skip
+        scene = (
+            common | cable_scene(line.pop("sections"), "free", "free", initial=straight | {"origin": [-1, 0, z]}) | line
+        )
     with pytest.raises(SceneError, match=r"outside of obstacles\.pipe" if several else "in obstacle pipe"):
         hybrid.run(scene)

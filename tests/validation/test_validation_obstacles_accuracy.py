@@ -10,6 +10,7 @@ import pytest
 import hybrid
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import one_line
+from tests.scenes import cable_scene, pinned_at
 from tests.validation.obstacle_scenes import over_pipe
 
 Tables = dict[str, Any]
@@ -159,12 +160,11 @@ def test_the_equilibrium_of_a_line_over_a_sheave_is_that_over_a_pipe_at_rest() -
 def under_pipe(cells: int, x: float = 5.0, **more: Any) -> dict[str, Any]:
     """11 m over 10 m, whose catenary hangs through a pipe: on top of it 53 N, round it from below 10 kN."""
     section = {"length": 11, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e6, "bending_stiffness": 2.0}
-    return {
-        "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [10, 0, 0]}},
-        "obstacles": {"pipe": {"kind": "cylinder", "at": [x, 0, -1.9], "axis": [0, 1, 0], "radius": 0.5}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells}, **more,
-    }  # fmt: skip
+    return (
+        cable_scene(section, pinned_at(0, 0, 0), pinned_at(10, 0, 0),
+                    obstacles={"pipe": {"kind": "cylinder", "at": [x, 0, -1.9], "axis": [0, 1, 0], "radius": 0.5}},
+                    model="rod", mesh=cells) | more
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(("cells", "x"), [(40, 5.0), (100, 5.0), (101, 5.0), (100, 4.9), (100, 5.01), (200, 5.0)])
@@ -193,14 +193,10 @@ def test_a_line_that_has_left_the_obstacle_of_its_points_says_so(cells: int, lef
     sections = [common | {"mass": 1.0, "diameter": 0.03}, common | {"mass": 1.5, "diameter": 0.02}]
     over = [[0, 0, -5], [3.6, 0, -0.6], [4, 0, -0.45], [4.4, 0, -0.6], [4.52, 0, -1], [4.52, 0, -10]]
     sheave = {"kind": "cylinder", "at": [4, 0, -1], "axis": [0, 1, 0], "radius": 0.5, "friction": 0.3}
-    found = hybrid.static(
-        {
-            "cable": {"sections": sections}, "initial": {"kind": "equilibrium", "points": over},
-            "ends": {"start": {"kind": "pinned", "position": [0, 0, -5]}, "end": {"kind": "body", "mass": 30}},
-            "obstacles": {"sheave": sheave | {"bearing": {"inertia": 2.0, "damping": 0.5}}},
-            "mesh": {"cells": cells}, "model": "rod",
-        }
-    )  # fmt: skip
+    found = hybrid.static(cable_scene(
+        sections, pinned_at(0, 0, -5), {"kind": "body", "mass": 30}, initial={"kind": "equilibrium", "points": over},
+        obstacles={"sheave": sheave | {"bearing": {"inertia": 2.0, "damping": 0.5}}}, mesh=cells, model="rod"
+    ))  # fmt: skip
     assert (found.position[0, -1, 0] < 1.0) == left
     said = [x for x in found.events if x.kind == "several equilibria"]
     assert bool(said) == left

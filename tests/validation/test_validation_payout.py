@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -23,19 +24,15 @@ def test_laid_at_the_speed_of_the_ship_a_cable_is_a_straight_line() -> None:
         "length": length, "mass": 2.0, "diameter": 0.04, "axial_stiffness": 2e6, "bending_stiffness": 50.0,
         "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
     }  # fmt: skip
-    ship = {
-        "kind": "pinned", "position": [length - 10.6, 0, 0], "motion": {"velocity": [speed, 0, 0], "ramp": 20},
-        "payout": {"rate": speed, "ramp": 20},
-    }  # fmt: skip
+    ship = pinned_at(
+        length - 10.6, 0, 0, motion={"velocity": [speed, 0, 0], "ramp": 20}, payout={"rate": speed, "ramp": 20}
+    )
     friction = {"axial": 0.5, "lateral": 0.5}
     fluid, bed = {"density": 1025}, {"z": -depth, "stiffness": 2e3, "damping": 5e2}
-    result = hybrid.run({
-        "environment": {"fluid": fluid, "seabed": {**bed, "friction": friction}},
-        "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -depth]}, "end": ship},
-        "initial": "equilibrium", "model": "rod", "dimension": 2, "mesh": {"cells": 160},
-        "time": {"duration": 420, "step": 0.1}, "output": {"every": 1.0, "points": 1201},
-    })  # fmt: skip
+    result = hybrid.run(cable_scene(
+        section, pinned_at(0, 0, -depth), ship, fluid=fluid, seabed={**bed, "friction": friction}, model="rod",
+        dimension=2, mesh=160, time=(420, 0.1), output=(1.0, 1201)
+    ))  # fmt: skip
     w, k = (2.0 - 1025 * np.pi * 0.04**2 / 4) * 9.81, 0.5 * 1025 * 1.2 * 0.04 * speed**2
     cosine = (np.sqrt(w * w + 4 * k * k) - w) / (2 * k)
     angle = 0.5 * np.pi - result["theta"][-1]
@@ -46,12 +43,10 @@ def test_laid_at_the_speed_of_the_ship_a_cable_is_a_straight_line() -> None:
     assert np.ptp(pull) < 1e-3 * pull.mean()
     laid = (result["s"] > 170.0) & (result["s"] < 300.0)
     assert np.abs(result["velocity"][-1, laid]).max() < 1e-3
-    towed = hybrid.static({
-        "environment": {"fluid": {**fluid, "current": [-speed, 0, 0]}, "seabed": bed},
-        "cable": {"sections": [section]},
-        "ends": {"start": "free", "end": {"kind": "pinned", "position": [0, 0, 0]}},
-        "initial": "equilibrium", "model": "rod", "dimension": 2, "mesh": {"cells": 160}, "output": {"points": 641},
-    })  # fmt: skip
+    towed = hybrid.static(cable_scene(
+        section, "free", pinned_at(0, 0, 0), fluid={**fluid, "current": [-speed, 0, 0]}, seabed=bed, model="rod",
+        dimension=2, mesh=160, output={"points": 641}
+    ))  # fmt: skip
     out, back = result["payout/length"][-1], np.linspace(1.0, 100.0, 100)  # m, from the ship along the cable
     ship_now = result["position"][-1, result["s"] >= out][0]
     for k, axis in ((0, "x"), (2, "z")):

@@ -12,6 +12,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.state.report import SPIN
+from tests.scenes import network_scene
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND
 from tests.validation.test_validation_moving_obstacles import ran, weights
 from tests.validation.thrown_lines import WIDTH, straight, throw
@@ -86,10 +87,9 @@ def two_ropes(apart: float = 0.1, **more: Any) -> Tables:
     """As `weights`, of two ropes with weights at their ends, which are pulled by 10 N, then one of each by more."""
     one = weights(INERTIA)
     section, over = one["cable"]["sections"][0], one["initial"]["points"]
-    tables: Tables = {
-        "environment": {"gravity": 0}, "obstacles": one["obstacles"], "points": {}, "bodies": {}, "lines": {},
-        "time": {"duration": 0.9, "step": 0.002}, "output": one["output"],
-    }  # fmt: skip
+    tables: Tables = network_scene(
+        {}, {}, gravity=0, obstacles=one["obstacles"], bodies={}, time=(0.9, 0.002), output=one["output"]
+    )
     for name, (side, pull) in ROPES.items():
         points = [[x, np.sign(side) * apart, z] for x, _, z in over]
         for end, at, most in (("start", points[0], 10.0), ("end", points[-1], pull)):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from tests.scenes import cable_scene
 
 RODS = ({"rod": 12, "cells": 48}, {"rod": 36, "cells": 144}, {"rod": 12, "cells": 48})
 
@@ -87,11 +88,10 @@ def test_an_equilibrium_with_zones_that_has_lost_turns_is_refused():
     """A loop between catenaries at the clamps, which hold no direction: one way led around them, to 1 of 3 turns."""
     section = {"length": 4.0, "mass": 0.4, "diameter": 0.02, "axial_stiffness": 1e5, "bending_stiffness": 0.5}
     clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 0, 1]}
-    scene = {
-        "environment": {"gravity": 0.5}, "cable": {"sections": [section | {"torsional_stiffness": 0.4}]},
-        "ends": {"start": clamp | {"position": [0, 0, 0]}, "end": clamp | {"position": [2.0, 0, 0], "turns": 3}},
-        "initial": "equilibrium", "mesh": {"cells": 100}, "contact": {"self": False},
-        "model": {"kind": "zones", "zones": [{"catenary": 0.5}, {"rod": 3.0}, {"catenary": 0.5}]},
-    }  # fmt: skip
+    scene = cable_scene(
+        section | {"torsional_stiffness": 0.4}, clamp | {"position": [0, 0, 0]},
+        clamp | {"position": [2.0, 0, 0], "turns": 3}, gravity=0.5, mesh=100, contact={"self": False},
+        model={"kind": "zones", "zones": [{"catenary": 0.5}, {"rod": 3.0}, {"catenary": 0.5}]}
+    )  # fmt: skip
     with pytest.raises(hybrid.ComputationError, match=r"compression|turns"):
         hybrid.static(hybrid.validate_scene(scene))

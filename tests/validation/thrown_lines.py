@@ -24,6 +24,7 @@ from hybrid.simulation.lines_contact import diameters, least_bending
 from hybrid.solve.contact import SharedContact, TouchingLine
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState
+from tests.scenes import cable_scene
 
 Floats = NDArray[np.float64]
 WIDTH, STIFF = 0.02, 0.1
@@ -77,12 +78,11 @@ def throw(
     for r, v in zip(shapes, speeds, strict=True):
         r = r if turn is None else r @ turn.T
         s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
-        model = build(one_line(hybrid.validate_scene({
-            "environment": {"gravity": 1e-15}, "cable": {"sections": [section(float(s[-1]), width)]},
-            "contact": {"self": True}, "ends": {"start": "free", "end": "free"}, "model": kind,
-            "mesh": {"nodes": s.tolist()}, "initial": {"kind": "points", "points": r.tolist()}, "dimension": 3,
-            "time": {"duration": 1.0, "step": 0.1},
-        } | around)))  # fmt: skip
+        model = build(one_line(hybrid.validate_scene(
+            cable_scene(section(float(s[-1]), width), "free", "free", gravity=1e-15, contact={"self": True}, model=kind,
+                        mesh={"nodes": s.tolist()}, initial={"kind": "points", "points": r.tolist()}, dimension=3,
+                        time=(1.0, 0.1)) | around
+        )))  # fmt: skip
         state = model.start.copy()
         state.v[:] = v if turn is None else v @ turn.T
         x = JoinedLine(

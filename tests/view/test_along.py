@@ -13,6 +13,7 @@ from hybrid.view import animation, panels
 from hybrid.view.curves import along, kept
 from hybrid.view.figure import Line, Panel
 from hybrid.view.summary import Fact, facts_of
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 CLUMP = 4.1  # m, where it hangs
 
@@ -20,15 +21,12 @@ CLUMP = 4.1  # m, where it hangs
 @pytest.fixture(scope="module")
 def swing() -> hybrid.Result:
     """A chain of 10 m with a clump that swings from its end at s = 10 m."""
-    scene: dict[str, Any] = {
-        "cable": {
-            "sections": [{"length": 10.0, "mass": 2.0, "axial_stiffness": 1e6}],
-            "attachments": [{"kind": "clump", "at": CLUMP, "mass": 50.0}],
-        },
-        "ends": {"start": "free", "end": {"kind": "pinned", "position": [0, 0, 0]}},
-        "initial": {"kind": "straight", "direction": [-0.3, 0, 1.0]}, "model": "catenary", "mesh": {"cells": 20},
-        "time": {"duration": 1.0, "step": 0.02}, "output": {"points": 11, "every": 0.1, "errors": True},
-    }  # fmt: skip
+    scene: dict[str, Any] = cable_scene(
+        {"length": 10.0, "mass": 2.0, "axial_stiffness": 1e6}, "free", pinned_at(0, 0, 0),
+        attachments=[{"kind": "clump", "at": CLUMP, "mass": 50.0}],
+        initial={"kind": "straight", "direction": [-0.3, 0, 1.0]}, model="catenary", mesh=20, time=(1.0, 0.02),
+        output={"points": 11, "every": 0.1, "errors": True}
+    )  # fmt: skip
     return hybrid.run(hybrid.validate_scene(scene))
 
 
@@ -41,10 +39,7 @@ def cantilever(**allowed: float) -> hybrid.Result:
     ]
     for part, radius in zip(parts, allowed.values(), strict=bool(allowed)):
         part["min_bend_radius"] = radius
-    scene: dict[str, Any] = {
-        "cable": {"sections": parts}, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 100},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}, "end": "free"},
-    }  # fmt: skip
+    scene: dict[str, Any] = cable_scene(parts, clamped_at([0, 0, 0], [1, 0, 0]), "free", model="rod", mesh=100)
     return hybrid.static(hybrid.validate_scene(scene))
 
 

@@ -38,6 +38,7 @@ from hybrid.view.lines import (
 )
 from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape
 from hybrid.view.report import _extreme_text, html
+from tests.scenes import network_scene
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 ENDS = {"start": 0, "end": 11.5}
@@ -48,17 +49,15 @@ def spar() -> dict[str, Any]:
     """A body on three lines, pulled and let go, over a bed; the tension of one line breaks its limit."""
     lines = {n: {"start": n, "end": f"to_{n}", "mesh": {"cells": 12}, "sections": [SECTION]} for n in PLACES}
     lines["east"]["sections"] = [SECTION | {"max_tension": 1000}]
-    return {
-        "title": "<three> lines",
-        "environment": {"fluid": {"density": 1025, "surface": 5.0}, "seabed": {"z": -62, "stiffness": 1e4}},
-        "points": {n: {"position": [x, y, -60]} for n, (x, y) in PLACES.items()}
-        | {f"to_{n}": {"body": "spar", "place": [x / 50, y / 50, -4]} for n, (x, y) in PLACES.items()},
-        "bodies": {"spar": {
-            "initial_guess": [0, 0, 0], "mass": 1e5, "centre": [0, 0, -3], "inertia": [4e6, 4e6, 2e6],
-            "hydrostatics": {"heave": 8e4, "roll": 4e6, "pitch": 4e6}, "force": {"value": [4e4, 0, 0], "until": 1},
-        }},
-        "lines": lines, "time": {"duration": 4.0, "step": 0.05}, "output": {"every": 0.2, "points": 13},
-    }  # fmt: skip
+    return network_scene(
+        {n: {"position": [x, y, -60]} for n, (x, y) in PLACES.items()} | {
+            f"to_{n}": {"body": "spar", "place": [x / 50, y / 50, -4]} for n, (x, y) in PLACES.items()},
+        lines, title="<three> lines", fluid={"density": 1025, "surface": 5.0}, seabed={"z": -62, "stiffness": 1e4},
+        bodies={"spar": {"initial_guess": [0, 0, 0], "mass": 1e5, "centre": [0, 0, -3], "inertia": [4e6, 4e6, 2e6],
+                         "hydrostatics": {"heave": 8e4, "roll": 4e6, "pitch": 4e6},
+                         "force": {"value": [4e4, 0, 0], "until": 1}}},
+        time=(4.0, 0.05), output=(0.2, 13)
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

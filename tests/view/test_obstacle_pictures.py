@@ -13,6 +13,7 @@ from hybrid.live.pictures import around, frames
 from hybrid.view.figure import Area, Axis, Marks, Panel
 from hybrid.view.matplotlib_backend import draw_panel
 from hybrid.view.projections import extent_in, hull, obstacles_at, outlines, surfaces, view_named
+from tests.scenes import cable_scene, pinned_at
 
 BALL = {"kind": "sphere", "at": [0.5, 0.3, -0.4], "radius": 0.1}
 PIPE = {"kind": "cylinder", "at": [1.0, 0.5, -0.6], "axis": [0, 1, 0], "radius": 0.05}
@@ -23,20 +24,11 @@ LIFT = {"travel": {"by": [0, 0.5, 0.25], "over": 0.05}}
 @pytest.fixture(scope="module")
 def result() -> Any:
     section = {"length": 2.2, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.05}
-    return hybrid.run(
-        hybrid.validate_scene(
-            {
-                "cable": {"sections": [section]},
-                "obstacles": {"ball": BALL | {"motion": LIFT}, "pipe": PIPE, "wall": WALL},
-                "ends": {
-                    "start": {"kind": "pinned", "position": [0, 0, 0.2]},
-                    "end": {"kind": "pinned", "position": [2, 0, 0.2]},
-                },
-                "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20}, "contact": {"self": False},
-                "time": {"duration": 0.1, "step": 0.01}, "output": {"every": 0.05, "points": 21},
-            }
-        )
-    )  # fmt: skip
+    return hybrid.run(hybrid.validate_scene(cable_scene(
+        section, pinned_at(0, 0, 0.2), pinned_at(2, 0, 0.2),
+        obstacles={"ball": BALL | {"motion": LIFT}, "pipe": PIPE, "wall": WALL}, model="rod", mesh=20,
+        contact={"self": False}, time=(0.1, 0.01), output=(0.05, 21)
+    )))  # fmt: skip
 
 
 def test_obstacles_are_where_they_are_at_an_output(result: Any) -> None:

@@ -19,6 +19,7 @@ import hybrid
 from hybrid.errors import ResultError
 from hybrid.view.curves import MOST_VALUES, kept, outline
 from hybrid.view.report import html, write_report
+from tests.scenes import cable_scene, pinned_at
 
 
 def index_of(page: str) -> dict[str, Any]:
@@ -206,15 +207,14 @@ def test_a_read_only_folder_is_refused(tmp_path: Path) -> None:
 
 
 def test_statistics_are_those_of_the_histories() -> None:
-    result = hybrid.run({
-        "cable": {"sections": [{"length": 30, "mass": 2, "axial_stiffness": 1e5, "diameter": 0.05, "drag": {"normal": 1.2}}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [20, 0, 0]}},
-        "initial": {"kind": "equilibrium", "guess": "catenary"}, "model": "catenary", "mesh": {"cells": 10},
-        "time": {"duration": 6, "step": 0.1},
-        "output": {"every": 0.1, "quantities": {
-            "hang_off": {"kind": "end_angle", "end": "end", "direction": [0, 0, -1], "largest": 10},
-        }},
-    } | {"environment": {"fluid": {"density": 1.2, "current": {"kind": "uniform", "velocity": [0, 9, 0], "ramp": 2}}}})  # fmt: skip
+    result = hybrid.run(
+        cable_scene({"length": 30, "mass": 2, "axial_stiffness": 1e5, "diameter": 0.05, "drag": {"normal": 1.2}},
+                    pinned_at(0, 0, 0), pinned_at(20, 0, 0), initial={"kind": "equilibrium", "guess": "catenary"},
+                    model="catenary", mesh=10, time=(6, 0.1),
+                    output={"every": 0.1,
+                            "quantities": {"hang_off": {"kind": "end_angle", "end": "end", "direction": [0, 0, -1],
+                                                        "largest": 10}}}) | {"environment": {"fluid": {"density": 1.2, "current": {"kind": "uniform", "velocity": [0, 9, 0], "ramp": 2}}}}
+    )  # fmt: skip
     page = text_of(html(result))
     found = result.statistics()["hang_off"]
     row = re.search(r"hang_off \(deg\)\s+([\d.]+)\s+([\d.]+)\s+([\d.]+)\s+([\d.]+)", page)

@@ -23,6 +23,7 @@ from hybrid.scene.read import one_line
 from hybrid.zones.change import transfer_to
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Allowed, Times
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 Shape = Callable[[Floats], Floats]
 X, Y, Z = np.eye(3)
@@ -222,14 +223,11 @@ def bight() -> dict:
     }  # fmt: skip
     current = [{"z": z, "velocity": [u, 0, 0]} for z, u in ((0, 0.4), (-200, 0.1), (-1000, 0.05))]
     heave = {"heave": {"amplitude": 1.0, "period": 8.0}, "ramp": 16}
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0, "current": current}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0], "motion": heave},
-            "end": {"kind": "clamped", "position": [30, 0, -960], "tangent": [0.3, 0, 1]},
-        },
-        "initial": {"kind": "equilibrium"},
-        "time": {"duration": 80.0, "step": 0.1},
-        "output": {"every": 1.0, "points": 401},
-    }
+    return cable_scene(
+        section,
+        pinned_at(0, 0, 0, motion=heave),
+        clamped_at([30, 0, -960], [0.3, 0, 1]),
+        fluid={"density": 1025, "surface": 0, "current": current},
+        time=(80.0, 0.1),
+        output=(1.0, 401),
+    )

@@ -32,6 +32,7 @@ from hybrid.kernels.state.state import no_sea
 from hybrid.zones.criteria import NodeState, cell_ratios, of_line
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Allowed, Times
+from tests.scenes import cable_scene
 
 STEP = 0.02
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -233,12 +234,7 @@ def test_far_beyond_is_no_tension_that_is_only_foreseen():
 @pytest.mark.parametrize("section, kind", [({"bending_stiffness": EI}, "adaptive"), ({}, "catenary")])
 def test_the_model_of_a_scene_that_does_not_say(section, kind):
     what = hybrid.validate_scene(
-        {
-            "cable": {"sections": [{"length": 10.0, "mass": 1.0, **section}]},
-            "ends": {"start": pinned(), "end": pinned(8.0, 0, 0)},
-            "initial": {"kind": "equilibrium"},
-            "time": {"duration": 0.2, "step": 0.02},
-        }
+        cable_scene({"length": 10.0, "mass": 1.0, **section}, pinned(), pinned(8.0, 0, 0), time=(0.2, 0.02))
     )
     assert what.model.kind == kind
     assert hybrid.run(what).status == "complete"

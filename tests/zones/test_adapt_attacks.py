@@ -10,15 +10,13 @@ from adapt_scenes import changes, rods
 from problems import clamped, free, pinned
 
 import hybrid
+from tests.scenes import cable_scene, pinned_at
 
 Text = dict[str, Any]
 
 
 def scene(section: Text, start: Text, end: Text, **more: Any) -> Text:
-    text: Text = {
-        "cable": {"sections": [section]}, "ends": {"start": start, "end": end}, "initial": {"kind": "equilibrium"},
-        "model": {"kind": "adaptive"}, "time": {"duration": 10.0, "step": 0.02}, "output": {"every": 0.25},
-    }  # fmt: skip
+    text: Text = cable_scene(section, start, end, model={"kind": "adaptive"}, time=(10.0, 0.02), output=0.25)
     return text | more
 
 
@@ -182,15 +180,11 @@ def hanging(random: np.random.Generator) -> dict[str, Any]:
     }  # fmt: skip
     profile = [{"z": 0.0, "velocity": [*top, 0.0]}, {"z": -length, "velocity": [*(0.3 * top[::-1]), 0.0]}]
     surge = {"amplitude": random.uniform(0.1, 0.6), "period": period, "phase": random.uniform(0.0, 360.0)}
-    return {
-        "environment": {"fluid": {"density": 1025, "current": profile}}, "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0.0, 0.0, 0.0], "motion": {"ramp": 1.8 * period, "surge": surge}},
-            "end": {"kind": "free"},
-        },
-        "initial": "equilibrium", "mesh": {"cells": 80, "ratio": 0.1},
-        "time": {"duration": duration, "step": duration / 200.0}, "output": {"every": duration / 20.0, "points": 41},
-    }  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0.0, 0.0, 0.0, motion={"ramp": 1.8 * period, "surge": surge}), {"kind": "free"},
+        fluid={"density": 1025, "current": profile}, mesh={"cells": 80, "ratio": 0.1},
+        time=(duration, duration / 200.0), output=(duration / 20.0, 41)
+    )  # fmt: skip
 
 
 @pytest.mark.long  # 1.8 s
@@ -218,20 +212,12 @@ def defect(force: float, length: float, time: float) -> dict[str, Any]:
     }  # fmt: skip
     surge = {"amplitude": 0.429689 * length, "period": 8.30559 * time, "phase": 33.4594}
     current = [{"z": z * length, "velocity": [x * length / time, y * length / time, 0.0]} for z, x, y in profile]
-    return {
-        "environment": {
-            "fluid": {"density": 1025.0 * mass / length**3, "current": current},
-            "gravity": 9.80665 * length / time**2,
-        },
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0.0] * 3, "motion": {"ramp": 15.1943 * time, "surge": surge}},
-            "end": {"kind": "free"},
-        },
-        "initial": "equilibrium", "mesh": {"cells": 80, "ratio": 0.1}, "model": "adaptive",
-        "time": {"duration": 13.8593 * time, "step": 0.0692965 * time},
-        "output": {"every": 0.692963 * time, "points": 201},
-    }  # fmt: skip
+    return cable_scene(
+        section, {"kind": "pinned", "position": [0.0] * 3, "motion": {"ramp": 15.1943 * time, "surge": surge}},
+        {"kind": "free"}, fluid={"density": 1025.0 * mass / length**3, "current": current},
+        gravity=9.80665 * length / time**2, mesh={"cells": 80, "ratio": 0.1}, model="adaptive",
+        time=(13.8593 * time, 0.0692965 * time), output=(0.692963 * time, 201)
+    )  # fmt: skip
 
 
 def test_the_units_of_a_line_with_a_free_end_do_not_matter() -> None:
@@ -262,18 +248,15 @@ def line(folder, turns, model, swing, span=12.0):
     clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 0, 1]}
     return hybrid.run(
         hybrid.validate_scene(
-            {
-                "cable": {"sections": [section]},
-                "ends": {
-                    "start": {**clamp, "position": [0, 0, 0]},
-                    "end": {**clamp, "position": [span, 0, 0], "motion": {"file": str(path)}},
-                },
-                "initial": "equilibrium",
-                "mesh": {"cells": 80},
-                "model": model,
-                "time": {"duration": 14.0, "step": 0.02},
-                "output": {"every": 0.5},
-            }
+            cable_scene(
+                section,
+                {**clamp, "position": [0, 0, 0]},
+                {**clamp, "position": [span, 0, 0], "motion": {"file": str(path)}},
+                mesh=80,
+                model=model,
+                time=(14.0, 0.02),
+                output=0.5,
+            )
         )
     )
 

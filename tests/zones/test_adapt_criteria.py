@@ -34,6 +34,7 @@ from hybrid.kernels.state.state import no_sea
 from hybrid.model.material import TENSION_FLOOR, Material
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Allowed, Times, wanted
+from tests.scenes import clamped_at, pinned_at
 
 EI, GJ, W = 2.0, 1.5, 1.0 * GRAVITY  # of `cable()`
 FLOORED = TENSION_FLOOR * (EI * W**2) ** (1 / 3)  # N
@@ -166,10 +167,7 @@ def clamp(angle, end=0):
 def clamped_cable(end):
     ends = [{"kind": "clamped", "position": (0, 0, 0), "tangent": (1, 0, 0)}, {"kind": "free"}]
     if end:
-        ends = [
-            {"kind": "pinned", "position": (0, 0, 0)},
-            {"kind": "clamped", "position": (10, 0, 0), "tangent": (1, 0, 0)},
-        ]
+        ends = [pinned_at(0, 0, 0), clamped_at((10, 0, 0), (1, 0, 0))]
     return cable(start=ends[0], end=ends[1])
 
 
@@ -297,8 +295,7 @@ def whole_case(seed, reverse=False):
     parts = rng.integers(2, 5, n)
     sections = [{"length": 6.5}, {"length": 3.5, "bending_stiffness": 6.0}]
     at = float(base[6])
-    ends = [{"kind": "clamped", "position": (0, 0, 0), "tangent": (1, 0, 0)},
-            {"kind": "clamped", "position": (10, 0, 0), "tangent": (1, 0, 0)}]  # fmt: skip
+    ends = [clamped_at((0, 0, 0), (1, 0, 0)), clamped_at((10, 0, 0), (1, 0, 0))]
     if reverse:
         sections, at = sections[::-1], 10.0 - at
     what = cable(start=ends[0], end=ends[1], sections=sections, attachments=[{"kind": "clump", "at": at, "mass": 2.0}])

@@ -28,6 +28,7 @@ from hybrid.solve.network_steps import NetworkSteps
 from hybrid.zones.criteria import shares_asked
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Allowed, Change, Times
+from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # A line that touches down, its upper end heaving; the layer at the touchdown is 0.4 m long and goes to and fro over 20 m.
@@ -194,15 +195,11 @@ def test_a_line_that_is_watched_changes_its_cells_in_arrays_made_once(monkeypatc
         "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0},
     }  # fmt: skip
     moves = {"surge": {"amplitude": 8.0, "period": 40}, "heave": {"amplitude": 2.0, "period": 10}, "ramp": 10}
-    scene = hybrid.validate_scene({
-        "environment": {"fluid": {"density": 1025}, "seabed": {"z": -500, "stiffness": 5e3, "damping": 500}},
-        "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -500]},
-                 "end": {"kind": "pinned", "position": [1650, 0, 0], "motion": moves}},
-        "initial": "equilibrium", "time": {"duration": 40.0, "step": 0.2}, "mesh": {"cells": 32},
-        "model": {"kind": "adaptive", "curvature_error": 0.03},
-        "output": {"every": 2, "points": 501, "errors": False},
-    })  # fmt: skip
+    scene = hybrid.validate_scene(cable_scene(
+        section, pinned_at(0, 0, -500), pinned_at(1650, 0, 0, motion=moves), fluid={"density": 1025},
+        seabed={"z": -500, "stiffness": 5e3, "damping": 500}, time=(40.0, 0.2), mesh=32,
+        model={"kind": "adaptive", "curvature_error": 0.03}, output={"every": 2, "points": 501, "errors": False}
+    ))  # fmt: skip
     changed, changes = [], RunZones._switch
 
     def switch_line(self: RunZones, line: Any, how: Change, here: Any = None) -> None:
@@ -327,11 +324,10 @@ def whip(model, cells: int) -> hybrid.Result:
     """1000 m hanging from a point that moves aside in 1 s: the kink runs down and is the sharper the less tension."""
     section = {"length": 1000, "diameter": 0.05, "mass": 10, "axial_stiffness": 2e8, "bending_stiffness": 2e4}
     held = {"kind": "pinned", "position": [0, 0, 0], "motion": {"travel": {"by": [6.0, 0, 0], "over": 1.0}}}
-    scene = {
-        "cable": {"sections": [section]}, "dimension": 2, "ends": {"start": held, "end": "free"},
-        "initial": "equilibrium", "model": model, "mesh": {"cells": cells},
-        "time": {"duration": 18.0, "step": 0.02}, "output": {"every": 0.5, "points": 2001, "errors": False},
-    }  # fmt: skip
+    scene = cable_scene(
+        section, held, "free", dimension=2, model=model, mesh=cells, time=(18.0, 0.02),
+        output={"every": 0.5, "points": 2001, "errors": False}
+    )  # fmt: skip
     return hybrid.run(scene)
 
 

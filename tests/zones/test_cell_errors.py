@@ -13,6 +13,7 @@ from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.mesh import cell_errors as e
 from hybrid.kernels.mesh import zone_criteria as c
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, POSITION, TENSION
+from tests.scenes import cable_scene, pinned_at
 
 LENGTH, W, GRAVITY = 100.0, 10.0 * 9.80665, 9.80665  # m, N/m
 LOW, HIGH = 0.5, 3.0  # measured error over predicted
@@ -222,13 +223,10 @@ def tension_on_the_bed(model: object) -> float:
     if isinstance(model, float):
         zones = [{"catenary": 17.5}, {"rod": 2.5 + model}, {"catenary": 17.520597 - model}]
         model = {"kind": "zones", "zones": zones}
-    found = hybrid.static({
-        "environment": {"gravity": 10.0, "seabed": {"z": 0, "stiffness": 1e9}},
-        "cable": {"sections": [{"length": 37.520597, "mass": 1.0, "bending_stiffness": EI}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
-                 "end": {"kind": "pinned", "position": [33.371257775207795, 0, RISE]}},
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 1500},
-    })  # fmt: skip
+    found = hybrid.static(cable_scene(
+        {"length": 37.520597, "mass": 1.0, "bending_stiffness": EI}, pinned_at(0, 0, 0),
+        pinned_at(33.371257775207795, 0, RISE), gravity=10.0, seabed={"z": 0, "stiffness": 1e9}, model=model, mesh=1500
+    ))  # fmt: skip
     return float(found.tension[-1, 0])
 
 

@@ -26,6 +26,7 @@ from hybrid.store.records import Zone as ZoneRow
 from hybrid.zones.change import transfer_to
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Allowed, Times
+from tests.scenes import cable_scene, pinned_at
 
 
 def planned(shape, fineness=1.0, share=0.02, leaving=(), every=1) -> Floats:
@@ -130,18 +131,11 @@ def test_new_nodes_have_the_curvature_of_the_line(follows: bool) -> None:
 
 # --- what a result says of its mesh, and what an accuracy may change ---
 
-SCENE = {
-    "environment": {"fluid": {"density": 1025}},
-    "cable": {"sections": [{"length": 60, "mass": 1.0, "diameter": 0.03, "bending_stiffness": 20.0}]},
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [40, 0, -20]},
-    },
-    "initial": "equilibrium",
-    "model": {"kind": "adaptive", "curvature_error": 0.1},
-    "time": {"duration": 6.0},
-    "accuracy": {"curvature": "10%"},
-}  # fmt: skip
+SCENE = cable_scene(
+    {"length": 60, "mass": 1.0, "diameter": 0.03, "bending_stiffness": 20.0}, pinned_at(0, 0, 0), pinned_at(40, 0, -20),
+    fluid={"density": 1025}, model={"kind": "adaptive", "curvature_error": 0.1}, time={"duration": 6.0},
+    accuracy={"curvature": "10%"}
+)  # fmt: skip
 
 
 def test_mesh_of_a_result_has_the_nodes_of_catenaries_too() -> None:
@@ -169,36 +163,16 @@ def test_no_pre_run_and_no_stricter_zones_where_cells_follow() -> None:
 
 FAR_END, SHIP = 3000.0, 1.5  # m
 FINE = (1435.0, 1600.0)  # m, where the bend of the tether is
-TETHER: dict[str, Any] = {
-    "environment": {
-        "fluid": {
-            "density": 1025, "surface": 0.0,
-            "current": [{"z": 0, "velocity": [0.1, 0, 0]}, {"z": -3000, "velocity": [0.02, 0, 0]}],
-        },
-    },
-    "cable": {
-        "sections": [
-            {
-                "length": 1500.0, "mass": mass, "diameter": 0.025, "axial_stiffness": 1.0e6, "bending_stiffness": 1.0,
-                "drag": {"normal": 1.2, "tangential": 0.02}, "added_mass": {"normal": 1.0},
-            }
-            for mass in (0.65, 0.36)
-        ]
-    },
-    "ends": {
-        "start": {
-            "kind": "pinned", "position": [0, 0, 0],
-            "motion": {"heave": {"amplitude": SHIP, "period": 8.0}, "ramp": 16.0},
-        },
-        "end": {
-            "kind": "pinned", "position": [60, 0, -2880], "motion": {"travel": {"by": [0, 0, 60.0], "over": 100.0}},
-        },
-    },
-    "initial": "equilibrium",
-    "contact": {"self": False},
-    "time": {"duration": 90.0, "step": 0.1},
-    "output": {"every": 1.0, "points": np.arange(1440.0, 1600.0, 0.1).tolist(), "errors": False},
-}  # fmt: skip
+TETHER: dict[str, Any] = cable_scene(
+    [{"length": 1500.0, "mass": mass, "diameter": 0.025, "axial_stiffness": 1.0e6, "bending_stiffness": 1.0,
+      "drag": {"normal": 1.2, "tangential": 0.02}, "added_mass": {"normal": 1.0}} for mass in (0.65, 0.36)],
+    pinned_at(0, 0, 0, motion={"heave": {"amplitude": SHIP, "period": 8.0}, "ramp": 16.0}),
+    pinned_at(60, 0, -2880, motion={"travel": {"by": [0, 0, 60.0], "over": 100.0}}),
+    fluid={"density": 1025, "surface": 0.0,
+           "current": [{"z": 0, "velocity": [0.1, 0, 0]}, {"z": -3000, "velocity": [0.02, 0, 0]}]},
+    contact={"self": False}, time=(90.0, 0.1),
+    output={"every": 1.0, "points": np.arange(1440.0, 1600.0, 0.1).tolist(), "errors": False}
+)  # fmt: skip
 
 
 def graded(h: float) -> list[float]:

@@ -1,0 +1,62 @@
+"""How tests write the tables of a scene: its lines, what holds them, and other tables by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+Tables = dict[str, Any]
+# What may be said without a table: cells; duration and step, s; interval of outputs, s, and how many points they have.
+SHORT = {"mesh": ("cells",), "time": ("duration", "step", "rho_inf"), "output": ("every", "points")}
+AROUND = ("gravity", "fluid", "seabed")
+
+
+def in_tables(given: Tables) -> Tables:
+    """Tables of which some are said by numbers, and parts of the environment by themselves."""
+    scene: Tables = {}
+    for key, x in given.items():
+        if key in AROUND:
+            scene.setdefault("environment", {})[key] = x
+        elif key in SHORT and not isinstance(x, dict | None):
+            scene[key] = dict(zip(SHORT[key], x if isinstance(x, tuple) else (x,), strict=False))
+        else:
+            scene[key] = x
+    return scene
+
+
+def pinned_at(x: float, y: float, z: float, **more: Any) -> Tables:
+    """An end that is held and turns freely."""
+    return {"kind": "pinned", "position": [x, y, z], **more}
+
+
+def clamped_at(position: Sequence[float], tangent: Sequence[float], **more: Any) -> Tables:
+    """An end that is held with its direction."""
+    return {"kind": "clamped", "position": position, "tangent": tangent, **more}
+
+
+def cable_scene(
+    sections: Tables | list[Tables],
+    start: Tables | str,
+    end: Tables | str,
+    *,
+    attachments: Any = None,
+    initial: Any = "equilibrium",
+    **tables: Any,
+) -> Tables:
+    """A scene of a cable, which begins at rest where nothing else is said; tables as in `in_tables`."""
+    cable: Tables = {"sections": [sections] if isinstance(sections, dict) else sections}
+    if attachments is not None:
+        cable["attachments"] = attachments
+    ends = {"start": start, "end": end}
+    return {"cable": cable, "ends": ends} | ({"initial": initial} if initial else {}) | in_tables(tables)
+
+
+def network_scene(points: Tables, lines: Tables, **tables: Any) -> Tables:
+    """A scene of lines between points; tables as in `in_tables`."""
+    return {"points": points, "lines": lines} | in_tables(tables)
+
+
+def line_between(start: str, end: str, sections: Tables | list[Tables], **tables: Any) -> Tables:
+    """A line of a network; tables as in `in_tables`."""
+    own = [sections] if isinstance(sections, dict) else sections
+    return {"start": start, "end": end, "sections": own} | in_tables(tables)
