@@ -15,9 +15,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from hybrid.scene.base import Table
 from hybrid.scene.combinations import REFUSALS
 from hybrid.scene.network import Network
-from hybrid.scene.schema import LineScene, Table
+from hybrid.scene.schema import LineScene
 
 PAGE = Path(__file__).with_name("scene.md")
 

@@ -28,8 +28,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import Equilibrium
 
 from .conditions import SETTLE, Before
 from .fields import PLACE, TURN, CatenaryFields, Clock, Fields, RodFields, moved

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
-from hybrid.scene.schema import Equilibrium, Points, Straight
+from hybrid.scene.analysis import Equilibrium, Points, Straight
 
 from .conditions import TIP
 from .fields import CatenaryFields, Fields, RodFields

@@ -14,21 +14,12 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.analysis import CatenaryModel, RodModel, RodZone, ZonesModel
+from hybrid.scene.cable import Environment, Section
+from hybrid.scene.ends import Clamped, End, Guided, Pinned
 from hybrid.scene.read import one_line
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import (
-    CatenaryModel,
-    Clamped,
-    End,
-    Environment,
-    Guided,
-    LineScene,
-    Pinned,
-    RodModel,
-    RodZone,
-    Section,
-    ZonesModel,
-)
+from hybrid.scene.schema import LineScene
 
 from .rotations import Array, frame
 

@@ -20,8 +20,8 @@ from hybrid.errors import ComputationError, ResultError, SceneError
 from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import with_models
 from hybrid.model.resolution import model_is_free
+from hybrid.scene.analysis import missing_time
 from hybrid.scene.read import SceneLike, as_scene
-from hybrid.scene.schema import missing_time
 from hybrid.simulation.case import Case, CaseAtRest
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.own_parts import RunPart, checked_parts, require_parts

@@ -43,11 +43,11 @@ from hybrid.model.plan import (
 )
 from hybrid.model.resolution import Resolution, model_is_free, wants_survey
 from hybrid.model.sections import OutputPoints
-from hybrid.scene.analysis import CatenaryZone, Mesh, RodModel, RodZone, ZonesModel
-from hybrid.scene.cable import Section
+from hybrid.scene.analysis import AdaptiveModel, CatenaryZone, Mesh, RodModel, RodZone, ZonesModel
+from hybrid.scene.cable import Environment, Section
 from hybrid.scene.network import JoinedLine, Network
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import AdaptiveModel, Environment, LineScene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.mesh_survey import CELLS, STEPS, Survey, lack_along, layered, shown, with_survey
 from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample, Samples

@@ -51,7 +51,8 @@ from hybrid.model.resolution import (
     wants_survey,
     zones_are_free,
 )
-from hybrid.scene.schema import AdaptiveModel, LineScene
+from hybrid.scene.analysis import AdaptiveModel
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import CELLS, STEPS

@@ -30,8 +30,8 @@ from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, Sce
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.observation import penetration
 from hybrid.outputs.probes import PROBES
+from hybrid.scene.attachments import Spread
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import Spread
 
 WAY = "differences of equilibria, from cell to cell"
 NAMES = ("touchdown", "touchdown_position", "grounded_length")

@@ -22,14 +22,7 @@ from hybrid.kernels.state.state import Ends, Floats, Line, State
 from hybrid.model.catenary_guess import Hanging
 from hybrid.model.contents import Entry, contact_bits, contents_of
 from hybrid.model.ends import EndConditions
-from hybrid.model.initial_shape import (
-    corners,
-    first_state,
-    from_joint,
-    hung,
-    other_state,
-    spare_shapes,
-)
+from hybrid.model.initial_shape import corners, first_state, from_joint, hung, other_state, spare_shapes
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on
 from hybrid.model.material import STIFFENER_CELLS, Material
 from hybrid.model.mesh import (
@@ -50,16 +43,10 @@ from hybrid.model.payout import PayoutPlan, cable_of, payout_of, payout_plan, sh
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
 from hybrid.model.sea import Surroundings, bed_bits, surroundings
 from hybrid.model.sections import merged_sections, stiffeners_of, tension_scale
+from hybrid.scene.analysis import AdaptiveModel, RodModel, RodZone, ZonesModel
 from hybrid.scene.motion_checks import prescribed_twist
 from hybrid.scene.plane import EXACT, TYPED, plane_of
-from hybrid.scene.schema import (
-    AdaptiveModel,
-    LineScene,
-    RodModel,
-    RodZone,
-    ZonesModel,
-    reachable_obstacles,
-)
+from hybrid.scene.schema import LineScene, reachable_obstacles
 
 # Of the length: how far an equilibrium may be out of the plane and count as in it (Newton's tolerance).
 IN_PLANE = 1e-8

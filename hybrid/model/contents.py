@@ -46,18 +46,13 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sections import swivels
 from hybrid.scene.accuracy import USUAL
+from hybrid.scene.analysis import AdaptiveModel, CatenaryModel
 from hybrid.scene.bodies import Carried, FreeBody
 from hybrid.scene.ends import Clamped, End, Payout, Pinned
 from hybrid.scene.network import Network, SomeScene
 from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, LinesContact
-from hybrid.scene.schema import (
-    AdaptiveModel,
-    CatenaryModel,
-    LineScene,
-    RecordedWaves,
-    StreamFunctionWaves,
-    reachable_obstacles,
-)
+from hybrid.scene.schema import LineScene, reachable_obstacles
+from hybrid.scene.waves import RecordedWaves, StreamFunctionWaves
 
 # Diameters of slack of the smallest loop: WINDOW of contact.self_contact_pairs less OUTER of contact.self_contact_law,
 # which a plan does not import.

@@ -18,8 +18,10 @@ from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_di
 from hybrid.model.material import Material
 from hybrid.model.sea import Surroundings
 from hybrid.model.sections import net_weight, swivels
+from hybrid.scene.analysis import Equilibrium, Points, RodZone, Straight, ZonesModel
+from hybrid.scene.ends import Body, Free
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.schema import Body, Equilibrium, Free, LineScene, Points, RodZone, Straight, ZonesModel
+from hybrid.scene.schema import LineScene
 from hybrid.scene.sea import Seabed
 
 # A line that is longer than taut by less than this part of its length is not called slack.

@@ -41,7 +41,9 @@ from hybrid.model.sections import (
     swivels,
     torsional_stiffness,
 )
-from hybrid.scene.schema import BendRestrictor, BendStiffener, LineScene, Section, Vortices
+from hybrid.scene.attachments import BendRestrictor, BendStiffener
+from hybrid.scene.cable import Section, Vortices
+from hybrid.scene.schema import LineScene
 from hybrid.scene.section_laws import Curve, Layer, slopes, stiffened
 
 # The tension below which bending counts as much as tension, in (EI w^2)^(1/3): there a cable bends under its weight as

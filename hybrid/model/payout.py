@@ -21,9 +21,12 @@ from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Layout, LineOnBase, Zone
 from hybrid.model.sections import bending_stiffness, restrictors_of, stiffeners_of
+from hybrid.scene.analysis import AdaptiveModel
+from hybrid.scene.attachments import Spread
+from hybrid.scene.cable import Section
 from hybrid.scene.ends import Payout
 from hybrid.scene.motion_file import RecordRefused, check_file, read_table
-from hybrid.scene.schema import AdaptiveModel, LineScene, Section, Spread
+from hybrid.scene.schema import LineScene
 
 # The fewest cells that may be left.
 FEWEST_CELLS = 4

@@ -38,9 +38,10 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sections import limits_along, outer_diameter
 from hybrid.scene.accuracy import of_unnamed_model
+from hybrid.scene.analysis import AdaptiveModel, CatenaryModel, RodModel
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import AdaptiveModel, CatenaryModel, LineScene, RodModel, SceneTables
+from hybrid.scene.schema import LineScene, SceneTables
 
 if TYPE_CHECKING:
     pass

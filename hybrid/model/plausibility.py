@@ -14,9 +14,9 @@ from typing import NamedTuple
 from hybrid.model.sea import current_table
 from hybrid.model.sections import bending_stiffness, rotary_inertia, weight
 from hybrid.scene.attachments import BendRestrictor, BendStiffener, Float
-from hybrid.scene.cable import DENSITIES
+from hybrid.scene.cable import DENSITIES, Section
 from hybrid.scene.motion_tables import SHIFTS
-from hybrid.scene.schema import LineScene, Section
+from hybrid.scene.schema import LineScene
 from hybrid.scene.start_checks import apart_in_motion
 from hybrid.scene.waves import GivenWaves
 

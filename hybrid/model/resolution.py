@@ -16,18 +16,11 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Grading
 from hybrid.model.sections import limits_along, output_points, tension_scale, weakest_bending
 from hybrid.scene.accuracy import NOT_ASKED, ROUGHEST, USUAL, Accuracy, amount
-from hybrid.scene.cable import Cable
+from hybrid.scene.analysis import AdaptiveModel, CatenaryZone, RodModel, ZonesModel
+from hybrid.scene.cable import Cable, Section
 from hybrid.scene.motion_checks import shortest_period
 from hybrid.scene.motion_tables import SHIFTS, Motion
-from hybrid.scene.schema import (
-    AdaptiveModel,
-    CatenaryZone,
-    LineScene,
-    RodModel,
-    Section,
-    ZonesModel,
-    reachable_obstacles,
-)
+from hybrid.scene.schema import LineScene, reachable_obstacles
 from hybrid.scene.waves import PeriodicWaves
 
 # Part of the requested error that neglecting bending in catenary zones may use; mesh and time step share the rest.

@@ -15,7 +15,8 @@ from hybrid.kernels.state.state import NO_SLOW, Floats, Sea, State, no_sea, with
 from hybrid.model.ends import DrivenEnd, rise
 from hybrid.model.obstacles import courses_of, facet_tables, obstacle_rows
 from hybrid.model.sections import pressing
-from hybrid.scene.schema import CurrentProfile, LineScene, PowerLawCurrent, Seabed, UniformCurrent
+from hybrid.scene.schema import LineScene
+from hybrid.scene.sea import CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.wave_theory import (
     JonswapWaves,
     OchiHubbleWaves,

@@ -9,23 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels.state.state import Floats, Line
+from hybrid.scene.analysis import RodZone, Straight, ZonesModel
+from hybrid.scene.attachments import BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
+from hybrid.scene.cable import Damping, Section
+from hybrid.scene.ends import Body
 from hybrid.scene.motion_tables import SHIFTS
-from hybrid.scene.schema import (
-    BendRestrictor,
-    BendStiffener,
-    Body,
-    Clump,
-    Damping,
-    Float,
-    LineScene,
-    Modules,
-    RodZone,
-    Section,
-    Spread,
-    Straight,
-    Swivel,
-    ZonesModel,
-)
+from hybrid.scene.schema import LineScene
 
 # Limits that a section may have and that only reports ask for: unit, what it is, the stricter one of two.
 SECTION_LIMITS: dict[str, tuple[str, str, np.ufunc]] = {

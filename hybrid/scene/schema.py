@@ -2,8 +2,6 @@
 
 Every class is one table of the YAML file; the same classes are the Python API.
 A missing table is None, and None costs nothing downstream.
-
-The tables live in five files (`cable`, `attachments`, `sea`, `ends`, `task`); import them from here.
 """
 
 from __future__ import annotations
@@ -21,139 +19,24 @@ from hybrid.scene.analysis import (
     PER_PERIOD,
     UNASKED_BYTES,
     VALUES,
-    AdaptiveModel,
-    CatenaryModel,
-    CatenaryZone,
     Equilibrium,
     Initial,
     Mesh,
     Model,
     Output,
-    Points,
     Resolution,
-    RodModel,
-    RodZone,
-    Straight,
     Time,
-    ZonesModel,
     missing_time,
     usual_model,
 )
-from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
-from hybrid.scene.base import Table, Text, Vector, refuse
+from hybrid.scene.base import Table, Text, refuse
 from hybrid.scene.bodies import Carried
-from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section, Vortices
+from hybrid.scene.cable import Cable, Contact, Environment
 from hybrid.scene.checks import contradictions
-from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned, Triple
+from hybrid.scene.ends import End, Ends, Triple
 from hybrid.scene.motion_checks import lasting_period, moved_in
-from hybrid.scene.motion_tables import TURNS, Harmonic, Load, Motion, Travel, most_shift
-from hybrid.scene.obstacles import (
-    BoxObstacle,
-    CylinderObstacle,
-    MeshObstacle,
-    Obstacle,
-    Obstacles,
-    PlaneObstacle,
-    SheaveObstacle,
-    SphereObstacle,
-    TorusObstacle,
-)
-from hybrid.scene.sea import (
-    Current,
-    CurrentPoint,
-    CurrentProfile,
-    Friction,
-    PowerLawCurrent,
-    Seabed,
-    UniformCurrent,
-)
-from hybrid.scene.wave_theory import (
-    JonswapWaves,
-    OchiHubbleWaves,
-    PiersonMoskowitzWaves,
-    Spreading,
-    SumOfWaves,
-    TorsethaugenWaves,
-)
-from hybrid.scene.waves import GivenWaves, MeasuredWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
-
-__all__ = [
-    "Accuracy",
-    "AdaptiveModel",
-    "AddedMass",
-    "Attachment",
-    "BendRestrictor",
-    "BendStiffener",
-    "Body",
-    "BoxObstacle",
-    "Cable",
-    "CatenaryModel",
-    "CatenaryZone",
-    "Clamped",
-    "Clump",
-    "Contact",
-    "Current",
-    "CurrentPoint",
-    "CurrentProfile",
-    "CylinderObstacle",
-    "Damping",
-    "Drag",
-    "End",
-    "Ends",
-    "Environment",
-    "Equilibrium",
-    "Float",
-    "Fluid",
-    "Free",
-    "Friction",
-    "GivenWaves",
-    "Guided",
-    "Harmonic",
-    "Initial",
-    "JonswapWaves",
-    "LineScene",
-    "Load",
-    "MeasuredWaves",
-    "Mesh",
-    "MeshObstacle",
-    "Model",
-    "Modules",
-    "Motion",
-    "OchiHubbleWaves",
-    "Output",
-    "PiersonMoskowitzWaves",
-    "Pinned",
-    "PlaneObstacle",
-    "Points",
-    "PowerLawCurrent",
-    "RecordedWaves",
-    "RegularWaves",
-    "Resolution",
-    "RodModel",
-    "RodZone",
-    "Seabed",
-    "Section",
-    "SheaveObstacle",
-    "SphereObstacle",
-    "Spread",
-    "Spreading",
-    "Straight",
-    "StreamFunctionWaves",
-    "SumOfWaves",
-    "Swivel",
-    "Table",
-    "Time",
-    "TorsethaugenWaves",
-    "TorusObstacle",
-    "Travel",
-    "UniformCurrent",
-    "Vector",
-    "Vortices",
-    "Waves",
-    "ZonesModel",
-    "missing_time",
-]
-
+from hybrid.scene.motion_tables import TURNS, Motion, most_shift
+from hybrid.scene.obstacles import Obstacle, Obstacles
 
 # pydantic leaves a bound under its own name where a validator of ours stands before the number
 _STANDARD = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}

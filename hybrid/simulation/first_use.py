@@ -18,10 +18,10 @@ from hybrid.kernels.mesh.remesh import ask_cells, change_cells, put_cells
 from hybrid.model.build import Model, build
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import first_resolution, wants_errors
-from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
+from hybrid.scene.analysis import Equilibrium, RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import Equilibrium, LineScene, reachable_obstacles
+from hybrid.scene.schema import LineScene, reachable_obstacles
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.entry.in_plane", "run.entry.in_space")

@@ -17,9 +17,9 @@ from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.ends import DrivenEnd, contradictions
 from hybrid.model.network import NetworkResolution
+from hybrid.scene.analysis import missing_time
 from hybrid.scene.network import Network
 from hybrid.scene.read import SceneLike, as_scene, scene_text
-from hybrid.scene.schema import missing_time
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, layered, rods_at_rest, with_survey
 from hybrid.simulation.new_run import Recording, new_run, static_system

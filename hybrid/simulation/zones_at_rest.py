@@ -15,8 +15,9 @@ from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.model.nearby import refined
 from hybrid.model.network import NetworkModel
+from hybrid.scene.analysis import AdaptiveModel
 from hybrid.scene.network import Network
-from hybrid.scene.schema import AdaptiveModel, LineScene
+from hybrid.scene.schema import LineScene
 from hybrid.simulation.equilibrium import equilibrium_of, joined_lines, solve_from
 from hybrid.simulation.run_start import nearness_in
 from hybrid.solve.lines_at_rest import LinesAtRest

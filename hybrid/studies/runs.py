@@ -23,11 +23,10 @@ import numpy as np
 from hybrid.accuracy.api import run
 from hybrid.errors import Complaint, ComputationError, ResultError, SceneError
 from hybrid.scene.accuracy import of_length
-from hybrid.scene.analysis import LEAST_DAMPED
+from hybrid.scene.analysis import LEAST_DAMPED, Model
 from hybrid.scene.base import Kinds, dotted
 from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import Model
 from hybrid.simulation.progress import Progress
 from hybrid.store.reader import Result
 from hybrid.store.tradeoff_table import DONE, FAILED, MISSED, OURS, Row

@@ -20,8 +20,9 @@ from hybrid.model.mesh import edges
 from hybrid.model.nearby import FEWER, MANY, picked
 from hybrid.model.payout import PayoutPlan, fastest
 from hybrid.model.resolution import Resolution, follows_curvature
+from hybrid.scene.analysis import AdaptiveModel
 from hybrid.scene.motion_checks import longest_period
-from hybrid.scene.schema import AdaptiveModel, LineScene
+from hybrid.scene.schema import LineScene
 from hybrid.zones.change import ZoneSwitching, on_layout
 from hybrid.zones.criteria import UserCriterion, shares_asked
 from hybrid.zones.manager import DomainManager

@@ -17,8 +17,8 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.interop.moordyn import ImportedScene
 from hybrid.interop.moordyn.cables import _rotated
+from hybrid.scene.ends import Body, Clamped, Free, Pinned
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import Body, Clamped, Free, Pinned
 from tests.scenes import cable_scene, pinned_at
 
 

@@ -17,8 +17,8 @@ from hybrid.model.ends import EndConditions, EndLoad
 from hybrid.model.sea import Surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.motion import EndMotion
+from hybrid.scene.motion_tables import Harmonic, Motion, Travel
 from hybrid.scene.read import one_line
-from hybrid.scene.schema import Harmonic, Motion, Travel
 
 ROUND_OFF = 1e-14  # of the size of what is compared
 TIMES = (-2.0, 0.0, 0.3, 1.7, 4.0, 5.5, 7.99, 10.0, 12.5, 19.9, 25.0, 33.3, 60.0, 1e4)

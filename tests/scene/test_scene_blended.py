@@ -9,7 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.schema import Motion
+from hybrid.scene.motion_tables import Motion
 from tests.scenes import cable_scene, pinned_at
 
 PLACE = np.array([3.0, 0.0, 1.0])

@@ -15,9 +15,9 @@ from scene_texts import OCEAN, change, complaints
 
 from hybrid.errors import SceneError
 from hybrid.scene.motion import EndMotion
+from hybrid.scene.motion_tables import Harmonic, Motion
 from hybrid.scene.read import parse_scene, validate_scene
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import Harmonic, Motion
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scene_texts import OCEAN, change, complaints
 
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.motion_tables import smooth_step, way_of_smooth_step
-from hybrid.scene.schema import Harmonic, Motion, Travel
+from hybrid.scene.motion_tables import Harmonic, Motion, Travel, smooth_step, way_of_smooth_step
 
 Array = NDArray[np.float64]
 

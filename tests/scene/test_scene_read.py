@@ -13,27 +13,21 @@ from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS, SUSPE
 
 from hybrid.errors import SceneError
 from hybrid.scene import yaml_nodes, yaml_source
-from hybrid.scene.network import Network
-from hybrid.scene.read import as_scene, load_scene, parse_scene, read_text, scene_text, validate_scene
-from hybrid.scene.root import Scene
-from hybrid.scene.schema import (
-    Cable,
+from hybrid.scene.analysis import (
     CatenaryModel,
     CatenaryZone,
-    Damping,
-    Ends,
     Equilibrium,
-    Fluid,
-    Free,
-    Guided,
-    Pinned,
     RodModel,
     RodZone,
-    Section,
     Straight,
     ZonesModel,
     missing_time,
 )
+from hybrid.scene.cable import Cable, Damping, Fluid, Section
+from hybrid.scene.ends import Ends, Free, Guided, Pinned
+from hybrid.scene.network import Network
+from hybrid.scene.read import as_scene, load_scene, parse_scene, read_text, scene_text, validate_scene
+from hybrid.scene.root import Scene
 
 ALL = [SUSPENSION, OCEAN, EVERYTHING, EVERYTHING_ELSE, AT_REST, *SEAS.values()]
 

@@ -10,11 +10,16 @@ import pytest
 from scene_texts import OCEAN, SEA, change, complaints
 
 from hybrid.errors import SceneError
+from hybrid.scene.analysis import AdaptiveModel
+from hybrid.scene.attachments import Modules
 from hybrid.scene.base import FORMER_NAMES, Table
 from hybrid.scene.checks import CHECKS
+from hybrid.scene.ends import Body
 from hybrid.scene.read import RenamedKey, load_scene, parse_scene, read_scene, validate_scene
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import AdaptiveModel, Body, JonswapWaves, LineScene, Modules, PowerLawCurrent
+from hybrid.scene.schema import LineScene
+from hybrid.scene.sea import PowerLawCurrent
+from hybrid.scene.wave_theory import JonswapWaves
 
 MODEL = "{kind: adaptive, hold_time: 2.0, force_rod: [[0, 10]], force_catenary: [[200, 250]]}"
 ADAPTIVE = change(OCEAN, "{kind: catenary}", MODEL)

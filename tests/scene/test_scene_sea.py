@@ -9,37 +9,17 @@ import pytest
 from scene_texts import AT_REST, OCEAN, SEA, SEA_LIST, SEA_TOO, SEA_UNIFORM, change, complaints, marked
 
 from hybrid.errors import SceneError
+from hybrid.scene.analysis import CatenaryModel, Equilibrium
+from hybrid.scene.attachments import Clump, Float, Modules
+from hybrid.scene.cable import Cable, Environment, Fluid, Section
+from hybrid.scene.ends import Body, Ends, Free, Pinned
+from hybrid.scene.motion_tables import Harmonic, Load, Motion, Travel
 from hybrid.scene.read import parse_scene, scene_text, validate_scene
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import (
-    Body,
-    Cable,
-    CatenaryModel,
-    Clump,
-    CurrentPoint,
-    CurrentProfile,
-    Ends,
-    Environment,
-    Equilibrium,
-    Float,
-    Fluid,
-    Free,
-    Friction,
-    Harmonic,
-    JonswapWaves,
-    Load,
-    Modules,
-    Motion,
-    Pinned,
-    PowerLawCurrent,
-    RegularWaves,
-    Seabed,
-    Section,
-    Travel,
-    UniformCurrent,
-)
+from hybrid.scene.sea import CurrentPoint, CurrentProfile, Friction, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.start_checks import net_weight
-from hybrid.scene.wave_theory import wavenumber
+from hybrid.scene.wave_theory import JonswapWaves, wavenumber
+from hybrid.scene.waves import RegularWaves
 from tests.scenes import cable_scene, pinned_at
 
 # --- what is read ------------------------------------------------------------------------------

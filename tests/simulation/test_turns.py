@@ -14,9 +14,9 @@ import hybrid
 from hybrid.model.build import build
 from hybrid.model.network import build_system
 from hybrid.scene.motion import EndMotion
+from hybrid.scene.motion_tables import Motion
 from hybrid.scene.read import one_line
 from hybrid.scene.root import in_full
-from hybrid.scene.schema import Motion
 from hybrid.simulation import equilibrium
 from tests.said import both_ways, line_of, said
 from tests.scenes import cable_scene, pinned_at

@@ -19,8 +19,8 @@ from hybrid.kernels.state.state import no_sea
 from hybrid.model.build import build
 from hybrid.model.mesh import Layout
 from hybrid.model.resolution import first_resolution
+from hybrid.scene.analysis import AdaptiveModel
 from hybrid.scene.read import one_line
-from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.zones_at_rest import managers_for
 from hybrid.zones.manager import DomainManager
 from hybrid.zones.plan import Allowed, Change, Rules, Times, planned
