@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_winch_of_joined import held_by_friction, pressed
+from test_winch import held_by_friction, pressed
 
 import hybrid
 

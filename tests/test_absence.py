@@ -337,7 +337,7 @@ BALL = {"mass": 1.0, "inertia": [1, 1, 1], "initial_guess": [1.5, 0, -3], "shape
 def test_newton_has_no_border_that_the_network_does_not_have(
     tables: dict[str, Any], borders: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No kernel, table or question for others; a line alone has none at all (tests/simulation/test_first_use.py)."""
+    """No kernel, table or question for others; a line alone has none at all (tests/simulation/test_api.py)."""
     listed = list[list[str]]()
     march_by = JointJobs.march_by
 

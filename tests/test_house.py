@@ -392,7 +392,7 @@ def test_importing_all_public_names_works() -> None:
 WAITING = {
     "extremes/extreme.py", "harden/harden_verdict.py", "harden/test_harden_files.py", "harden/test_harden_scenes.py",
     "harden/test_harden_yaml.py", "killed_studies.py", "live/test_live_browser.py", "live/viewed.py",
-    "simulation/test_resume_kill.py", "simulation/test_resume_rows.py",
+    "simulation/test_resume_bits.py", "simulation/test_resume_rows.py",
     "view/test_report_browser.py",
 }  # fmt: skip
 CLOCKS = re.compile(r"\b(process_time|perf_counter|monotonic|thread_time)(_ns)?\(|\btime\.time\(")

@@ -16,12 +16,12 @@ import hybrid
 from tests.combinations.pairs import END, FEATURES, as_network, scene_of
 from tests.problems import tables_with
 from tests.simulation.bits import Stopping, differences, went_on
-from tests.simulation.test_system_cells import followed
+from tests.simulation.test_one_world import between_springs
+from tests.simulation.test_releases import scene_break as carried
 from tests.simulation.test_system_contact import RUBS
 from tests.simulation.test_system_contact import system as touching
-from tests.simulation.test_system_failures import scene as carried
-from tests.simulation.test_system_placed_starts import between_springs
-from tests.simulation.test_system_resume import clamped, mooring, spar
+from tests.simulation.test_system_saving import clamped, mooring, spar
+from tests.simulation.test_system_zones import followed
 from tests.simulation.test_system_zones import mooring as slackening
 from tests.validation.test_validation_body_contact import pushed
 from tests.validation.test_validation_body_contact_of_lines import crossed

@@ -1,4 +1,4 @@
-"""Forges checkpoints, and resumes from them in this process; test_resume_foreign.py starts it.
+"""Forges checkpoints, and resumes from them in this process; test_resume_releases.py starts it.
 
     python forge.py GOOD.h5 FOLDER FIRST LAST
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 import pytest
+import yaml
 
 import hybrid
 from hybrid.errors import Outcome
 from hybrid.simulation import equilibrium
 from hybrid.simulation.lines_contact import gauss_integral
 from hybrid.solve.stepper import LineFailed
-from tests.scenes import cable_scene, pinned_at
+from tests.scenes import cable_scene, network_scene, pinned_at
 
 WIDTH, LENGTH = 0.02, 8.0
 LEGS = {"zones": [{"catenary": 3.0}, {"rod": 2.0}, {"catenary": 3.0}]}
@@ -173,3 +175,151 @@ def test_a_line_that_loses_its_turns_without_contact_is_found_with_it(monkeypatc
     np.testing.assert_allclose(found.position, asked.position, rtol=0.0, atol=1e-12)
     judged = ["stability not judged" in {e.kind for e in x.events} for x in (asked, found)]
     assert judged[0] == judged[1]
+
+
+# --- Equilibria of systems with lines that touch themselves: beside each other, at a body, and runs that begin there
+# ---
+
+WIDTH_BESIDE_BODY = 0.02
+HOSE = {
+    "length": 4.0, "mass": 0.4, "diameter": WIDTH_BESIDE_BODY, "axial_stiffness": 1e5, "bending_stiffness": 0.02,
+    "torsional_stiffness": 0.016, "damping": {"mass": 0.5},
+}  # fmt: skip
+LINE = {
+    "sections": [HOSE], "attachments": [{"kind": "clump", "at": 2.0, "mass": 2.0}], "mesh": {"cells": 160},
+    "contact": {"self": True, "friction": 0.3},
+}  # fmt: skip
+Y = 0.9 * WIDTH_BESIDE_BODY  # m, between the ends of a U
+OPEN = [[0, 0, 0], [-0.5, 0, -1.0], [0, 0.5 * Y, -1.85], [0.5, Y, -1.0], [0, Y, 0]]
+COMMON = {"time": {"duration": 0.3, "step": 0.01}, "output": {"every": 0.1, "points": 81}}
+
+
+def beside_each_other(*shifts: float) -> dict[str, Any]:
+    """Us whose ends are 0.9 diameters apart, with a weight, y (m) apart; all have the first shape of the first."""
+    points, lines = {}, {}
+    for k, y in enumerate(shifts):
+        points |= {f"a{k}": {"position": [0, y, 0]}, f"b{k}": {"position": [0, y + Y, 0]}}
+        lines[f"line {k}"] = LINE | {"start": f"a{k}", "end": f"b{k}", "model": "adaptive", "initial": {"points": OPEN}}
+    return COMMON | {"points": points, "lines": lines}
+
+
+def at_a_body(y: float = -0.01) -> dict[str, Any]:
+    """One leg hangs on a body that two ropes, which end at y (m), pull against the other leg; nothing holds its yaw."""
+    rope = {"sections": [{"length": 1.1, "mass": 0.1, "axial_stiffness": 1e5}], "model": "catenary", "start": "free"}
+    first = [[0, 0, 0], [-0.3, -0.3, -1.0], [0, 0, -1.8], [0.3, 0.3, -1], [0, 0.3, 0.1]]
+    return COMMON | network_scene(
+        {"a": {"position": [0, 0, 0]}, "left": {"position": [-0.6, y, 0.75]}, "right": {"position": [0.6, y, 0.75]},
+         "free": {"kind": "fairlead", "body": "pod", "place": [0, 0, -0.05]}},
+        {"hose": LINE | {"start": "a", "end": "free", "model": "rod", "initial": {"points": first}},
+         "left": rope | {"end": "left", "mesh": {"cells": 5}}, "right": rope | {"end": "right", "mesh": {"cells": 5}}},
+        bodies={"pod": {"kind": "free", "mass": 1.0, "inertia": [0.1] * 3, "initial_guess": [0, 0.3, 0.15]}}
+    )  # fmt: skip
+
+
+def stays_beside_body(scene: dict[str, Any], static: hybrid.Result, name: str) -> None:
+    """A run with friction begins in the equilibrium without, and stays."""
+    run = hybrid.run(scene, progress=False).lines[name]
+    assert np.abs(run.position - static.lines[name].position).max() < 1e-9
+    energy = float(static.lines[name]["energy/self_contact"][0])
+    assert run["energy/self_contact"] == pytest.approx(energy, rel=1e-5)
+
+
+@pytest.mark.long
+def test_a_line_that_a_body_presses_against_itself() -> None:
+    scene = at_a_body()
+    result = hybrid.static(scene)
+    hose = result.lines["hose"]
+    assert (
+        hose["energy/self_contact"][0] > 0.0 and 0.94 < float(hose["self_distance/distance"]) / WIDTH_BESIDE_BODY < 1.05
+    )
+    assert result.attributes["static_residual"] < 1e-9
+    without = at_a_body()
+    without["lines"]["hose"]["contact"] = {"self": False}
+    there = hybrid.static(without)["bodies/pod/position"][0]
+    assert np.linalg.norm(result["bodies/pod/position"][0] - there) > 1e-4  # the contact holds it off
+    stays_beside_body(scene, result, "hose")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("y", [-0.005, -0.02])
+def test_the_stiffness_of_a_body_in_contact(y: float) -> None:
+    """That of the forces on the body held on both sides, with the contact of the node at its fairlead; yaw is free."""
+    scene = at_a_body(y)
+    K = hybrid.stiffness(scene, "body:pod").matrix
+    assert np.abs(K - K.T).max() < 1e-4 * np.abs(K).max()
+    assert np.abs(K[5]).max() < 1e-5 * np.abs(K[3:5]).max()
+    for k, heading in enumerate((0.0, 90.0)):
+        held = hybrid.offsets(scene, "body:pod", [-2e-5, 2e-5], heading=heading)
+        for found, there in ((K[:3, k], held.force), (K[3:, k], held.moment)):
+            assert found == pytest.approx((there[0] - there[1]) / 4e-5, rel=3e-3, abs=1e-4 * np.abs(found).max())
+
+
+@pytest.mark.long
+def test_without_a_seabed_no_friction_settles() -> None:
+    """What settles is friction on the bed: a line that has none rests where it rests without."""
+    scene = beside_each_other(0.0)
+    neglected = hybrid.static(scene).lines["line 0"]
+    scene["lines"]["line 0"] |= {"initial": {"points": OPEN, "friction": "settled"}}
+    assert np.array_equal(hybrid.static(scene).lines["line 0"].position, neglected.position)
+
+
+# --- Ways over unstable equilibria. A column beyond Greenhill's load falls to a side that nothing chooses, which is
+# said; below it stands ---
+
+DEFECTS = Path(__file__).parents[1] / "data" / "defects"
+
+GREENHILL = 7.8373  # w L^3/EI at which a column that is clamped at its foot buckles under its own weight
+
+
+@pytest.mark.parametrize(("load", "cells", "falls"), [(0.9, 20, False), (1.5, 20, True), (1.5, 300, True)])
+def test_the_side_that_nothing_chooses(load: float, cells: int, falls: bool) -> None:
+    section = {"length": 1.0, "mass": load * GREENHILL / 9.81, "diameter": 0.01, "bending_stiffness": 1.0}
+    clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, 1]}
+    what = cable_scene(section, clamp, {"kind": "free"}, gravity=9.81, model="rod", mesh=cells)
+    result = hybrid.static(what)
+    said = [x.text for x in result.events if x.kind == "several equilibria"]
+    assert bool(said) == falls == (result.position[-1, -1, 2] < 0.9)
+    assert all("initial.points" in text for text in said)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "cells", "orcaflex"), [("lazy_s", 200, 59640.7), ("lazy_wave", 400, 24172.9)])
+def test_a_line_is_pushed_off_each_unstable_equilibrium_that_is_met(name: str, cells: int, orcaflex: float) -> None:
+    """0.6.0 refused both, unless the scene said `guess: arc` or `guess: span`."""
+    scene = hybrid.load_scene(DEFECTS / f"equilibrium_refused_{name}.yaml", [f"mesh.cells={cells}"])
+    found = hybrid.static(scene)
+    assert np.linalg.norm(found.reaction_start[-1]) == pytest.approx(orcaflex, rel=1e-3)
+    assert "several equilibria" in {event.kind for event in found.events}
+
+
+# --- equilibria that are wound up ---
+
+PAGE = (Path(__file__).parents[2] / "docs" / "points.md").read_text(encoding="utf-8")
+SCENE = next(x.partition("```")[0] for x in PAGE.split("```yaml\n")[1:] if x.startswith("# cantilever.yaml"))
+
+
+@pytest.mark.parametrize(("guess", "wound"), [((7.9, -2.2, -21), ["lower", "upper"]), ((0, 0, -30), [])])
+def test_a_line_that_rests_wound_up_is_noted(guess: tuple[float, ...], wound: list[str]) -> None:
+    """The system is symmetric about y = 0; from the first guess it is found wound up about its lines."""
+    given = "tee: {initial_guess: [0, 0, -30]}"
+    assert given in SCENE
+    system = yaml.safe_load(SCENE.replace(given, f"tee: {{initial_guess: {list(guess)}}}"))
+    result = hybrid.static(system)
+    assert [n for n, x in result.lines.items() if any(e.kind == "several equilibria" for e in x.events)] == wound
+    twisted = abs(result.lines["lower"].torque[-1]).max() > 1e-3 * abs(result.lines["lower"].bending_moment[-1]).max()
+    assert twisted == bool(wound)
+
+
+def test_a_twist_that_a_moment_makes_is_no_news() -> None:
+    line = {"mass": 1, "diameter": 0.02, "axial_stiffness": 1e6, "bending_stiffness": 100, "torsional_stiffness": 50}
+    ends = {"start": {"tangent": [1, 0, 0]}, "end": {"tangent": [1, 0, 0]}}
+    common = {"connections": ends, "sections": [{"length": 5, **line}], "mesh": {"cells": 10}}
+    system = network_scene(
+        {"low": {"position": [0, 0, 0]}, "high": {"position": [10.01, 0, 0]},
+         "middle": {"kind": "free", "initial_guess": [5, 0, 0], "moment": [60, 0, 0]}},
+        {"a": {"start": "low", "end": "middle", **common}, "b": {"start": "middle", "end": "high", **common}}, gravity=0
+    )  # fmt: skip
+    result = hybrid.static(system)
+    for name, torque in (("a", 30.0), ("b", -30.0)):  # 3 rad between its ends
+        assert result.lines[name].torque[-1] == pytest.approx(torque, rel=1e-6)
+        assert all(e.kind != "several equilibria" for e in result.lines[name].events)

@@ -8,11 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_plane import storm, swinging
 from test_system_contact import CLOSER, HOSE, LOW, RUBS
-from test_winch_of_joined import floating
+from test_winch import floating
 
 import hybrid
+from hybrid.kernels.state.report import PLANAR
+from hybrid.scene.root import in_full
 from hybrid.solve.network_solver import NetworkSolver
+from tests.combinations.networks import differences, events_differ
 
 Tables = dict[str, Any]
 ROPE = {"mass": 2.0, "diameter": 0.04, "axial_stiffness": 2e5, "damping": {"mass": 0.2}}
@@ -179,3 +183,198 @@ def test_a_body_that_comes_to_touch_a_line_moves_with_it(
     assert groups[-1] == [0, 1, 2, 3]
     for name, x in together.lines.items():
         assert np.abs(x.position - found.lines[name].position).max() <= 1e-7, name
+
+
+# --- Lines of a network that are joined to nothing and lie in a plane: computed there, as one cable is ---
+
+
+@pytest.fixture
+def flat(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
+    """Numbers of the lines whose steps are made in a plane, of each solver of a motion."""
+    found: list[list[int]] = []
+    swap_states = NetworkSolver.swap_states
+
+    def noted(solver: NetworkSolver, states: Any) -> dict[str, Any]:
+        found.append([k for k in solver.lone if solver.lines[k].line.bits & PLANAR])
+        return swap_states(solver, states)
+
+    monkeypatch.setattr(NetworkSolver, "swap_states", noted)
+    return found
+
+
+def as_network(tables: Any) -> hybrid.Scene:
+    return in_full(hybrid.validate_scene(tables))
+
+
+def same_planes(network: Any, cable: Any, part: float = 1e-9) -> None:
+    """The only line of a network moves as a cable."""
+    (line,) = network.lines.values()
+    for key in ("position", "velocity", "tension", "energy/kinetic", "work/end", "envelope/tension_max"):
+        scale = np.nanmax(np.abs(cable[key]))
+        assert np.nanmax(np.abs(line[key] - cable[key])) <= part * scale, key
+
+
+@pytest.mark.parametrize("dimension", [None, 2, 3])
+def test_a_line_in_a_plane_is_the_cable(dimension: int | None, flat: list[list[int]]) -> None:
+    """In a vertical plane of any direction; where nothing is said, in its plane."""
+    network = hybrid.run(as_network(swinging(0.8, 0.0, dimension)))
+    assert flat == [[] if dimension == 3 else [0]]
+    cable = hybrid.run(swinging(0.8, 0.0, 3))
+    assert flat[1:] == [[]]
+    same_planes(network, cable)
+    (line,) = network.lines.values()
+    np.testing.assert_array_equal(line["steps/iterations"], cable["steps/iterations"])
+
+
+# What changes cells or lengths of a line in motion: a third of them change within these scenes.
+CHANGES: dict[str, Tables] = {
+    "zones that move": {"model": {"kind": "adaptive", "always_move": True, "hold_time": 0.1}},
+    "cells that follow": {"model": {"kind": "adaptive", "curvature_error": 0.02}, "mesh": {}},
+    "payout": {"payout": {"rate": 1.5, "ramp": 0.5, "longest": 40}},
+}  # fmt: skip
+
+
+def changing(kind: str) -> Tables:
+    """A swinging line whose cells, zones or length change; it lies in a plane, of which nothing is said."""
+    tables = swinging(0.8, 0.0) | {"time": {"duration": 3.0, "step": 0.05}} | CHANGES[kind]
+    if payout := tables.pop("payout", None):
+        tables["ends"]["end"] |= {"payout": payout}
+        tables["ends"]["end"].pop("motion")
+    return tables
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_a_line_that_changes_in_a_plane_is_the_cable(kind: str, flat: list[list[int]]) -> None:
+    """Zones, cells and nodes come and go in the plane; so they do on the way out of it."""
+    tables = changing(kind)
+    network = hybrid.run(as_network(tables))
+    assert flat and all(x == [0] for x in flat)
+    if kind != "zones that move":
+        assert len(flat) == 1  # cells and nodes come and go without another solver
+    cable = hybrid.run(tables | {"dimension": 3})
+    assert flat[-1] == []
+    assert [str(x) for x in differences(cable, network)] == []
+    assert events_differ(cable, network) == []
+
+
+def test_only_what_is_joined_to_nothing_is_computed_in_a_plane(flat: list[list[int]]) -> None:
+    """A pendant with a body goes on in space, and lines that may touch a shape; lines that no plane holds do, too."""
+    points = {name: BALL["points"][name] for name in ("top", "eye")}
+    hanging = {"points": points, "lines": {"pendant": BALL["lines"]["pendant"]}}
+    hanging["bodies"] = {"ball": {k: x for k, x in BALL["bodies"]["ball"].items() if k != "shape"}}
+    still = {name: {"position": point["position"]} for name, point in SPANS["points"].items()}
+    tables = scene(hanging, SPANS | {"points": still | {"b1": SPANS["points"]["b1"]}}, duration=0.1)
+    hybrid.run(tables)
+    assert flat[-1] == [1]  # an end of line b sways across
+    hybrid.run(tables | {"bodies": BALL["bodies"]})
+    assert flat[-1] == []
+
+
+def ball(*at: float) -> Tables:
+    """A small ball in the way of nothing."""
+    return {"obstacles": {"ball": {"kind": "sphere", "at": [*at], "radius": 0.2, "stiffness": 1e5}}}
+
+
+def test_an_obstacle_out_of_reach_leaves_a_line_in_its_plane(flat: list[list[int]]) -> None:
+    """As without it, to the bit; one that the line could reach does not, and is written beside both."""
+    alone, far, near = (
+        hybrid.run(as_network(swinging(0.8, 0.0) | x)).lines["cable"] for x in ({}, ball(7, 10, -40), ball(7, 10, 5))
+    )
+    assert flat == [[0], [0], []]
+    for key in ("position", "velocity", "tension", "curvature", "energy/kinetic", "steps/iterations"):
+        np.testing.assert_array_equal(far[key], alone[key], err_msg=key)
+    np.testing.assert_allclose(near.position, alone.position, rtol=0, atol=1e-9 * 30)
+    assert not any(far["obstacles/ball/normal_force"].ravel())
+    contents = {at: hybrid.plan(swinging(0.8, 0.0) | ball(7, 10, at)).contents for at in (-40, 5)}
+    why = [{e.what: e.why for e in x}["computed in a plane (3 unknowns a node)"] for x in contents.values()]
+    assert why[0].startswith("all of the scene lies in") and why[1].startswith("obstacles: contact with obstacles")
+    assert [e.on for x in contents.values() for e in x if e.what.startswith("obstacle ball")] == [False, True]
+
+
+def test_an_obstacle_takes_only_lines_out_of_their_planes_that_may_reach_it(flat: list[list[int]]) -> None:
+    spans = {
+        "points": {f"{x}{k}": {"position": [8 * k - 4, y, 0]} for x, y in zip("abc", (0, 20, 40), strict=True) for k in (0, 1)},
+        "lines": {x: SPANS["lines"]["a"] | {"start": f"{x}0", "end": f"{x}1", "initial": "equilibrium"} for x in "abc"},
+    }  # fmt: skip
+    beside = hybrid.run(scene(spans, ball(0, 20, 1), duration=0.2))
+    assert flat[-1] == [0, 2]
+    alone = hybrid.run(scene(spans, duration=0.2))
+    assert flat[-1] == [0, 1, 2]
+    for name, x in alone.lines.items():
+        np.testing.assert_allclose(beside.lines[name].position, x.position, rtol=0, atol=1e-8)
+
+
+@pytest.mark.long
+def test_other_loads_may_reach_an_obstacle(flat: list[list[int]], tmp_path: Path) -> None:
+    """An end comes nearer from 1 s on, which lets the line come to the ball: it goes on in space."""
+    tables = swinging(0.8, 0.0) | ball(7.5, 10, -10.6) | {"time": {"duration": 1.0, "step": 0.05}}
+    hybrid.run(tables, tmp_path / "part.h5", progress=False).close()
+    assert flat == [[0]]
+    nearer = ["ends.end.motion.travel={by: [-3, -4, 0], over: 2, begin: 1}"]
+    found = hybrid.resume(tmp_path / "part.h5", until=4.0, settings=nearer, progress=False)
+    assert flat[-1] == [] and [e.kind for e in found.events].count("out of plane") == 1
+
+
+@pytest.mark.long
+def test_other_loads_may_take_a_line_out_of_its_plane(flat: list[list[int]], tmp_path: Path) -> None:
+    """A current across it from 2 s on: the same motion, but for the push by which it leaves, as computed in space."""
+    across = ["environment.fluid.current=[0.4, -0.3, 0]"]
+    found = []
+    for dimension in (None, 3):
+        tables = swinging(0.8, 0.0, dimension) | {"time": {"duration": 2.0, "step": 0.05}}
+        path = tmp_path / f"{dimension}.h5"
+        hybrid.run(as_network(tables), path, progress=False).close()
+        found.append(hybrid.resume(path, until=4.0, settings=across, progress=False).lines["cable"])
+    assert [0] in flat and flat[-1] == []
+    normal = np.array([0.8, -0.6, 0.0])
+    assert np.abs(found[1].position[-1] @ normal).max() > 0.1
+    assert np.abs(found[0].position - found[1].position).max() < 1e-3
+
+
+def test_a_line_that_comes_near_itself_leaves_its_plane(flat: list[list[int]]) -> None:
+    """To touch itself in space."""
+    closer = {"travel": {"by": [1.19, 0.0, 0.0], "over": 1.5}}
+    tables = {
+        "cable": {"sections": [HOSE]}, "model": "rod", "mesh": {"cells": 40}, "initial": "equilibrium",
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": closer},
+                 "end": {"kind": "pinned", "position": [1.2, 0, 0]}},
+        "time": {"duration": 1.6, "step": 0.01}, "output": {"every": 0.1},
+    }  # fmt: skip
+    network = hybrid.run(as_network(tables))
+    assert [e.kind for e in network.events].count("out of plane") == 1
+    assert flat[0] == [0] and flat[-1] == []
+    assert network.lines["cable"]["energy/self_contact"].max() > 0.0
+
+
+@pytest.mark.long
+def test_it_is_resumed_bit_for_bit(flat: list[list[int]], tmp_path: Path) -> None:
+    """From its plane, from space, and from the plane again."""
+    whole = hybrid.run(as_network(storm(300.0)), tmp_path / "whole.h5", progress=False)
+    assert [x for k, x in enumerate(flat) if x != flat[k - 1] or not k] == [[0], [], [0]]
+    hybrid.run(as_network(storm(100.0)), tmp_path / "part.h5", progress=False).close()
+    for until in (200.0, 290.0, 300.0):
+        found = hybrid.resume(tmp_path / "part.h5", until=until)
+    for key in ("position", "tension", "envelope/tension_max", "work/end"):
+        np.testing.assert_array_equal(found.lines["cable"][key], whole.lines["cable"][key], err_msg=key)
+
+
+def test_stepped_from_outside_it_is_computed_in_the_plane_that_a_scene_asks_for(flat: list[list[int]]) -> None:
+    """Nothing is set out of the plane, and what is restored goes on there; else it moves in space."""
+    for dimension in (2, None):
+        tables, found = swinging(0.0, 0.0, dimension), []
+        del tables["ends"]["end"]["motion"]
+        for back in (False, True):
+            with hybrid.Simulation(as_network(tables)) as network:
+                saved = network.save()
+                for k in [*range(1, 9), 0] * back + [*range(1, 9)]:
+                    if k == 0:
+                        network.restore(saved)
+                        continue
+                    network.set_point("end", (15 + 0.03 * k, 20 + 0.04 * k, 0.02 * k * k))
+                    network.step()
+                assert flat[-1] == ([0] if dimension == 2 else [])
+                if dimension == 2:
+                    with pytest.raises(ValueError, match="out of the plane"):
+                        network.set_point("end", (15, 21, 0))
+                found.append(network.result().lines["cable"].position)
+        np.testing.assert_array_equal(*found)

@@ -14,7 +14,6 @@ import test_payout_laws as laws
 import test_payout_layers as layers
 import test_payout_zones as zones
 import test_winch as winch
-import test_winch_of_joined as joined
 from bits import resumed
 from test_payout import clamped, exchanged, kicks, sagging
 from test_system_payout import crane, to_a_buoy
@@ -187,7 +186,7 @@ RESUMED: dict[str, tuple[Tables, tuple[float, ...]]] = {
     "cells that follow": (zones.touching(0.8, cells.FOLLOWING), (2.0, 4.5)),
     "cells that follow, taken in": (cells.pinned(-0.8), (2.0, 4.5)),
     "tension at the start": (exchanged(of_winch("catenary", 6.0, 0.1)), (4.0,)),
-    "winch of a load": (joined.lowered(model="adaptive"), (4.0,)),
+    "winch of a load": (winch.lowered(model="adaptive"), (4.0,)),
     "crane": (crane(), (3.0,)), "buoy": (to_a_buoy(-0.8), (5.0,)),
 }  # fmt: skip
 

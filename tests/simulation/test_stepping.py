@@ -5,18 +5,23 @@ from __future__ import annotations
 import runpy
 import threading
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from math import inf, nan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from test_system_saving import STEP, VESSEL, scene
 
 import hybrid
+from hybrid.errors import Outcome
 from hybrid.kernels.laws.end_motion import driven_frame, driven_position
 from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import no_moves
 from hybrid.model.ends import PATH, DrivenEnd, rotation, rotation_vector
+from tests.inside import OnlyLine
 from tests.said import both_ways, line_of, said
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
@@ -481,3 +486,194 @@ def test_two_threads_in_one_simulation_are_told_apart() -> None:
     with simulation(400) as alone:
         alone.advance(2.0)
         assert np.array_equal(alone.state.position, cable.state.position)
+
+
+# --- Velocities of what is set from outside: left out they follow from the places, and those that contradict are told
+# ---
+
+Said = Callable[[np.ndarray], Any]
+
+
+def heaved(said: Said, size: float = 1.5, period: float = 8.0, steps: int = 80) -> hybrid.Result:
+    """The fairlead of examples/touchdown.yaml goes up and down by `size`, m; said: what velocities (3,) m/s are given."""
+    w = 2.0 * np.pi / period
+    with hybrid.Simulation(touchdown("model=catenary", PINNED)) as simulation:
+        for k in range(steps):
+            phase = 0.05 * w * (k + 1)
+            velocity = np.array([0.0, 0.0, size * w * np.sin(phase)])
+            simulation.set_end("end", [205.0, 0.0, size * (1.0 - np.cos(phase))], said(velocity))
+            simulation.step()
+        return simulation.result()
+
+
+def test_left_out_it_follows_from_the_places() -> None:
+    right, left_out = heaved(lambda v: v), heaved(lambda v: None)
+    work = right["work/end"][-1]
+    assert np.array_equal(right.position, left_out.position), "the motion is that of the places"
+    assert left_out["work/end"][-1] == pytest.approx(work, rel=0.01)
+    assert abs(left_out["work/scheme"][-1]) < 0.01 * abs(work)
+    assert not left_out.events
+
+
+def test_one_that_contradicts_the_places_is_told_with_numbers() -> None:
+    events = [x for x in heaved(lambda v: 0.5 * v).events if x.kind == "implausible"]
+    assert len(events) == 1
+    assert events[0].text.startswith("ends.end: the velocities given miss ")
+    assert "in 16 steps" in events[0].text and "leave velocity out" in events[0].text
+    assert not [x for x in heaved(lambda v: 1.2 * v).events if x.kind == "implausible"]
+
+
+def test_a_run_that_stops_by_its_energy_says_so() -> None:
+    with pytest.raises(hybrid.ComputationError) as caught:
+        heaved(lambda v: -v)
+    assert caught.value.outcome == Outcome.GAINS_ENERGY
+    assert "try:      ends.end: the velocities given miss" in str(caught.value)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("again", [False, True])
+def test_points_of_several_lines(again: bool) -> None:
+    """Left out as for ends; again: every step is taken back once, which leaves the same bits and one event."""
+    work, data = {}, scene()
+    data["output"]["every"] = 0.9  # nothing is judged by its energy before it is told
+    for name, given in {"right": 1.0, "left out": None, "half": 0.5}.items():
+        with hybrid.Simulation(data) as lines:
+            for k in range(18):
+                place = VESSEL + np.array([0, 0, 0.2 * (1.0 - np.cos(2.0 * STEP * (k + 1)))])
+                velocity = np.array([0, 0, 0.4 * np.sin(2.0 * STEP * (k + 1))])
+                saved = lines.save() if again else None
+                for _ in range(1 + again):
+                    lines.set_point("vessel", place, None if given is None else given * velocity)
+                    lines.advance(STEP * (k + 1))
+                    if saved is not None and _ == 0:
+                        lines.restore(saved)
+            result = lines.result()
+        work[name] = result.lines["hose"]["work/end"][-1] + result.lines["hose"]["work/start"][-1]
+        told = [x.text for x in result.events if x.kind == "implausible" and "points.vessel" in x.text]
+        assert len(told) == (name == "half")
+    assert work["left out"] == pytest.approx(work["right"], rel=0.02)
+
+
+def test_obstacles() -> None:
+    rope = {"length": 2.2, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.05}
+    arm = {"kind": "cylinder", "at": [1, -0.3, 0], "axis": [0, 0, 1], "length": 0.6, "radius": 0.15, "friction": 0.4}
+    tables = cable_scene(
+        rope, pinned_at(0, 0, 0.2), pinned_at(2, 0, 0.2), obstacles={"arm": arm | {"from_outside": True}}, model="rod",
+        mesh=30, time=(0.2, 0.01)
+    )  # fmt: skip
+    told = {}
+    for speed in (0.6, 0.06, None):
+        with hybrid.Simulation(tables) as simulation:
+            for k in range(20):
+                simulation.set_obstacle("arm", [1.0, -0.3 + 0.006 * (k + 1), 0], speed and [0, speed, 0])
+                simulation.advance(0.01 * (k + 1))
+            told[speed] = [x.text for x in simulation.result().events if x.kind == "implausible"]
+    assert not told[0.6] and not told[None]
+    assert "obstacles.arm: the velocities given miss 0.08" in told[0.06][0]
+
+
+def test_the_velocity_of_places() -> None:
+    """At the end of the parabola through three places; from rest to rest trapezoids add up to the way."""
+    end, dt, places = DrivenEnd(no_moves().paths[0], np.zeros(3), np.eye(3), True, False), 0.1, np.zeros((9, 3))
+    places[1:6, 0], places[6:, 0] = 0.5 * np.arange(1, 6) ** 2, 12.5
+    rates = [np.zeros(3)]
+    for k, place in enumerate(places[1:]):
+        end.set(k * dt, (k + 1) * dt, place, None, np.zeros(3), True)
+        rates.append(end.path[11:14].copy())
+    assert np.allclose([x[0] * dt for x in rates[2:6]], [2.0, 3.0, 4.0, 5.0])
+    assert sum(0.5 * dt * (a[0] + b[0]) for a, b in pairwise(rates)) == pytest.approx(12.5)
+    end.set(0.9, 5.0, [20.0, 0, 0], None, np.zeros(3), False)  # in what takes several steps: from rest to rest
+    assert not end.path[5:8].any() and not end.path[11:14].any()
+
+
+@pytest.mark.parametrize(("size", "told"), [(1e-9, False), (1e-3, True)])
+def test_what_another_solver_leaves_of_a_thing_that_rests_is_no_way(size: float, told: bool) -> None:
+    """Places that go back and forth by so many m, with velocities of the other sign."""
+    found = heaved(lambda v: -v, size, 2.0, 40)
+    assert bool([x for x in found.events if x.kind == "implausible"]) == told
+
+
+# --- The interface stiffness of an end, from the factors of the last step: against differences of the same step ---
+
+SHIFT = 1e-5  # m
+SECTION = {"length": 20.0, "mass": 3.0, "axial_stiffness": 2e5, "diameter": 0.03}
+STIFF = SECTION | {"bending_stiffness": 40.0, "torsional_stiffness": 30.0, "damping": {"stiffness": 0.02, "mass": 0.1}}
+PINNED_STIFFNESS = {"kind": "pinned", "position": [0, 0, 0]}
+CLAMPED = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1]}
+
+
+def scene_stiffness(section: dict[str, Any], start: dict[str, Any], model: str, **more: Any) -> dict[str, Any]:
+    return cable_scene(section, start, pinned_at(15, 1, -2), model=model, mesh=24, time=(2.0, 0.05)) | more
+
+
+BED = {"fluid": {"density": 1025.0}, "seabed": {"z": -5.0, "stiffness": 2e4, "damping": 500.0, "friction": 0.6}}
+SCENES = {
+    "catenary": scene_stiffness(SECTION, PINNED_STIFFNESS, "catenary"),
+    "inextensible": scene_stiffness(
+        {k: v for k, v in SECTION.items() if k != "axial_stiffness"}, PINNED_STIFFNESS, "catenary"
+    ),
+    "rod": scene_stiffness(STIFF, CLAMPED, "rod"),
+    "seabed": scene_stiffness(STIFF | {"drag": {"normal": 1.2}}, PINNED_STIFFNESS, "rod", environment=BED),
+    "in a plane": scene_stiffness(
+        STIFF, CLAMPED, "rod", dimension=2, ends={"start": CLAMPED, "end": pinned_at(15, 0, -2)}
+    ),
+}
+
+
+def report_now(cable: Any) -> np.ndarray:
+    """Forces of the state of now: the report of a step is of the iterate before the last correction."""
+    line = OnlyLine(cable)
+    line.run.ends_of_now()
+    line.run.solver.evaluate_forces(line.run.state, line.run.t)
+    return line.work.report
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("end", ["start", "end"])
+@pytest.mark.parametrize("name", list(SCENES))
+def test_it_is_what_differences_of_the_step_give(name: str, end: str) -> None:
+    given = SCENES[name]
+    place, axes = np.array(given["ends"][end]["position"], float), (0, 2) if name == "in a plane" else (0, 1, 2)
+    with hybrid.Simulation(given) as cable:
+        k = ("start", "end").index(end)
+        cable.set_end(end, place + np.array([0.01, 0.0, 0.02]), [0.1, 0.0, 0.2])
+        cable.advance(0.2)
+        saved, place = cable.save(), place + np.array([0.015, 0.0, 0.03])
+
+        def step(shift: np.ndarray) -> None:
+            cable.restore(saved)
+            cable.set_end(end, place + shift, [0.1, 0.0, 0.2])
+            cable.step()
+
+        def force(shift: np.ndarray) -> np.ndarray:
+            step(shift)
+            return report_now(cable)[FORCE_A + 3 * k : FORCE_A + 3 * k + 3].copy()
+
+        step(np.zeros(3))
+        found = cable.stiffness(end)
+        before = cable.state.position
+        for axis in axes:
+            shift = SHIFT * np.eye(3)[axis]
+            expected = -(force(shift) - force(-shift)) / (2.0 * SHIFT)
+            assert found[:, axis] == pytest.approx(expected, abs=1e-6 * np.abs(found).max())
+        step(np.zeros(3))
+        assert np.array_equal(cable.state.position, before)  # asking changes nothing
+
+
+def test_before_the_first_step_it_is_that_of_a_step_to_come() -> None:
+    """Of a line that stays at rest it is the same after the step."""
+    with hybrid.Simulation(SCENES["rod"]) as cable:
+        first = cable.stiffness("end")
+        cable.set_end("end", [15, 1, -2])
+        cable.step()
+        assert cable.stiffness("end") == pytest.approx(first, rel=1e-6, abs=1e-6 * np.abs(first).max())
+
+
+def test_what_is_not_held_has_none() -> None:
+    free = scene_stiffness(STIFF, CLAMPED, "rod", ends={"start": CLAMPED, "end": "free"})
+    with hybrid.Simulation(free) as cable:
+        with pytest.raises(ValueError, match="is not held"):
+            cable.stiffness("end")
+        with pytest.raises(ValueError, match="expected 'start' or 'end'"):
+            cable.stiffness("middle")
+        assert np.linalg.eigvalsh(0.5 * (cable.stiffness("start") + cable.stiffness("start").T)).min() > 0.0

@@ -11,7 +11,10 @@ from test_payout import exchanged
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
-from tests.scenes import cable_scene, pinned_at
+from tests.combinations.pairs import as_network
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
+from tests.validation.obstacle_scenes import CENTRELINE
+from tests.validation.test_validation_moving_obstacles import weights
 
 G = 9.81
 
@@ -166,3 +169,245 @@ def test_a_winch_that_cannot_be_is_refused(payout: dict[str, Any], where: str) -
     with pytest.raises(SceneError) as found:
         hybrid.run(scene)
     assert where in str(found.value)
+
+
+# --- Winches that hold a tension, of lines with an end that moves by what pulls there: closed forms, and the cable
+# ---
+
+Tables = dict[str, Any]
+STEP = 0.02
+LINE = {
+    "length": 60.0, "mass": 0.4, "diameter": 0.02, "axial_stiffness": 2e5, "bending_stiffness": 5.0,
+    "torsional_stiffness": 4.0, "drag": {"normal": 1.2},
+}  # fmt: skip
+WINCH = {"longest": 80.0, "winch": {"tension": 150.0, "inertia": 20.0, "damping": 20.0, "ramp": 3.0}}
+MOVES = {"heave": {"amplitude": 1.0, "period": 8.0}, "surge": {"amplitude": 1.0, "period": 6.0}, "ramp": 8.0}
+
+
+def lowered(winch_first: bool = True, model: str = "catenary", clamp: bool = False) -> Tables:
+    """A load in a current hangs on a line, whose winch heaves and surges; the winch is at its start or its end."""
+    held = {"kind": "clamped", "tangent": [0, 0, -1 if winch_first else 1]} if clamp else {}
+    a, b = ("start", "end") if winch_first else ("end", "start")
+    line = {a: "top", b: "load", "model": model, "mesh": {"cells": 30}, "sections": [LINE]}
+    return network_scene(
+        {"top": {"position": [0, 0, 0], "motion": MOVES},
+         "load": {"kind": "free", "mass": 10.0, "initial_guess": [5, 0, -59]}},
+        {"one": line | {"connections": {a: held | {"payout": WINCH}}}}, fluid={"density": 1025, "current": [0.3, 0, 0]},
+        time=(10.0, STEP), output=0.5
+    )  # fmt: skip
+
+
+def floating(*anchors: float, M: float = 40.0, lift: float = 1000.0) -> Tables:
+    """A body that is lifted has a winch for each weightless line to an anchor at x; they hold as much as keeps it down."""
+    hold = {"tension": (lift - M * G - 100.0) / len(anchors), "inertia": 30.0, "damping": 15.0, "ramp": 4.0}
+    line = {"length": 50.0, "mass": 1e-6, "axial_stiffness": 1e8}
+    payout = {"connections": {"start": {"payout": {"longest": 90.0, "winch": hold}}}}
+    return network_scene(
+        {"eye": {"body": "frame", "place": [0, 0, -0.5]},
+         **{f"anchor {k}": {"position": [x, 0, -50.5]} for k, x in enumerate(anchors)}},
+        {f"line {k}": payout | line_between("eye", f"anchor {k}", line, model="catenary", mesh=10,
+             contact={"self": False}) for k in range(len(anchors))},
+        bodies={"frame": {"mass": M, "inertia": [9, 9, 9], "initial_guess": [0, 0, 0], "force": [0, 0, lift]}},
+        time=(10.0, STEP), output=0.5
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("anchors", [[0.0], [0.0, 0.0]], ids=["one winch", "two winches"])
+def test_a_body_that_its_own_winches_let_rise(anchors: list[float]) -> None:
+    """(M + n I) z'' + n B z' = F - M g - n T(t), by another integrator; and the pull of each line is I z'' + B z' + T."""
+    scene, n = floating(*anchors), len(anchors)
+    found = hybrid.run(scene)
+    hold = scene["lines"]["line 0"]["connections"]["start"]["payout"]["winch"]
+    first = (1000.0 - 40.0 * G) / n
+
+    def held(t: float) -> float:
+        return blend(t, first, hold["tension"], 0.0, 4.0)
+
+    def law(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], (n * (first - held(t)) - 15.0 * n * y[1]) / (40.0 + 30.0 * n)]
+
+    exact = solve_ivp(law, (0.0, 10.0), [0.0, 0.0], rtol=1e-10, atol=1e-12, t_eval=found.t).y
+    assert exact[0, -1] > 5.0
+    grown = found["bodies/frame/position"][:, 2] - found["bodies/frame/position"][0, 2]
+    assert np.abs(grown - exact[0]).max() < 2e-4 * exact[0, -1]
+    for line in found.lines.values():
+        assert np.abs(line["payout/length"] - line["payout/length"][0] - exact[0]).max() < 2e-4 * exact[0, -1]
+        pull = 30.0 * np.array([law(t, y)[1] for t, y in zip(found.t, exact.T, strict=True)]) + 15.0 * exact[1]
+        pull += [held(t) for t in found.t]
+        assert np.abs(np.linalg.norm(line["reaction_start"], axis=1) / pull - 1.0).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("model", "clamp"), [("catenary", False), ("rod", False), ("rod", True), ("adaptive", False)],
+    ids=["catenary", "rod", "clamp", "zones"],
+)  # fmt: skip
+def test_lines_with_their_ends_exchanged(model: str, clamp: bool) -> None:
+    one, other = (hybrid.run(lowered(x, model, clamp)).lines["one"] for x in (True, False))
+    assert np.ptp(one["payout/length"]) > 1.0
+    # A catenary alone has the winch of one cable, whose own length differs as much: 1.2e-7 of it.
+    assert np.abs(one["payout/length"] - other["payout/length"]).max() < (
+        1e-5 if model == "catenary" and not clamp else 1e-7
+    )
+    assert np.abs(one.position - other.position[:, ::-1]).max() < (1e-5 if model == "catenary" and not clamp else 1e-6)
+
+
+def test_energy_is_balanced_to_second_order() -> None:
+    left, put_in = [], 0.0
+    for step in (0.04, 0.02):
+        line = hybrid.run(lowered() | {"time": {"duration": 10.0, "step": step}}).lines["one"]
+        left.append(np.abs(line["work/scheme"]).max())
+        put_in = np.abs(line["work/start"]).max()
+    assert left[1] < 1.5e-4 * put_in
+    assert left[0] > 3.0 * left[1]
+
+
+def over_a_sheave(inertia: float) -> Tables:
+    """A rope over a sheave that turns, with 1 kg at one end, from a winch below the other one."""
+    tables = weights(inertia)
+    points = tables["initial"]["points"]
+    hold = {"longest": 8.0, "winch": {"tension": 7.0, "inertia": 0.5, "begin": 1.0, "ramp": 0.2}}
+    tables["ends"] = {
+        "start": {"kind": "pinned", "position": points[0], "payout": hold},
+        "end": {"kind": "free", "force": {"history": [[0, 0, 0, 0], [0.2, 0, 0, -10]]}},
+    }  # fmt: skip
+    tables["mesh"], tables["time"] = {"cells": 120}, {"duration": 1.6, "step": 0.002}
+    return tables
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("inertia", [0.01, 0.1])
+def test_a_winch_lets_a_rope_run_over_a_sheave(inertia: float) -> None:
+    """(m L + J/rho^2 + I) L'' = F - T(t) by another integrator; winch and sheave stand beside each other in Newton's method."""
+    tables = over_a_sheave(inertia)
+    scene = as_network(tables)
+    found = hybrid.run(scene)
+    line, late = found.lines["cable"], found.t > 1.2
+
+    def law(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], (10.0 - blend(t, 10.0, 7.0, 1.0, 0.2)) / (0.1 * y[0] + inertia / CENTRELINE**2 + 0.5)]
+
+    begin = [float(line["payout/length"][0]), 0.0]
+    exact = solve_ivp(law, (1.0, 1.6), begin, rtol=1e-10, t_eval=found.t[late]).y
+    assert np.abs(line["payout/rate"][late] - exact[1]).max() < 5e-3 * exact[1, -1]
+    assert np.abs(line["payout/length"][late] - exact[0]).max() < 5e-3 * (exact[0, -1] - begin[0])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("dimension", [2, 3])  # where it says none, it runs in its plane and is stepped in space
+def test_stepped_from_outside_bit_for_bit(dimension: int) -> None:
+    """Every other step is taken twice, elsewhere at first."""
+    scene = lowered() | {"time": {"duration": 3.0, "step": STEP}, "dimension": dimension}
+    with hybrid.Simulation(scene) as sim:
+        while sim.t < 3.0:
+            saved = sim.save()
+            sim.advance(min(sim.t + 0.3 * STEP, 3.0))
+            sim.restore(saved)
+            sim.step()
+            sim.step()
+        stepped = sim.result().lines["one"]
+    whole = hybrid.run(scene).lines["one"]
+    assert np.ptp(whole["payout/length"]) > 0.05
+    for name in ("position", "tension", "reaction_start", "payout/length", "payout/rate", "work/start"):
+        assert np.array_equal(whole[name], stepped[name]), name
+
+
+@pytest.mark.long
+def test_an_accuracy_that_is_asked_holds() -> None:
+    """Positions lie within their stated error of those of short fixed steps on twice the cells."""
+    fine = lowered() | {"time": {"duration": 4.0, "step": 0.005}}
+    fine["lines"]["one"]["mesh"] = {"cells": 60}
+    true = hybrid.run(fine).lines["one"]
+    asked = hybrid.run(lowered() | {"time": {"duration": 4.0}, "accuracy": "5%"})
+    line, stated = asked.lines["one"], float(asked.attributes["error_total_position"])
+    assert np.array_equal(line.times, true.times) and np.ptp(true["payout/length"]) > 0.2
+    off = np.linalg.norm(line.position - true.position, axis=-1).max()
+    assert 0.05 * stated < off < stated
+    assert not [x for x in asked.events if x.kind == "accuracy missed"]
+
+
+def pressed(friction: float, winch_first: bool = True, step: float = 0.01) -> Tables:
+    """A winch hauls in a load, on a rope that it has moved against a bar of another line."""
+    a, b = ("start", "end") if winch_first else ("end", "start")
+    hold = {"tension": 70.0, "inertia": 5.0, "damping": 60.0, "begin": 0.5, "ramp": 0.5}
+    rope = {"length": 2.0, "mass": 0.05, "diameter": 0.02, "axial_stiffness": 1e5}
+    bar = {"length": 1.99, "mass": 20.0, "diameter": 0.1, "axial_stiffness": 2e7, "damping": {"mass": 5.0}}
+    surge = {"surge": {"amplitude": 0.6, "period": 8.0}, "ramp": 0.5}
+    return network_scene(
+        {"winch": {"position": [0, 0, 0], "motion": surge}, "left": {"position": [0.08, -1, -0.8]},
+         "right": {"position": [0.08, 1, -0.8]}, "load": {"kind": "free", "mass": 5.0, "initial_guess": [0, 0, -2]}},
+        {"rope": {a: "winch", b: "load", "model": "catenary", "mesh": {"cells": 60}, "sections": [rope],
+                  "connections": {a: {"payout": {"longest": 4.0, "winch": hold}}}},
+         "bar": line_between("left", "right", bar, model="catenary", mesh=20)},
+        contact={"friction": friction}, time=(2.5, step), output=(0.1, 81)
+    )  # fmt: skip
+
+
+def held_by_friction(found: hybrid.Result) -> tuple[float, float]:
+    """ln(T1/T2) over the angle by which the rope turns at the bar, and that angle, rad, at 2 s.
+
+    T1, T2: tensions of both ends, less the weight of the rope between each and the bar.
+    """
+    rope, weight, height = found.lines["rope"], 0.05 * G, -0.8
+    x = rope.position[20]
+    upper, lower = (
+        x[0] - x[np.linalg.norm(x - x[0], axis=1) > 0.3][0],
+        x[np.linalg.norm(x - x[-1], axis=1) > 0.3][-1] - x[-1],
+    )
+    angle = np.arccos(upper @ lower / np.linalg.norm(upper) / np.linalg.norm(lower))
+    T = rope.tension[20, 0] - weight * (x[0, 2] - height), rope.tension[20, -1] + weight * (height - x[-1, 2])
+    return float(np.log(T[0] / T[1]) / angle), float(angle)
+
+
+@pytest.mark.long
+def test_a_rope_that_another_line_holds_by_friction() -> None:
+    """Without friction the load feels the winch; with it less, and what slides takes energy.
+
+    It acts on the surface of the bar, of 5 cm, and not on the axis of the rope, 6 cm from that of the bar: e^(5/6 mu theta).
+    """
+    ratios, hauled = {}, {}
+    for friction in (0.0, 0.3):
+        found = hybrid.run(pressed(friction))
+        rope, bar = found.lines["rope"], found.lines["bar"]
+        ratios[friction], angle = held_by_friction(found)
+        hauled[friction] = 2.0 - rope["payout/length"][-1]
+        assert angle > 0.6 and found["contacts/rope/bar/contact_force"][20] > 25.0
+        work = {name: rope[name][-1] + bar[name][-1] for name in rope.names if name.startswith("work/")}
+        assert abs(work["work/scheme"]) < 5e-4 * work["work/start"]
+        assert (work["work/friction"] < -2.0) == (friction > 0.0) and work["work/friction"] < 1e-3
+    assert abs(ratios[0.0]) < 0.03 and ratios[0.3] == pytest.approx(0.3 * 5 / 6, abs=0.02)
+    assert 0.3 < hauled[0.3] < 0.8 * hauled[0.0]
+
+
+def zones_that_touch(diameter: float) -> Tables:
+    """`pressed`, with zones that move in both lines, 12 cm of diameters; the bar is clamped, else it would turn."""
+    scene = pressed(0.3)
+    for name, width, stiffness in (("rope", 0.12 - diameter, 1e-2), ("bar", diameter, 200.0)):
+        line = scene["lines"][name]
+        more = {"diameter": width, "bending_stiffness": stiffness, "torsional_stiffness": stiffness}
+        line["sections"] = [line["sections"][0] | more]
+        line["model"] = {"kind": "adaptive", "always_move": True}
+    clamp = {"kind": "clamped", "tangent": [0, 1, 0]}
+    scene["lines"]["bar"]["connections"] = {"start": clamp, "end": clamp}
+    return scene
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("diameter", [0.1, 0.11])
+def test_friction_acts_where_surfaces_of_zones_that_move_touch(diameter: float) -> None:
+    """e^(mu theta R/(R + r)) of a bar of R and a rope of r: R + r = 6 cm from axis to axis in both."""
+    found = hybrid.run(zones_that_touch(diameter))
+    rope, bar = found.lines["rope"], found.lines["bar"]
+    for line in (rope, bar):  # they have become rods where they touch
+        assert any(event.kind in ("grow", "split") and event.criterion == "contact" for event in line.events)
+        assert {zone.kind for zone in line.zones[20]} == {"rod", "catenary"}
+    ratio, angle = held_by_friction(found)
+    assert angle > 0.6 and ratio == pytest.approx(0.3 * diameter / 0.12, abs=0.01)
+    work = {name: rope[name][-1] + bar[name][-1] for name in ("work/scheme", "work/start", "work/friction")}
+    assert abs(work["work/scheme"]) < 5e-4 * work["work/start"] and work["work/friction"] < -2.0
+
+
+@pytest.mark.long
+def test_a_rope_under_friction_with_its_ends_exchanged() -> None:
+    one, other = (hybrid.run(pressed(0.3, first)).lines["rope"] for first in (True, False))
+    assert np.abs(one["payout/length"] - other["payout/length"]).max() < 1e-6
+    assert np.abs(one.position - other.position[:, ::-1]).max() < 1e-5
