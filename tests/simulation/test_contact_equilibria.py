@@ -56,7 +56,7 @@ def apart(result: hybrid.Result) -> float:
 
 def stays(tables: dict[str, Any], static: hybrid.Result, within: float) -> None:
     """A run with friction begins in the equilibrium without, and stays."""
-    result = hybrid.run(hybrid.validate_scene(tables))
+    result = hybrid.run(tables)
     assert np.abs(result["position"] - static["position"]).max() < within
     assert result["energy/self_contact"] == pytest.approx(float(static["energy/self_contact"][0]), rel=1e-5)
     assert any(e.kind == "static friction neglected" and "touches itself" in e.text for e in result.events)
@@ -67,8 +67,8 @@ def test_zones_of_an_equilibrium_in_contact() -> None:
     """What touches is rod, what hangs free between is catenary, and it lies where rods on the same nodes lie."""
     mesh = {"mesh": {"cells": 200}}  # on the 100 of a scene that names none the bend at the weight holds the legs apart
     tables = hanging("adaptive", **mesh)
-    result = hybrid.static(hybrid.validate_scene(tables))
-    rods = hybrid.static(hybrid.validate_scene(hanging({"kind": "adaptive", "force_rod": [[0.0, LENGTH]]}, **mesh)))
+    result = hybrid.static(tables)
+    rods = hybrid.static(hanging({"kind": "adaptive", "force_rod": [[0.0, LENGTH]]}, **mesh))
     assert {z.kind for z in rods.zones[0]} == {"rod"} and {z.kind for z in result.zones[0]} == {"rod", "catenary"}
     kinds = {e.kind for e in result.events}
     assert "line touches itself" in kinds and "stability not judged" not in kinds
@@ -90,8 +90,8 @@ def test_fixed_zones_in_contact(more: float) -> None:
     """
     tables = hanging(LEGS, **MESH)
     tables["cable"]["sections"][0]["mass"] *= 1.0 + more
-    result = hybrid.static(hybrid.validate_scene(tables))
-    rods = hybrid.static(hybrid.validate_scene(tables | {"model": "rod"}))
+    result = hybrid.static(tables)
+    rods = hybrid.static(tables | {"model": "rod"})
     assert 0.94 < apart(result) < 1.0 and result["energy/self_contact"][0] > 0.0
     assert np.linalg.norm(result["position"] - rods["position"], axis=2).max() < 1e-5 * LENGTH
     stays(tables, result, 1e-9)
@@ -99,7 +99,7 @@ def test_fixed_zones_in_contact(more: float) -> None:
 
 def test_stretches_that_stay_catenary_touch() -> None:
     model = {"kind": "adaptive", "force_catenary": [[0.0, 1.5], [6.5, 8.0]]}
-    result = hybrid.static(hybrid.validate_scene(hanging(model)))
+    result = hybrid.static(hanging(model))
     assert result.zones[0][0].kind == result.zones[0][-1].kind == "catenary"
     assert result.zones[0][0].s_b >= 1.5 and 0.94 < apart(result) < 1.05
 
@@ -107,7 +107,7 @@ def test_stretches_that_stay_catenary_touch() -> None:
 @pytest.mark.long
 def test_a_loop_in_zones_that_move_is_rod() -> None:
     """A torque that throws a loop asks for rods from end to end."""
-    result = hybrid.static(hybrid.validate_scene(twisted("adaptive")))
+    result = hybrid.static(twisted("adaptive"))
     assert {z.kind for z in result.zones[0]} == {"rod"} and 0.94 < apart(result) < 1.05
     assert result["turns/link"][0] == pytest.approx(3.0, abs=1e-9) and result["turns/writhe"][0] > 1.5
     assert result["envelope/self_contact_max"].max() >= result["self_contact"].max() > 0.0  # limits count at all nodes
@@ -117,7 +117,7 @@ def test_a_loop_in_zones_that_move_is_rod() -> None:
 def test_a_catenary_that_a_loop_presses_is_refused() -> None:
     """Between catenaries at both clamps the loop pushes; they cannot carry that, and the message says where."""
     with pytest.raises(hybrid.ComputationError, match=r"compression; a catenary cannot carry it \(s = "):
-        hybrid.static(hybrid.validate_scene(twisted({"zones": [{"catenary": 0.4}, {"rod": 3.2}, {"catenary": 0.4}]})))
+        hybrid.static(twisted({"zones": [{"catenary": 0.4}, {"rod": 3.2}, {"catenary": 0.4}]}))
 
 
 def test_strands_that_are_too_close_along_the_line_for_contact() -> None:
@@ -126,7 +126,7 @@ def test_strands_that_are_too_close_along_the_line_for_contact() -> None:
     tables["cable"]["sections"][0] |= {"length": 4.0}
     tables["cable"]["attachments"][0] |= {"at": 2.0, "mass": 2.0}
     tables["initial"]["points"] = [[0, 0, 0], [-0.5, 0, -1.0], [0, 0.009, -1.85], [0.5, 0.018, -1.0], [0, 0.018, 0]]
-    result = hybrid.static(hybrid.validate_scene(tables))
+    result = hybrid.static(tables)
     assert result["energy/self_contact"][0] == 0.0 and apart(result) < 1.0
     assert "line touches itself" in {e.kind for e in result.events}
 

@@ -164,7 +164,7 @@ def test_a_loop_that_forms_slowly_is_foreseen(model: Any, time: dict[str, float]
     """The straight line is left at a margin below 1 in an ever shorter stretch: no output of it was long enough."""
     tables = twisted(6.0, 6.0, model if isinstance(model, dict) else "rod", away=0.8)
     data = tables.model_dump(mode="python", exclude_unset=True) | {"model": model, "time": time}
-    result = hybrid.run(hybrid.validate_scene(data))
+    result = hybrid.run(data)
     (formed, *_) = [event for event in result.events if event.kind == "loop formed"]
     first, least = told(result)[0], margins(result).min(axis=1)
     assert 0.9 < first.value < 1.0 and first.t < formed.t - 1.5
@@ -463,7 +463,7 @@ def test_a_line_leaves_a_sheave_and_comes_back() -> None:
 
 def test_a_run_that_is_resumed_knows_where_the_line_lay(tmp_path: Any) -> None:
     whole = departures(hybrid.run(over_a_sheave()))
-    simulation = hybrid.Simulation(hybrid.validate_scene(over_a_sheave()), tmp_path / "run.h5")
+    simulation = hybrid.Simulation(over_a_sheave(), tmp_path / "run.h5")
     simulation.advance(whole[0].t - 0.12)
     kept = simulation.save()
     simulation.advance(whole[0].t + 0.2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from test_payout import clamped, exchanged, kicks, sagging
 from test_system_payout import crane, to_a_buoy
 
 import hybrid
+from hybrid.errors import SceneError
 
 Tables = dict[str, Any]
 MODELS = {
@@ -140,6 +142,64 @@ def test_energy_is_balanced(name: str) -> None:
         assert (np.diff(two["work/hysteresis"]) <= 1e-12).all() and two["work/hysteresis"][-1] < -0.1
 
 
+# --- said in two ways ---------------------------------------------------------------------------------------------
+
+
+def never_slipping(rate: float, clamp: bool, **bends: Any) -> Tables:
+    """A stiffness of 2e4 N m2, some of it in a layer that never slips unless bends says otherwise."""
+    scene = layers.paid(rate=rate, clamp=clamp)
+    never = {"bending_stiffness": 2e3, "bending_slip": [{"stiffness": 1.8e4, "moment": 1e9}]}
+    scene["cable"]["sections"][0] |= never | bends
+    return scene
+
+
+def without_payout(scene: Tables) -> Tables:
+    """The same line, of a fixed length."""
+    scene = deepcopy(scene)
+    del scene["ends"]["end"]["payout"]
+    return scene
+
+
+BENDS = ("reaction_end", "position", "moment", "energy/bending", "work/end", "work/zones")
+STRETCHES = ("reaction_end", "position", "energy/stretch", "work/end")
+STIFF, PLAIN = {"axial_stiffness": laws.STIFF}, {"bending_stiffness": 2e4, "bending_slip": []}
+RATES = (0.8, -0.8)
+# A line, the same line otherwise, and how far it may be off, as a part of the largest value; what is compared.
+ALIKE: dict[str, tuple[Tables, list[tuple[Tables, float]], tuple[str, ...]]] = {
+    **{f"moments by a table {x}": (bending.paid({"bending_stiffness": bending.EI}, x),
+                                   [(bending.paid(bending.SAME, x), 1e-7)], ("curvature", *BENDS)) for x in RATES},
+    **{f"tension by a table, or of a rope {x}": (
+        laws.stretched(STIFF, x), [(laws.stretched(laws.SAME, x), 1e-7), (laws.stretched(laws.NEAR, x), 2e-5)],
+        ("payout/power", *STRETCHES)) for x in RATES},
+    **{f"zones, tension by a table {x}": (zones.stretching(STIFF, x), [(zones.stretching(laws.SAME, x), 1e-6)],
+                                          ("work/zones", *STRETCHES)) for x in RATES},
+    **{f"layers that never slip {x}, clamped: {clamp}": (
+        never_slipping(x, clamp, **PLAIN), [(never_slipping(x, clamp), 1e-7)], BENDS)
+       for x, clamp in ((0.8, True), (-0.8, True), (0.8, False))},
+    **{f"{name}, a rate of zero, clamped: {clamp}": (
+        without_payout(scene := layers.paid(name, 0.0, clamp=clamp, duration=2.0)), [(scene, 1e-10)],
+        ("position", "reaction_end", "moment", "work/hysteresis"))
+       for name in ("layers", "damped") for clamp in (True, False)},
+    "damped, a rate of zero": (
+        without_payout(scene := damping.damped(sagging("rod", 2e6, 2e4, 0.0, duration=2.0))), [(scene, 1e-12)],
+        ("position", "reaction_end", "work/stiffness_damping")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_one_line_that_is_said_in_two_ways(name: str) -> None:
+    """Forces, places, energies and works, over nodes that enter and leave."""
+    scene, others, quantities = ALIKE[name]
+    one = hybrid.run(scene)
+    assert "zones" not in name or sum(x.kind in zones.CHANGES for x in one.events) >= 2
+    for other, most in others:
+        two = hybrid.run(other)
+        assert "zero" in name or np.abs(np.diff(two["payout/length"])).sum() > 4.0
+        for x in quantities:
+            assert np.abs(one[x]).max() > 0.0
+            assert np.abs(two[x] - one[x]).max() <= most * np.abs(one[x]).max(), x
+
+
 # --- the mirror image -----------------------------------------------------------------------------------------
 
 
@@ -158,6 +218,9 @@ MIRRORED: dict[str, tuple[Tables, float]] = {
     "torque": (LAWS["torque"], 1e-6), "polyester": (LAWS["polyester"], 1e-6), "reel of rope": (reeled(), 1e-7),
     **{f"{name}, clamped: {clamp}": (layers.paid(name, clamp=clamp), 1e-6) for name, clamp in (
         ("layers", True), ("layers", False), ("tension", True), ("damped", True))},
+    **{f"a winch, {model} {dimension}": (of_winch(model, step=0.1) | ({"dimension": dimension} if dimension else {}), 1e-8)
+       for model, dimension in (("catenary", None), ("rod", 3), ("clamped", None), ("clamped", 3))},
+    "zones that move": (zones.touching(-0.8), 1e-5),
 }  # fmt: skip
 
 
@@ -172,6 +235,55 @@ def test_the_mirror_image_pays_out_the_same(name: str) -> None:
         assert np.abs(other["moment"][:, ::-1] - one["moment"]).max() < 1e-6 * np.abs(one["moment"]).max()
     if "work/hysteresis" in one:
         assert np.abs(other["work/hysteresis"] - one["work/hysteresis"]).max() < 1e-6 * np.ptp(one["work/hysteresis"])
+    if name.startswith("a winch"):  # there an iteration takes another right-hand side
+        assert np.ptp(one["payout/length"]) > 3.0
+        assert other["steps/iterations"].mean() < one["steps/iterations"].mean() + 0.2
+    if name == "zones that move":
+        assert sum(x.kind in zones.CHANGES for x in one.events) >= 2
+        assert [len(x) for x in one.zones] == [len(x) for x in other.zones]
+
+
+# --- refused --------------------------------------------------------------------------------------------------
+
+
+def on_the_reel(scene: Tables, **other: Any) -> Tables:
+    """A section on the reel that differs from that at the winch; None: without the key."""
+    section = scene["cable"]["sections"][0] | other
+    scene["ends"]["end"]["payout"]["reel"] = [{key: x for key, x in section.items() if x is not None}]
+    return scene
+
+
+def polyester_by(scene: Tables) -> Tables:
+    return on_the_reel(scene, syrope=scene["cable"]["sections"][0]["syrope"] | {"highest_tension": 2500.0})
+
+
+REEL = "ends.end.payout.reel[0]"
+LAYERED = "of the section at the winch"
+REFUSED: dict[str, tuple[Tables, tuple[str, ...]]] = {
+    "torque": (on_the_reel(laws.twisting(), tension_torque=1e-3), (f"{REEL}.tension_torque",)),
+    "vortices": (on_the_reel(laws.shedding(), vortices={"lift": 0.5}), (f"{REEL}.vortices",)),
+    "creep": (on_the_reel(laws.creeping(), creep={"per_decade": 5e-3, "loaded": 1.0}), (f"{REEL}.creep",)),
+    "polyester": (polyester_by(laws.polyester()), ()),
+    "rope": (on_the_reel(laws.stretched(laws.ROPE), **laws.TABLE, dynamic_stiffness=None), (REEL,)),
+    "stiffener at the winch": (bending.paid({}) | {"cable": bending.paid({})["cable"] | {
+        "attachments": [bending.CONE | {"range": [90, 100]}]}}, ("s = 100 m, and the winch",)),
+    "moments": (on_the_reel(bending.paid(bending.TABLE), **bending.SAME), (f"{REEL}.moment_curvature",)),
+    "slip": (on_the_reel(layers.paid(), bending_slip=layers.LAYERS[:1]), (LAYERED, f"{REEL}.bending_slip")),
+    "tension": (on_the_reel(layers.paid(), stiffness_per_tension=2.0), (LAYERED, f"{REEL}.stiffness_per_tension")),
+    "first loading": (on_the_reel(layers.paid("table"), first_loading=False), (LAYERED,)),
+    "damped table": (damping.damped(on_the_reel(sagging("catenary"))) | {"cable": {"sections": [
+        {"length": 100.0, "mass": 5.0, "tension_strain": [[0, 0], [0.01, 1e4]], "damping": {"stiffness": 0.05}}]}},
+        ("damping.stiffness",)),
+    "damping": (damping.damped(on_the_reel(sagging("catenary", 2e6))), ("the damping.stiffness of the section at the winch",)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_differs_at_a_winch_is_refused(name: str) -> None:
+    scene, words = REFUSED[name]
+    with pytest.raises(SceneError) as refused:
+        hybrid.plan(scene)
+    assert all(x in str(refused.value) for x in words), refused.value
 
 
 # --- resumed --------------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ from bits import resumed
 from test_payout import G, clamped, hanging, sagging
 
 import hybrid
-from hybrid.errors import SceneError
 from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B, PHASE
 from hybrid.model.build import build
 from hybrid.scene.read import as_scene, one_line
@@ -147,24 +145,6 @@ def test_lift_grows_with_the_length_that_is_out() -> None:
     assert len(before[-1]) > len(before[0])
 
 
-def test_what_differs_on_the_reel_is_refused() -> None:
-    all_of_them = (
-        (twisting(), "tension_torque"),
-        (shedding(), "vortices"),
-        (polyester(), "syrope"),
-        (creeping(), "creep"),
-    )
-    for scene, key in all_of_them:
-        section = dict(scene["cable"]["sections"][0])
-        other: Any = {"tension_torque": 1e-3, "vortices": {"lift": 0.5}, "creep": {"per_decade": 5e-3, "loaded": 1.0}}
-        other = other.get(key)
-        changed = section | {key: other} if other else section | {key: section[key] | {"highest_tension": 2500.0}}
-        scene["ends"]["end"]["payout"]["reel"] = [changed]
-        with pytest.raises(SceneError) as refused:
-            hybrid.plan(scene)
-        assert f"ends.end.payout.reel[0].{key}" in str(refused.value) or key == "syrope"
-
-
 # --- the end at the winch is let go -----------------------------------------------------------------
 
 
@@ -241,22 +221,6 @@ def stretched(
     return scene
 
 
-@cache
-def of_stiffness(rate: float) -> hybrid.Result:
-    """The line of constant stiffness."""
-    return hybrid.run(stretched({"axial_stiffness": STIFF}, rate))
-
-
-@pytest.mark.parametrize("rate", [0.8, -0.8])
-@pytest.mark.parametrize(("same", "most"), [(SAME, 1e-7), (NEAR, 2e-5)], ids=["table", "rope"])
-def test_a_law_that_is_a_constant_stiffness_does_as_that(rate: float, same: dict[str, Any], most: float) -> None:
-    """Tension, places and energies, over nodes that enter and leave."""
-    one, other = of_stiffness(rate), hybrid.run(stretched(same, rate))
-    assert np.abs(np.diff(one["payout/length"])).sum() > 5.0
-    for name in ("reaction_end", "position", "energy/stretch", "work/end", "payout/power"):
-        assert np.abs(other[name] - one[name]).max() < most * np.abs(one[name]).max()
-
-
 def test_a_winch_holds_its_tension_on_a_rope() -> None:
     """The length is an unknown beside a tension that is no multiple of strain: what remains at rest is what is held."""
     winch = {"tension": 2200.0, "inertia": 200.0, "damping": 100.0, "ramp": 4.0}
@@ -267,12 +231,3 @@ def test_a_winch_holds_its_tension_on_a_rope() -> None:
     found = hybrid.run(scene)
     pull = np.linalg.norm(found["reaction_end"], axis=1)
     assert pull[-1] == pytest.approx(2200.0, rel=5e-3) and pull[0] < 1900.0
-
-
-def test_another_rope_on_the_reel_is_refused() -> None:
-    scene = stretched(ROPE)
-    section = scene["cable"]["sections"][0]
-    scene["ends"]["end"]["payout"]["reel"] = [{**section, **TABLE, "dynamic_stiffness": None}]
-    with pytest.raises(SceneError) as refused:
-        hybrid.plan(scene)
-    assert "ends.end.payout.reel[0]" in str(refused.value)

@@ -12,7 +12,6 @@ from bits import resumed
 from test_payout import clamped, exchanged, sagging
 
 import hybrid
-from hybrid.errors import SceneError
 from tests.scenes import cable_scene, clamped_at, network_scene
 
 LAYERS = [{"stiffness": 1e4, "moment": 60.0}, {"stiffness": 8e3, "moment": 100.0, "per_tension": 1e-2}]
@@ -93,31 +92,6 @@ def test_what_is_paid_out_has_slipped_at_the_clamp_and_what_is_taken_in_has_not(
     assert abs(off[1]) < 0.01 and abs(off[1]) < 0.5 * abs(off[0])
 
 
-@pytest.mark.parametrize(("rate", "clamp"), [(0.8, True), (-0.8, True), (0.8, False)])
-def test_layers_that_never_slip_are_a_stiffness(rate: float, clamp: bool) -> None:
-    """Forces, places and all works, over nodes that enter and leave."""
-    scene, found = paid(rate=rate, clamp=clamp), []
-    never = {"bending_stiffness": 2e3, "bending_slip": [{"stiffness": 1.8e4, "moment": 1e9}]}
-    for bends in (never, {"bending_stiffness": 2e4, "bending_slip": []}):
-        scene["cable"]["sections"][0] |= bends
-        found.append(hybrid.run(scene))
-    one, other = found
-    for name in ("reaction_end", "position", "moment", "energy/bending", "work/end", "work/zones"):
-        assert np.abs(other[name] - one[name]).max() < 1e-7 * np.abs(one[name]).max(), name
-
-
-@pytest.mark.parametrize("clamp", [True, False])
-@pytest.mark.parametrize("name", ["layers", "damped"])
-def test_a_rate_of_zero_is_a_fixed_line(name: str, clamp: bool) -> None:
-    scene = paid(name, 0.0, clamp=clamp, duration=2.0)
-    still = hybrid.run(scene)
-    del scene["ends"]["end"]["payout"]
-    fixed = hybrid.run(scene)
-    assert fixed["work/hysteresis"][-1] < -0.01
-    for one in ("position", "reaction_end", "moment", "work/hysteresis"):
-        assert np.abs(still[one] - fixed[one]).max() <= 1e-10 * np.abs(fixed[one]).max(), one
-
-
 # --- energy ---------------------------------------------------------------------------------------
 
 
@@ -179,14 +153,3 @@ def test_from_a_clamp_that_turns_with_its_lines() -> None:
     left = [sum(np.abs(x["work/scheme"]).max() for x in found.lines.values()) for found in (plain, slip)]
     lost = -slip.lines["left"]["work/hysteresis"][-1]
     assert lost > 50.0 and left[1] < left[0] + 2e-3 * lost
-
-
-@pytest.mark.parametrize("key", ["bending_slip", "stiffness_per_tension", "first_loading"])
-def test_other_layers_on_the_reel_are_refused(key: str) -> None:
-    scene = paid("table" if key == "first_loading" else "layers")
-    own = scene["cable"]["sections"][0]
-    other = {"bending_slip": LAYERS[:1], "stiffness_per_tension": 2.0, "first_loading": False}[key]
-    scene["ends"]["end"]["payout"]["reel"] = [own | {key: other}]
-    with pytest.raises(SceneError, match="of the section at the winch") as refused:
-        hybrid.plan(scene)
-    assert f"ends.end.payout.reel[0].{key}" in str(refused.value) or key == "first_loading"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from test_payout import G, clamped, hanging, sagging
-from test_payout_laws import ROPE, SAME, STIFF, TABLE
+from test_payout_laws import ROPE, TABLE
 
 import hybrid
 from tests.combinations.pairs import scene_of, seen_by
@@ -17,6 +17,7 @@ from tests.scenes import cable_scene, clamped_at, pinned_at
 
 ADAPTIVE = {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0}
 CHANGES = ("grow", "split", "shrink", "merge")
+DAMPED = {"axial_stiffness": 2e6, "damping": {"stiffness": 0.05}}
 
 
 def touching(rate: float = 0.8, model: Any = ADAPTIVE, side: str = "end", **more: Any) -> dict[str, Any]:
@@ -54,15 +55,6 @@ def test_zones_move_while_line_is_paid_out() -> None:
     assert left[0] < 1.02 * left[1]
 
 
-def test_zones_move_while_line_is_taken_in_at_the_start() -> None:
-    """The line and its mirror image, to round-off."""
-    found, mirror = hybrid.run(touching(-0.8)), hybrid.run(touching(-0.8, side="start"))
-    assert sum(x.kind in CHANGES for x in found.events) >= 2
-    assert [len(x) for x in found.zones] == [len(x) for x in mirror.zones]
-    np.testing.assert_allclose(mirror["position"][:, ::-1], found["position"], atol=1e-6)
-    np.testing.assert_allclose(mirror["reaction_start"], found["reaction_end"], atol=1e-5 * 4000.0)
-
-
 def test_zones_that_move_in_a_current_across_are_those_of_the_turned_scene() -> None:
     """In space, where the cell that grows has no inertia about its chord that others do not have."""
     c, s = np.cos(0.3), np.sin(0.3)
@@ -73,25 +65,17 @@ def test_zones_that_move_in_a_current_across_are_those_of_the_turned_scene() -> 
     assert np.abs(found.position[-1, :, 1]).max() > 0.1
 
 
-def stretching(law: dict[str, Any], rate: float, model: Any = ADAPTIVE) -> hybrid.Result:
+def stretching(law: dict[str, Any], rate: float, model: Any = ADAPTIVE) -> dict[str, Any]:
     scene = touching(rate, model)
     section = scene["cable"]["sections"][0]
     del section["axial_stiffness"]
-    return hybrid.run(scene | {"cable": {"sections": [section | law]}})
+    return scene | {"cable": {"sections": [section | law]}}
 
 
 @pytest.mark.parametrize("rate", [0.8, -0.8])
-def test_a_straight_table_is_a_stiffness_where_zones_move(rate: float) -> None:
-    one, other = stretching({"axial_stiffness": STIFF}, rate), stretching(SAME, rate)
-    assert sum(x.kind in CHANGES for x in one.events) >= 2
-    for name in ("reaction_end", "position", "energy/stretch", "work/end", "work/zones"):
-        assert np.abs(other[name] - one[name]).max() < 1e-6 * np.abs(one[name]).max()
-
-
-@pytest.mark.parametrize("rate", [0.8, -0.8])
-@pytest.mark.parametrize("law", [TABLE, ROPE], ids=["table", "rope"])
+@pytest.mark.parametrize("law", [TABLE, ROPE, DAMPED], ids=["table", "rope", "damped"])
 def test_a_rope_by_a_law_is_paid_out_as_with_rods(law: dict[str, Any], rate: float) -> None:
-    found, rods = stretching(law, rate), stretching(law, rate, "rod")
+    found, rods = (hybrid.run(stretching(law, rate, model)) for model in (ADAPTIVE, "rod"))
     assert sum(x.kind in CHANGES for x in found.events) >= 2
     assert np.abs(found["position"] - rods["position"]).max() < 1e-3 * 100.0
     pulls = [np.linalg.norm(x["reaction_end"], axis=1) for x in (found, rods)]

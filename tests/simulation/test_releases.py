@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences, went_on
+from bits import differences
 
 import hybrid
 from hybrid.errors import SceneError
@@ -91,27 +91,6 @@ def test_an_end_is_let_go_by_its_force(controlled: bool) -> None:
         first = int(np.argmax(force > 150.0))
         assert event.t == t[first] < 1.0 and "release_at.tension, 150 N" in event.text
         assert (force[:first] <= 150.0).all() and (force[first + 1 :] == 0.0).all()
-
-
-CASES = {
-    "tension": (pinned(motion=HEAVE, release_at={"tension": 150.0}), {}),
-    "clamp, adaptive": (CLAMP | {"release_at": {"time": 0.55}}, {"model": "adaptive"}),
-    "errors": (pinned(release_at={"time": 0.5}), {"output": {"every": 0.1, "errors": True}}),
-}  # fmt: skip
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", CASES)
-def test_a_stopped_run_goes_on_bit_for_bit(name: str, tmp_path: Path, monkeypatch) -> None:
-    """Stopped before, near and after the release."""
-    end, changes = CASES[name]
-    made, stopping = scene(end, **changes), Stopping(monkeypatch)
-    with hybrid.run(made, tmp_path / "whole.h5", progress=stopping) as result:
-        t = next(e.t for e in result.events if e.kind == "end released")
-        at = int(np.searchsorted(result.steps["t"], t))
-    stops = np.diff([0, at // 2, at, at + 1, at + 2, at + 30]).tolist()
-    assert went_on(made, tmp_path / "run.h5", stopping, stops) == len(stops)
-    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
 def test_a_load_that_changes_after_a_release_leaves_it_free(tmp_path: Path) -> None:

@@ -387,7 +387,7 @@ def test_an_end_that_would_turn_at_once_is_refused(setting, tmp_path):
         gravity=0.0, initial={"kind": "straight", "direction": [1, 0, 0]}, model="rod", mesh=10, time=(1.0, 0.02),
         output={"every": 0.1, "points": 5, "errors": False}
     )  # fmt: skip
-    hybrid.run(hybrid.validate_scene(data), tmp_path / "run.h5").close()
+    hybrid.run(data, tmp_path / "run.h5").close()
     with pytest.raises(hybrid.SceneError, match=r"(?s)jumps by.*rad"):
         hybrid.resume(tmp_path / "run.h5", until=2.0, settings=[setting])
 

@@ -56,7 +56,7 @@ def led_through(**more: Any) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("led") / "whole.h5"
-    hybrid.run(hybrid.validate_scene(led_through()), path).close()
+    hybrid.run(led_through(), path).close()
     return path
 
 
@@ -102,7 +102,7 @@ def test_a_file_of_before_goes_on_as_it_began(tmp_path: Path, monkeypatch: pytes
         before.setattr(hybrid.model.build, "contact_bits", lambda scene: 0)
         stopping.left = 4
         with pytest.raises(KeyboardInterrupt):
-            hybrid.run(hybrid.validate_scene(scene), tmp_path / "run.h5", progress=stopping)
+            hybrid.run(scene, tmp_path / "run.h5", progress=stopping)
     with hybrid.resume(tmp_path / "run.h5") as result:
         assert result.status == "complete" and result.times[-1] == 0.2 and "self_contact" not in result
         assert one_line(hybrid.parse_scene(result.scene_text)).contact.self is None
@@ -165,10 +165,10 @@ def test_it_is_on_where_the_slack_makes_a_loop() -> None:
 def test_a_start_within_itself_is_told_of_and_refused_where_contact_is_asked() -> None:
     ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [0.01, 0, 0]}}
     short = {"ends": ends, "time": {"duration": 0.04, "step": 0.02}, "output": {"every": 0.02}}
-    kinds = [event.kind for event in hybrid.run(hybrid.validate_scene(led_through(**short))).events]
+    kinds = [event.kind for event in hybrid.run(led_through(**short)).events]
     assert kinds.count("line meets itself") == 1
     with pytest.raises(hybrid.SceneError, match=r"s = .* m and s = .* m are .* m apart, less than 0.85[\s\S]*diameter"):
-        hybrid.run(hybrid.validate_scene(led_through(contact={"self": True}, **short)))
+        hybrid.run(led_through(contact={"self": True}, **short))
 
 
 # --- Contact of a line with itself begins where it is near itself, ends where it is not, and is given up where it
@@ -193,7 +193,7 @@ def test_it_comes_and_goes_with_the_legs(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(RunContact, "_let_touch", noted)
     sway = {"surge": {"amplitude": 0.26, "period": 2.0}, "ramp": 4.0}
     ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(0.3, 0, 0, motion=sway)}
-    result = hybrid.run(hybrid.validate_scene(led_through(ends=ends, time={"duration": 7.0, "step": 0.01})))
+    result = hybrid.run(led_through(ends=ends, time={"duration": 7.0, "step": 0.01}))
     assert [name for name, _ in happened] == ["begins", "ends"] * 2
     assert "line touches itself" in kinds(result) and "line meets itself" not in kinds(result)
     assert float(result["self_distance/distance"]) > 0.85 * WIDTH
@@ -214,7 +214,7 @@ def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("no_room")
 def test_where_no_step_leads_on_it_is_given_up() -> None:
-    result = hybrid.run(hybrid.validate_scene(led_through()))
+    result = hybrid.run(led_through())
     (event,) = [x for x in result.events if x.kind == GIVEN_UP]
     assert result.status == "complete" and event.s_a < 1.4 and event.s_b > 3.9
     assert "cells of at most" in event.text and "until these are apart" in event.text
@@ -227,7 +227,7 @@ def test_where_it_is_asked_for_a_failure_names_it() -> None:
     with pytest.raises(
         hybrid.ComputationError, match=r"contact of the line with itself is computed, s = .*self: false"
     ):
-        hybrid.run(hybrid.validate_scene(led_through(contact={"self": True})))
+        hybrid.run(led_through(contact={"self": True}))
 
 
 # --- steps that collapse ------------------------------------------------------------------------------------
@@ -267,7 +267,7 @@ def longest(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("longest")
 def test_a_collapse_is_named_and_a_run_to_compare_with_is_given_up() -> None:
-    result = hybrid.run(hybrid.validate_scene(hanging(errors=True)))
+    result = hybrid.run(hanging(errors=True))
     (event,) = [x for x in result.events if x.kind == COLLAPSE]
     assert event.t == pytest.approx(MANY * 0.0005) and "shorter than 0.001 of the longest, 1e+03 s" in event.text
     (none,) = [x for x in result.events if x.kind == "no error figure"]

@@ -31,14 +31,14 @@ def static(*tables):
     data = {}
     for table in tables:
         data |= table
-    return hybrid.static(hybrid.validate_scene({"initial": "equilibrium"} | data))
+    return hybrid.static({"initial": "equilibrium"} | data)
 
 
 def run(*tables):
     data = {}
     for table in tables:
         data |= table
-    return hybrid.run(hybrid.validate_scene({"initial": "equilibrium"} | data))
+    return hybrid.run({"initial": "equilibrium"} | data)
 
 
 def kinds(result):

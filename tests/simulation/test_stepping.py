@@ -62,31 +62,6 @@ def test_stepped_from_outside_it_is_the_run(model: str) -> None:
     assert len(result["steps/t"]) == len(run["steps/t"])
 
 
-@pytest.mark.long
-def test_what_is_taken_back_in_a_plane_leaves_nothing() -> None:
-    """Every fifth step is taken thrice, with the end elsewhere at first: bit for bit the run without that."""
-    scene = touchdown("model=rod", PINNED, "dimension=2")
-    with hybrid.Simulation(scene) as plain:
-        driven(plain, 60)
-        expected = plain.result()
-    with hybrid.Simulation(scene) as simulation:
-        for k in range(60):
-            if k % 5 == 0:
-                saved = simulation.save()
-                for _ in range(2):
-                    place, speed = heave(simulation.t + 0.05)
-                    simulation.set_end("end", np.add(place, [0.0, 0.0, 0.01]), speed)
-                    simulation.step()
-                    simulation.restore(saved)
-            driven(simulation, 1)
-        result = simulation.result()
-    for name in expected.names:
-        if "t" in expected.dims(name)[:1]:
-            assert np.array_equal(result[name], expected[name]), name
-    assert np.array_equal(result["steps/dt"], expected["steps/dt"])
-    assert [(e.t, e.kind) for e in result.events] == [(e.t, e.kind) for e in expected.events]
-
-
 def test_an_end_that_is_turned_counts_its_turns() -> None:
     """Three turns of a clamp about a straight rod, 0.3 rad a step: torque GJ 6 pi / L."""
     line = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e6, "bending_stiffness": 5.0, "torsional_stiffness": 4.0}
@@ -335,23 +310,6 @@ def test_an_end_that_is_set_first_after_a_save_stands_again_after_restore(model:
                 simulation.restore(saved)
     assert places[0][-1].tolist() == [205.0, 0.0, 0.0]
     assert np.array_equal(places[0], places[2]) and np.array_equal(places[1], places[3])
-
-
-def test_after_a_failed_step_it_asks_for_a_restore() -> None:
-    with hybrid.Simulation(touchdown("model=catenary", PINNED)) as simulation:
-        saved = simulation.save()
-        simulation.set_end("end", [150.0, 0.0, 0.0])
-        with pytest.raises(hybrid.ComputationError):
-            simulation.step()
-        # Forces were those of the step that had failed, and `save` kept its state in place of the last good one.
-        for ask in (simulation.step, simulation.forces, simulation.tension, simulation.save):
-            with pytest.raises(ValueError, match="a step has failed"):
-                ask()
-        with pytest.raises(ValueError, match="a step has failed"):
-            simulation.stiffness("end")
-        simulation.restore(saved)
-        driven(simulation, 2)
-        assert simulation.t == pytest.approx(0.1)
 
 
 # --- contact with itself that begins ---

@@ -242,7 +242,7 @@ def test_turns_of_sections_that_resist_torsion_differently() -> None:
     far = clamp | {"position": [50, 3, 0], "tangent": [1, 0, 0.5], "turns": 8}
     scene = {"cable": {"sections": sections}, "mesh": {"cells": 240}, "ends": {"start": clamp, "end": far}}
     torque = [
-        hybrid.static(hybrid.validate_scene(scene | {"initial": "equilibrium", "model": model}))["torque"][0]
+        hybrid.static(scene | {"initial": "equilibrium", "model": model})["torque"][0]
         for model in ("rod", {"zones": [{"rod": 12}, {"catenary": 36}, {"rod": 12}]})
     ]
     compliance = sum(x["length"] / x["torsional_stiffness"] for x in sections)
@@ -281,23 +281,23 @@ def turning(turns: float, folder: Path, swivel: bool = True, model: Any = "rod")
     scene = line(swivel, model=model) | {"time": {"duration": 12.0, "step": 0.02}}
     scene["output"] = {"every": 0.5, "points": 41}
     scene["ends"]["start"]["motion"] = {"file": str(path)}
-    return hybrid.run(hybrid.validate_scene(scene))
+    return hybrid.run(scene)
 
 
 def test_a_line_in_a_plane_hangs_with_a_swivel_as_without() -> None:
-    with_one, without = (hybrid.static(hybrid.validate_scene(line(x))) for x in (True, False))
+    with_one, without = (hybrid.static(line(x)) for x in (True, False))
     np.testing.assert_allclose(with_one.position, without.position, atol=1e-9 * LENGTH_SWIVEL)
     np.testing.assert_allclose(with_one.bending_moment, without.bending_moment, atol=1e-8)
 
 
 def test_clamps_turned_against_each_other_twist_a_line_without_a_swivel_only() -> None:
     """A quarter turn between the normals of both clamps."""
-    with_one, without = (hybrid.static(hybrid.validate_scene(line(x, (1.0, 0.0, -1.0)))) for x in (True, False))
+    with_one, without = (hybrid.static(line(x, (1.0, 0.0, -1.0))) for x in (True, False))
     assert np.abs(with_one.torque).max() < 1e-9
     np.testing.assert_allclose(
         np.abs(without.torque), GJ_SWIVEL * 0.5 * np.pi / LENGTH_SWIVEL, rtol=0.02
     )  # its bend takes a part
-    level = hybrid.static(hybrid.validate_scene(line(True)))
+    level = hybrid.static(line(True))
     np.testing.assert_allclose(with_one.position, level.position, atol=1e-9 * LENGTH_SWIVEL)
 
 
@@ -342,7 +342,7 @@ def test_a_swivel_end_that_bends_the_line_feels_no_turns(turns: float, tmp_path:
             clamped_at([0.8, 0.0, 0.0], [0.8, 0.6, 0.0], swivel=True), gravity=0.0, model="rod", mesh=40,
             time=(10.0, 0.02), output=(1.0, 21)
         )  # fmt: skip
-        results.append(hybrid.run(hybrid.validate_scene(scene)))
+        results.append(hybrid.run(scene))
     still, turned = results
     np.testing.assert_allclose(turned.position[-1], still.position[-1], atol=1e-4)
     np.testing.assert_allclose(turned.bending_moment[-1], still.bending_moment[-1], rtol=1e-3)
@@ -353,7 +353,7 @@ def test_a_swivel_of_mass_hangs_as_a_clump_does() -> None:
     swivel, clump = line(True), line(True)
     swivel["cable"]["attachments"][0]["mass"] = 3.0
     clump["cable"]["attachments"] = [{"kind": "clump", "at": 12.0, "mass": 3.0}]
-    a, b = (hybrid.static(hybrid.validate_scene(x)) for x in (swivel, clump))
+    a, b = (hybrid.static(x) for x in (swivel, clump))
     np.testing.assert_allclose(a.position, b.position, atol=1e-9 * LENGTH_SWIVEL)
 
 
@@ -361,7 +361,7 @@ def test_a_swivel_is_idle_in_a_plane() -> None:
     """A line that moves in a plane is the same in it as in space."""
     scene = line(True) | {"time": {"duration": 1.0, "step": 0.02}}
     scene["ends"]["end"]["motion"] = {"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 1.0}
-    plane, space = (hybrid.run(hybrid.validate_scene(scene | {"dimension": k})) for k in (2, 3))
+    plane, space = (hybrid.run(scene | {"dimension": k}) for k in (2, 3))
     np.testing.assert_allclose(plane.position, space.position, atol=1e-9 * LENGTH_SWIVEL)
     np.testing.assert_allclose(plane.tension, space.tension, rtol=1e-9)
 
