@@ -6,6 +6,7 @@ is, and four numbers; its text explains itself and is meant to be changed.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import re
@@ -16,8 +17,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from difflib import SequenceMatcher
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from string import Template
+from typing import Any
 
 from hybrid.errors import SceneError
 from hybrid.scene.read import LARGEST_SCENE, parse_scene, text_of
@@ -261,49 +264,34 @@ def _paths(text: str, folder: Path) -> Iterator[Path]:
                 yield folder / name
 
 
-class Question(NamedTuple):
-    """A number that is asked for, between two bounds."""
-
-    key: str
-    text: str
-    unit: str
-    usual: float
-    low: float
-    high: float
+# Kinds of new scenes with their questions, each a number between two bounds; and beside it the text of each kind.
+SCENES = files("hybrid.live") / "scenes"
 
 
-class Kind(NamedTuple):
-    """A kind of scene: what it is, its questions, and what makes the text of their answers."""
-
-    text: str
-    questions: tuple[Question, ...]
-    make: Callable[..., str]
-
-
+@cache
 def questions() -> list[dict[str, Any]]:
     """All kinds with their questions, for the page."""
-    return [
-        {"kind": name, "text": kind.text, "questions": [x._asdict() for x in kind.questions]}
-        for name, kind in KINDS.items()
-    ]
+    return list(json.loads((SCENES / "questions.json").read_text(encoding="utf-8")))
 
 
 def new_scene(kind: str, answers: Mapping[str, Any]) -> str:
     """The text of a scene; answers: numbers by the keys of the questions, the usual ones where they are missing."""
-    if kind not in KINDS:
-        raise Refused(f"unknown kind of scene {kind[:100]!r}; there are {', '.join(KINDS)}")
+    asked = {x["kind"]: x["questions"] for x in questions()}
+    if kind not in asked:
+        raise Refused(f"unknown kind of scene {kind[:100]!r}; there are {', '.join(asked)}")
     values = {}
-    for question in KINDS[kind].questions:
-        given = answers.get(question.key, question.usual)
+    for question in asked[kind]:
+        given = answers.get(question["key"], question["usual"])
         try:
             value = float(given)
         except (TypeError, ValueError):
             value = math.nan
-        if not question.low <= value <= question.high:
-            between = f"{question.low:g} to {question.high:g} {question.unit}"
-            raise Refused(f"{question.text}: {str(given)[:50]!r} is no number from {between}")
-        values[question.key] = value
-    text = KINDS[kind].make(**values)
+        if not question["low"] <= value <= question["high"]:
+            between = f"{question['low']:g} to {question['high']:g} {question['unit']}"
+            raise Refused(f"{question['text']}: {str(given)[:50]!r} is no number from {between}")
+        values[question["key"]] = value
+    numbers = {key: f"{value:g}" for key, value in values.items()} | _MORE[kind](**values)
+    text = Template((SCENES / f"{kind}.yaml").read_text(encoding="utf-8")).substitute(numbers)
     try:
         parse_scene(text)
     except SceneError as error:
@@ -311,127 +299,37 @@ def new_scene(kind: str, answers: Mapping[str, Any]) -> str:
     return text
 
 
-def _mooring(depth: float, length: float, mass: float, heave: float) -> str:
+def _mooring(depth: float, length: float, mass: float, heave: float) -> dict[str, str]:
     if length < 1.2 * depth:
         raise Refused(
             f"the line must be longer than 1.2 times the depth, {1.2 * depth:.4g} m, to reach the seabed flat"
         )
-    far = 0.93 * math.sqrt(length**2 - depth**2)
     bar = math.sqrt(mass / 20000.0)  # diameter of the bar of a chain, whose mass is 20 t/m3 of its square
-    return f"""\
-# A mooring line of chain, from an anchor on the seabed
-# to a fairlead that heaves.
-title: Mooring line in {depth:g} m of water
-environment:
-  # kg/m^3; m/s, to the side of the fairlead
-  fluid: {{density: 1025, current: [0.3, 0, 0]}}
-  # m; N/m and N s/m per metre of line
-  seabed: {{z: {-depth:g}, stiffness: 5.0e+3, damping: 5.0e+2}}
-cable:
-  sections:
-    - length: {length:g}  # m, unstretched
-      mass: {mass:g}  # kg/m, in air
-      diameter: {1.8 * bar:.3g}  # m, displaces as much water
-      axial_stiffness: {8.5e10 * bar**2:.3g}  # N
-      drag: {{normal: 1.3, tangential: 0.4}}
-      added_mass: {{normal: 1.0}}
-ends:
-  start:  # the anchor
-    kind: pinned
-    position: [0, 0, {-depth:g}]
-  end:  # the fairlead
-    kind: pinned
-    position: [{far:.4g}, 0, 0]
-    # m, s; it grows from rest over two periods
-    motion: {{heave: {{amplitude: {heave:g}, period: 10}}, ramp: 20}}
-initial: equilibrium
-model: catenary
-time: {{duration: 60}}  # s
-output: {{every: 0.25}}
-"""
+    return {
+        "bed": f"{-depth:g}",
+        "far": f"{0.93 * math.sqrt(length**2 - depth**2):.4g}",
+        "diameter": f"{1.8 * bar:.3g}",
+        "axial": f"{8.5e10 * bar**2:.3g}",
+    }
 
 
-def _tether(depth: float, length: float, diameter: float, heave: float) -> str:
+def _tether(depth: float, length: float, diameter: float, heave: float) -> dict[str, str]:
     if length <= 1.02 * depth:
         raise Refused(f"the tether must be longer than 1.02 times the depth, {1.02 * depth:.4g} m")
-    far = 0.7 * math.sqrt(length**2 - depth**2)
-    d = diameter / 1000.0
-    mass = 1.3 * 1025.0 * math.pi / 4.0 * d**2
-    return f"""\
-# A tether, from a ship that heaves down to a vehicle
-# that keeps its place.
-title: Tether to a vehicle {depth:g} m below
-environment:
-  # kg/m^3; m; m/s
-  fluid: {{density: 1025, surface: 0, current: [0.25, 0, 0]}}
-cable:
-  sections:
-    - length: {length:g}  # m
-      mass: {mass:.3g}  # kg/m: 1.3 times that of water
-      diameter: {d:g}  # m
-      axial_stiffness: {1.5e9 * d**2:.3g}  # N
-      bending_stiffness: {3e7 * d**4:.3g}  # N m^2
-      drag: {{normal: 1.2, tangential: 0.02}}
-      added_mass: {{normal: 1.0}}
-ends:
-  start:  # the ship
-    kind: pinned
-    position: [0, 0, 0]
-    # m, s; it grows from rest over two periods
-    motion: {{heave: {{amplitude: {heave:g}, period: 8}}, ramp: 16}}
-  end:  # the vehicle
-    kind: pinned
-    position: [{far:.4g}, 0, {-depth:g}]
-initial: equilibrium
-model: adaptive  # rod where it bends, else catenary
-time: {{duration: 60}}  # s
-output: {{every: 0.25}}
-"""
+    mass = f"{1.3 * _water(diameter):.3g}"
+    far = f"{0.7 * math.sqrt(length**2 - depth**2):.4g}"
+    return {"bottom": f"{-depth:g}", "far": far, "mass": mass} | _stiffness(diameter, 1.5e9, 3e7)
 
 
-def _hose(distance: float, length: float, diameter: float, surge: float) -> str:
+def _hose(distance: float, length: float, diameter: float, surge: float) -> dict[str, str]:
     if length <= 1.02 * distance:
         raise Refused(f"the hose must be longer than 1.02 times the distance, {1.02 * distance:.4g} m")
-    d = diameter / 1000.0
-    mass = 1.4 * 1025.0 * math.pi / 4.0 * d**2
-    radius = max(0.5 * d, 1e-3)
-    return f"""\
-# A hose that hangs under water between two ships, of which
-# one moves; its bend radius is limited.
-title: Hose between two ships
-environment:
-  # kg/m^3; m/s, across
-  fluid: {{density: 1025, current: [0, 0.3, 0]}}
-cable:
-  sections:
-    - length: {length:g}  # m
-      mass: {mass:.4g}  # kg/m, filled: 1.4 times that of water
-      diameter: {d:g}  # m
-      axial_stiffness: {2e8 * d**2:.3g}  # N
-      bending_stiffness: {6e6 * d**4:.3g}  # N m^2
-      min_bend_radius: {16 * radius:.3g}  # m, the limit that is watched
-      drag: {{normal: 1.2, tangential: 0.02}}
-      added_mass: {{normal: 1.0}}
-ends:
-  start:
-    kind: clamped
-    position: [0, 0, -5]
-    tangent: [0.2, 0, -1]
-  end:
-    kind: clamped
-    position: [{distance:g}, 0, -5]
-    tangent: [0.2, 0, 1]
-    # m, s; it grows from rest over two periods
-    motion: {{surge: {{amplitude: {surge:g}, period: 12}}, ramp: 24}}
-initial: equilibrium
-model: rod
-time: {{duration: 60}}  # s
-output: {{every: 0.25}}
-"""
+    radius = f"{16 * max(0.5 * diameter / 1000.0, 1e-3):.3g}"
+    return {"radius": radius, "mass": f"{1.4 * _water(diameter):.4g}"} | _stiffness(diameter, 2e8, 6e6)
 
 
-def _lay(depth: float, mass: float, diameter: float, speed: float) -> str:
-    d, water = diameter / 1000.0, 1025.0 * math.pi / 4.0 * (diameter / 1000.0) ** 2
+def _lay(depth: float, mass: float, diameter: float, speed: float) -> dict[str, str]:
+    d, water = diameter / 1000.0, _water(diameter)
     if mass <= 1.05 * water:
         raise Refused(f"a cable of {diameter:g} mm must have more than {1.05 * water:.3g} kg/m, or it does not sink")
     # Far from the ship a cable that is laid is straight: normal drag bears its weight, at an angle a to the ground.
@@ -440,113 +338,37 @@ def _lay(depth: float, mass: float, diameter: float, speed: float) -> str:
     length = 1.5 * depth / math.sqrt(1.0 - cosine**2)
     # Without a tension at the bottom the heave presses the cable on the bed together, which bows it sideways.
     bottom = 0.2 * (mass - water) * 9.80665 * depth
-    return f"""\
-# A ship lays a cable.  Seen from the ship the cable stands
-# still, and the water comes towards it as a current.
-title: Cable laid in {depth:g} m of water at {speed:g} m/s
-environment:
-  # kg/m^3; m; m/s
-  fluid: {{density: 1025, surface: 0, current: [{-speed:g}, 0, 0]}}
-  # m; N/m and N s/m per metre of cable
-  seabed: {{z: {-depth:g}, stiffness: 2.0e+3, damping: 5.0e+2}}
-cable:
-  sections:
-    - length: {length:.4g}  # m: about a third lies on the seabed
-      mass: {mass:g}  # kg/m
-      diameter: {d:g}  # m
-      axial_stiffness: {2e10 * d**2:.3g}  # N
-      bending_stiffness: {1.2e8 * d**4:.3g}  # N m^2
-      drag: {{normal: 1.2}}
-      added_mass: {{normal: 1.0}}
-ends:
-  # N: what the brakes hold back
-  start: {{kind: free, force: [{-bottom:.3g}, 0, 0]}}
-  end:  # the ship
-    kind: pinned
-    position: [0, 0, 0]
-    # m, s; it grows from rest over two periods
-    motion: {{heave: {{amplitude: 1, period: 8}}, ramp: 16}}
-initial: equilibrium
-model: adaptive  # rod where it bends, else catenary
-time: {{duration: 60}}  # s
-output: {{every: 0.25}}
-"""
+    signed = {"current": f"{-speed:g}", "bed": f"{-depth:g}", "pull": f"{-bottom:.3g}", "length": f"{length:.4g}"}
+    return signed | _stiffness(diameter, 2e10, 1.2e8)
 
 
-def _span(distance: float, sag: float, mass: float, wind: float) -> str:
+def _span(distance: float, sag: float, mass: float, wind: float) -> dict[str, str]:
     if sag >= 0.5 * distance:
         raise Refused(f"the sag must be less than half of the span, {0.5 * distance:.4g} m")
     length = distance * (1.0 + 8.0 / 3.0 * (sag / distance) ** 2)
     d = math.sqrt(mass / 2600.0)
-    return f"""\
-# A cable hangs between two towers in the wind.
-title: Span of {distance:g} m in the wind
-environment:
-  # air, kg/m^3; wind across the span, m/s
-  fluid: {{density: 1.225, current: [0, {wind:g}, 0]}}
-cable:
-  sections:
-    - length: {length:.6g}  # m: sag {sag:g} m, more by stretch
-      mass: {mass:g}  # kg/m
-      diameter: {d:.3g}  # m
-      axial_stiffness: {4.5e10 * d**2:.3g}  # N
-      drag: {{normal: 1.0, tangential: 0.01}}
-ends:
-  start: {{kind: pinned, position: [0, 0, 0]}}
-  end:  # the top of a tower
-    kind: pinned
-    position: [{distance:g}, 0, 0]
-    # m, s; it grows from rest over two periods
-    motion: {{sway: {{amplitude: 0.05, period: 5}}, ramp: 10}}
-initial: equilibrium
-model: catenary
-time: {{duration: 30}}  # s
-output: {{every: 0.1}}
-"""
+    return {"length": f"{length:.6g}", "diameter": f"{d:.3g}", "axial": f"{4.5e10 * d**2:.3g}"}
 
 
-KINDS: dict[str, Kind] = {
-    "mooring": Kind(
-        "a mooring line, from an anchor to a fairlead",
-        (
-            Question("depth", "water depth", "m", 100, 5, 3000), Question("length", "length of the line", "m", 250, 10, 9000),
-            Question("mass", "mass of the chain in air", "kg/m", 50, 1, 1000), Question("heave", "heave of the fairlead, amplitude", "m", 2, 0, 15),
-        ),
-        _mooring,
-    ),
-    "tether": Kind(
-        "a tether, from a ship to a vehicle",
-        (
-            Question("depth", "depth of the vehicle", "m", 100, 5, 4000), Question("length", "length of the tether", "m", 140, 10, 8000),
-            Question("diameter", "diameter", "mm", 25, 3, 200), Question("heave", "heave of the ship, amplitude", "m", 1, 0, 10),
-        ),
-        _tether,
-    ),
-    "hose": Kind(
-        "a hose between two ships, with a limit on its bend radius",
-        (
-            Question("distance", "distance of its ends", "m", 60, 5, 500), Question("length", "length of the hose", "m", 90, 6, 800),
-            Question("diameter", "outer diameter", "mm", 300, 20, 1200), Question("surge", "surge of one ship, amplitude", "m", 2, 0, 20),
-        ),
-        _hose,
-    ),
-    "lay": Kind(
-        "a cable that a ship lays onto the seabed",
-        (
-            Question("depth", "water depth", "m", 200, 10, 3000), Question("mass", "mass of the cable in air", "kg/m", 1.5, 0.05, 100),
-            Question("diameter", "diameter", "mm", 30, 5, 300), Question("speed", "speed of the ship", "m/s", 2, 0.3, 6),
-        ),
-        _lay,
-    ),
-    "span": Kind(
-        "a suspended span between two towers",
-        (
-            Question("distance", "span", "m", 300, 5, 3000), Question("sag", "sag in the middle", "m", 6, 0.05, 1000),
-            Question("mass", "mass of the cable", "kg/m", 1.6, 0.05, 50), Question("wind", "wind", "m/s", 8, 0, 60),
-        ),
-        _span,
-    ),
-}  # fmt: skip
+def _water(diameter: float) -> float:
+    """Mass of sea water, kg/m, that a cable of a diameter in mm displaces."""
+    return 1025.0 * math.pi / 4.0 * (diameter / 1000.0) ** 2
+
+
+def _stiffness(diameter: float, axial: float, bending: float) -> dict[str, str]:
+    """Diameter in m and stiffnesses of a cable of a diameter in mm; axial: N/m2; bending: N/m2."""
+    d = diameter / 1000.0
+    return {"thick": f"{d:g}", "axial": f"{axial * d**2:.3g}", "bending": f"{bending * d**4:.3g}"}
+
+
+# What the text of each kind has beside the answers.
+_MORE: dict[str, Callable[..., dict[str, str]]] = {
+    "mooring": _mooring,
+    "tether": _tether,
+    "hose": _hose,
+    "lay": _lay,
+    "span": _span,
+}
 
 
 # The examples that a new scene can begin with: as they stand in the folder of examples.

@@ -8,8 +8,10 @@ import re
 import pytest
 
 import hybrid
-from hybrid.live.document import KINDS, Refused, example_text, examples, new_scene
+from hybrid.live.document import Refused, example_text, examples, new_scene, questions
 from hybrid.live.pictures import picture_of
+
+KINDS = {x["kind"]: x["questions"] for x in questions()}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -28,9 +30,9 @@ def test_random_answers_make_a_scene_that_is_read_or_are_refused_in_words(kind: 
     made = 0
     for _ in range(40):
         answers = {}
-        for question in KINDS[kind].questions:
-            low = max(question.low, 1e-3 * question.high)
-            answers[question.key] = float(f"{low * (question.high / low) ** rng.random():.3g}")
+        for question in KINDS[kind]:
+            low = max(question["low"], 1e-3 * question["high"])
+            answers[question["key"]] = float(f"{low * (question['high'] / low) ** rng.random():.3g}")
         try:
             text = new_scene(kind, answers)
         except Refused as refused:
