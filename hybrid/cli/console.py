@@ -16,7 +16,7 @@ import stat
 import sys
 import time as clock
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -496,6 +496,27 @@ class Grid:
         for row in self.rows:
             table.add_row(*row)
         return Group(table, *([self.below] if self.below else []))
+
+
+def table_of(
+    heads: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[str] = ("",), free: Sequence[str] = (),
+    **how: Any,
+) -> Any:  # fmt: skip
+    """A table for rich without lines.
+
+    words: heads of columns that are no numbers, which stand on the right; free: of those that may be wrapped; how: as
+    rich has it.
+    """
+    from rich.table import Table
+
+    titled = {"title_justify": "left", "padding": (0, 2)} if "title" in how else {"pad_edge": False}
+    table = Table(box=None, **{**titled, "header_style": "bold", **how})
+    for head in heads:
+        how_wide: Any = {"overflow": "fold" if head in words else "ellipsis"} if head in free else {"no_wrap": True}
+        table.add_column(head, justify="left" if head in words else "right", **how_wide)
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 # The output and error streams where they are no terminal, as in `hybrid schema | head`, `hybrid schema > file`.

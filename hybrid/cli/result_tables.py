@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import hybrid
-from hybrid.cli.console import Console, Grid
+from hybrid.cli.console import Console, Grid, table_of
 from hybrid.cli.tables import (
     ends_rows,
     equilibrium_facts,
@@ -164,18 +164,14 @@ def _rows_of_line(name: str, facts: dict[str, Any], moves: bool) -> Iterator[tup
 
 def _ranked(lines: dict[str, Any], moves: bool) -> Any:
     """A row for each of the worst of many lines, which come first, and one for all others."""
-    from rich.table import Table
-
     from hybrid.view.figure import prefix
 
     most = max(x["tension_max"]["value"] for x in lines.values())
     factor, unit = prefix("N", most)
-    table = Table(box=None, padding=(0, 1), pad_edge=False)
-    where = ["s (m)"] + ["t (s)"] * moves
-    table.add_column("line", style="bold", no_wrap=True)
-    for name in (f"largest {unit}", *where, f"smallest {unit}", *where):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("limits and accuracy")
+    where, verdict = ["s (m)"] + ["t (s)"] * moves, "limits and accuracy"
+    heads = ["line", f"largest {unit}", *where, f"smallest {unit}", *where, verdict]
+    table = table_of(heads, [], ("line", verdict), [verdict])
+    table.columns[0].style = "bold"
     for name, facts in [*lines.items()][:SHOWN]:
         ends = [facts["tension_max"], facts["tension_min"]]
         cells = [[f"{factor * x['value']:.4g}", f"{x['s']:.4g}", *[f"{x['t']:.4g}"] * moves] for x in ends]
@@ -283,27 +279,20 @@ def show_holding(
 
 
 def _matrix(title: str, matrix: Any) -> Any:
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2), min_width=len(title))
-    size, big = len(matrix), np.abs(matrix).max(initial=0.0)
-    for name in ("", *NAMES[:size]):
-        table.add_column(name, justify="right")
-    for name, row in zip(NAMES, matrix, strict=False):
-        table.add_row(name, *(f"{x if abs(x) > 1e-9 * big else 0.0:.5g}" for x in row))
-    return table
+    heads, big = ["", *NAMES[: len(matrix)]], np.abs(matrix).max(initial=0.0)
+    rows = [
+        [name, *(f"{x if abs(x) > 1e-9 * big else 0.0:.5g}" for x in row)]
+        for name, row in zip(NAMES, matrix, strict=False)
+    ]
+    return table_of(heads, rows, (), heads, title=title, min_width=len(title))
 
 
 def _curve(curve: Any) -> Any:
-    from rich.table import Table
-
-    title = f"{curve.at} held at offsets along {curve.heading:g} deg, without friction"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2))
-    for name in ("offset (m)", "restoring force (N)", "vertical force (N)", "largest tension (N)", "in line"):
-        table.add_column(name, justify="right")
+    title, rows = f"{curve.at} held at offsets along {curve.heading:g} deg, without friction", []
     for k, distance in enumerate(curve.distance):
         line = max(curve.tension, key=lambda name: curve.tension[name][k])
         least = 1e-9 * float(np.abs(curve.force).max())
         forces = [f"{x if abs(x) > least else 0.0:.5g}" for x in (curve.restoring[k], curve.force[k, 2])]
-        table.add_row(f"{distance:.5g}", *forces, f"{curve.tension[line][k]:.5g}", line)
-    return table
+        rows.append([f"{distance:.5g}", *forces, f"{curve.tension[line][k]:.5g}", line])
+    heads = ("offset (m)", "restoring force (N)", "vertical force (N)", "largest tension (N)", "in line")
+    return table_of(heads, rows, (), heads, title=title)

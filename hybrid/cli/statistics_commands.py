@@ -27,7 +27,7 @@ from hybrid.cli.app import (
     window,
     words,
 )
-from hybrid.cli.console import Console
+from hybrid.cli.console import Console, table_of
 from hybrid.errors import ResultError
 from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse, Response
 from hybrid.statistics.fatigue import life_in_years
@@ -125,18 +125,14 @@ def _row(
 
 
 def _response_table(found: Response, rows: list[dict[str, Any]], hours: float) -> Any:
-    from rich.table import Table
-
     title = f"{found.title or 'response'}, where each varies most"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), min_width=min(len(title), 80))
-    table.add_column("quantity")
-    for name in ("s (m)", "mean", "standard\ndeviation", "mean\nperiod (s)", f"MPM\nin {hours:g} h"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
+    heads = ("quantity", "s (m)", "mean", "standard\ndeviation", "mean\nperiod (s)", f"MPM\nin {hours:g} h", "unit")
+    texts = []
     for row in rows:
         cells = [f"{row[key]:.4g}" if key in row else "" for key in ("s", "mean", "deviation", "period", "largest")]
-        table.add_row(row["quantity"] + ("" if row["valid"] else ", not valid"), *cells, row["unit"])
-    return table
+        texts.append([row["quantity"] + ("" if row["valid"] else ", not valid"), *cells, row["unit"]])
+    how = {"title": title, "padding": (0, 1), "min_width": min(len(title), 80)}
+    return table_of(heads, texts, ("quantity", "unit"), ("quantity",), **how)
 
 
 # The command modes: natural periods of a scene about its equilibrium.
@@ -188,20 +184,14 @@ def modes(
 
 
 def _modes_table(found: Modes) -> Any:
-    from rich.table import Table
-
-    title = f"{found.title or 'modes'}: {len(found.modes)} modes on {found.cells} cells"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), min_width=min(len(title), 80))
-    for name in ("", "period (s)", "error (s)"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("moves, by kinetic energy")
-    table.add_column("mass x, y, z (%)", justify="right", no_wrap=True)
+    title, rows = f"{found.title or 'modes'}: {len(found.modes)} modes on {found.cells} cells", []
     for k, x in enumerate(found.modes, start=1):
         parts = [f"{word} {100.0 * part:.0f} %" for word, part in x.energy.items() if part >= LEAST_SHARE][:SHOWN]
         masses = [100.0 * m / a if a > 0.0 else 0.0 for m, a in zip(x.mass, found.mass, strict=True)]
         error = "not known" if x.error is None else f"{x.error:.2g}"
-        table.add_row(str(k), f"{x.period:.5g}", error, ", ".join(parts), "  ".join(f"{m:4.1f}" for m in masses))
-    return table
+        rows.append([str(k), f"{x.period:.5g}", error, ", ".join(parts), "  ".join(f"{m:4.1f}" for m in masses)])
+    moves, how = "moves, by kinetic energy", {"title": title, "padding": (0, 1), "min_width": min(len(title), 80)}
+    return table_of(("", "period (s)", "error (s)", moves, "mass x, y, z (%)"), rows, (moves,), (moves,), **how)
 
 
 HOUR = 3600.0  # s
@@ -383,48 +373,26 @@ def _moored(
 
 
 def _statistics_table(rows: list[dict[str, Any]], hours: float) -> Any:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("", no_wrap=True)
-    for title in (
-        "s (m)",
-        "mean",
-        "standard\ndeviation",
-        "skewness",
-        "smallest",
-        "largest",
-        "period (s)",
-        f"MPM\nin {hours:g} h",
-        f"P90\nin {hours:g} h",
-    ):
-        table.add_column(title, justify="right", no_wrap=True)
-
     def text(x: float | None) -> str:
         return "" if x is None else f"{x:.5g}"
 
+    heads = ["", "s (m)", "mean", "standard\ndeviation", "skewness", "smallest", "largest", "period (s)"]
+    heads += [f"MPM\nin {hours:g} h", f"P90\nin {hours:g} h"]
+    texts = []
     for row in rows:
-        extreme = row["extreme"]
-        table.add_row(
-            f"{row['quantity']} ({row['unit']})", text(row["s"]), text(row["mean"]), text(row["standard_deviation"]),
-            "" if row["skewness"] is None else f"{row['skewness']:.2f}", text(row["minimum"]), text(row["maximum"]),
-            text(row["crossing_period"]), text(extreme and extreme["most_probable"]),
-            text(extreme and extreme["fractile"]),
-        )  # fmt: skip
-    return table
+        numbers = [row[x] for x in ("s", "mean", "standard_deviation", "minimum", "maximum", "crossing_period")]
+        numbers += [row["extreme"] and row["extreme"][x] for x in ("most_probable", "fractile")]
+        skewness = "" if row["skewness"] is None else f"{row['skewness']:.2f}"
+        cells = [text(x) for x in numbers]
+        texts.append([f"{row['quantity']} ({row['unit']})", *cells[:3], skewness, *cells[3:]])
+    return table_of(heads, texts)
 
 
 def _values_table(rows: list[dict[str, Any]]) -> Any:
     """Values of an equilibrium."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for title in ("", "s (m)", "value"):
-        table.add_column(title, justify="right" if title else "left", no_wrap=True)
-    for row in rows:
-        texts = ("" if x is None else f"{x:.5g}" for x in (row["s"], row["value"]))
-        table.add_row(f"{row['quantity']} ({row['unit']})", *texts)
-    return table
+    texts = (["" if x is None else f"{x:.5g}" for x in (row["s"], row["value"])] for row in rows)
+    names = [f"{row['quantity']} ({row['unit']})" for row in rows]
+    return table_of(("", "s (m)", "value"), [[name, *text] for name, text in zip(names, texts, strict=True)])
 
 
 def _parts_of_time(rows: list[dict[str, Any]], above: float | None, below: float | None) -> list[str]:

@@ -29,7 +29,7 @@ from hybrid.cli.app import (
     session,
     words,
 )
-from hybrid.cli.console import Console, span
+from hybrid.cli.console import Console, span, table_of
 
 if TYPE_CHECKING:
     from hybrid.designs.design import Found, Identified, Kept
@@ -87,14 +87,12 @@ def _as_data(found: Found) -> dict[str, Any]:
 
 def _tables(found: Found) -> Any:
     from rich.console import Group
-    from rich.table import Table
 
     took = [f"{found.equilibria} equilibria"] if found.equilibria else []
     took += [f"{found.runs} runs ({found.runs / found.moving:.3g} of each case)"] if found.moving else []
     head = f"{found.title or 'found'}: {', '.join(took)}"
-    numbers = Table(title=head, title_justify="left", box=None, padding=(0, 2), min_width=min(len(head), 80))
-    for name in ("", "found", "start", ""):
-        numbers.add_column(name, justify="left" if not name else "right")
+    heads = ("", "found", "start", "")
+    numbers = table_of(heads, [], free=heads, title=head, min_width=min(len(head), 80))
     at = {x.name: x for x in found.bounds}
     for name, x in found.numbers.items():
         bound = at.get(name)
@@ -107,9 +105,8 @@ def _tables(found: Found) -> Any:
         numbers.add_row("minimised", f"{found.minimised:.6g}", f"{found.minimised_at_start:.6g}", word)
     if not found.kept:
         return Group(numbers, *_ways(found))
-    kept = Table(box=None, padding=(0, 2), title_justify="left")
-    for name in ("", "result", "value", "asked", "2 x cells", "price"):
-        kept.add_column(name, justify="left" if name in ("", "result") else "right", no_wrap=name not in ("", "result"))
+    words = ("", "result")
+    kept = table_of((*words, "value", "asked", "2 x cells", "price"), [], words, words, title=None)
     for row in shown(found.kept):
         name = f"{row.name} ({row.case})" if row.case else row.name
         price = f"{row.price:.3g}" if row.active and found.minimised is not None else "active" * row.active
@@ -130,16 +127,14 @@ def _ways(found: Found) -> list[str]:
 
 def _identified(found: Identified) -> Any:
     from rich.console import Group
-    from rich.table import Table
 
     left = f"{found.scatter:.3g}" + (" of the stated deviation" if found.stated else "")
     head = f"{found.title or 'found'}: {found.count} numbers"
     head += f", {found.equilibria} equilibria" if found.equilibria else ""
     head += f", {found.runs} runs" if found.runs else ""
     head += f"; left over {left} (r.m.s.)"
-    table = Table(title=head, title_justify="left", box=None, padding=(0, 2), min_width=min(len(head), 80))
-    for name in ("", "found", "deviation", "95 % from", "to", "by cells", "start"):
-        table.add_column(name, justify="right" if name else "left")
+    heads = ("", "found", "deviation", "95 % from", "to", "by cells", "start")
+    table = table_of(heads, [], free=heads, title=head, min_width=min(len(head), 80))
     for x in found.estimates:
         spread = [f"{x.deviation:.3g}", f"{x.low:.6g}", f"{x.high:.6g}"]
         spread = spread if x.deviation < float("inf") else ["not known", "", ""]
@@ -147,12 +142,10 @@ def _identified(found: Identified) -> Any:
         table.add_row(x.name, f"{x.value:.6g}", *spread, by_cells, f"{found.start[x.name]:.6g}")
     parts: list[Any] = [table, *(f"  not told apart: {x.text}" for x in found.apart)]
     if len(found.estimates) > 1 and (found.correlations == found.correlations).sum() > len(found.estimates):
-        related = Table(title="correlations", title_justify="left", box=None, padding=(0, 2))
-        for name in ("", *found.numbers):
-            related.add_column(name, justify="right" if name else "left")
-        for name, row in zip(found.numbers, found.correlations.tolist(), strict=True):
-            related.add_row(name, *(f"{y:.3f}" if y == y else "" for y in row))
-        parts += ["", related]
+        each = zip(found.numbers, found.correlations.tolist(), strict=True)
+        related = [[name, *(f"{y:.3f}" if y == y else "" for y in row)] for name, row in each]
+        heads = ("", *found.numbers)
+        parts += ["", table_of(heads, related, free=heads, title="correlations")]
     return Group(*parts, *_ways(found))
 
 
@@ -208,17 +201,9 @@ def seek(
 
 
 def _design_table(found: Sought) -> Any:
-    from rich.table import Table
-
-    table = Table(title=f"found in {found.equilibria} equilibria", title_justify="left", box=None, padding=(0, 2))
-    table.add_column("")
-    table.add_column("value", justify="right")
-    table.add_column("asked", justify="right")
-    for key, x in found.numbers.items():
-        table.add_row(key, f"{x:.8g}", "")
-    for name, x in found.results.items():
-        table.add_row(name, f"{x:.8g}", f"{found.targets[name]:.8g}")
-    return table
+    rows, heads = [[key, f"{x:.8g}", ""] for key, x in found.numbers.items()], ("", "value", "asked")
+    rows += [[name, f"{x:.8g}", f"{found.targets[name]:.8g}"] for name, x in found.results.items()]
+    return table_of(heads, rows, free=heads, title=f"found in {found.equilibria} equilibria")
 
 
 # The command sensitivity: what results at rest answer to the numbers of a scene.
@@ -275,21 +260,18 @@ def _numbers(scene: Scene) -> list[str]:
 def _sensitivity_tables(found: list[Derivative]) -> Any:
     """One for each result, what it answers to most first."""
     from rich.console import Group
-    from rich.table import Table
 
     tables = []
     for result in dict.fromkeys(x.of for x in found):
         rows = [x for x in found if x.of == result]
         rows.sort(key=lambda x: -abs(x.elasticity) if math.isfinite(x.elasticity) else 0.0)
         title = f"{result}: {rows[0].result:.6g}"
-        table = Table(title=title, title_justify="left", box=None, padding=(0, 1), min_width=len(title))
-        table.add_column("by")
-        for name in ("value", "derivative", "error", "% by %"):
-            table.add_column(name, justify="right", no_wrap=True)
+        texts = []
         for x in rows:
             elastic = f"{x.elasticity:.3g}" if math.isfinite(x.elasticity) else ""
-            table.add_row(x.by, f"{x.number:.5g}", f"{x.derivative:.5g}", f"{x.error:.1g}", elastic)
-        tables.append(table)
+            texts.append([x.by, f"{x.number:.5g}", f"{x.derivative:.5g}", f"{x.error:.1g}", elastic])
+        heads, by = ("by", "value", "derivative", "error", "% by %"), ("by",)
+        tables.append(table_of(heads, texts, by, by, title=title, padding=(0, 1), min_width=len(title)))
     ways = dict.fromkeys(x.way for x in found)
     return Group(*tables, *(f"by {way}" if len(ways) == 1 else f"{_keys(found, way)} by {way}" for way in ways))
 
@@ -446,30 +428,18 @@ HEADS = {
 
 
 def _influences(rows: list[Any]) -> Any:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("", no_wrap=True)
-    for title in HEADS[rows[0].method] if rows else ("nothing varies",):
-        table.add_column(title, justify="right", no_wrap=True)
-    for row in rows:
-        figures = (f"{x:.3g}" if x == x else "" for x in (row.first, row.total, row.interval))
-        table.add_row(row.variable, *figures)
-    return table
+    heads = HEADS[rows[0].method] if rows else ("nothing varies",)
+    texts = ([f"{x:.3g}" if x == x else "" for x in (row.first, row.total, row.interval)] for row in rows)
+    return table_of(("", *heads), [[row.variable, *text] for row, text in zip(rows, texts, strict=True)])
 
 
 def _show_shares(console: Console, found: Any) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("", no_wrap=True)
-    for title in ("derivative", "share", "first order from", "to"):
-        table.add_column(title, justify="right", no_wrap=True)
+    rows = []
     for row in found.rows:
         parts = (f"{x:.3f}" if x == x else "" for x in (row.share, row.low, row.high))
-        table.add_row(row.variable, f"{row.derivative:.4g}", *parts)
+        rows.append([row.variable, f"{row.derivative:.4g}", *parts])
     console.json("shares", **found._asdict() | {"rows": [x._asdict() for x in found.rows]})
-    console.show(lambda: table)
+    console.show(lambda: table_of(("", "derivative", "share", "first order from", "to"), rows))
     if found.why:
         console.note(f"note: no shares by derivatives: {found.why}")
     else:
@@ -482,14 +452,9 @@ def _kind(reason: str) -> str:
 
 
 def _study_table(rows: list[dict[str, Any]]) -> Any:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("", no_wrap=True)
-    for title in ("smallest", "median", "largest", "in case"):
-        table.add_column(title, justify="right", no_wrap=True)
+    texts = []
     for row in rows:
         name = f"{row['name']} ({row['unit']})" if row["unit"] else row["name"]
         figures = ("" if row[key] is None else f"{row[key]:.5g}" for key in ("smallest", "median", "largest"))
-        table.add_row(name, *figures, "" if row["case"] is None else str(row["case"]))
-    return table
+        texts.append([name, *figures, "" if row["case"] is None else str(row["case"])])
+    return table_of(("", "smallest", "median", "largest", "in case"), texts)

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybrid.cli.console import Grid
+from hybrid.cli.console import Grid, table_of
 from hybrid.errors import OMITTED, ZONE_EVENTS
 
 ANCHORED = 1.0  # m
@@ -294,16 +294,11 @@ def judged(table: TradeTable, row: Row) -> dict[str, Any]:
 
 def trade_table(table: TradeTable) -> Any:
     """The rows as a terminal has room for them."""
-    from rich.table import Table
 
     def part(value: float | None) -> str:
         return "" if value is None else f"{100 * value:.2g} %"
 
-    out = Table(box=None, pad_edge=False, header_style="bold")
-    out.add_column("run", no_wrap=True)
-    for name in ("position", "end force", "cells", "steps", "CPU"):
-        out.add_column(name, justify="right", no_wrap=True)
-    out.add_column("", overflow="fold")
+    out = table_of(("run", "position", "end force", "cells", "steps", "CPU", ""), [], ("run", ""), ("",))
     front, best = table.front(), table.recommended
     for row in table.rows:
         remark = "recommended" if row == best else "Pareto front" if row in front else ""
@@ -316,15 +311,10 @@ def trade_table(table: TradeTable) -> Any:
 
 def level_table(table: LevelTable) -> Any:
     """What each level costs with every model."""
-    from rich.table import Table
-
     from hybrid.studies.tradeoff import percent, status_of
 
-    out = Table(box=None, pad_edge=False, header_style="bold")
-    out.add_column("level, model", no_wrap=True)
-    for name in ("position", "end force", "moment", "curvature", "cells", "CPU"):
-        out.add_column(name, justify="right", no_wrap=True)
-    out.add_column("", overflow="fold")
+    heads = ("level, model", "position", "end force", "moment", "curvature", "cells", "CPU", "")
+    out = table_of(heads, [], (heads[0], ""), ("",))
     for row in table.rows:
         best = row == table.cheapest(row.level)
         figures = [percent(x) for x in (row.position, row.end_force, row.moment, row.curvature)]
