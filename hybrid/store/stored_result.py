@@ -132,7 +132,8 @@ class StoredResult:
         self._cache: dict[str, np.ndarray] = {}
         data = contents.data
         self.names, self._groups = tuple(data), contents.groups
-        self._dims, self.units = OnRequest(data, contents.dims_of), OnRequest(data, contents.units_of, ALIASES)
+        self._dims = OnRequest(data, lambda name: contents.dims_of(_dataset(contents, name)))
+        self.units = OnRequest(data, lambda name: contents.units_of(_dataset(contents, name)), ALIASES)
         # Taken once, so that everything read later shows the same moment of a file that grows.
         # t first: the zones of an output are complete before its time is.
         self._rows = {n: contents.length(n) for n in sorted(contents.scales(), key=lambda n: n != "t")}
@@ -435,6 +436,13 @@ class StoredResult:
     def _within(self, group: str) -> dict[str, None]:
         """Names of what has a group of its own in one of the result, such as the points in `points`."""
         return dict.fromkeys(n.split("/")[1] for n in self.names if n.startswith(f"{group}/"))
+
+
+def _dataset(contents: Contents, name: str) -> Any:
+    data = contents.data[name]
+    if data is None or not data.valid:
+        raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
+    return data
 
 
 def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str) -> Any:

@@ -1,13 +1,16 @@
-"""Natural modes that swing: a section of a report, and a page of their own."""
+"""Natural modes that swing: a section of a report, and a page of their own.
+
+Modes are as `hybrid.modes` returns them.
+"""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -42,36 +45,14 @@ FACTS = (
 )
 
 
-class DrawnMode(Protocol):
-    """What is drawn of a mode."""
-
-    @property
-    def period(self) -> float: ...
-    @property
-    def what(self) -> str: ...
-    @property
-    def shifts(self) -> Mapping[str, Any]: ...
-
-
-class DrawnModes(Protocol):
-    """What is drawn of all."""
-
-    @property
-    def title(self) -> str: ...
-    @property
-    def position(self) -> Mapping[str, Any]: ...
-    @property
-    def modes(self) -> Sequence[DrawnMode]: ...
-
-
-def plot_modes(found: DrawnModes, target: Path) -> None:
+def plot_modes(found: Any, target: Path) -> None:
     """Draw every mode in a panel of its own, all from the same side, as PNG, PDF or SVG."""
     from hybrid.view.matplotlib_backend import draw_page
 
     save_figure(draw_page(_page(found)), target)
 
 
-def _page(found: DrawnModes) -> Page:
+def _page(found: Any) -> Page:
     view = oblique_view(found.position)
     places = {name: np.asarray(r) @ view.T for name, r in found.position.items()}
     every = np.concatenate(list(places.values()))
@@ -135,39 +116,13 @@ EXPLAINED = (
 )
 
 
-class PagedMode(DrawnMode, Protocol):
-    """What is shown of a mode."""
-
-    @property
-    def error(self) -> float | None: ...
-    @property
-    def energy(self) -> Mapping[str, float]: ...
-    @property
-    def mass(self) -> Any: ...
-    @property
-    def twists(self) -> Mapping[str, Any]: ...
-
-
-class PagedModes(DrawnModes, Protocol):
-    """What is shown of all."""
-
-    @property
-    def modes(self) -> Sequence[PagedMode]: ...
-    @property
-    def mass(self) -> Any: ...
-    @property
-    def cells(self) -> int: ...
-    @property
-    def notes(self) -> tuple[str, ...]: ...
-
-
-def write_modes(found: PagedModes, path: str | Path) -> Path:
+def write_modes(found: Any, path: str | Path) -> Path:
     """Write a page of modes as .html and return where it is; ResultError where it cannot be written."""
     target = check_target(path, PAGES)
     return write_file(target, lambda new: new.write_text(html(found), encoding="utf-8"))
 
 
-def html(found: PagedModes) -> str:
+def html(found: Any) -> str:
     """The page as text."""
     title = f"Natural modes of {found.title or 'a line'}"
     parts = {
@@ -178,7 +133,7 @@ def html(found: PagedModes) -> str:
     return page_of("modes.html", parts)
 
 
-def section(found: PagedModes) -> str:
+def section(found: Any) -> str:
     """Table, notes and moving pictures of modes, for a report."""
     head = ["", "period (s)", "error (s)", "moves, by kinetic energy", "mass x (%)", "y", "z"]
     notes = "".join(f"<li>{escape(x)}</li>" for x in found.notes)
@@ -192,7 +147,7 @@ def section(found: PagedModes) -> str:
     )
 
 
-def _row(found: PagedModes, k: int) -> list[str]:
+def _row(found: Any, k: int) -> list[str]:
     mode = found.modes[k]
     parts = [f"{word} {100.0 * part:.0f} %" for word, part in mode.energy.items() if part >= LEAST][:SHOWN]
     masses = [100.0 * m / a if a > 0.0 else 0.0 for m, a in zip(mode.mass, found.mass, strict=True)]
@@ -200,7 +155,7 @@ def _row(found: PagedModes, k: int) -> list[str]:
     return [str(k + 1), short(mode.period, 5), error, ", ".join(parts), *(f"{m:.1f}" for m in masses)]
 
 
-def _picture(found: PagedModes, k: int) -> str:
+def _picture(found: Any, k: int) -> str:
     """One mode, drawn at an end of its swing, with the numbers that let it move."""
     mode, view = found.modes[k], oblique_view(found.position)
     every = np.concatenate([np.asarray(r) for r in found.position.values()])
@@ -236,9 +191,7 @@ def _points(x: list[list[float]]) -> str:
     return " ".join(f"{a:g},{b:g}" for a, b in x)
 
 
-def _ticks(
-    mode: PagedMode, name: str, r: Any, shift: Any, view: Any, upright: Any, twice_middle: Any
-) -> list[list[float]]:
+def _ticks(mode: Any, name: str, r: Any, shift: Any, view: Any, upright: Any, twice_middle: Any) -> list[list[float]]:
     """Of places along a line: x, y, their shift, two axes across the line in the picture, the largest turn (rad)."""
     if mode.energy.get("twist", 0.0) < TWISTS or name not in mode.twists:
         return []

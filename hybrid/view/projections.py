@@ -7,7 +7,7 @@ a plane of view and surfaces in space, and may move.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -413,7 +413,9 @@ def _triangles(body: Body, box: np.ndarray, when: str) -> dict[str, Any]:
         return look
     n = len(x) // AROUND
     circles = [[*range(at, at + AROUND), at] for at in (0, n // 2 * AROUND, (n - 1) * AROUND)]
-    rim = closed_way(x, triangles) if body.kind == MESH else [k for circle in circles for k in circle]
+    rim: list[int | None] = [k for circle in circles for k in circle]
+    if body.kind == MESH:  # edges, with a gap behind each
+        rim = [k for pair in sharp_edges(x, triangles) for k in (*pair, None)]
     return look | {name: triangles[:, k].tolist() for k, name in enumerate("ijk")} | {"rim": rim}
 
 
@@ -446,63 +448,3 @@ def sharp_edges(points: np.ndarray, triangles: np.ndarray) -> list[Edge]:
     n = np.cross(b - a, c - a)
     n /= np.linalg.norm(n, axis=1)[:, None]
     return [pair for pair, first, second in edges_of(triangles) if n[first] @ n[second] < SHARP]
-
-
-def closed_way(points: np.ndarray, triangles: np.ndarray) -> list[int]:
-    """Corners of a way over all sharp edges and back, that leads along edges alone; of a round surface one corner."""
-    sharp, all_edges = (_beside(x) for x in (sharp_edges(points, triangles), (x[0] for x in edges_of(triangles))))
-    if not sharp:
-        return [0]
-    found: list[int] = []
-    back: list[int] = []
-    done: set[Edge] = set()
-    here = next(iter(sharp))
-    while True:
-        found += _tour(here, sharp, done)
-        to = _nearest(here, all_edges, {a for a, others in sharp.items() if any((a, b) not in done for b in others)})
-        if not to:
-            return found + back
-        found += to[1:-1]
-        back = to[-2::-1] + back
-        here = to[-1]
-
-
-def _beside(edges: Iterable[Edge]) -> dict[int, list[int]]:
-    """Corners at the other end of the edges of each."""
-    found: dict[int, list[int]] = {}
-    for a, b in edges:
-        found.setdefault(a, []).append(b)
-        found.setdefault(b, []).append(a)
-    return found
-
-
-def _tour(start: int, edges: dict[int, list[int]], done: set[Edge]) -> list[int]:
-    """A way over all edges that hang together with a corner, each there and back; done: what has been gone along."""
-    found, stack = [start], [start]
-    while stack:
-        here = stack[-1]
-        to = next((b for b in edges[here] if (here, b) not in done), None)
-        if to is None:
-            stack.pop()
-            found += stack[-1:]
-        else:
-            done |= {(here, to), (to, here)}
-            stack.append(to)
-            found.append(to)
-    return found
-
-
-def _nearest(start: int, edges: dict[int, list[int]], wanted: set[int]) -> list[int]:
-    """The shortest way along edges to one of the corners that are wanted; empty: there is none."""
-    came, waiting = {start: -1}, [start]
-    for here in waiting:
-        if here in wanted:
-            way = [here]
-            while came[way[-1]] >= 0:
-                way.append(came[way[-1]])
-            return way[::-1]
-        for to in edges[here]:
-            if to not in came:
-                came[to] = here
-                waiting.append(to)
-    return []

@@ -45,7 +45,7 @@ from hybrid.view.lines import (
     tension_ranges,
     views_of_lines,
 )
-from hybrid.view.modes_page import PagedModes, section
+from hybrid.view.modes_page import section
 from hybrid.view.notebook import picture
 from hybrid.view.panels import end_forces, energy, energy_parts, history, ranges, touchdown
 from hybrid.view.plotly_backend import draw, figure_of
@@ -223,7 +223,7 @@ LEAST_FRAMES = 50  # of a moving picture, for which points of many lines are lef
 LEAST_MOVE = 0.02
 
 
-def write_report(result: Result, path: str | Path, *, overwrite: bool = False, modes: PagedModes | None = None) -> Path:
+def write_report(result: Result, path: str | Path, *, overwrite: bool = False, modes: Any = None) -> Path:
     """Write the report of a result as .html or .htm and return where it is; ResultError where it cannot be written.
 
     overwrite: also replace a file that is not a report of hybrid; modes: of its scene (`hybrid.modes`), which it shows.
@@ -232,7 +232,7 @@ def write_report(result: Result, path: str | Path, *, overwrite: bool = False, m
     return write_file(target, lambda new: new.write_text(html(result, modes), encoding="utf-8"))
 
 
-def html(result: Result, modes: PagedModes | None = None) -> str:
+def html(result: Result, modes: Any = None) -> str:
     """The page as text."""
     store = Store()
     made = _Report(result, store)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from html import escape
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -54,34 +54,15 @@ HIGH = 2.9  # and its height
 FLAT = 0.05
 NUMBERS = 6  # of unknowns in the head
 
-Shapes = Mapping[str, Mapping[str, Any]]
 
-
-class DrawnDesign(Protocol):
-    """What is drawn of a design; places that were `measured`, by case and line, and `histories`, where there are."""
-
-    @property
-    def title(self) -> str: ...
-    @property
-    def numbers(self) -> Mapping[str, float]: ...
-    @property
-    def start(self) -> Mapping[str, float]: ...
-    @property
-    def before(self) -> Shapes: ...
-    @property
-    def after(self) -> Shapes: ...
-    @property
-    def bed(self) -> float | None: ...
-
-
-def plot_design(found: DrawnDesign, target: Path) -> None:
-    """Draw every case in a panel of its own, as PNG, PDF or SVG."""
+def plot_design(found: Any, target: Path) -> None:
+    """Draw every case of what `hybrid.design` returns in a panel, as PNG, PDF or SVG."""
     from hybrid.view.matplotlib_backend import draw_page
 
     save_figure(draw_page(_design_page(found)), target)
 
 
-def _design_page(found: DrawnDesign) -> Page:
+def _design_page(found: Any) -> Page:
     every = [
         np.asarray(r) for shapes in (found.before, found.after) for lines in shapes.values() for r in lines.values()
     ]
@@ -102,7 +83,7 @@ def _design_page(found: DrawnDesign) -> Page:
     return Page(found.title or "(no title)", facts, 2, panels, mosaic, legend=(named,), size=size)
 
 
-def _case_panel(found: DrawnDesign, case: str, key: str, view: Any, across: str) -> Panel:
+def _case_panel(found: Any, case: str, key: str, view: Any, across: str) -> Panel:
     items: list[Item] = []
     if found.bed is not None and across:
         items.append(Rule("y", [found.bed], colour=BED, dash=""))

@@ -18,13 +18,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.all_lines import ImportedScene, scene_of, scene_of_lines
 from hybrid.interop.moordyn.cables import Cable, cables
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import LEFT_OUT, NOT_NEEDED, TAKEN, Note, Source, in_order, note, read_source
-from hybrid.interop.moordyn.writer import WRITTEN, Computed, WrittenDeck, deck_of
+from hybrid.interop.moordyn.writer import WRITTEN, WrittenDeck, deck_of
 
 __all__ = ["ImportedDeck", "ImportedScene", "Note", "WrittenDeck", "export_moordyn", "import_moordyn"]
 
@@ -111,7 +112,7 @@ def _is_written(path: Path) -> bool:
         return not file.readline(10_000) or file.readline(10_000).startswith(WRITTEN.encode())
 
 
-def export_moordyn(result: Computed, path: str | Path, overwrite: bool = False) -> WrittenDeck:
+def export_moordyn(result: Any, path: str | Path, overwrite: bool = False) -> WrittenDeck:
     """Write a deck of MoorDyn 2 of the scene of a result (`hybrid.static` or `run`), with the cells of the result.
 
     Free points begin where the result has them at its first output.  `.notes` says what the deck does not have.

@@ -14,11 +14,11 @@ seabed.stiffness, .damping              kBot, cBot, per diameter of the thickest
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
 from textwrap import shorten
-from typing import Any, Protocol
+from typing import Any
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.bodies import body_row
@@ -52,18 +52,6 @@ _POINTS = "--- POINTS ---\nID Attachment X Y Z M V CdA Ca\n(#) (-) (m) (m) (m) (
 _LINES = "--- LINES ---\nID LineType AttachA AttachB UnstrLen NumSegs Outputs\n(#) (-) (-) (-) (m) (-) (-)\n"
 
 
-class Computed(Protocol):
-    """What is read of a result (`hybrid.Result`)."""
-
-    @property
-    def scene_text(self) -> str: ...
-    @property
-    def lines(self) -> Mapping[str, Any]: ...
-    @property
-    def s(self) -> Any: ...
-    def __getitem__(self, name: str) -> Any: ...
-
-
 @dataclass(frozen=True)
 class WrittenDeck:
     """The text of a deck, and what it does not have of the scene."""
@@ -94,7 +82,7 @@ class _Shape:
         return 1 + sum(a + near < s < b - near for s in self.nodes)
 
 
-def deck_of(result: Computed) -> WrittenDeck:
+def deck_of(result: Any) -> WrittenDeck:
     """The deck of the scene of a result, its free points where the result has them first.
 
     SceneError, with every complaint, if the scene has what MoorDyn has not.
