@@ -99,12 +99,13 @@ def _scene(scenario: Scenario, cells: int, folder: Path) -> dict[str, Any]:
         nodes = rod.nodes(cells)
         for end, place in ((End.START, nodes[0]), (End.END, nodes[-1])):
             points[ends[end.value]] = _point(rod, end, place, folder / f"rod{i}_{end.value}.csv", scenario.duration)
+        even = np.linspace(0.0, rod.length, cells + 1)
         lines[f"rod{i}"] = {
             **ends,
             "model": "rod",
             "mesh": {"cells": cells},
             "sections": [_section(rod, _damping(scenario))],
-            "initial": {"kind": "points", "points": nodes.tolist(), "arc_lengths": _even(rod, cells)},
+            "initial": {"kind": "points", "points": nodes.tolist(), "arc_lengths": even.tolist()},
             "connections": _connections(rod, nodes),
             "contact": {"self": scenario.self_contact, "friction": rod.friction},
         }
@@ -121,10 +122,6 @@ def _environment(scenario: Scenario) -> dict[str, Any]:
     if gravity[:2].any() or gravity[2] > 0.0:
         raise NotImplementedError("gravity that is not along -z")
     return {"gravity": float(-gravity[2])}
-
-
-def _even(rod: Rod, cells: int) -> list[float]:
-    return [float(s) for s in np.linspace(0.0, rod.length, cells + 1)]
 
 
 def _section(rod: Rod, damping: float) -> dict[str, Any]:

@@ -85,13 +85,9 @@ def _write_scene(scene: Scene, folder: Path) -> list[Path]:
             copies[path] = folder / f"file{len(copies) + 1}{Path(path).suffix}"
             copies[path].write_bytes(Path(path).read_bytes())
         table[key] = copies[path].name
-    (folder / SCENE).write_text(scene_text(scene) if not copies else _yaml(data), encoding="utf-8")
+    text = scene_text(scene) if not copies else json.dumps(data, indent=1)  # JSON is YAML 1.2
+    (folder / SCENE).write_text(text, encoding="utf-8")
     return list(copies.values())
-
-
-def _yaml(data: Any) -> str:
-
-    return json.dumps(data, indent=1)  # JSON is YAML 1.2
 
 
 def _interface(scene: Scene) -> dict[str, Any]:

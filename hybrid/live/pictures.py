@@ -172,11 +172,11 @@ def frames(result: Result, outputs: list[int], most: int) -> list[dict[str, Any]
     lines = [_along_line(line, outputs, most) for _, line in result.each_line()]
     marks = _marks(result, outputs)
     one = next(x for _, x in result.each_line())
-    moved = [[_plain(x) for x in rings(one, i)] for i in outputs]
-    times = result.times[outputs]
+    arms = [arms_of(result, name, np.array(outputs, int)) for name in bodies_of(result)]
+    curves = [[_plain(x) for x in (*(arm[k] for arm in arms), *rings(one, i))] for k, i in enumerate(outputs)]
     return [
-        {"t": float(t), "lines": [line[k] for line in lines], "marks": marks[k], "arms": _arms(result, i) + moved[k]}
-        for k, (i, t) in enumerate(zip(outputs, times, strict=True))
+        {"t": float(t), "lines": [line[k] for line in lines], "marks": marks[k], "arms": curves[k]}
+        for k, t in enumerate(result.times[outputs])
     ]
 
 
@@ -252,11 +252,6 @@ def _marks(result: Result, outputs: list[int]) -> list[list[dict[str, Any]]]:
         mark("start (s = 0)", "square", INK, position[:, :1])
         mark("end", "diamond", INK, position[:, -1:])
     return out
-
-
-def _arms(result: Result, output: int) -> list[Any]:
-    """From each body to its fairleads, as curves with gaps."""
-    return [_plain(arms_of(result, name, np.array([output]))[0]) for name in bodies_of(result)]
 
 
 def _plain(values: Any) -> Any:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import time as clock
-from collections.abc import Coroutine
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -258,7 +257,7 @@ class Session:
                 continue
             answer = answer or _ENDED
             self._answer, self._answered = answer, revision
-            if _has_frame(answer):
+            if b'"frame": {' in answer:  # within a text the quotes of a key would be escaped
                 self._picture = answer
             self.send_all(_picture(revision, answer))
             self._send_state()
@@ -269,10 +268,7 @@ class Session:
             answer = await self.workers.ask_spare({"do": "report", "file": str(self.playback.path.resolve())})
         else:
             answer = await self.workers.ask({"do": "report", "file": None})
-        made = json.loads(answer) if answer is not None else {}
-        if "problems" in made:
-            return {"refused": made["problems"][0]["text"]}
-        return dict(made) or {"refused": "the process that makes reports has ended: try again"}
+        return _page(answer)
 
     async def modes(self) -> dict[str, Any]:
         """The page of natural modes of the scene as it stands: `html`, or `refused`."""
@@ -280,10 +276,7 @@ class Session:
             return {"refused": "modes are of a scene: open it in place of its result"}
         asked = {"do": "modes", "text": self.document.text, "file": self.document.name}
         answer = await self.workers.ask_spare(asked)
-        made = json.loads(answer) if answer is not None else {}
-        if "problems" in made:
-            return {"refused": made["problems"][0]["text"]}
-        return dict(made) or {"refused": "the process that computes modes has ended: try again"}
+        return _page(answer)
 
     # ---- the motion ---------------------------------------------------------------------------
 
@@ -302,7 +295,8 @@ class Session:
             self.playback.close()
         self.playback = None
         self.run = WatchedRun(document.path, target, self._send_state)
-        self._spawn(self._run_to_end(self.run))
+        work = asyncio.create_task(self._run_to_end(self.run))
+        self._tasks = [task for task in self._tasks if not task.done()] + [work]
 
     async def _run_to_end(self, run: WatchedRun) -> None:
         before = run.target.stat().st_mtime_ns if run.target.exists() else 0
@@ -386,9 +380,6 @@ class Session:
             self._sent_state = state
             self.send_all(state)
 
-    def _spawn(self, work: Coroutine[Any, Any, None]) -> None:
-        self._tasks = [task for task in self._tasks if not task.done()] + [asyncio.create_task(work)]
-
 
 _ENDED = json.dumps(
     {
@@ -402,13 +393,16 @@ def _message(kind: str, /, **content: Any) -> str:
     return json.dumps({"is": kind} | content)
 
 
+def _page(answer: bytes | None) -> dict[str, Any]:
+    """A page of an answer, or why there is none."""
+    made = json.loads(answer) if answer is not None else {}
+    if "problems" in made:
+        return {"refused": made["problems"][0]["text"]}
+    return dict(made) or {"refused": "the process that makes pages has ended: try again"}
+
+
 def _picture(revision: int, answer: bytes) -> str:
     return f'{{"is": "picture", "revision": {revision}, "picture": {answer.decode()}}}'
-
-
-def _has_frame(answer: bytes) -> bool:
-    """Whether an answer has a frame: within a text the quotes of a key would be escaped."""
-    return b'"frame": {' in answer
 
 
 def session_of(path: Path | None, workers: Workers | None = None) -> Session:
@@ -453,7 +447,8 @@ class Playback:
         self.running = False
         self.problem = ""
         self._result: Result | None = None
-        self._cost, self._last, self._stamp = 0.0, -1e9, (0, 0)
+        self._cost, self._last = 0.0, -1e9
+        self._stamp: Stamp | None = None
 
     @property
     def due(self) -> bool:
@@ -467,7 +462,9 @@ class Playback:
         """
         begin = clock.monotonic()
         try:
-            stamp = self._stamped()
+            stamp = stamp_of(self.path)
+            if stamp is None:
+                raise FileNotFoundError(f"there is no file {self.path}")
             running = is_held(self.path)
             if self.head and stamp == self._stamp and running == self.running:
                 return len(self.frames), False
@@ -488,10 +485,6 @@ class Playback:
         if self._result is not None:
             self._result.close()
             self._result = None
-
-    def _stamped(self) -> tuple[int, int]:
-        found = self.path.stat()
-        return found.st_mtime_ns, found.st_size
 
     def _read(self) -> int:
         with open_result(self.path) as result:

@@ -100,14 +100,13 @@ def stretches_of(result: StoredResult) -> list[Stretch]:
     return [Stretch(a, b, rows[(rows[:, 0] == a) & (rows[:, 1] == b), 2:]) for a, b in places]
 
 
-def _inside(x: Stretch, s: Floats) -> np.ndarray:
-    """Which places (n,) m lie in a section; of a place that comes twice the first belongs to the left one."""
+def inside_of(a: float, b: float, s: Floats) -> np.ndarray:
+    """Which places (n,) m lie in a section from a to b (m); of a place that comes twice the first is the left one's."""
     near = NEAR * max(float(s[-1] - s[0]), 1.0)
     twice = np.diff(s) == 0.0
     first, second = np.append(twice, False), np.insert(twice, 0, False)
-    return (s >= x.a - near) & (s <= x.b + near) & ~(first & (np.abs(s - x.a) <= near)) & ~(
-        second & (np.abs(s - x.b) <= near)
-    )  # fmt: skip
+    late, early = first & (np.abs(s - a) <= near), second & (np.abs(s - b) <= near)
+    return (s >= a - near) & (s <= b + near) & ~late & ~early
 
 
 def bound_of_steps(result: StoredResult, errors: tuple[float, float] = (0.0, 0.0)) -> float | None:
@@ -135,7 +134,8 @@ def bound_with_errors(result: StoredResult) -> float | None:
 
 
 def _largest(result: StoredResult, part: Callable[[Stretch, np.ndarray], Floats], s: Floats) -> float | None:
-    values = [v for x in stretches_of(result) if (v := part(x, _inside(x, s))).size and np.isfinite(v).any()]
+    parts = (part(x, inside_of(x.a, x.b, s)) for x in stretches_of(result))
+    values = [v for v in parts if v.size and np.isfinite(v).any()]
     return max((float(np.nanmax(v)) for v in values), default=None)
 
 
@@ -375,15 +375,6 @@ def clauses_of(result: StoredResult) -> str:
     return "; ".join(text for kind, text in zip((E301, F201), CLAUSES.values(), strict=True) if kind in kinds)
 
 
-def inside_of(row: Row, s: Floats) -> np.ndarray:
-    """Which places (n,) m lie in a section; of a place that comes twice the first belongs to the left one."""
-    near = 1e-9 * max(float(s[-1] - s[0]), 1.0)
-    twice = np.diff(s) == 0.0
-    first, second = np.append(twice, False), np.insert(twice, 0, False)
-    late, early = first & (np.abs(s - row.first) <= near), second & (np.abs(s - row.last) <= near)
-    return (s >= row.first - near) & (s <= row.last + near) & ~late & ~early
-
-
 def mooring_of_steps(result: StoredResult) -> tuple[float, float, float] | None:
     """The largest part that E301 lets a line use at any step and node, its time (s) and arc length (m).
 
@@ -394,7 +385,7 @@ def mooring_of_steps(result: StoredResult) -> tuple[float, float, float] | None:
         return None
     s, (T, t), most = np.asarray(result[SCALE]), (np.asarray(result[name]) for name in names), None
     for row in rows_of(result):
-        at = np.flatnonzero(inside_of(row, s) & np.isfinite(T))
+        at = np.flatnonzero(inside_of(row.first, row.last, s) & np.isfinite(T))
         if row.kind == E301 and at.size:
             used = use(row, T[at], np.zeros(at.size), np.zeros(at.size))
             k = int(used.argmax())
@@ -462,5 +453,5 @@ def _moments(result: StoredResult, name: str, read: Callable[[str], Floats]) -> 
 
 
 def _largest_by_code(result: StoredResult, s: Floats, part: Callable[[Row, np.ndarray], Floats]) -> float | None:
-    values = [v for x in rows_of(result) if (v := part(x, inside_of(x, s))).size]
+    values = [v for x in rows_of(result) if (v := part(x, inside_of(x.first, x.last, s))).size]
     return None if not values or any(np.isnan(v).any() for v in values) else max(float(v.max()) for v in values)

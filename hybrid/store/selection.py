@@ -11,7 +11,6 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,7 @@ import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, ResultError, optional_package
 from hybrid.store.envelope import stored_window
+from hybrid.store.format import versions
 from hybrid.store.records import ALIASES, right_of
 from hybrid.store.stored_result import StoredResult
 
@@ -172,7 +172,7 @@ def facts(part: Part) -> dict[str, Any]:
     own = {k: v for k, v in result.attributes.items() if k not in ("format", "format_version")}
     made = {"format": MARK, "exported_from": result.file.name if result.file else "a result in memory"}
     said = {"noted": ", ".join(noted_events(part)), "left_out": "; ".join(missing_parts(part))}
-    return made | own | {"exported_by": f"hybrid-cable {_version()}"} | said
+    return made | own | {"exported_by": f"hybrid-cable {versions()['hybrid-cable']}"} | said
 
 
 def noted_events(part: Part) -> list[str]:
@@ -216,13 +216,6 @@ def error_name(part: Part, name: str) -> tuple[str, str]:
         if f"errors/{kind}/{name}" in part.result:
             return f"errors/{kind}/{name}", said
     return "", ""
-
-
-def _version() -> str:
-    try:
-        return version("hybrid-cable")
-    except PackageNotFoundError:  # run from a checkout that was not installed
-        return "unknown"
 
 
 # ---- a Dataset of xarray, and that as netCDF ------------------------------------------------------

@@ -373,16 +373,10 @@ def _held(result: StoredResult, x: Held) -> Held:
         if (doubt := _too_sharp(result, _names_of_held(result, x), x.t)) is None:
             return x._replace(verdict=BROKEN)
         return x._replace(verdict=NOT_VERIFIED, broken=False, why=doubt.why, remedy=doubt.remedy)
-    doubt = unfinished(result) or _no_value(x) or _doubt_of_held(result, x)
+    doubt = unfinished(result) or _doubt_of_held(result, x)
     if doubt is None:
         return x._replace(verdict=WITHIN)
     return x._replace(verdict=NOT_VERIFIED, why=doubt.why, remedy=doubt.remedy)
-
-
-def _no_value(x: Held) -> Doubt | None:
-    if np.isnan(x.value):
-        return Doubt("it had no value at any time", "check that it can have one, such as a touchdown point")
-    return None
 
 
 def _names_of_held(result: StoredResult, x: Held) -> frozenset[str]:
@@ -395,6 +389,8 @@ def _names_of_held(result: StoredResult, x: Held) -> frozenset[str]:
 
 def _doubt_of_held(result: StoredResult, x: Held) -> Doubt | None:
     """Of a force at an end, an angle of it, or a clearance the error follows from those that are estimated."""
+    if np.isnan(x.value):
+        return Doubt("it had no value at any time", "check that it can have one, such as a touchdown point")
     clearance = f"{x.name}_at" in result
     if (doubt := next(_doubts(result, _names_of_held(result, x), np.zeros(0)), None)) is not None:
         return doubt

@@ -109,8 +109,10 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int, width
         return film(page, shown, frames, dpi)
     result = alone
     views = dict(zip(("shape", "second"), views_of(result), strict=False))
-    names, profile = list(views), _tension_range(result)
-    panels = {name: _still(result, view) for name, view in views.items()} | {"tension": profile}
+    names, profile = list(views), profiles(result, "tension", title="tension, and its range over all times")
+    band = next(item for item in profile.items if isinstance(item, Band))
+    panels = {name: _still(result, view) for name, view in views.items()}
+    panels["tension"] = profile._replace(items=[band._replace(opacity=0.18)])
     tall = aspect_of(list(views.values()), result) < 1.0
     mosaic: list[Any] = [[*names, "tension"]] if tall else [names, ["tension"] * len(names)]
     heights = None if tall else [2.2, 1.0]
@@ -145,12 +147,6 @@ def _still(result: Result, view: View) -> Panel:
     legend = [Line(none, none, kind, colour_of(kind), 2.0) for kind in kinds]
     first = Line(*view.project(result.position[0]), "first shape", "#B5B5B5", 0.8)
     return framed(result, view, [*sea(result, view), *legend, first])
-
-
-def _tension_range(result: Result) -> Panel:
-    panel = profiles(result, "tension", title="tension, and its range over all times")
-    band = next(item for item in panel.items if isinstance(item, Band))
-    return panel._replace(items=[band._replace(opacity=0.18)])
 
 
 # ---- files ----------------------------------------------------------------------------------------

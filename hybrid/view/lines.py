@@ -117,17 +117,14 @@ def clearest_view(every: AllLines) -> View:
         return min(parts) >= SEEN, total
 
     usual = [views_of(every.as_result)[0], view_named("xz"), view_named("yz")]
-    angles = np.radians([30.0, 45.0, 60.0, 120.0, 135.0, 150.0])
-    turned = [_upright(float(angle)) for angle in angles]
+    turned = [
+        View(np.array([np.cos(angle), np.sin(angle), 0.0]), np.eye(3)[2], f"horizontal, {degrees}° from x", "z")
+        for degrees in (30, 45, 60, 120, 135, 150)
+        for angle in [np.radians(degrees)]
+    ]
     return max(
         [view for view in usual if seen(view)[0]] or [view for view in turned if seen(view)[0]] or usual, key=seen
     )
-
-
-def _upright(angle: float) -> View:
-    """The upright plane along a direction, rad from x."""
-    across = np.array([np.cos(angle), np.sin(angle), 0.0])
-    return View(across, np.eye(3)[2], f"horizontal, {short(np.degrees(angle), 3)}° from x", "z")
 
 
 def bodies_of(result: Result) -> list[str]:

@@ -69,7 +69,9 @@ def plot_space(result: Result, colour: str | None = None) -> Figure:
         {"name": str(k), "data": _moment(scene, way, k), "traces": list(range(first, first + 1 + len(scene["marks"])))}
         for k in range(moving)
     ]
-    entries = [_entry(name, shade) for name, shade in (way or {}).get("legend", [])]
+    nowhere = {"type": "scatter3d", "mode": "lines", "x": [None], "y": [None], "z": [None], "hoverinfo": "skip"}
+    legend = (way or {}).get("legend", [])
+    entries = [nowhere | {"name": name, "line": {"color": shade, "width": 6}} for name, shade in legend]
     data = [*still, *frames[0]["data"], *entries]
     layout = _layout(result, scene) | (_controls(scene) if moving > 1 else {})
     return Figure({"data": data, "layout": layout, "frames": frames if moving > 1 else []})
@@ -117,12 +119,6 @@ def _moment(scene: dict[str, Any], way: dict[str, Any] | None, k: int) -> list[d
     return [curve, *marks]
 
 
-def _entry(name: str, shade: str) -> dict[str, Any]:
-    """A row of the legend, without a point."""
-    look = {"type": "scatter3d", "mode": "lines", "name": name, "line": {"color": shade, "width": 6}}
-    return look | {"x": [None], "y": [None], "z": [None], "hoverinfo": "skip"}
-
-
 def _plane(plane: dict[str, Any]) -> dict[str, Any]:
     corners = {key: plane[key] for key in "ijk"} if "i" in plane else {"i": [0, 0], "j": [1, 2], "k": [2, 3]}
     look = {"type": "mesh3d", "color": plane["fill"], "opacity": plane["solid"], "hoverinfo": "skip"}
@@ -131,7 +127,7 @@ def _plane(plane: dict[str, Any]) -> dict[str, Any]:
 
 
 def _layout(result: Result, scene: dict[str, Any]) -> dict[str, Any]:
-    box = scene["box"]
+    box, title = scene["box"], escape(result.title or "(no title)", quote=False)  # plotly finds no tag in it
     wide, deep = (high - low for low, high in box[:2])
     largest = max(high - low for low, high in box)
     eye = {"x": 0.5, "y": -1.9, "z": 0.5} if wide >= deep else {"x": 1.9, "y": 0.5, "z": 0.5}
@@ -144,7 +140,7 @@ def _layout(result: Result, scene: dict[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
     return {
         "height": HEIGHT, "margin": {"l": 0, "r": 0, "t": 36, "b": 0}, "paper_bgcolor": "#FFFFFF",
-        "title": {"text": _plain(result.title or "(no title)"), "font": {"size": 15}, "x": 0.01, "xanchor": "left"},
+        "title": {"text": title, "font": {"size": 15}, "x": 0.01, "xanchor": "left"},
         "font": {"color": scene["ink"]}, "legend": {"x": 0.99, "xanchor": "right", "y": 0.99, "yanchor": "top"},
         "scene": {"aspectmode": "data", "camera": {"eye": eye}} | axes,
     }  # fmt: skip
@@ -174,11 +170,6 @@ def _controls(scene: dict[str, Any]) -> dict[str, Any]:
         "y": 0.0, "yanchor": "top", "pad": {"t": 28, "r": 8},
     }  # fmt: skip
     return {"sliders": [slider], "updatemenus": [menu]}
-
-
-def _plain(text: str) -> str:
-    """A text in which plotly finds no tag."""
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
 MIME = "application/vnd.plotly.v1+json"

@@ -310,7 +310,10 @@ def outlines(result: Result, view: View, output: int, moving: bool | None = None
             rings = surface_rings(body, at - 3.0 * size, at + 3.0 * size)
             x, y = view.project(rings.reshape(-1, 3))
             if body.kind == TORUS:  # what is seen through its hole stays
-                items.append(Area(_quads(np.stack([x, y], axis=-1).reshape(len(rings), AROUND, 2)), STONE, "obstacle"))
+                flat = np.stack([x, y], axis=-1).reshape(len(rings), AROUND, 2)
+                after = np.roll(flat, -1, axis=1)
+                faces = np.stack([flat[:-1], after[:-1], after[1:], flat[1:]], axis=2)
+                items.append(Area(faces.reshape(-1, 4, 2), STONE, "obstacle"))
                 continue
             corners = hull(np.column_stack([x, y]))
         if corners is not None:
@@ -319,12 +322,6 @@ def outlines(result: Result, view: View, output: int, moving: bool | None = None
             closed = np.vstack([edge, edge[:1]]) if body.kind != PLANE else edge
             items.append(Line(closed[:, 0], closed[:, 1], colour=STONE_EDGE, width=0.8))
     return items
-
-
-def _quads(rings: np.ndarray) -> np.ndarray:
-    """Corners (m, 4, 2) of the faces between neighbouring points of rings (n, AROUND, 2)."""
-    after = np.roll(rings, -1, axis=1)
-    return np.stack([rings[:-1], after[:-1], after[1:], rings[1:]], axis=2).reshape(-1, 4, 2)
 
 
 def _half_plane(body: Body, view: View, box: np.ndarray, size: float) -> np.ndarray | None:

@@ -110,22 +110,20 @@ def facts_of_all(result: Result, every: AllLines) -> list[Fact]:
 
 
 def facts_and_tables(result: Result, every: AllLines, facts: list[Fact]) -> str:
-    """Rows of the summary, and tables of lines with names, points and bodies."""
+    """Rows of the summary, and tables of lines with names, points and bodies.
+
+    Errors of lines that are not among the worst fold away.
+    """
     tables = _lines(every) * (every.alone is None)
     if len(result.times):
         tables += _points(result) + _bodies(result)
-    return _facts(facts, every) + tables
-
-
-def _facts(facts: list[Fact], every: AllLines) -> str:
-    """Rows of the summary; errors of lines that are not among the worst fold away."""
     if every.alone is None:
         facts = [fact for fact in facts if fact.weight != "alarm"]
     several, left = every.outputs > 1, {f"errors-{x}" for x in every.worst if x not in every.named}
     others = parts.facts_html([x for x in facts if x.key in left], several)
     folded = f"<details><summary>Estimated errors of {len(left)} other lines</summary>{others}</details>"
     shown = parts.facts_html([x for x in facts if x.key not in left], several)
-    return shown + folded * any(x.key in left for x in facts)
+    return shown + folded * any(x.key in left for x in facts) + tables
 
 
 # ---- tables ---------------------------------------------------------------------------------------
@@ -234,69 +232,44 @@ def write_report(result: Result, path: str | Path, *, overwrite: bool = False, m
 
 def html(result: Result, modes: Any = None) -> str:
     """The page as text."""
-    store = Store()
-    made = _Report(result, store)
-    figures = [figure_of(panel, store) for group in made.panels.values() for panel in group]
+    store, every = Store(), AllLines(result)
+    facts, several = facts_of_all(result, every), every.outputs > 1
+    shown = _shown(every, [fact.t for fact in facts])
+    scene, panels = scenery(result, every, shown, store) or None, _panels(result, every, shown)
+    figures = [figure_of(panel, store) for group in panels.values() for panel in group]
     numbers = iter(range(len(figures)))
-    numbered = {name: [(next(numbers), panel) for panel in group] for name, group in made.panels.items()}
-    own = made.sections(numbered)
+    numbered = {name: [(next(numbers), panel) for panel in group] for name, group in panels.items()}
     parts = {  # in the order of the contents
         "title": escape(result.title or "(no title)"),
-        "subtitle": escape("; ".join([*made.subtitle, _computed(result)])),
-        "verdict": verdict_html(made.facts, made.several),
-        "facts": own["facts"],
-        "cable": own["cable"],
-        "figures": own["figures"] + (section(modes) if modes is not None else ""),
-        "statistics": own["statistics"],
-        "events": events_html(result, made.several),
-        "energy": own["energy"],
+        "subtitle": escape("; ".join(_subtitle(result, every))),
+        "verdict": verdict_html(facts, several),
+        "facts": facts_and_tables(result, every, facts),
+        "cable": _space(result, every, scene, shown) if scene else "",
+        "figures": _graphs(every, numbered) + (section(modes) if modes is not None else ""),
+        "statistics": statistics_of_all(result, every),
+        "events": events_html(result, several),
+        "energy": _energy(every.alone, numbered["energy"]) if every.alone is not None else "",
         "settings": settings_html(result),
         "scene": escape(result.scene_text),
         "scene_title": "Scene as it was run (YAML)",
         "footer": escape(footer()),
         "mark": REPORT_MARK,
-        "index": script_json({"scene": made.scene, "figures": figures}),
+        "index": script_json({"scene": scene, "figures": figures}),
     }
     return filled_page(parts, store)
 
 
-def _computed(result: Result) -> str:
-    """When and with what a result was computed."""
-    made = str(result.attributes.get("created", ""))[:16].replace("T", " ")
-    return f"computed {made} UTC with hybrid-cable {result.versions.get('hybrid-cable', '?')}"
-
-
-class _Report:
-    """What a page shows of the lines of a result: of one all there is, of many the worst."""
-
-    def __init__(self, result: Result, store: Store) -> None:
-        self._result, self._every = result, AllLines(result)
-        self.facts, self.several = facts_of_all(result, self._every), self._every.outputs > 1
-        self._shown = _shown(self._every, [fact.t for fact in self.facts])
-        self.scene = scenery(result, self._every, self._shown, store) or None
-        self.panels = _panels(result, self._every, self._shown)
-
-    @property
-    def subtitle(self) -> list[str]:
-        """Outputs, and length of a line alone or number of lines."""
-        every, result, n = self._every, self._result, self._every.outputs
-        outputs = "no output" if n == 0 else "static, one output" if n == 1 and result.status == "complete" else ""
-        outputs = outputs or f"{n} output{'s' * (n != 1)} to t = {short(every.times[-1], 6)} s"
-        if every.alone is None:
-            return [outputs, *facts_line(result, every)]
+def _subtitle(result: Result, every: AllLines) -> list[str]:
+    """Outputs, length of a line alone or number of lines, and when and with what it was computed."""
+    n = every.outputs
+    outputs = "no output" if n == 0 else "static, one output" if n == 1 and result.status == "complete" else ""
+    outputs = outputs or f"{n} output{'s' * (n != 1)} to t = {short(every.times[-1], 6)} s"
+    extent = facts_line(result, every)
+    if every.alone is not None:
         points = len(every.alone.s)
-        return [outputs, f"{short(length_of(every.alone), 6)} m of cable, {points} point{'s' * (points != 1)}"]
-
-    def sections(self, numbered: dict[str, list[tuple[int, Panel]]]) -> dict[str, str]:
-        """Sections by their names in the template; numbered: the graphs."""
-        result, every = self._result, self._every
-        return {
-            "facts": facts_and_tables(result, every, self.facts),
-            "cable": _space(result, every, self.scene, self._shown) if self.scene else "",
-            "figures": _graphs(every, numbered),
-            "statistics": statistics_of_all(result, every),
-            "energy": _energy(every.alone, numbered["energy"]) if every.alone is not None else "",
-        }
+        extent = [f"{short(length_of(every.alone), 6)} m of cable, {points} point{'s' * (points != 1)}"]
+    made = str(result.attributes.get("created", ""))[:16].replace("T", " ")
+    return [outputs, *extent, f"computed {made} UTC with hybrid-cable {result.versions.get('hybrid-cable', '?')}"]
 
 
 def _shown(every: AllLines, moments: list[float | None]) -> dict[str, Kept]:

@@ -522,13 +522,9 @@ def _errors(result: Result) -> Fact:
         position, force = (found[f"extremes_total_{x}"] for x in ("position", "end_force"))
         text += f" at an instant; extremes {amount(position, 'm', 2)} and {amount(force, 'N', 2)}"
     text += f"; asked was {asked}" if asked else "."
-    return Fact("errors", title, text + _verdicts(result), "plain", found | not_known | {"asked": asked})
-
-
-def _verdicts(result: Result) -> str:
-    """Whether what was asked is met, of a line of several by quantity; empty if nothing was."""
     each = asked_accuracy(result)
-    return f": {accuracy_text(each)}." if each else ""
+    text += f": {accuracy_text(each)}." if each else ""
+    return Fact("errors", title, text, "plain", found | not_known | {"asked": asked})
 
 
 def _status(result: Result) -> Fact:
